@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The time of a batch beyond Blender's own opening and saving, and the gain by a second Blender.
+"""Measures the time of a batch beyond Blender's own opening and saving, and the gain from a second Blender.
 
     .venv/bin/python bench/batch.py [--files 48] [--repetitions 5] [--json FILE]
 
-From the first file that is done to the last, so that no start counts; the processor's time (user and system)
-is that of whole runs, starts included. Candidates alternate, and the least of each is taken: on a shared
-machine, others make a run only longer.
+Times run from the first finished file to the last, so that start-up does not count. The processor's time
+(user and system) is that of whole runs, including start-up. Candidates alternate, and the minimum of each is
+used: other programs on a shared machine only make a run longer.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ print("vertices", len(obj.data.vertices))
 
 
 def processor_time() -> float:
-    """Seconds of all processes that were started and have ended."""
+    """Seconds of processor time of all child processes that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -82,12 +82,12 @@ def run(command: list[str]) -> str:
 
 
 def number(output: str, name: str) -> float:
-    """The one on the line that begins with `name`, among what Blender prints."""
+    """The number on the line that begins with `name` in Blender's output."""
     return float(next(line.split()[1] for line in output.splitlines() if line.startswith(name + " ")))
 
 
 def plain(folder: Path) -> dict[str, float]:
-    """Seconds a file for opening and saving in one Blender; of the processor, with Blender's start."""
+    """Seconds per file for opening and saving in one Blender; processor time including Blender's start."""
     paths = [str(path) for path in sorted(folder.glob("*.blend"))]
     before = processor_time()
     command = [sys.executable, "-c", OPEN_AND_SAVE, str(folder / "plain.out"), *paths]
@@ -96,7 +96,7 @@ def plain(folder: Path) -> dict[str, float]:
 
 
 def batch(folder: Path, *options: str) -> dict[str, float]:
-    """Seconds a file in a batch, from the first that is done to the last; and in each step of it."""
+    """Seconds per file in a batch, from the first finished file to the last, and for each step of it."""
     with tempfile.TemporaryDirectory(dir=folder.parent) as out:
         command = [*SINEW, "reskin", str(folder), "--method", "dq", "--out", out, *options]
         before = processor_time()
@@ -112,7 +112,7 @@ def batch(folder: Path, *options: str) -> dict[str, float]:
 
 
 def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str, float]:
-    """Milliseconds a file, and ratios."""
+    """Milliseconds per file, and ratios."""
     folder = work / "files"
     folder.mkdir()
     for index in range(files):
@@ -142,7 +142,7 @@ def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str,
         return min(run[step] for run in runs[name])
 
     beside = [run["file"] - run["opening"] - run["deforming"] - run["saving"] for run in runs["bare"]]
-    # Of neighbours in time, as what else the machine does slows down both.
+    # Ratios of runs adjacent in time, because other programs slow down both.
     parts = [extra / own["file"] for extra, own in zip(beside, runs["plain"], strict=True)]
     result = {
         "Blender opens and saves": 1000 * least("plain", "file"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shared by all measurements: the machine's description, alternating candidates, JSON and tables."""
+"""Shared by all benchmarks: the machine's description, alternating candidates, JSON and tables."""
 
 from __future__ import annotations
 
@@ -37,14 +37,15 @@ def version_of(distribution: str) -> str | None:
 
 
 def spread(times: list[float]) -> dict:
-    """The least and the median; the load of other programs changes the median, and hardly the least."""
+    """The minimum and the median. The load of other programs changes the median, but hardly the minimum."""
     return {"least": min(times), "median": statistics.median(times), "runs": len(times)}
 
 
 def alternate(candidates: dict, seconds: float, clock: Callable[[], float] = time.perf_counter) -> dict:
-    """Calls the functions of {name: function} alternately, for `seconds` each: {name: spread() of seconds a
-    call}. Each runs for some calls at a time: the first of these has to fill the caches again. What a
-    function has as `prepare` is called before it, out of the time, which is `clock`'s."""
+    """Calls the functions of {name: function} alternately, for `seconds` each. Returns {name: spread() of
+    seconds per call}. Each function is called several times in a row, of which the first call fills the
+    caches. If a function has an attribute `prepare`, that is called before it, outside of the time, which
+    `clock` measures."""
     times = {name: [] for name in candidates}
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each kernel once, for callgrind to count its instructions: one dump a case, named after it.
+// Runs each kernel once, for callgrind to count its instructions: one dump for each case, with its name.
 #define GLM_ENABLE_EXPERIMENTAL
 #include <valgrind/callgrind.h>
 
@@ -17,7 +17,7 @@ using namespace sinew::bench;
 
 template <class Call>
 void count(const std::string& name, const Call& call) {
-    // The first makes room and starts what is kept.
+    // The first call allocates memory and starts threads.
     call();
     CALLGRIND_ZERO_STATS;
     CALLGRIND_TOGGLE_COLLECT;

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Instructions that each kernel takes, counted by callgrind, against those in bench/counts.json.
+"""Compares the instructions of each kernel, counted by callgrind, with those in bench/counts.json.
 
-They do not depend on the machine or on what else runs on it, only on the compiler: AVX2 kernels, as callgrind
-knows no AVX-512. Exits with 1 where one takes 5 % more.
+They do not depend on the machine or on its load, only on the compiler. The kernels are those for AVX2, as
+callgrind does not support AVX-512. Exits with 1 if a kernel takes 5 % more.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ ALLOWED = 0.05
 
 
 def compiler_of(program: Path) -> str:
-    """Name and version of the compiler as CMake found it for this build."""
+    """Name and version of the compiler that CMake found for this build."""
     cache = (program.parents[1] / "CMakeCache.txt").read_text()
     compiler = re.search(r"^CMAKE_CXX_COMPILER:\w+=(.*)$", cache, re.MULTILINE).group(1)
     first = subprocess.run([compiler, "--version"], check=True, capture_output=True, text=True).stdout
-    # The first word is what the program is called here, c++ or g++.
+    # The first word is the program's name on this machine, c++ or g++.
     return first.splitlines()[0].split(maxsplit=1)[1]
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stage delta_mush beside Blender's Corrective Smooth, on a sheet of 317 x 317 vertices that an Armature
-modifier bends: python bench/delta_mush.py [--name NAME]
+"""Compares the stage delta_mush with Blender's Corrective Smooth, on a sheet of 317 x 317 vertices bent by
+an Armature modifier: python bench/delta_mush.py [--name NAME]
 
-Once with its vertices row by row, which is the best for Blender, and once in random order.
+Once with the vertices row by row, which is best for Blender, and once in random order.
 
-Nanoseconds a vertex, least of alternating runs. Of Blender, and of Sinew in Blender, it is what a change of
-frame takes more than without the smoothing; of the library it is one call, on one thread. In Blender Sinew
-takes as many threads as help.
+Nanoseconds per vertex, minimum of alternating runs. For Blender, and for Sinew in Blender, this is the
+additional time of a change of frame compared with no smoothing; for the library it is one call on one
+thread. In Blender, Sinew uses as many threads as useful.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def make_sheet(order: str) -> bpy.types.Object:
 
 
 def least_frame() -> float:
-    """Seconds."""
+    """The minimum time of a frame, seconds."""
     times = []
     for frame in FRAMES:
         started = time.perf_counter()
@@ -81,7 +81,7 @@ def least_frame() -> float:
 
 
 def least_of_rounds(candidates: dict[str, Callable[[], None]]) -> dict[str, float]:
-    """The least frame after each of {name: what sets the object up for it}, seconds."""
+    """The minimum time of a frame for each of {name: function that sets the object up for it}, seconds."""
     least = dict.fromkeys(candidates, math.inf)
     for _round in range(ROUNDS):
         for name, set_up in candidates.items():
@@ -123,7 +123,7 @@ def of_sinew(obj: bpy.types.Object) -> dict[str, float]:
 
 
 def of_library(obj: bpy.types.Object) -> dict[str, float]:
-    """On one thread."""
+    """Times of the library's own calls, on one thread."""
     bpy.context.scene.frame_set(11)
     rest, topology = mesh_io.read_points(obj.data), mesh_io.read_topology(obj.data)
     points = session.state_of(obj).points.copy()
@@ -148,7 +148,7 @@ def of_library(obj: bpy.types.Object) -> dict[str, float]:
 
 
 def measure(order: str) -> dict[str, dict[str, float]]:
-    """Nanoseconds a vertex of each part and case."""
+    """Nanoseconds per vertex for each part and case."""
     obj = make_sheet(order)
     parts = {"Corrective Smooth": of_blender(obj), "Sinew in Blender": of_sinew(obj)}
     parts["library, one thread"] = of_library(obj)

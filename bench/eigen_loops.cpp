@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The plain loops once more as one writes them with Eigen, on the same data.
+// The plain loops written with Eigen, on the same data.
 #define GLM_ENABLE_EXPERIMENTAL
 #include <Eigen/Geometry>
 #include <glm/gtc/type_ptr.hpp>

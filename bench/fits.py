@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigid fits beside scipy and beside solving in two steps: times, errors of noisy data, docs/fits.svg."""
+"""Compares rigid fits with scipy and with solving in two steps: times, errors for noisy data,
+docs/fits.svg."""
 
 from __future__ import annotations
 
@@ -37,14 +38,15 @@ def dual(transform: RigidTransform) -> np.ndarray:
 
 
 def scipy_fit(source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """What align_vectors() leaves to its caller: the middles."""
+    """Includes the middles, which align_vectors() leaves to its caller."""
     middles = source.mean(axis=0), target.mean(axis=0)
     rotation = Rotation.align_vectors(target - middles[1], source - middles[0])[0]
     return np.append(rotation.as_quat(), middles[1] - rotation.apply(middles[0]))
 
 
 def times(seconds: float) -> dict:
-    """{"points/solver": spread() of seconds a fit}, and of SETS sets of 10 points in one call."""
+    """{"points/solver": spread() of seconds per fit}, and the same for SETS sets of 10 points in one
+    call."""
     rng = np.random.default_rng(0)
     found = {}
     for size in SIZES:
@@ -69,7 +71,7 @@ def times(seconds: float) -> dict:
     return found
 
 
-# --- Hand-eye: by dual quaternions, or by matrices
+# --- Hand-eye: with dual quaternions, or with matrices
 
 
 def two_steps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -84,14 +86,14 @@ def two_steps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def hand_eye(trials: int) -> dict:
-    """{noise: {solver: [median angle, median distance]}} of what eight motions give."""
+    """{noise: {solver: [median angle, median distance]}} of the errors for eight motions."""
     rng = np.random.default_rng(1)
     found = {}
     for noise in NOISES:
         off: dict[str, list] = {"dual quaternions": [], "two steps": []}
         for _ in range(trials):
             x = motions(rng, 1)[0]
-            # Below half a turn, where the sign of a logarithm would be the noise's.
+            # Below 180 degrees, where noise would decide the sign of a logarithm.
             hand = RigidTransform.from_exp_coords(
                 np.hstack([rng.uniform(-1.5, 1.5, (8, 3)), rng.uniform(-2, 2, (8, 3))])
             )
@@ -111,7 +113,8 @@ def hand_eye(trials: int) -> dict:
 
 
 def outliers(trials: int) -> dict:
-    """{share: {kind: [median angle, median distance]}} from the middle of 100 poses, spread by 0.02."""
+    """{share: {kind: [median angle, median distance]}} from the middle of 100 poses, with a spread of
+    0.02."""
     rng = np.random.default_rng(2)
     found = {}
     for share in OUTLIERS:
@@ -130,7 +133,7 @@ def outliers(trials: int) -> dict:
     return found
 
 
-# --- What is shown
+# --- Output
 
 
 def draw(spreads: dict, eyes: dict, averages: dict) -> None:

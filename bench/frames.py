@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times of a frame in Blender with the Armature modifier and with Sinew, on the same scene in the same run.
+"""Measures frames in Blender with the Armature modifier and with Sinew, on the same scene in the same run.
 
-One process and one file, in which Sinew is switched off and on alternately, a few frames each. Two processes
-differ by some percent even without Sinew. A frame is Scene.frame_set() and then reading the evaluated mesh,
-which has Sinew's points. One that is drawn is then asked for the normals of all its corners, too, which
-Blender computes where nobody gives them.
+One process and one file, in which Sinew is switched off and on alternately for a few frames each, since two
+processes differ by some percent even without Sinew. A frame is Scene.frame_set() and then reading the
+evaluated mesh, which has Sinew's points. For a drawn frame the normals of all corners are read, too, which
+Blender computes if nobody provides them.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ import numpy as np
 import sinew
 
 FRAMES = 60
-# Frames in a row, as on playback, before Sinew is switched; and frames before these that are not timed, for
-# binding and caches.
+# The number of frames in a row, as in playback, before Sinew is switched; and the number of frames before
+# these that are not timed, for binding and caches.
 RUN, BEFORE = 24, 4
 
 
 @dataclass(frozen=True)
 class Case:
-    """rig: a file in SINEW_RIGS instead of a tube; normals: also read; subdivision: levels behind; shading:
-    of a tube, one of SHADINGS."""
+    """rig: a file in SINEW_RIGS instead of a tube; normals: read as well; subdivision: levels of a
+    modifier after it; shading: of a tube, one of SHADINGS."""
 
     vertices: int = 1080
     method: str = "dq"
@@ -54,7 +54,7 @@ class Case:
 
 
 SHADINGS = ("smooth", "sharp", "custom", "flat")
-# Who computes the normals, as the panel has it.
+# Who computes the normals, as in the panel.
 CHOICES = ("AS_BLENDER", "SKINNED", "LEAVE")
 
 
@@ -73,7 +73,7 @@ def cases(million: bool) -> list[Case]:
 
 
 def make_tube(case: Case, index: int) -> bpy.types.Object:
-    """A tube along Y, one unit a bone, each bone keyed to bend and twist."""
+    """A tube along Y with one unit for each bone, and keys on each bone that bend and twist it."""
     collection = bpy.context.scene.collection.objects
     armature = bpy.data.objects.new(f"Rig {index}", bpy.data.armatures.new(f"Rig {index}"))
     collection.link(armature)
@@ -127,7 +127,8 @@ def make_tube(case: Case, index: int) -> bpy.types.Object:
 
 
 def shade(mesh: bpy.types.Mesh, shading: str) -> None:
-    """Every fiftieth edge sharp; custom normals of corners, as imported characters have them; or all flat."""
+    """Makes every fiftieth edge sharp, adds custom normals of corners, as imported characters have, or
+    makes all flat."""
     rng = np.random.default_rng(1)
     if shading == "flat":
         mesh.shade_flat()
@@ -142,7 +143,8 @@ def shade(mesh: bpy.types.Mesh, shading: str) -> None:
 
 
 def open_rig(path: Path) -> list[bpy.types.Object]:
-    """The meshes of a rig that its armature deforms; every bone keyed, so that none of a frame is idle."""
+    """The meshes of a rig that its armature deforms. Every bone is keyed, so that each frame moves all
+    bones."""
     if path.suffix == ".blend":
         bpy.ops.wm.open_mainfile(filepath=str(path))
     else:
@@ -201,7 +203,7 @@ class Scene:
                 mesh.vertices[0].co.length  # noqa: B018
 
     def points(self, number: int) -> np.ndarray:
-        """float32 [n, 3] of the first mesh: what both must agree on."""
+        """The points of the first mesh, float32 [n, 3], on which both must agree."""
         self.frame(number)
         mesh = self.meshes[0].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
@@ -217,13 +219,13 @@ class Scene:
         return times
 
     def handler(self) -> dict:
-        """Seconds in Sinew's handler for each object, at frames that change it and where it stays."""
+        """Seconds in Sinew's handler per object, at frames that change it and at frames that do not."""
         moving = self._handler_times([1 + number * 7 % FRAMES for number in range(30)])
         staying = self._handler_times([FRAMES // 2] * 31)[1:]
         return {"moving": common.spread(moving), "staying": common.spread(staying)}
 
     def _handler_times(self, numbers: list[int]) -> list[float]:
-        """Between two functions of ours, one before and one behind Sinew's."""
+        """Measured by two functions, one before Sinew's handler and one after it."""
         functions = bpy.app.handlers.frame_change_post
         times: list[float] = []
 
@@ -262,8 +264,8 @@ def measure(case: Case, seconds: float, leave_small: bool) -> dict:
 
 
 def looks(scene: Scene) -> dict[str, Callable[[], None]]:
-    """What sets the scene up, by name: the Armature modifier with Preserve Volume and with Corrective Smooth
-    behind it, every method, stages behind dq."""
+    """Functions that set the scene up, by name: the Armature modifier with Preserve Volume and with
+    Corrective Smooth after it, every method, and stages after dq."""
     smooths = [obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH") for obj in scene.meshes]
 
     def look(method: str | None, stage: str = "") -> Callable[[], None]:
@@ -291,7 +293,7 @@ def looks(scene: Scene) -> dict[str, Callable[[], None]]:
 
 
 def measure_normals(case: Case, seconds: float) -> dict:
-    """Spreads of seconds of a drawn frame by the modifier and by each choice of normals, which take turns."""
+    """Spreads of seconds of a drawn frame, alternately for the modifier and for each choice of normals."""
     scene = Scene(case, leave_small=False)
     times: dict[str, list[float]] = {"modifier": [], **{choice: [] for choice in CHOICES}}
     number, end = 1, time.perf_counter() + seconds
@@ -308,7 +310,7 @@ def measure_normals(case: Case, seconds: float) -> dict:
 
 
 def measure_methods(case: Case, seconds: float) -> dict:
-    """Spreads of seconds of a frame by the names of looks(), which take turns."""
+    """Spreads of seconds of a frame, alternately for each of looks()."""
     scene = Scene(case, leave_small=False)
     chosen = looks(scene)
     times: dict[str, list[float]] = {name: [] for name in chosen}
@@ -325,7 +327,7 @@ def measure_methods(case: Case, seconds: float) -> dict:
 
 @contextmanager
 def quiet_blender() -> Iterator[Callable[[str], None]]:
-    """A context with a function that prints, in which Blender's own output is discarded."""
+    """A context in which Blender's own output is discarded; gives a function that prints."""
     sys.stdout.flush()
     with os.fdopen(os.dup(1), "w") as stdout, open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 1)
@@ -396,7 +398,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    # Not in a whole Blender, whose extension has another name: see window.py.
+    # Not imported in a whole Blender, where the extension has another name: see window.py.
     import sinew_addon
 
     sinew_addon.register()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the heat map adds to a frame in Blender: python bench/heat_map.py [FILE.blend MESH]
+"""Measures what the heat map adds to a frame in Blender: python bench/heat_map.py [FILE.blend MESH]
 
-Without a file a tube of 100,000 vertices. Frames with each measure and without alternate; printed are
-differences of the least times, milliseconds.
+Without a file, a tube of 100,000 vertices. Frames with each measure and without alternate; prints the
+differences of the minimum times in milliseconds.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def make_tube() -> bpy.types.Object:
 
 
 def least_time(scene: bpy.types.Scene) -> float:
-    """Of one frame, milliseconds."""
+    """The minimum time of a frame, milliseconds."""
     times = []
     for frame in FRAMES:
         started = time.perf_counter()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inverse kinematics beside Blender's constraint, in one process by turns: times of a solve, what is left,
-how smoothly bones move; docs/ik.svg."""
+"""Compares inverse kinematics with Blender's constraint, alternately in one process: times of a solve,
+remaining errors, how smoothly bones move; docs/ik.svg."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ def place_targets(targets: list, bones: int, rng: np.random.Generator) -> None:
 
 
 def times(bones: int, kind: str, seconds: float) -> dict:
-    """{solver: microseconds a solve, and what is left}: Blender's time is an update of the armature with the
-    constraints, less one without; Sinew solves the same chains in one call. The clock is the processor's, of
-    all threads: what other programs do counts little."""
+    """{solver: microseconds per solve, and remaining errors}. Blender's time is an update of the armature
+    with the constraints, minus one without; Sinew solves the same chains in one call. Processor time of
+    all threads, on which other programs have little influence."""
     armature, targets = make_chains(bones, kind, CHAINS)
     place_targets(targets, bones, np.random.default_rng(bones))
     bpy.context.view_layer.update()
@@ -87,7 +87,7 @@ def times(bones: int, kind: str, seconds: float) -> dict:
     names = [pair for tree in trees for pair in tree.constraints]
     ik_io.set_muted(armature, names, True)
     bpy.context.view_layer.update()
-    # All trees have the same bones and limits: as if they were frames of one.
+    # All trees have the same bones and limits, so they can be solved like frames of one tree.
     problem = core.problem_of(trees[0], core.stack([ik_io.read_posed(armature, tree) for tree in trees]))
     solver = trees[0].solver()
 
@@ -181,8 +181,8 @@ def animated(bones: int, kind: str) -> dict:
 
 
 def live_frames(bones: int, chains: int, seconds: float) -> dict:
-    """{way: microseconds of a frame of an animation, and of an update after a target was moved}, by the
-    processor's clock, by turns: without a solver, with Blender's constraints, with Sinew live."""
+    """{way: microseconds of a frame of an animation, and of an update after a target was moved}, in
+    processor time, alternately without a solver, with Blender's constraints, and with Sinew live."""
     armature, targets = make_chains(bones, "free", chains)
     for number, frame in enumerate((1, 9, 17, 24)):
         place_targets(targets, bones, np.random.default_rng(number))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The times of the kernels and of plain loops: a table of ratios, and JSON."""
+"""Compares the times of the kernels and of plain loops: a table of ratios, and JSON."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ LOOPS = ("glm", "eigen")
 def run(
     program: Path, pattern: str, repetitions: int, options: list[str], seconds: float = 0.001
 ) -> tuple[dict, dict]:
-    """({context}, {name: spread() of nanoseconds a call}) of the benchmarks that match `pattern`.
+    """({context}, {name: spread() of nanoseconds per call}) for the benchmarks that match `pattern`.
 
-    seconds  filled by the calls of a repetition
+    seconds  duration of one repetition, which calls the function many times
     """
-    # Interleaved, so that the load of other programs affects all candidates alike.
+    # Interleaved, so that the load of other programs affects all candidates equally.
     command = [
         program,
         "--benchmark_format=json",
@@ -42,8 +42,7 @@ def run(
 
 
 def rows(kind: str, size: int, times: dict) -> list[str]:
-    """A line for each method that the program measured, and for what follows them; nan where one has no plain
-    loops."""
+    """A line for each measured method, and for what follows methods; nan for those without plain loops."""
     scene = f"{kind}/{size}"
     of_lbs = times[f"glm/lbs/{scene}"]["least"] / size
     lines = []
@@ -83,8 +82,8 @@ def main() -> None:
         for size in (100_000,) if arguments.quick else SIZES:
             if size > 1_000_000 and kind != "chain":
                 continue
-            # Short, so that some are whole without an interruption; large meshes need more calls to find
-            # their data where the last one left it.
+            # Short repetitions, so that some run without interruption. Large meshes need more calls until
+            # their data is in the caches as after a previous call.
             repetitions, seconds = {1_000_000: (40, 0.005), 8_000_000: (8, 0.05)}.get(size, (60, 0.001))
             if arguments.quick:
                 repetitions = 20

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Time of one deformation of a whole mesh, ours beside the plain loops on the same data.
+// Times one deformation of a whole mesh, with Sinew and with the plain loops on the same data.
 #define GLM_ENABLE_EXPERIMENTAL
 #include <benchmark/benchmark.h>
 
@@ -19,14 +19,14 @@ using namespace sinew::bench;
 
 struct Bound {
     Scene scene;
-    std::map<int, Deformer> deformers;  // by the number of the method
+    std::map<int, Deformer> deformers;  // keyed by the method's number
 
     const Deformer& deformer(const MethodInfo& method) {
         return deformers.try_emplace(method.number, scene.data_for(method), method).first->second;
     }
 };
 
-/// Kept for the next measurement, one at a time: those of 8 million vertices are a gigabyte each.
+/// Kept for the next measurement, one at a time: meshes of 8 million vertices take a gigabyte each.
 Bound& bound(const Shape& shape) {
     static std::map<Shape, Bound> kept;
     if (!kept.contains(shape)) {
@@ -47,7 +47,7 @@ void ours(benchmark::State& state, const MethodInfo& method, const Shape& shape,
     }
 }
 
-/// The stage bulge_limit after dq, so weak that the points stay as they are, and it writes them.
+/// The stage bulge_limit after dq. It is so weak that it hardly changes the points, but it writes them.
 void bulge_limit(benchmark::State& state, const Shape& shape) {
     Scene& scene = scene_of(shape);
     std::vector<BoneSegment<float>> segments;
@@ -64,7 +64,7 @@ void bulge_limit(benchmark::State& state, const Shape& shape) {
     }
 }
 
-// The loops that one writes first, of methods that have some.
+// The loops that one writes first, for methods that have one.
 void glm_loop(Lbs, Scene& s) { plain::lbs(s.plain, s.matrices, s.points.data()); }
 void glm_loop(Dq, Scene& s) { plain::dq(s.plain, s.dual_quats, s.points.data()); }
 void glm_loop(Qv, Scene& s) { plain::qv(s.plain, s.rotations, s.translations, s.points.data()); }
@@ -101,7 +101,7 @@ void new_rest_points(benchmark::State& state, const Shape& shape) {
     for (auto _ : state) deformer.set_rest_points(scene.plain.rest_points);
 }
 
-// Two pieces of no work: what the pool itself costs.
+// Two chunks without work: the cost of the pool itself.
 void pool_call(benchmark::State& state) {
     for (auto _ : state)
         parallel_for(
@@ -169,7 +169,7 @@ void register_all() {
 
 }  // namespace
 
-// Beside Google Benchmark's own options: --simd=NAME for another instruction set than the best.
+// Options in addition to Google Benchmark's: --simd=NAME for another instruction set than the best.
 int main(int argc, char** argv) {
     std::vector<char*> rest;
     for (int i = 0; i < argc; ++i) {

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two clips blended pose by pose, and at once: beside scipy, numpy and Blender's mathutils. With bpy.
+"""Measures blending two clips pose by pose, and all at once, compared with scipy, numpy and Blender's
+mathutils. Needs bpy.
 
-Times are the processor's: all run on one thread, and longer runs share it with other programs.
+Processor times: everything runs on one thread, and longer runs share it with other programs.
 """
 
 from __future__ import annotations
@@ -29,17 +30,17 @@ SHARE = 0.3
 
 
 def poses(count: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Two times [frames, bones, 7], rotations at most a right angle apart."""
+    """Two arrays [frames, bones, 7], whose rotations are at most 90 degrees apart."""
     rng = np.random.default_rng(0)
     a = quat_vec.from_twist(rng.uniform(-0.8, 0.8, (*count, 6)))
     return a, quat_vec.compose(a, quat_vec.from_twist(rng.uniform(-0.9, 0.9, (*count, 6))))
 
 
-# --- Others
+# --- Other packages
 
 
 def mathutils_loop(a: list, b: list) -> list:
-    """Slerp and lerp of each bone in each frame, as a script does it."""
+    """Slerp and lerp for each bone in each frame, as a script would do it."""
     return [
         [(p.slerp(q, SHARE), s.lerp(t, SHARE)) for (p, s), (q, t) in zip(left, right, strict=True)]
         for left, right in zip(a, b, strict=True)
@@ -47,7 +48,7 @@ def mathutils_loop(a: list, b: list) -> list:
 
 
 def scipy_loop(a: list, b: list) -> list:
-    """The same by one Slerp for each bone in each frame."""
+    """The same with one Slerp object for each bone in each frame."""
     return [
         (Slerp([0.0, 1.0], Rotation.concatenate([p, q]))(SHARE), (1.0 - SHARE) * s + SHARE * t)
         for (p, s), (q, t) in zip(a, b, strict=True)
@@ -69,7 +70,7 @@ def numpy_dlb(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def times(seconds: float) -> dict:
-    """{name: spread() of seconds a call} of BONES bones in FRAMES frames."""
+    """{name: spread() of seconds per call} for BONES bones in FRAMES frames."""
     a, b = poses((FRAMES, BONES))
     weights = np.array([1.0 - SHARE, SHARE])
     pair = np.stack([a, b], axis=2)
@@ -92,7 +93,7 @@ def times(seconds: float) -> dict:
         [[(Quaternion(bone[:4]), Vector(bone[4:])) for bone in frame] for frame in each] for each in (a, b)
     ]
     of_scipy = [list(zip(r, t, strict=True)) for r, t in zip(rotations, places, strict=True)]
-    # They agree: slerp is slerp.
+    # All must agree, since slerp is unique.
     wanted = interpolate.between(a, b, SHARE, "qv_slerp").transforms.reshape(-1, 7)
     theirs = scipy_at_once(*rotations, *places)
     _same(wanted, np.hstack([theirs[0].as_quat(scalar_first=True), theirs[1]]))
@@ -114,17 +115,17 @@ def times(seconds: float) -> dict:
 
 
 def _same(a: np.ndarray, b: np.ndarray, close: float = 1e-9) -> None:
-    """Rows of pairs or dual quaternions, up to the sign that both of a transform have."""
+    """Rows of pairs or dual quaternions, up to the common sign of a transform's quaternions."""
     signs = np.where((a[:, :4] * b[:, :4]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
     b = b * signs if b.shape[1] == 8 else np.hstack([b[:, :4] * signs, b[:, 4:]])
     assert np.abs(a - b).max() < close
 
 
-# --- The whole of a blend
+# --- A complete blend
 
 
 def whole(seconds: float) -> dict:
-    """Parts of a blend of two walks, of eight bones, in Blender: seconds a call."""
+    """Seconds per call for the parts of a blend of two walks with eight bones in Blender."""
     from sinew_addon.core.motion import blend
     from sinew_addon.core.motion.align import align
     from sinew_addon.core.motion.root import grounded
@@ -152,7 +153,7 @@ def whole(seconds: float) -> dict:
 
 
 def _in_blender(pair: tuple) -> tuple:
-    """An armature of the walks' bones, and their actions."""
+    """An armature with the walks' bones, and their actions."""
     from sinew_addon.io import clips
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

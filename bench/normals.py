@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Normals of vertices, and of corners with sharp edges and custom normals, on one thread: Sinew, Blender,
-libigl, trimesh and numpy in one process, on a sheet of 317 x 317 vertices:
+"""Measures normals of vertices, and of corners with sharp edges and custom normals, on one thread: Sinew,
+Blender, libigl, trimesh and numpy in one process, on a sheet of 317 x 317 vertices:
 python bench/normals.py [--threads N] [--name NAME]
 
-Once with its vertices row by row, and once in random order; as quads, and as the triangles that libigl and
-trimesh take. It needs Blender 4.5 or later, which let custom normals be read. Blender makes as many threads
-as it may use processors when it starts. libigl and trimesh are left out where they are not installed.
+Once with the vertices row by row, and once in random order; as quads, and as the triangles that libigl and
+trimesh need. Needs Blender 4.5 or later, where custom normals can be read. Blender starts as many threads as
+it may use processors at its start. libigl and trimesh are left out if they are not installed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import sys
 import time
 from collections.abc import Callable
 
-# Before bpy is imported: its threads are counted then.
+# Before bpy is imported, which counts its threads then.
 PARSER = argparse.ArgumentParser(description=__doc__)
 PARSER.add_argument("--threads", type=int, default=1, help="of Blender and Sinew; the others have one")
 PARSER.add_argument("--seconds", type=float, default=3.0, help="for each candidate")
@@ -33,7 +33,7 @@ import sinew  # noqa: E402
 
 SIDE = 317
 ORDERS = ("rows", "random")
-# What is sharp by case: shares of the edges and faces.
+# The shares of sharp edges and faces for each case.
 CASES = {"smooth": (0.0, 0.0), "sharp edges": (0.02, 0.01), "custom": (0.02, 0.01)}
 
 
@@ -58,7 +58,7 @@ def make_mesh(points: np.ndarray, faces: np.ndarray) -> bpy.types.Mesh:
 
 
 def tilt(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Gives it custom normals; int16 [corners, 2], as they are stored."""
+    """Gives the mesh custom normals. Returns them as they are stored, int16 [corners, 2]."""
     normals = Blender(mesh, "corner").result() + np.float32([0.1, 0.2, -0.1])
     mesh.normals_split_custom_set(unit(normals).tolist())
     stored = mesh.attributes["custom_normal"].data
@@ -68,7 +68,7 @@ def tilt(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def mark(mesh: bpy.types.Mesh, edges: float, faces: float) -> dict[str, np.ndarray]:
-    """Makes them sharp; arguments of sinew.Normals that say the same."""
+    """Makes edges and faces sharp. Returns the same as arguments of sinew.Normals."""
     rng = np.random.default_rng(1)
     ends = np.empty((len(mesh.edges), 2), np.int32)
     mesh.edges.foreach_get("vertices", ends.ravel())
@@ -81,7 +81,8 @@ def mark(mesh: bpy.types.Mesh, edges: float, faces: float) -> dict[str, np.ndarr
 
 
 class Blender:
-    """Its own normals. A call only computes them: that the points have changed is told it before."""
+    """Blender's normals. A call only computes them: before it, Blender is told that the points have
+    changed."""
 
     def __init__(self, mesh: bpy.types.Mesh, domain: str) -> None:
         self.mesh, self.normals = mesh, f"{domain}_normals"
@@ -90,7 +91,7 @@ class Blender:
         self.mesh.update()
 
     def __call__(self) -> None:
-        # Reading one has all of them computed.
+        # Reading one normal computes all of them.
         _ = getattr(self.mesh, self.normals)[0]
 
     def result(self) -> np.ndarray:
@@ -101,7 +102,7 @@ class Blender:
 
 
 class Call:
-    """Of a function, whose result it keeps."""
+    """A function whose result is kept."""
 
     def __init__(self, function: Callable[[], np.ndarray]) -> None:
         self.function = function
@@ -125,7 +126,7 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def by_numpy(points: np.ndarray, faces: np.ndarray) -> Call:
-    """The obvious code, for all faces at once."""
+    """Straightforward code for all faces at once."""
 
     def compute() -> np.ndarray:
         ring = points[faces]
@@ -190,7 +191,7 @@ def main() -> None:
         ):
             candidates = candidates_of(points, faces, case)
             kind = f"{case}, {'quads' if faces.shape[1] == 4 else 'triangles'}, {order}"
-            # Of the processor on one thread, so that other programs change it less.
+            # Processor time on one thread, which other programs change less.
             clock = time.process_time if ARGUMENTS.threads == 1 else time.perf_counter
             times = common.alternate(candidates, ARGUMENTS.seconds, clock)
             normals = {name: candidate.result() for name, candidate in candidates.items()}
@@ -205,7 +206,7 @@ def main() -> None:
                 )
     common.write(ARGUMENTS.name, machine=facts, seconds=results)
     sys.stdout.flush()
-    # Blender as a module may hang in its own ending.
+    # As a module, Blender may hang when it exits.
     os._exit(0)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's Python package and other packages, on the same data in the same run."""
+"""Compares Sinew's Python package with other packages, on the same data in the same run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ import sinew
 METHODS = [method.name for method in sinew.methods()]
 BONES = 100
 INFLUENCES = 4
-# Of the scene of ddm: libigl keeps ten numbers of each bone for each vertex, those that do not move it too.
+# For the scene of ddm: libigl stores ten numbers of each bone for each vertex, including bones that do not
+# move it.
 FEW_BONES = INFLUENCES
 
 
@@ -51,7 +52,7 @@ class Scene:
     def deformer(self, method: str) -> sinew.Deformer:
         count = len(self.rest)
         offsets = np.arange(0, INFLUENCES * count + 1, INFLUENCES, dtype=np.int32)
-        # Centres of rotation as they are found for a limb: near its middle.
+        # Centres of rotation as they are for a limb: near its middle.
         data = {"cor": self.rest * np.float32([0, 0, 1])} if method == "cor" else {}
         if method == "ddm":
             data = {"ddm": self.moments()}
@@ -59,7 +60,7 @@ class Scene:
         return sinew.Deformer(*own, method, vertex_data=data)
 
     def moments(self) -> np.ndarray:
-        """What ddm keeps, float32 [4 n, 12]: neighbourhoods on the surface, spread more along the axis."""
+        """The vertex data of ddm, float32 [4 n, 12]: neighbourhoods on the surface, wider along the axis."""
         centres = 0.98 * self.rest[:, None].repeat(INFLUENCES, axis=1)
         away = 0.02 * (np.arange(INFLUENCES) - (INFLUENCES - 1) / 2)
         centres[..., 2] += away - (self.weights @ away)[:, None]
@@ -79,7 +80,7 @@ def rotate(quats: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def numpy_candidates(scene: Scene) -> dict:
-    """The obvious code with numpy, for all vertices at once."""
+    """Straightforward numpy code for all vertices at once."""
     rest, bones, weights = scene.rest, scene.bones, scene.weights
     poses = sinew.affine.to_quat_vec(scene.pose)
     duals = sinew.affine.to_dual_quat(scene.pose)
@@ -108,7 +109,7 @@ def numpy_candidates(scene: Scene) -> dict:
 
 
 def igl_moments(scene: Scene) -> np.ndarray:
-    """The moments as libigl has them, [n, 10 x bones]: the upper triangles of Omega, about the origin."""
+    """The moments in libigl's form, [n, 10 x bones]: the upper triangles of Omega, about the origin."""
     rows = scene.moments().astype(np.float64).reshape(len(scene.rest), INFLUENCES, 12)
     weights, firsts = rows[..., 2], rows[..., 3:6]
     xx, yy, zz, yz, xz, xy = np.moveaxis(rows[..., 6:], 2, 0)
@@ -130,7 +131,7 @@ def igl_candidates(scene: Scene) -> dict:
     np.put_along_axis(dense, scene.bones.astype(np.int64), scene.weights, axis=1)
     blend = igl.lbs_matrix(scene.rest.astype(np.float64), dense)
 
-    # A stack of transposed 3 x 4.
+    # A stack of transposed 3 x 4 matrices.
     def stacked(pose: np.ndarray) -> np.ndarray:
         return np.ascontiguousarray(pose[:, :3].astype(np.float64).transpose(0, 2, 1).reshape(-1, 3))
 
@@ -149,14 +150,14 @@ def usd_candidates(scene: Scene) -> dict:
     vt = importlib.import_module("pxr.Vt")
     gf = importlib.import_module("pxr.Gf")
     identity = gf.Matrix4f(1)
-    # Of row vectors.
+    # For row vectors.
     pose = vt.Matrix4fArray.FromNumpy(np.ascontiguousarray(scene.pose.transpose(0, 2, 1)))
     bones = vt.IntArray.FromNumpy(scene.bones.ravel())
     weights = vt.FloatArray.FromNumpy(scene.weights.ravel())
 
     def skin(method: str, serial: bool):
         def run() -> np.ndarray:
-            # In place: the rest points are copied first, as its users have to.
+            # Works in place: the rest points are copied first, as its users have to do.
             points = vt.Vec3fArray.FromNumpy(scene.rest)
             if not skel.SkinPoints(method, identity, pose, bones, weights, INFLUENCES, points, serial):
                 raise RuntimeError("UsdSkel.SkinPoints refused its input")
@@ -191,7 +192,7 @@ PEERS = {
 
 
 def collect(scene: Scene) -> tuple[dict, dict, dict]:
-    """({method: {name: function}}, {distribution: version}, {distribution: why it is missing})."""
+    """({method: {name: function}}, {distribution: version}, {distribution: reason why it is missing})."""
     candidates = {method: {} for method in METHODS}
     versions, missing = {}, {}
     for distribution, make in PEERS.items():

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The obvious loops with GLM, one vertex after the other: the baseline of the kernels.
+// Straightforward loops with GLM, one vertex after the other: the baseline for the kernels.
 #define GLM_ENABLE_EXPERIMENTAL
 #include "plain_loops.h"
 

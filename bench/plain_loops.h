@@ -9,7 +9,7 @@
 
 namespace plain {
 
-/// Four influences a vertex, as in most tutorials.
+/// Four influences for each vertex, as in most tutorials.
 struct Mesh {
     std::vector<glm::vec3> rest_points;
     std::vector<glm::u16vec4> bones;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The time of a vertex by influences and by bones: two plots in docs/, a table and JSON."""
+"""Plots the time per vertex by influences and by bones: two plots in docs/, a table and JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-# In the order of the methods (P. Tol's bright scheme, which people of all kinds of colour vision tell apart).
+# In the order of the methods (P. Tol's bright scheme, which is safe for colour-blind readers).
 COLOURS = ("#4477aa", "#ccbb44", "#ee6677", "#228833", "#66ccee", "#aa3377", "#bbbbbb")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 INFLUENCES = ("1", "2", "3", "4", "6", "8", "mixed")
@@ -30,7 +30,7 @@ def pairs() -> list[tuple[str, int]]:
 
 
 def costs(program: Path, simd: str | None) -> tuple[dict, dict]:
-    """({context}, {"method/influences/bones": nanoseconds a vertex}), the least of many runs."""
+    """({context}, {"method/influences/bones": nanoseconds per vertex}), the minimum of many runs."""
     context, found = {}, {}
     options = [f"--simd={simd}"] if simd else []
     for influences, bones in pairs():
@@ -46,7 +46,7 @@ def methods_of(found: dict) -> list[str]:
 
 
 def draw(name: str, label: str, ticks: tuple, positions: tuple, keys: list[str], found: dict) -> None:
-    """A panel for each instruction set, on one scale."""
+    """A panel for each instruction set, on a common scale."""
     figure, panels = plt.subplots(
         1, len(found), figsize=(4.2 * len(found), 3.4), layout="constrained", sharey=True, squeeze=False
     )
@@ -70,7 +70,7 @@ def draw(name: str, label: str, ticks: tuple, positions: tuple, keys: list[str],
     panels[0][0].set_ylabel("nanoseconds a vertex")
     panels[0][0].legend(frameon=False, loc="lower right")
     path = DOCS / f"{name}.svg"
-    # Without a date, so that the same figures make the same file.
+    # Without a date, so that the same figures give the same file.
     figure.savefig(path, metadata={"Date": None})
     plt.close(figure)
     print(path)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What methods keep of each vertex, made for a plate of 316 x 316 vertices whose bones are all over it:
+"""Measures precomputations for a plate of 316 x 316 vertices with bones all over it:
 python bench/precompute.py [--name NAME] [--threads 2]
 
-Seconds by the clock and of the processor, least of the runs. The processor's are of all threads: other
-programs make them little longer.
+Wall-clock and processor seconds, minimum of the runs. Processor times are those of all threads; other
+programs hardly increase them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import sinew
 
 SIDE, SIZE = 316, 2.0
-# Bones along each side, and the radius of ddm.
+# The number of bones along each side, and the radius for ddm.
 CASES = [(3, 0.2), (10, 0.05), (10, 0.2), (10, 0.5), (20, 0.02)]
 
 
@@ -32,7 +32,7 @@ def plate() -> tuple[np.ndarray, np.ndarray]:
 
 
 def influences(points: np.ndarray, along: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Offsets, bones and weights: the four nearest of along x along bones, by a bell's curve."""
+    """Offsets, bones and weights: the four nearest of along x along bones, weighted by a Gaussian."""
     apart = SIZE / along
     middles = -SIZE / 2 + apart * (np.arange(along) + 0.5)
     squared = (points[:, :1] - middles)[:, :, None] ** 2 + (points[:, 1:2] - middles)[:, None] ** 2

@@ -102,8 +102,8 @@ Scene make_scene(const Shape& shape) {
     }
     std::size_t patch_left = 0;
     std::size_t count = shape.influences;
-    std::size_t of[kMostInfluences] = {};
-    float share[kMostInfluences] = {};
+    std::size_t of[kMaxShapeInfluences] = {};
+    float share[kMaxShapeInfluences] = {};
     const auto last_first = static_cast<float>(shape.bones - std::min(shape.bones, count));
     for (const std::size_t i : order) {
         const float along =
@@ -111,7 +111,7 @@ Scene make_scene(const Shape& shape) {
         const float angle = unit(engine) * 6.2831853f;
         if (shape.kind == Kind::character) {
             if (patch_left == 0) {
-                // Means of 1.85 influences and of 24 vertices a patch, as in human.blend.
+                // On average 1.85 influences, and 24 vertices in a patch, as in human.blend.
                 const float chance = unit(engine);
                 count = chance < 0.45f ? 1 : chance < 0.80f ? 2 : chance < 0.95f ? 3 : 4;
                 patch_left = 1 + static_cast<std::size_t>(unit(engine) * 46.0f);
@@ -139,7 +139,7 @@ Scene make_scene(const Shape& shape) {
 
 std::vector<Variant> variants_of(const MethodInfo& method) {
     if (!method.keeps_moments) return {};
-    // The index of the variant is the first parameter.
+    // The first parameter is the index of the variant.
     return {{std::string(method.name) + "2", {1.0}}, {std::string(method.name) + "4", {2.0}}};
 }
 

@@ -15,7 +15,7 @@ namespace sinew::bench {
 enum class Kind {
     chain,      // vertices along a cylinder
     shuffled,   // the same, in random order within windows of 4096
-    character,  // 1 to 4 influences, 1.85 in the mean, in patches of some dozens of vertices
+    character,  // 1 to 4 influences, on average 1.85, in patches of a few dozen vertices
 };
 inline constexpr const char* kKindNames[] = {"chain", "shuffled", "character"};
 
@@ -23,13 +23,13 @@ struct Shape {
     Kind kind = Kind::chain;
     std::size_t vertices = 100'000;
     std::size_t bones = 100;
-    std::size_t influences = 4;  // of chain and shuffled
+    std::size_t influences = 4;  // for chain and shuffled
     auto operator<=>(const Shape&) const = default;
 };
 
-inline constexpr std::size_t kMostInfluences = 8;
+inline constexpr std::size_t kMaxShapeInfluences = 8;
 
-/// A mesh, its weights and a pose, for ours and for the plain loops.
+/// A mesh, its weights and a pose, for Sinew and for the plain loops.
 struct Scene {
     plain::Mesh plain;
     std::vector<std::int32_t> offsets{0};
@@ -41,12 +41,12 @@ struct Scene {
     std::vector<glm::quat> rotations;
     std::vector<glm::vec3> translations;
     std::vector<Vec3<float>> points;
-    std::vector<float> method_values;  // what data_for() was last asked for
+    std::vector<float> method_values;  // made by the last call of data_for()
     std::vector<VertexData> vertex_data;
 
     BindData data() const { return {plain.rest_points, offsets, bones, weights}; }
 
-    /// With what the method keeps of each vertex.
+    /// Includes the vertex data that the method keeps.
     BindData data_for(const MethodInfo& method) {
         BindData bound = data();
         if (method.vertex_floats == 0) return bound;
@@ -55,7 +55,7 @@ struct Scene {
             add_moments();
         } else {
             for (const glm::vec3& rest : plain.rest_points) {
-                // Points on the axis: the centre of Cor; C, R0, R1 and their use of Sdef.
+                // Points on the axis: the centre for Cor; C, R0, R1 and the flag for Sdef.
                 const float z = rest.z;
                 const float numbers[] = {0, 0, z, 0, 0, z - 0.3f, 0, 0, z + 0.3f, 1};
                 method_values.insert(method_values.end(), numbers, numbers + method.vertex_floats);
@@ -66,21 +66,24 @@ struct Scene {
         return bound;
     }
 
-    /// What Ddm keeps, of as many bones as influences: neighbourhoods on the surface, spread more along the axis.
+    /// Adds the moments that Ddm keeps, for as many bones as influences: neighbourhoods on the surface, wider
+    /// along the axis.
     void add_moments();
 
-    /// of, share  [count]; the plain loops see the first four
+    /// Adds a vertex.
+    ///
+    /// of, share  [count] bones and weights; the plain loops use the first four
     void add_vertex(const glm::vec3& rest, std::size_t count, const std::size_t* of, const float* share);
 };
 
 Scene make_scene(const Shape& shape);
 
-/// A method by values of its parameters that are not the default ones.
+/// A method with values of its parameters other than the default ones.
 struct Variant {
     std::string name;
     std::vector<double> parameters;
 
-    /// On one thread.
+    /// Options for one thread.
     DeformOptions options() const {
         DeformOptions options;
         options.threads = 1;
@@ -89,7 +92,7 @@ struct Variant {
     }
 };
 
-/// Those that take another time: of ddm "ddm2" and "ddm4".
+/// Variants that take another time: for ddm "ddm2" and "ddm4".
 std::vector<Variant> variants_of(const MethodInfo& method);
 
 }  // namespace sinew::bench

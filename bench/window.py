@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Playback and live posing in Blender's window, with the Armature modifier and with Sinew, in one file
-alternately.
+"""Measures playback and live posing in Blender's window, with the Armature modifier and with Sinew.
+
+Both alternate in one file:
 
     blender --factory-startup --python bench/window.py -- --zip dist/sinew-VERSION.zip [--file RIG]
 
-Blender itself plays and draws, as fast as it can; each round switches Sinew on and off and measures
+Blender itself plays and draws as fast as it can; each round switches Sinew on and off and measures
 
-play  frames a second of Blender's own playback
+play  frames per second of Blender's own playback
 step  milliseconds of one change of frame without drawing
 draw  milliseconds of drawing the window when nothing changed
-pose  milliseconds from rotating a bone to the end of the 3D view's drawing that shows it
-late  of these drawings, those that did not show it yet
+pose  milliseconds from rotating a bone until the 3D view that shows it is drawn
+late  how many of these drawings did not show it yet
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def shown_point(obj: bpy.types.Object, vertex: int) -> np.ndarray:
 
 
 def farthest_vertex(obj: bpy.types.Object) -> int:
-    """A vertex that moves when a bone in the middle rotates: the farthest from the object's origin."""
+    """A vertex that moves when a bone in the middle rotates: the one farthest from the object's origin."""
     points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
     obj.data.vertices.foreach_get("co", points.ravel())
     return int((points**2).sum(axis=1).argmax())
@@ -75,7 +76,7 @@ class Bench:
         self.armature = modifiers[0].object
         scene = bpy.context.scene
         scene.frame_start, scene.frame_end = 1, frames.FRAMES
-        # As fast as it goes, and every frame.
+        # As fast as possible, without skipping frames.
         scene.sync_mode, scene.render.fps = "NONE", 1000
         for obj in self.meshes:
             with in_view3d(active_object=obj, object=obj, selected_objects=[obj]):
@@ -83,7 +84,7 @@ class Bench:
             obj.sinew.method = arguments.method
         with in_view3d():
             space = bpy.context.space_data
-            # Software draws slowly: as little as shows the mesh.
+            # Software rendering is slow: draw no more than shows the mesh.
             space.overlay.show_overlays, space.shading.light = False, "FLAT"
             bpy.ops.view3d.view_all()
 
@@ -91,7 +92,7 @@ class Bench:
         self.found[who].setdefault(what, []).append(value)
 
     def steps(self) -> Iterator[float]:
-        """Yields the seconds to wait, in which Blender does what it has to."""
+        """Yields how many seconds to wait while Blender works."""
         yield 1.0
         for _round in range(self.arguments.turns):
             for who, on in CANDIDATES.items():
@@ -206,7 +207,7 @@ def main() -> None:
         return None
 
     bpy.context.preferences.view.show_splash = False
-    # Opening a file ends timers without this.
+    # Without this, opening a file ends timers.
     bpy.app.timers.register(tick, first_interval=2.0, persistent=True)
 
 

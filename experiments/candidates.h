@@ -14,10 +14,10 @@
 
 namespace experiments {
 
-// A candidate is a representation as one library has it, with what it can do of
-//   make(rigid)                      from the same double for all
-//   compose(a, b), apply(a, point)   first b, then a; a point moved
-//   blend(transforms, weights)       of three, to the caller's knowledge with signs of quaternions free
+// A candidate is a representation from one library, with these operations:
+//   make(rigid)                      from the same double-precision motion for all
+//   compose(a, b), apply(a, point)   b first, then a; the image of a point
+//   blend(transforms, weights)       of three transforms, with arbitrary signs of quaternions
 
 using Rigid = sinew::QuatVec<double>;
 using Weights = std::array<float, 3>;
@@ -83,10 +83,10 @@ struct Plain4x4 {
     }
 };
 
-/// Four numbers of one register, by the vectors of GCC and Clang.
+/// Four numbers in one register, with the vector extension of GCC and Clang.
 using Lanes = float __attribute__((vector_size(16)));
 
-/// A 4x4 matrix in four registers, one for a column: what the four loops of Plain4x4 become by hand.
+/// A 4x4 matrix in four registers, one for each column: the loops of Plain4x4 vectorised by hand.
 struct Lanes4x4 {
     struct Transform {
         Lanes columns[4];
@@ -128,7 +128,7 @@ struct Lanes4x4 {
     }
 };
 
-/// A 3x4 matrix in three registers, one for a row.
+/// A 3x4 matrix in three registers, one for each row.
 struct Lanes3x4 {
     struct Transform {
         Lanes rows[3];
@@ -173,7 +173,7 @@ struct Lanes3x4 {
     }
 };
 
-/// A representation of Sinew's, by its operators.
+/// A representation of Sinew, with its operators.
 template <template <class> class Representation>
 struct Ours {
     using Transform = Representation<float>;
@@ -252,8 +252,9 @@ struct GlmDualQuat {
     static Transform dlb(const Transform& a, const Transform& b, float t) {
         return glm::normalize(glm::lerp(a, b, t));
     }
-    /// Screw linear interpolation as Kenwright 2012 has it ("A beginners guide to dual-quaternions", section 7), which
-    /// the report took (section 3.1): the angle by acos, and no case for rotations that are equal or half a turn apart.
+    /// Screw linear interpolation by Kenwright 2012 ("A beginners guide to dual-quaternions", section 7), which
+    /// the report used (section 3.1): the angle by acos, and no special case for rotations that are equal or 180
+    /// degrees apart.
     static Transform sclerp(const Transform& a, const Transform& b, float t) {
         const Transform onto = glm::dot(a.real, b.real) < 0.0f ? b * -1.0f : b;
         const Transform step = Transform(glm::conjugate(a.real), glm::conjugate(a.dual)) * onto;
@@ -303,7 +304,7 @@ struct Eigen4x4 {
     }
 };
 
-/// 3x4, as Eigen has it for rigid motions.
+/// 3x4 matrices, as in Eigen for rigid motions.
 struct Eigen3x4 {
     using Transform = Eigen::AffineCompact3f;
     using Point = Eigen::Vector3f;

@@ -7,10 +7,11 @@
 
 namespace experiments {
 
-/// What was done with numbers. Comparisons and changes of sign are free in the report, and not in a total.
+/// Counts of operations on numbers. The report does not count comparisons and changes of sign, so totals leave
+/// them out.
 struct Operations {
     int additions = 0;        ///< and subtractions
-    int multiplications = 0;  ///< but for those by 2
+    int multiplications = 0;  ///< except for those by 2
     int doublings = 0;
     int divisions = 0;
     int roots = 0;
@@ -23,9 +24,9 @@ struct Operations {
     }
 };
 
-/// A number that counts what is done with it, by the rule of Smith 2013, section 3.4.2: nothing that is
-/// multiplied by 0 or 1, and nothing that 0 is added to, where the source says so. A number made from one of
-/// C++ is such a constant; input() makes one that is not known beforehand.
+/// A number that counts operations on it, by the rule of Smith 2013, section 3.4.2: multiplications by 0 or 1 and
+/// additions of 0 are not counted if they are visible in the source. A number made from a C++ number is such a
+/// constant; input() makes one that is not known in advance.
 class Counted {
 public:
     Counted() = default;
@@ -36,7 +37,7 @@ public:
     [[nodiscard]] static constexpr Counted input(double value) { return {value, false}; }
     [[nodiscard]] double value() const { return value_; }
 
-    /// While it lives, counts go to its operations.
+    /// While this object exists, operations are counted in its Operations.
     class CountIn {
     public:
         explicit CountIn(Operations& operations) : before_(counts_) { counts_ = &operations; }
@@ -99,7 +100,7 @@ private:
 
     [[nodiscard]] bool is(double constant) const { return is_constant_ && value_ == constant; }
 
-    /// What a compiler knows beforehand costs nothing.
+    /// Results that a compiler knows in advance cost nothing.
     static Counted result(Counted a, Counted b, double value, int Operations::*operation) {
         const bool is_constant = a.is_constant_ && b.is_constant_;
         if (!is_constant) ++(counts_->*operation);
@@ -118,7 +119,7 @@ private:
 
 }  // namespace experiments
 
-// GLM calls this by its full name, and so must find it among its own: include this file before GLM's.
+// GLM calls this by its full name and must find it in its own namespace: include this file before GLM's.
 namespace glm {
 inline experiments::Counted sqrt(experiments::Counted a) { return square_root(a); }
 }  // namespace glm
@@ -126,7 +127,7 @@ namespace experiments {
 using glm::sqrt;
 }  // namespace experiments
 
-/// GLM asks whether it is a floating-point number; Sinew, for its rounding.
+/// GLM checks whether it is a floating-point number; Sinew reads its rounding error.
 template <>
 class std::numeric_limits<experiments::Counted> : public std::numeric_limits<double> {
 public:

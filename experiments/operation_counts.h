@@ -14,8 +14,8 @@
 
 namespace experiments {
 
-/// table  the table of Smith 2013 that this is about
-/// name   what does it
+/// table  the table of Smith 2013 with this operation
+/// name   the candidate
 struct OperationCount {
     std::string_view table;
     std::string_view name;
@@ -31,7 +31,7 @@ inline Vec input(double x, double y, double z) {
     return {Counted::input(x), Counted::input(y), Counted::input(z)};
 }
 
-/// `constants` as numbers that are not known beforehand.
+/// `constants` as numbers that are not known in advance.
 inline sinew::Quat<Counted> input(const sinew::Quat<double>& q) {
     return {Counted::input(q.w), Counted::input(q.x), Counted::input(q.y), Counted::input(q.z)};
 }
@@ -51,7 +51,7 @@ inline sinew::Affine<Counted> input(const sinew::Affine<double>& a) {
     return result;
 }
 
-/// Three motions of no special angle or axis, no two more than 90 degrees apart.
+/// Three motions without special angles or axes, all within 90 degrees of each other.
 template <template <class> class Transform>
 std::array<Transform<Counted>, 3> inputs() {
     const auto motion = [](double angle, double x, double y, double z) {
@@ -73,8 +73,8 @@ Operations counted(Task task) {
 
 }  // namespace detail
 
-/// The point `p` by the report's own formula: the dual part of d (1 + e p) times the combined conjugate of d
-/// (Smith 2013, section 2.2.3).
+/// The image of the point `p` by the report's own formula: the dual part of d (1 + e p) times the combined
+/// conjugate of d (Smith 2013, section 2.2.3).
 template <class T>
 [[nodiscard]] sinew::Vec3<T> transform_point_by_products(const sinew::DualQuat<T>& d,
                                                          const sinew::Vec3<T>& p) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The loops of Smith 2013, Tables 3.4, 3.5, 3.9 and 3.10, for each candidate: "TABLE/NAME". One iteration is
-// one whole loop. --shorten=N makes the loops N times shorter.
+// The loops of Smith 2013, Tables 3.4, 3.5, 3.9 and 3.10, for each candidate: "TABLE/NAME". One iteration is one
+// whole loop. --shorten=N makes the loops N times shorter.
 #define GLM_ENABLE_EXPERIMENTAL
 #include <benchmark/benchmark.h>
 
@@ -17,14 +17,14 @@ namespace {
 
 using namespace experiments;
 
-// How often, in the report; Table 3.10 does not say, its text speaks of a point.
+// Repetitions in the report. Table 3.10 does not state them; its text mentions a point.
 constexpr int kChains = 100'000;
 constexpr int kPoints = 1'000'000;
 constexpr int kInterpolations = 1'000'000;
 constexpr int kBlends = 1'000'000;
 constexpr int kChainLength = 6;
 
-// So few that they stay in the nearest cache: arithmetic is to be measured.
+// Few enough to stay in the first-level cache, so that arithmetic is measured.
 constexpr int kDistinct = 64;
 constexpr std::size_t kMesh = 10'000;
 
@@ -35,7 +35,7 @@ std::mt19937& dice() {
     return engine;
 }
 
-/// Motions in order along a smooth path, as bones next to each other have: up to some 40 degrees apart.
+/// Motions along a smooth path, as adjacent bones have: up to about 40 degrees apart.
 const std::vector<Rigid>& motions() {
     static const std::vector<Rigid> list = [] {
         std::uniform_real_distribution<double> number(-1.0, 1.0);
@@ -86,7 +86,7 @@ std::vector<Weights> weights() {
     return list;
 }
 
-/// task(i) for i in 0 .. kDistinct - 1, `count` times in all.
+/// Runs task(i) for i in 0 .. kDistinct - 1, `count` times in all.
 template <class Task>
 void loop(benchmark::State& state, int count, Task task) {
     for (std::size_t i = 0; i < kDistinct; ++i) task(i);
@@ -173,8 +173,8 @@ void add_skinning(std::string_view name) {
     });
 }
 
-/// Sinew's kernels: a mesh of kMesh vertices at once on one thread, until there are kBlends; three bones to a
-/// vertex, runs of neighbours with the same three, as a mesh has.
+/// Sinew's kernels: deform a mesh of kMesh vertices on one thread until kBlends vertices are done. Three bones
+/// for each vertex, in runs of vertices with the same three, as in a mesh.
 void add_kernels(const sinew::MethodInfo& method, std::string_view name) {
     struct Scene {
         sinew::Deformer deformer;

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes a Python for Linux on arm64, to be run by qemu, of Debian's packages: for tests on a Debian machine.
+"""Makes a Python for Linux on arm64, to be run by qemu, from Debian's packages, for tests.
 
-The packages are unpacked into a folder of their own, of this Debian's release; nothing is installed on the
-machine. Packages of Python are installed beside it, as wheels for arm64. Prints a script that runs it. It
-needs this Debian's own Python, as that has the version of the release.
+The packages, of the release of this Debian, are unpacked into a folder; nothing is installed on the machine.
+Python packages are installed next to it, as wheels for arm64. Prints the path of a script that runs it.
+Needs Debian's own Python, since that has the same version.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PACKAGES = (
     ),
     *("libsqlite3-0", "libuuid1", "libcrypt1", "libncursesw6", "libtinfo6", "libreadline8"),
 )
-# apt with an architecture, lists and a cache of its own.
+# An own configuration of apt, with its own architecture, lists and cache.
 APT_CONFIG = """\
 APT::Architecture "arm64";
 APT::Architectures {{"arm64";}};
@@ -46,7 +46,7 @@ Dir::State::status "{0}/status";
 Dir::Cache "{0}/cache";
 APT::Sandbox::User "root";
 """
-# By its own name, the script: what Python starts as sys.executable is run by qemu, too.
+# The script is Python's sys.executable, so programs that Python starts through that are run by qemu, too.
 SCRIPT = """\
 #!/bin/sh
 export PYTHONHOME="{root}/usr"

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the library for another platform by zig: wheels for several Pythons, or the C++ tests.
+"""Builds the library for another platform with zig: wheels for several Pythons, or the C++ tests.
 
-The Python that runs this has ziglang, pybind11, scikit-build-core and auditwheel. Prints what it made. The
-module is one file with the library in it, as two files with the standard library in each could not throw
-to each other.
+The Python that runs this needs ziglang, pybind11, scikit-build-core and auditwheel. Prints the paths of what
+it built. The module is one file that contains the library: two files, each with its own standard library,
+could not throw exceptions to each other.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from platforms import PLATFORMS, Platform
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "platforms"
-# Headers alone; the folder as a whole has the C library of this machine in it.
+# Only these headers; the whole folder also contains this machine's C library.
 HEADERS = {"glm": "glm", "hwy": "hwy", "Eigen": "eigen3/Eigen"}
 SYSTEM_HEADERS = [Path("/usr/include"), Path("/usr/local/include"), Path("/opt/homebrew/include")]
 GOOGLETEST = Path("/usr/src/googletest")
@@ -69,9 +69,10 @@ def zig_program() -> Path:
 
 
 def compilers(platform: Platform) -> dict[str, str]:
-    """CMake's names of the tools, each a script: it takes programs, and zig wants a word behind.
+    """CMake's variables for the tools. Each is a script, because CMake expects a program and zig needs an
+    argument.
 
-    In a script is zig's version, too, so that ccache compiles anew by another one."""
+    The scripts contain zig's version, so that ccache compiles again with another version."""
     folder = BUILD / platform.name / "bin"
     folder.mkdir(parents=True, exist_ok=True)
     words = {
@@ -94,8 +95,8 @@ def compilers(platform: Platform) -> dict[str, str]:
 
 
 def environment() -> dict[str, str]:
-    # zig keeps what it makes of the C and C++ libraries in a folder of its own. ccache knows compilers by
-    # their bytes: by their dates it would not know a script that was written again.
+    # zig stores what it builds of the C and C++ libraries in its own folder. ccache identifies compilers by
+    # their content: by date it would not recognise a script that was written again.
     kept = {
         key: value for key, value in os.environ.items() if key not in ("CXX", "CC", "CXXFLAGS", "LDFLAGS")
     }
@@ -143,7 +144,7 @@ EXPORTED = re.compile(r"\bPyAPI_(FUNC|DATA)\(\s*([^()]|\([^()]*\))*\)\s*(?P<name
 
 
 def exported_names(include: Path) -> dict[str, bool]:
-    """What Python's headers declare of its library: name -> whether it is data."""
+    """The names that Python's headers declare of its library: name -> whether it is data."""
     names = {}
     for header in sorted([*include.glob("*.h"), *include.glob("cpython/*.h")]):
         for match in EXPORTED.finditer(header.read_text(encoding="utf-8")):
@@ -152,7 +153,7 @@ def exported_names(include: Path) -> dict[str, bool]:
 
 
 def import_library(platform: Platform, python: Python, include: Path) -> Path:
-    """What a module for Windows is linked with: the names that python3xx.dll gives."""
+    """What a module for Windows is linked with: the names in python3xx.dll."""
     dll = f"python{python.version.replace('.', '')}"
     lines = [f"LIBRARY {dll}.dll", "EXPORTS"]
     lines += [name + (" DATA" if is_data else "") for name, is_data in exported_names(include).items()]
@@ -176,12 +177,12 @@ def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
         "CMAKE_BUILD_TYPE": "Release",
         "CMAKE_SYSTEM_NAME": platform.system,
         "CMAKE_SYSTEM_PROCESSOR": platform.processor,
-        # Optimised as what CMake tries before the build, too: zig makes its libraries for each of both.
-        # Without what a debugger wants, which zig adds unless told: a seventh of the time, and nine
-        # tenths of an object.
+        # The same optimisation as for what CMake tries before the build, because zig builds its libraries for
+        # each. Without debugging information, which zig adds by default: it takes a seventh of the time and
+        # nine tenths of an object file.
         "CMAKE_C_FLAGS": "-O2 -g0",
         "CMAKE_CXX_FLAGS": f"-O2 -g0 -ffile-prefix-map={ROOT}=.",
-        # No symbols; for Windows no time, either.
+        # No symbols, and for Windows no timestamp.
         "CMAKE_EXE_LINKER_FLAGS": "-s",
         "CMAKE_MODULE_LINKER_FLAGS": "-s",
         "CMAKE_STRIP": "true",
@@ -203,7 +204,7 @@ def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
         **options,
     }
     words: list[str | Path] = ["cmake", "-G", "Ninja", "-S", ROOT, "-B", build]
-    # What the last run found of another Python.
+    # Clears what the last run found for another Python.
     words += ["-U", "Python_*", "-U", "_Python_*", "-U", "PYTHON_*"]
     run(words + [f"-D{name}={value}" for name, value in defined.items()], log)
     return build
@@ -258,7 +259,7 @@ def start_log(platform: Platform) -> Path:
 
 
 def metadata() -> dict[str, bytes]:
-    """METADATA and licences, as scikit-build-core writes them: name within .dist-info -> bytes."""
+    """METADATA and licences, as scikit-build-core writes them: name in .dist-info -> bytes."""
     from scikit_build_core.build import prepare_metadata_for_build_wheel
 
     with tempfile.TemporaryDirectory() as place, contextlib.chdir(ROOT):
@@ -287,7 +288,7 @@ def record_line(name: str, data: bytes) -> str:
 
 
 def write_wheel(module: Path, tag: str, described: dict[str, bytes], out: Path) -> Path:
-    """described: as of metadata()"""
+    """Writes the wheel. described: a result of metadata()."""
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     stem = f"sinew_skinning-{version}"
     info = f"{stem}.dist-info"
@@ -309,7 +310,7 @@ AUDITED = re.compile(
 
 
 def audit(wheel: Path, platform: Platform) -> None:
-    """That it runs on the systems that its name says, by auditwheel."""
+    """Checks with auditwheel that it runs on the systems that its name claims."""
     done = subprocess.run(
         [sys.executable, "-m", "auditwheel", "show", wheel], capture_output=True, text=True, check=False
     )

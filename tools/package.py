@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts the extension and the library's wheels into dist/sinew-VERSION.zip, and prints its path.
+"""Packs the extension and the library's wheels into dist/sinew-VERSION.zip, and prints its path.
 
-Bundled are the wheels of this version in dist/wheels/, wherever they were built; or those of one platform,
-which tools/cross_build.py built, into dist/platforms/sinew-VERSION-PLATFORM.zip, as Blender names it. The
-zip's manifest names them (`wheels`) and their systems (`platforms`); the same files always give the same
-bytes.
+Includes the wheels of this version in dist/wheels/, wherever they were built; or only those of one platform,
+built by tools/cross_build.py, into dist/platforms/sinew-VERSION-PLATFORM.zip, with Blender's name of the
+platform. The zip's manifest lists them (`wheels`) and their systems (`platforms`). The same files always
+give the same bytes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PLATFORMS = {
     r"win_arm64": ["windows-arm64"],
 }
 ALL_PLATFORMS = {name for names in PLATFORMS.values() for name in names}
-# The earliest date that a zip can hold.
+# The earliest date that a zip can store.
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -47,7 +47,7 @@ class Wheel:
             raise SystemExit(f"package: {path.name} is not a wheel's name")
         self.path = path
         self.version, self.python = fields["version"], fields["python"]
-        # A wheel may carry several tags of one system, as manylinux_2_17_x86_64.manylinux2014_x86_64 does.
+        # A wheel may have several tags of one system, such as manylinux_2_17_x86_64.manylinux2014_x86_64.
         self.tags = fields["system"].split(".")
 
     @property
@@ -67,7 +67,7 @@ class Wheel:
 
 
 def recorded_wheels(stamps: Path | None) -> dict[str, tuple[str, str]]:
-    """What ./dev built itself: wheel's name -> (digest of the native sources, digest of the wheel)."""
+    """The wheels that ./dev built: wheel's name -> (digest of the native sources, digest of the wheel)."""
     records = {}
     for stamp in sorted(stamps.glob("wheel-*")) if stamps else []:
         inputs, name, digest = stamp.read_text().splitlines()
@@ -83,7 +83,8 @@ def select_wheels(folder: Path, version: str, stamps: Path | None, sources: str 
         if wheel.version != version:
             continue
         built_from, digest = records.get(path.name, (None, None))
-        # A Python that has gone since leaves its wheel behind; one put here by hand has no such record.
+        # Wheels remain after their Python is removed; wheels that were copied here by hand have no such
+        # record.
         if built_from and built_from != sources and digest == hashlib.sha256(path.read_bytes()).hexdigest():
             print(f"package: leaving out {path.name}, built from older sources", file=sys.stderr)
             continue
@@ -96,7 +97,8 @@ def select_wheels(folder: Path, version: str, stamps: Path | None, sources: str 
 
 
 def warn_of_gaps(wheels: list[Wheel]) -> None:
-    """Blender installs a zip on each of its platforms, so each should have a wheel for the same Pythons."""
+    """Warns if a platform lacks a wheel for some Python, since Blender installs a zip on each of its
+    platforms."""
     pythons = {wheel.python for wheel in wheels}
     for platform in sorted({p for wheel in wheels for p in wheel.platforms}):
         missing = pythons - {wheel.python for wheel in wheels if platform in wheel.platforms}
@@ -141,7 +143,7 @@ def write_zip(target: Path, files: dict[str, bytes]) -> None:
                 entry = zipfile.ZipInfo(name, EPOCH)
                 entry.create_system = 3
                 entry.external_attr = 0o100644 << 16
-                # A wheel is compressed already.
+                # Wheels are compressed already.
                 entry.compress_type = zipfile.ZIP_STORED if name.endswith(".whl") else zipfile.ZIP_DEFLATED
                 archive.writestr(entry, files[name])
         os.replace(unfinished, target)

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs tests of what tools/cross_build.py builds: linux-x64 here, linux-arm64 by qemu, windows-x64 by wine.
+"""Runs tests of what tools/cross_build.py builds: for linux-x64, linux-arm64 (qemu) and windows-x64 (wine).
 
-C++ tests; for the two that are emulated the Python tests, in a Python of that platform; for Windows some of
-the Blender tests, in Blender's own build of bpy. The Python that runs this has what tools/cross_build.py
-wants; wheels that it does not have are fetched from the registry.
+Runs the C++ tests; for the two emulated platforms also the Python tests, in a Python of that platform; for
+Windows also some of the Blender tests, in Blender's own build of bpy. The Python that runs this needs the
+same packages as for tools/cross_build.py; missing wheels are fetched from the registry.
 """
 
 from __future__ import annotations
@@ -27,19 +27,21 @@ PARTS = {
     "linux-arm64": ("native", "python"),
     "windows-x64": ("native", "python", "blender"),
 }
-# Words before a C++ program. The C library of arm64 is Debian's for who compiles for it (libc6-arm64-cross).
+# The prefix of a C++ program's command. The C library for arm64 is Debian's package for cross-compilation
+# (libc6-arm64-cross).
 NATIVE: dict[str, list[str | Path]] = {
     "linux-x64": [],
     "linux-arm64": ["qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"],
     "windows-x64": ["wine"],
 }
-# About the checkout, its documents and its tools, which are the same wherever they run: ./dev test has them.
+# Tests of the checkout, its documents and its tools, which do not depend on the platform: ./dev test runs
+# them.
 CHECKOUT_TESTS = (
     *("test_documented", "test_layering", "test_locks", "test_platforms", "test_release", "test_report_map"),
     *("test_sbom", "test_site", "test_wheel", "test_workflows"),
 )
-# Shapes as Blender's, Sinew added and removed, files saved and read, bakes, commands. Without batches, which
-# take long there: docs/install.md has what was tried.
+# Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands. Without
+# batches, which take long there: docs/install.md lists what was tried.
 BLENDER_TESTS = (
     *("test_against_armature_modifier", "test_changes", "test_restore", "test_saved_files"),
     *("test_bake", "test_command_line"),
@@ -54,11 +56,11 @@ LEFT_OUT: dict[str, dict[str, str]] = {
     },
 }
 BPY = "bpy==4.5.*"
-# As Blender 4.5 has it, whose compiled code wants this one.
+# The version that Blender 4.5 includes, which its compiled code requires.
 NUMPY = "numpy==1.26.*"
-# Complex logarithms of scipy's call what wine 8 lacks (ucrtbase.dll.carg), and end the process.
+# scipy's complex logarithms call a function that wine 8 lacks (ucrtbase.dll.carg), which ends the process.
 WITHOUT_LOGARITHMS = ("-k", "not log")
-# As long as it takes on a machine of two processors, some times over.
+# A multiple of the time that it takes on a machine with two processors.
 LIMITS = {"native": 900, "python": 2400, "blender": 2400}
 
 
@@ -66,13 +68,13 @@ def environment() -> dict[str, str]:
     kept = {
         name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))
     }
-    # Wine's own remarks off; a folder for what it keeps of Windows.
+    # Switches wine's own messages off, and sets a folder for its files.
     return kept | {"WINEPREFIX": str(BUILD / "wine"), "WINEDEBUG": "-all", "SINEW_RIGS": ""}
 
 
 def run(words: Sequence[str | Path], limit: int) -> int:
-    """Runs a program and prints what it prints. Returns its exit code; where there is no end in
-    time 124, as timeout(1). Wine's programs fail where standard output is a file, so they have a pipe."""
+    """Runs a program and prints its output. Returns its exit code, or 124, as timeout(1) does, if it does
+    not end in time. Programs under wine fail if standard output is a file, so they get a pipe."""
     process = subprocess.Popen(
         words,
         cwd=ROOT,
@@ -109,13 +111,13 @@ def output_of(*words: str | Path) -> Path:
 
 
 def requirements() -> list[str]:
-    """Those of the extension and of its tests, without Sinew and Blender."""
+    """The requirements of the extension and of its tests, without Sinew and Blender."""
     lines = (ROOT / "requirements/tests.in").read_text().splitlines()
     return [line for line in lines if line and not line.startswith("#")]
 
 
 class Emulated:
-    """The Python of a platform; tool makes it, prints its path and installs packages."""
+    """The Python of a platform. `tool` creates it, prints its path and installs packages."""
 
     def __init__(self, platform: Platform) -> None:
         self.platform = platform
@@ -183,7 +185,7 @@ def blender_tests(emulated: Emulated, options: Sequence[str]) -> int:
         emulated.install(BPY)
     if options:
         return emulated.pytest(LIMITS["blender"], *options)
-    # Each in a process of its own: what one leaves behind is not the others' fault.
+    # Each in its own process, so that one can not affect the others.
     worst = 0
     for name in BLENDER_TESTS:
         print(f"-- {name}", flush=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The platforms that Blender's extensions are for, and how zig and Python name them."""
+"""The platforms that Blender supports extensions for, and their names for zig and Python."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Platform:
     """
-    name        as Blender names it in a manifest's `platforms`
-    zig         zig's name of the target, with the oldest system that it is for
+    name        Blender's name in a manifest's `platforms`
+    zig         zig's name of the target, with the oldest supported system
     system      CMAKE_SYSTEM_NAME
     processor   CMAKE_SYSTEM_PROCESSOR
     wheel       the platform's tag in the name of a wheel
-    module      what follows "_native." in a module's name; {tag} is such as cp311, {digits} as 311
+    module      what follows "_native." in a module's name; {tag} stands for cp311 and the like, {digits} for
+                311
     """
 
     name: str
@@ -42,7 +43,7 @@ class Platform:
         return f"{tag}-{tag}-{self.wheel}"
 
 
-# The C library of Blender's own builds for Linux; its macOS is 11.2.
+# The version of the C library of Blender's own builds for Linux; its version of macOS is 11.2.
 LINUX = "linux-gnu.2.28"
 MACOS = "macos.11.0"
 

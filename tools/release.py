@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Prepares a release: sets its version, dates its changes, builds it, writes notes and checksums.
 
-Nothing public changes, and there is no commit and no tag: these are said at the end. What stands in the way
-is found before anything is written; where the build fails, the files get their old text back.
+Changes nothing public, and makes no commit and no tag; it prints the commands for these at the end.
+Obstacles are found before anything is written; if the build fails, the files get their old text back.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
-# What CMake, pip and Blender's manifest all take.
+# The form of version that CMake, pip and Blender's manifest all accept.
 VERSION = r"(?:0|[1-9][0-9]*)\.(?:0|[1-9][0-9]*)\.(?:0|[1-9][0-9]*)"
 CHANGELOG = "CHANGELOG.md"
 CITATION = "CITATION.cff"
@@ -30,7 +30,7 @@ UNRELEASED = "## [Unreleased]"
 
 
 class Place(NamedTuple):
-    """Where the version stands: the one group of the one match in the file."""
+    """The position of the version in a file: the one group of the pattern's one match."""
 
     file: str
     pattern: str
@@ -58,7 +58,7 @@ def read_texts(root: Path) -> dict[str, str]:
 
 
 def numbers(version: str) -> tuple[int, ...]:
-    """To compare versions by."""
+    """The version as numbers, for comparison."""
     if not re.fullmatch(VERSION, version):
         raise fail(f"{version} is not a version: three numbers with dots between, such as 1.4.0.")
     return tuple(map(int, version.split(".")))
@@ -75,7 +75,7 @@ def match_of(place: Place, text: str) -> re.Match[str]:
 
 
 def version_in(texts: Texts) -> str:
-    """The one version that all files name."""
+    """The version, which must be the same in all files."""
     named = {(place.file, match_of(place, texts[place.file])[1]) for place in PLACES}
     versions = {version for _file, version in named}
     if len(versions) != 1:
@@ -101,7 +101,7 @@ def with_version(texts: Texts, version: str, date: str) -> dict[str, str]:
 
 
 def section(changelog: str, heading: str) -> tuple[int, int]:
-    """Where the text below a heading begins and ends."""
+    """The positions at which the text below a heading begins and ends."""
     found = list(re.finditer(rf"^{re.escape(heading)}(?: - .*)?$", changelog, re.MULTILINE))
     if len(found) != 1:
         raise fail(f"{CHANGELOG} has {len(found)} headings {heading} instead of one.")
@@ -110,7 +110,7 @@ def section(changelog: str, heading: str) -> tuple[int, int]:
 
 
 def notes_of(changelog: str, heading: str) -> str:
-    """What a section says; nothing where it has no entry."""
+    """The text of a section; empty if it has no entry."""
     start, end = section(changelog, heading)
     text = changelog[start:end].strip()
     return f"{text}\n" if re.search(r"^- ", text, re.MULTILINE) else ""
@@ -121,16 +121,17 @@ def released_versions(changelog: str) -> list[str]:
 
 
 def with_release(changelog: str, version: str, date: str) -> str:
-    """The unreleased changes below a heading of this version, and the heading for the next ones above it."""
+    """Moves the unreleased changes below a heading of this version, and adds the heading for the next
+    ones above it."""
     start, _end = section(changelog, UNRELEASED)
     return f"{changelog[:start]}\n\n## [{version}] - {date}{changelog[start:]}"
 
 
-# --- What stands in the way
+# --- Obstacles
 
 
 def git(root: Path, *words: str) -> str | None:
-    """What git prints, or None where it fails."""
+    """git's output, or None if it fails."""
     try:
         done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=False)
     except FileNotFoundError:
@@ -168,7 +169,7 @@ def obstacles_in_checkout(root: Path, version: str) -> list[str]:
     return found
 
 
-# --- Doing it
+# --- The release
 
 
 def release_folder(root: Path, version: str) -> Path:
@@ -176,7 +177,7 @@ def release_folder(root: Path, version: str) -> Path:
 
 
 def write_texts(root: Path, texts: Texts) -> None:
-    """Each is whole beside its old one before any is replaced: a full disk changes none."""
+    """Writes all new files completely before it replaces any old one: a full disk changes none."""
     unfinished = {name: (root / name).with_name(f".{Path(name).name}.{os.getpid()}") for name in texts}
     try:
         for name, path in unfinished.items():
@@ -190,7 +191,7 @@ def write_texts(root: Path, texts: Texts) -> None:
 
 
 def build_packages(root: Path) -> list[Path]:
-    """The zips that ./dev package says it made."""
+    """Builds the zips, and returns the paths that ./dev package prints."""
     done = subprocess.run([root / "dev", "package"], cwd=root, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:
         raise fail("./dev package failed; the files have their old text again.")
@@ -215,7 +216,7 @@ def wheels_in(package: Path) -> dict[str, bytes]:
 
 
 def bill_beside(package: Path) -> Path:
-    """What tools/sbom.py wrote."""
+    """The bill of materials that tools/sbom.py wrote."""
     path = package.with_suffix(".cdx.json")
     if not path.exists():
         raise fail(f"./dev package made no {path.name}; the files have their old text again.")
@@ -223,7 +224,8 @@ def bill_beside(package: Path) -> Path:
 
 
 def write_release(folder: Path, packages: list[Path], notes: str) -> None:
-    """The zips, their bills of materials, the wheels in them, the notes; SHA256SUMS for sha256sum --check."""
+    """Writes the zips, their bills of materials, their wheels, the notes, and SHA256SUMS for sha256sum
+    --check."""
     unfinished = folder.with_name(f".{folder.name}.{os.getpid()}")
     shutil.rmtree(unfinished, ignore_errors=True)
     try:
@@ -247,7 +249,7 @@ def write_release(folder: Path, packages: list[Path], notes: str) -> None:
 def prepare(
     root: Path, version: str, date: str, build: Callable[[Path], list[Path]] = build_packages
 ) -> Path:
-    """The release's folder; or all as it was, and an error."""
+    """Makes the release's folder and returns it; after an error, everything is as before."""
     before = read_texts(root)
     obstacles = obstacles_in_checkout(root, version) + obstacles_in_texts(before, version)
     if obstacles:
@@ -268,7 +270,7 @@ def edited(texts: Texts, version: str, date: str) -> dict[str, str]:
 
 
 def next_version(named: str, step: str) -> str:
-    """named with one of its numbers raised, where step says which; else step itself."""
+    """`named` with one of its numbers incremented, if `step` names one; otherwise `step` itself."""
     major, minor, patch = numbers(named)
     raised = {
         "major": f"{major + 1}.0.0",

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the bill of materials of the extension's zips beside them: NAME.cdx.json, as CycloneDX 1.6.
+"""Writes the bill of materials of the extension's zips next to them: NAME.cdx.json, in CycloneDX 1.6.
 
-It says what a zip really holds: the extension, each wheel in it with its digest, and what of other projects
-is compiled into the wheel's module, with versions and licences. These stand in the module itself
-(native/bindings/compiled_in.cpp), so that a wheel that was built elsewhere says the truth as well. The same
-zip always gives the same bytes.
+It lists the actual content of a zip: the extension, each wheel in it with its digest, and the other projects
+compiled into the wheel's module, with versions and licences. The module itself contains this list
+(native/bindings/compiled_in.cpp), so it is right for wheels that were built elsewhere, too. The same zip
+always gives the same bytes.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ Component = dict[str, Any]
 
 @dataclass(frozen=True)
 class Project:
-    """One whose code is compiled in.
+    """A project whose code is compiled in.
 
     licence  an SPDX expression
-    purl     as package-url.org has it, without the version
-    source   where its code is
+    purl     in the form of package-url.org, without the version
+    source   the address of its code
     """
 
     licence: str
@@ -43,7 +43,7 @@ class Project:
     source: str
 
 
-# NOTICES.md has their licences in full.
+# NOTICES.md has the full licences.
 PROJECTS = {
     "GLM": Project("MIT", "pkg:github/g-truc/glm", "https://github.com/g-truc/glm"),
     "Highway": Project("Apache-2.0", "pkg:github/google/highway", "https://github.com/google/highway"),
@@ -63,7 +63,7 @@ def fail(message: str) -> SystemExit:
 
 
 def version_of(name: str, said: str) -> str:
-    """A version as people write it, of what a project's headers say."""
+    """The usual form of a version, from what a project's headers say."""
     if name == "LLVM" and re.fullmatch(r"\d{5,}", said):
         number = int(said)
         return f"{number // 10000}.{number // 100 % 100}.{number % 100}"
@@ -74,8 +74,8 @@ def version_of(name: str, said: str) -> str:
 
 
 def compiled_in(module: bytes) -> list[tuple[str, str]]:
-    """What a module says to have within: name and version of each project."""
-    # A universal module for macOS has a part for each processor, which say the same.
+    """The projects that a module says are compiled into it: name and version of each."""
+    # A universal module for macOS has a part for each processor, all with the same list.
     said = {match[1] for match in COMPILED_IN.finditer(module)}
     if len(said) != 1:
         raise fail(f"a module says {len(said)} times what is compiled into it; build it anew.")
@@ -156,7 +156,7 @@ def bill_of(package: Path) -> dict[str, Any]:
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
         "bomFormat": "CycloneDX",
         "specVersion": "1.6",
-        # Of the zip's bytes: the same zip has the same bill, another zip another.
+        # Derived from the zip's bytes: the same zip has the same number, another zip another one.
         "serialNumber": uuid.uuid5(uuid.NAMESPACE_URL, hashlib.sha256(data).hexdigest()).urn,
         "version": 1,
         "metadata": {"component": ours},

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Splits the extension's zip into one for each platform, and validates them, both by Blender's own program.
-Without a folder for these, zips are validated as they are.
+"""Splits the extension's zip into one for each platform, and validates them, with Blender's own program.
 
-The Python that runs this needs bpy, as .venv has it: Blender's program for extensions lies within.
+Without a folder for these, validates zips as they are.
+
+The Python that runs this needs bpy, as .venv has it, which contains Blender's program for extensions.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from package import write_zip
 
 
 def blenders_program() -> Path:
-    """What `blender --command extension` runs: a program of its own, without bpy."""
+    """The program that `blender --command extension` runs, which does not need bpy."""
     spec = importlib.util.find_spec("bpy")
     found = [
         path
@@ -53,14 +54,15 @@ def files_in(package: Path) -> dict[str, bytes]:
 
 
 def split(package: Path, out: Path) -> list[Path]:
-    """The zips made in out: the platforms that the package's manifest names, each with its own wheels."""
+    """Makes a zip in `out` for each platform in the package's manifest, with its wheels, and returns
+    their paths."""
     with tempfile.TemporaryDirectory() as place:
         sources, made = Path(place, "sources"), Path(place, "made")
         made.mkdir()
         with zipfile.ZipFile(package) as archive:
             archive.extractall(sources)
         run("build", "--split-platforms", "--output-dir", made, "--source-dir", sources)
-        # Blender dates what it wrote itself; the same files are to give the same bytes.
+        # Blender dates the files that it writes itself; the same files must give the same bytes.
         split_files = {path: files_in(path) for path in sorted(made.glob("*.zip"))}
         for path, files in split_files.items():
             write_zip(path, files)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes a Python for Windows, to be run by wine, of what the Python registry has: for tests on other systems.
+"""Makes a Python for Windows, to be run by wine, from what the Python registry has, for tests.
 
-python3xx.dll and the compiled part of the standard library come from a wheel of panda3d, which takes them
-along for the programs that it packs; the rest of the standard library is the same on all systems, and so a
-copy of this Python's; python.exe is a program of one line, and python3.dll, which modules for any Python
-such as psutil's are linked with, says where its names are. Packages are installed beside it, as wheels for
-Windows. Prints python.exe.
+python3xx.dll and the compiled part of the standard library come from a wheel of panda3d, which includes them
+for the programs that it packs. The rest of the standard library is the same on all systems, and is copied
+from this Python. python.exe is a program of one line. python3.dll, with which modules for any Python are
+linked, such as psutil's, forwards its names. Packages are installed next to it, as wheels for Windows.
+Prints the path of python.exe.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PROGRAM = """\
 __declspec(dllimport) int Py_Main(int count, wchar_t** words);
 int wmain(int count, wchar_t** words) { return Py_Main(count, words); }
 """
-# Of the standard library: what only Python's own tests and windows need, and other systems' modules.
+# Parts of the standard library that are left out: for Python's own tests, for windows, and for other systems.
 LEFT_OUT = (
     "test",
     "idlelib",
@@ -54,7 +54,8 @@ def for_windows(version: str) -> list[str]:
 
 
 def unpack_compiled(version: str, folder: Path) -> None:
-    """python3xx.dll into the folder, extension modules and what they load into its DLLs."""
+    """Unpacks python3xx.dll into the folder, and extension modules with the libraries that they load into
+    its DLLs."""
     with tempfile.TemporaryDirectory() as place:
         pip("download", "--no-deps", *for_windows(version), "--dest", place, SOURCE)
         (wheel,) = Path(place).glob("*.whl")
@@ -79,7 +80,7 @@ def compile_program(folder: Path) -> None:
 
 
 def link_forwarder(folder: Path) -> None:
-    """python3.dll: each name of the stable ABI, and those beside it, is one of python3xx.dll."""
+    """Makes python3.dll: forwards the names of the stable ABI, and those beside it, to python3xx.dll."""
     platform, python = PLATFORMS["windows-x64"], python_of(Path(sys.executable))
     dll = f"python{python.version.replace('.', '')}"
     definition, empty = folder / "python3.def", folder / "empty.c"

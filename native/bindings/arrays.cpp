@@ -29,14 +29,14 @@ bool is_finite(const float* values, py::ssize_t count) {
     return true;
 }
 
-/// str(value), whatever is in it.
+/// str(value), for any content.
 std::string text_of(const py::handle& value) {
     const py::str text(value);
     return py::reinterpret_steal<py::bytes>(
         PyUnicode_AsEncodedString(text.ptr(), "utf-8", "backslashreplace"));
 }
 
-/// `wide` as T, whose name is `type`. ValueError for a finite number that T can not hold.
+/// `wide` as T, whose name is `type`. ValueError for a finite number that T can not represent.
 template <class T, class Wide>
 py::array_t<T> narrowed(const py::array_t<Wide>& wide, const char* argument, const char* type) {
     py::array_t<T> narrow(std::vector<py::ssize_t>(wide.shape(), wide.shape() + wide.ndim()));
@@ -75,7 +75,7 @@ py::array as_array(const py::handle& value, const char* argument) {
     try {
         return py::array(py::module_::import("numpy").attr("asarray")(value));
     } catch (py::error_already_set& error) {
-        // Whatever numpy or the value says, it is no array; but not what ends a program.
+        // Whatever error numpy or the value raises, it is no array; except for errors that end a program.
         if (error.matches(PyExc_MemoryError) || !error.matches(PyExc_Exception)) throw;
         return py::reinterpret_steal<py::array>(py::handle());
     }
@@ -102,7 +102,7 @@ py::array_t<float> as_type(const py::array& array, const char* argument, const s
 template <>
 py::array_t<std::int32_t> as_type(const py::array& array, const char* argument, const std::string& wanted) {
     const char kind = array.dtype().kind();
-    // What numpy makes of an empty list has fractions by name alone.
+    // The array that numpy makes of an empty list has a floating-point type, but no fractions.
     const bool is_empty = array.size() == 0 && is_numeric(array);
     if (kind != 'b' && kind != 'i' && kind != 'u' && !is_empty) fail(argument, wanted, describe(array));
     if (kind == 'u') return narrowed<std::int32_t>(in_order<std::uint64_t>(array), argument, "int32");
@@ -182,7 +182,7 @@ py::array_t<float> array_of(std::span<const Vec3<float>> points) {
     return array;
 }
 
-// An array to write into: never a silent copy, or the caller's array would keep its old points.
+// Never makes a copy silently: the caller's array would then keep its old points.
 py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) {
     const auto rows = static_cast<py::ssize_t>(vertex_count);
     if (out.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
@@ -202,7 +202,7 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
 std::size_t checked_threads(const py::object& threads) {
     if (threads.is_none()) return 0;
     const char* const wanted = "None or an integer, 0 or more";
-    // Those of numpy, too.
+    // Accepts numpy's integers, too.
     const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(threads.ptr()));
     if (!number) {
         PyErr_Clear();
@@ -210,14 +210,14 @@ std::size_t checked_threads(const py::object& threads) {
     }
     int overflow = 0;
     const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
-    // As text the longest are refused by Python.
+    // Python refuses to convert the longest integers to text.
     if (overflow < 0) fail("threads", wanted, "a negative one");
     if (overflow == 0 && count < 0) fail("threads", wanted, std::to_string(count));
     if (overflow == 0 && count == 0) return hardware_threads();
     return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
-/// The item `index` of a state of `size` items.
+/// The item `index` of a pickled state, which must have `size` items.
 py::object part_of(const py::object& state, std::size_t size, std::size_t index) {
     const std::string wanted = "a tuple of " + std::to_string(size) + ", as pickling makes it";
     if (!py::isinstance<py::tuple>(state)) fail("state", wanted, describe(state));

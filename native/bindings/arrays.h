@@ -21,24 +21,24 @@ inline constexpr std::size_t kAnyLength = std::numeric_limits<std::size_t>::max(
 /// Raises ValueError "`argument`: expected `wanted`, got `got`".
 [[noreturn]] void fail(const char* argument, const std::string& wanted, const std::string& got);
 
-/// "float64 [120, 4]" for an array, "list of float64 [120, 4]" for what numpy makes an array of numbers of, the type's
-/// name for anything else.
+/// Describes `value` for an error: "float64 [120, 4]" for an array, "list of float64 [120, 4]" for something that
+/// numpy converts to an array of numbers, otherwise the type's name.
 std::string describe(const py::handle& value);
 
-/// `value` itself where it is an array, else what numpy makes of it; null where it makes nothing of it. ValueError for
-/// a masked array with masked values: these would be taken for numbers.
+/// `value` itself if it is an array, else numpy's conversion of it; null if numpy can not convert it. ValueError
+/// for a masked array with masked values, since these would be read as numbers.
 py::array as_array(const py::handle& value, const char* argument);
 
-/// The text of a `str`. TypeError for anything else, naming `wanted`.
+/// The text of a `str`. TypeError, naming `wanted`, for anything else.
 std::string checked_name(const py::handle& value, const char* argument, const std::string& wanted);
 
-/// The array `value` of element type T, C-contiguous and aligned; copied only where it is not.
+/// `value` as a C-contiguous, aligned array of element type T. Copies only if it is not one already.
 template <class T>
 py::array_t<T> in_order(const py::handle& value) {
     constexpr int kFlags =
         py::array::c_style | py::array::forcecast | py::detail::npy_api::NPY_ARRAY_ALIGNED_;
     auto array = py::array_t<T, kFlags>::ensure(value);
-    // Too large to copy.
+    // The copy would be too large.
     if (!array) throw std::bad_alloc();
     return py::reinterpret_steal<py::array_t<T>>(array.release());
 }
@@ -51,39 +51,39 @@ bool has_type(const py::array& array) {
 /// Whether the elements are real numbers of at most 64 bits.
 bool is_numeric(const py::array& array);
 
-/// The numbers of `array` as T (float, double or std::int32_t), C-contiguous and aligned: the array itself where it is
-/// so already. Fractions are rounded to T. ValueError for what T can not hold: fractions as integers, numbers beyond
-/// its range.
+/// The numbers of `array` as T (float, double or std::int32_t), C-contiguous and aligned; the array itself if it
+/// is so already. Fractions are rounded to T. ValueError for numbers that T can not represent: fractions as
+/// integers, and numbers beyond its range.
 template <class T>
 py::array_t<T> as_type(const py::array& array, const char* argument, const std::string& wanted);
 
-/// `value` as a C-contiguous array of T with `dimensions` dimensions: an array or anything that numpy makes one of,
-/// copied only where its layout or its element type is another. ValueError, naming `wanted`, for what is no array of
-/// numbers that T holds, or has more than `most` of its first dimension.
+/// `value`, an array or anything that numpy converts to one, as a C-contiguous array of T with `dimensions`
+/// dimensions. Copies only if its layout or element type differs. ValueError, naming `wanted`, if it is no array
+/// of numbers that T can represent, or if its first dimension is larger than `most`.
 template <class T>
 py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_t dimensions,
                        const std::string& wanted, std::size_t most = kAnyLength) {
     const py::array array = as_array(value, argument);
     if (!array || !is_numeric(array) || array.ndim() != dimensions) fail(argument, wanted, describe(value));
-    // Before a copy is made.
+    // Checked before a copy is made.
     if (static_cast<std::size_t>(array.shape(0)) > most) {
         fail(argument, wanted + ", at most " + std::to_string(most), describe(value));
     }
     return has_type<T>(array) ? in_order<T>(array) : as_type<T>(array, argument, wanted);
 }
 
-/// [n, 3], n at most kMaxVertices.
+/// An array [n, 3], n at most kMaxVertices.
 py::array_t<float> checked_points(const py::handle& value, const char* argument);
 
-/// [n, 4, 4] or [n, 3, 4], row-major, finite; a fourth row is not read.
+/// An array [n, 4, 4] or [n, 3, 4], row-major, finite. A fourth row is not read.
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument);
 
-/// [4, 4] or [3, 4].
+/// An array [4, 4] or [3, 4].
 Affine<float> checked_affine(const py::handle& value, const char* argument);
 
 static_assert(sizeof(Vec3<float>) == 3 * sizeof(float), "points are read and written in place");
 
-/// Of an array [n, 3].
+/// The points in an array [n, 3].
 inline std::span<const Vec3<float>> as_points(const py::array_t<float>& points) {
     return {reinterpret_cast<const Vec3<float>*>(points.data()), static_cast<std::size_t>(points.shape(0))};
 }
@@ -98,16 +98,16 @@ py::array_t<T> array_of(std::span<const T> values) {
     return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// [n, 3]
+/// The points as an array [n, 3].
 py::array_t<float> array_of(std::span<const Vec3<float>> points);
 
-/// An array of points to write into, made where `out` is None.
+/// An array of points to write to; a new one if `out` is None.
 py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count);
 
-/// 0 where `threads` is None: as many as help.
+/// 0, which stands for as many as useful, if `threads` is None.
 std::size_t checked_threads(const py::object& threads);
 
-/// The item `index` of a pickle's state of `size` items.
+/// The item `index` of a pickled state, which must have `size` items.
 py::object part_of(const py::object& state, std::size_t size, std::size_t index);
 
 }  // namespace sinew::bindings

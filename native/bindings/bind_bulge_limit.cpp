@@ -13,7 +13,7 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 16'384;  // some 30 microseconds
+constexpr std::size_t kVerticesUnderLock = 16'384;  // about 30 microseconds
 
 const Parameter& parameter_of(std::string_view id) {
     for (const Parameter& parameter : BulgeLimitStage::kParameters) {
@@ -74,7 +74,7 @@ BulgeLimit make_from_weights(const py::object& rest_points, const py::object& in
 void set_rest_points(BulgeLimit& limit, const py::object& rest_points, const py::object& bones_from_model) {
     const auto points = checked_points(rest_points, "rest_points");
     const Affine<float> space = checked_space(bones_from_model);
-    // It may have to wait for another thread that applies it.
+    // May have to wait for another thread that applies it.
     without_gil([&] { limit.set_rest_points(as_points(points), space); });
 }
 
@@ -107,7 +107,7 @@ py::array_t<float> apply(const BulgeLimit& limit, const py::object& points, cons
     return result;
 }
 
-// --- Pickles: what was given, as the constructor takes it, with weights normalised.
+// --- Pickles: the constructor's arguments, with normalised weights.
 
 py::tuple state_of(const BulgeLimit& limit) {
     const BulgeLimit::Parts parts = limit.parts();
@@ -143,57 +143,60 @@ BulgeLimit of_state(const py::object& state) {
 }  // namespace
 
 void bind_bulge_limit(py::module_& m) {
-    py::class_<BulgeLimit>(
-        m, "BulgeLimit",
-        "The stage `bulge_limit` of one mesh: takes deformed points back towards their bones where blending "
-        "took "
-        "them\n"
-        "farther away than they are at rest (Kim, Han 2014, and a continuous form). Can be pickled.")
-        .def(py::init(&make_from_weights), py::arg("rest_points"), py::arg("influence_offsets"),
-             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("heads"), py::arg("tails"),
-             py::kw_only(), py::arg("bones_from_model") = py::none(), py::arg("weights") = py::none(),
-             "rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.\n"
-             "heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone "
-             "transforms.\n"
-             "bones_from_model: float32 [4, 4] or [3, 4], takes model space to that space. None: the same.\n"
-             "weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.\n\n"
-             "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
-        .def_property_readonly("vertex_count", &BulgeLimit::vertex_count, "Vertices of the mesh.")
+    py::class_<BulgeLimit>(m, "BulgeLimit",
+                           "The stage `bulge_limit` for one mesh: moves deformed points back towards their "
+                           "bones where blending\n"
+                           "took them farther away than they are at rest (Kim, Han 2014, and a continuous "
+                           "form). Can be pickled.")
+        .def(
+            py::init(&make_from_weights), py::arg("rest_points"), py::arg("influence_offsets"),
+            py::arg("influence_bones"), py::arg("influence_weights"), py::arg("heads"), py::arg("tails"),
+            py::kw_only(), py::arg("bones_from_model") = py::none(), py::arg("weights") = py::none(),
+            "rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.\n"
+            "heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone\n"
+            "transforms.\n"
+            "bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same "
+            "space.\n"
+            "weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.\n\n"
+            "All input is copied. Raises ValueError that names the argument, what was expected and what was\n"
+            "given.")
+        .def_property_readonly("vertex_count", &BulgeLimit::vertex_count, "Number of vertices.")
         .def_property_readonly("bone_count", &BulgeLimit::bone_count,
-                               "One more than the highest bone that an influence names.")
+                               "One more than the highest bone index in the influences.")
         .def("__repr__",
              [](const BulgeLimit& limit) {
                  return "<sinew.BulgeLimit: " + std::to_string(limit.vertex_count()) + " vertices, " +
                         std::to_string(limit.bone_count()) + " bones>";
              })
         .def(py::pickle(&state_of, &of_state))
+        .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
+             py::arg("bones_from_model") = py::none(),
+             "Sets other rest points, float32 [vertices, 3], or another space of the bones: measures\n"
+             "distances at rest again, which takes about as long as apply().")
         .def(
-            "set_rest_points", &set_rest_points, py::arg("rest_points"),
-            py::arg("bones_from_model") = py::none(),
-            "Other rest points, float32 [vertices, 3], or another space of the bones: distances at rest are\n"
-            "measured again, in about the time of apply().")
-        .def("apply", &apply, py::arg("points"), py::arg("bone_transforms"), py::arg("out") = py::none(),
-             py::kw_only(), py::arg("strength") = 1.0, py::arg("form") = "continuous",
-             py::arg("threads") = py::none(),
-             "The limited points, float32 [vertices, 3], model space.\n\n"
-             "points: float32 [vertices, 3], deformed, model space.\n"
-             "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as of "
-             "Deformer.deform().\n"
-             "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never "
-             "converted.\n"
-             "    May be `points`.\n"
-             "strength: how much of the bulge is taken away, 0 to 1.\n"
-             "form: \"continuous\": distances to all bones of a vertex, by weight; \"kim_han\": to the "
-             "heaviest "
-             "alone,\n"
-             "    which tears the surface where that changes.\n"
-             "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The "
-             "result\n    is the same bit for bit.\n\n"
-             "A vertex of fewer than two bones stays, as do all in the rest pose, to the bit. A bone that is "
-             "scaled\n"
-             "allows as much more as it stretches what is perpendicular to it, at most. The GIL is released "
-             "for\n"
-             "large meshes. Raises ValueError that names the argument, what was wanted and what came.");
+            "apply", &apply, py::arg("points"), py::arg("bone_transforms"), py::arg("out") = py::none(),
+            py::kw_only(), py::arg("strength") = 1.0, py::arg("form") = "continuous",
+            py::arg("threads") = py::none(),
+            "The limited points, float32 [vertices, 3], model space.\n\n"
+            "points: float32 [vertices, 3], deformed, model space.\n"
+            "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for "
+            "Deformer.deform().\n"
+            "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
+            "converted.\n"
+            "    May be `points`.\n"
+            "strength: how much of the bulge is removed, 0 to 1.\n"
+            "form: \"continuous\": distances to all bones of a vertex, weighted; \"kim_han\": only to the "
+            "heaviest,\n"
+            "    which tears the surface where that changes.\n"
+            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
+            "    result is the same bit for bit.\n\n"
+            "Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit "
+            "for\n"
+            "bit. A scaled bone allows a distance larger by the largest factor by which it stretches "
+            "vectors\n"
+            "perpendicular to it. Releases the GIL for large meshes. Raises ValueError that names the "
+            "argument,\n"
+            "what was expected and what was given.");
 }
 
 }  // namespace sinew::bindings

@@ -17,7 +17,7 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 32'768;  // some 30 microseconds
+constexpr std::size_t kVerticesUnderLock = 32'768;  // about 30 microseconds
 
 std::string names_of_methods() {
     std::string names;
@@ -39,7 +39,7 @@ MethodInfo checked_method(const py::object& method, const char* argument) {
 
 namespace {
 
-/// The arrays that BindData points at.
+/// The arrays that BindData refers to.
 struct BindArrays {
     py::array_t<float> points;
     py::array_t<std::int32_t> offsets;
@@ -55,7 +55,7 @@ struct BindArrays {
     }
 };
 
-/// From a dict of arrays by the names of methods.
+/// Adds the arrays of a dict with names of methods as keys.
 void add_vertex_data(const py::object& vertex_data, BindArrays& arrays) {
     if (!py::isinstance<py::dict>(vertex_data)) {
         fail("vertex_data", "None or a dict of arrays by names of methods", describe(vertex_data));
@@ -132,7 +132,7 @@ Deformer make_deformer_of(const Binding& binding, const py::object& method, cons
     return Deformer(binding, first, second.data());
 }
 
-// --- Pickles: what a Binding keeps, as arrays; of a Deformer, then its method and mix.
+// --- Pickles: the data that a Binding keeps, as arrays; for a Deformer also its method and mix.
 
 py::tuple state_of(const BoundMesh& mesh) {
     py::object rest_bones = py::none();
@@ -201,8 +201,8 @@ std::string text_of_deformer(const Deformer& deformer) {
     return text + ": " + counts_of(deformer);
 }
 
-// Read in place, as posed bones come by columns from Blender on every frame. Multiplied in double, as a bone
-// far from the origin would lose digits.
+// Read in place, because posed bones come from Blender by columns in every frame. Multiplied in double, because a
+// bone far from the origin would lose digits.
 std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
                                            const py::object& rest_inverses) {
     const char* const wanted = "float32 [n, 4, 4] or [n, 3, 4]";
@@ -243,14 +243,14 @@ std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
     return bones;
 }
 
-/// Values of the parameters of `method` in its order.
+/// The default values of the parameters of `method`, in its order.
 std::vector<double> default_parameters(const MethodInfo& method) {
     std::vector<double> values;
     for (const Parameter& parameter : method.parameters) values.push_back(parameter.initial);
     return values;
 }
 
-/// A parameter of some method, and its index.
+/// A parameter of some method, as an index.
 struct MethodParameter {
     MethodInfo method;
     std::size_t index;
@@ -269,7 +269,8 @@ MethodParameter checked_parameter_name(const py::handle& name) {
     fail("parameters", wanted, "'" + text + "'");
 }
 
-/// From a dict of values by the full names of parameters. Those of other methods are checked, and change nothing.
+/// The values of a dict with full names of parameters as keys. Those of other methods are checked, but have no
+/// effect.
 Parameters checked_parameters(const Deformer& deformer, const py::object& parameters) {
     if (parameters.is_none()) return {};
     if (!py::isinstance<py::dict>(parameters)) {
@@ -326,14 +327,14 @@ py::array_t<float> deform(const Deformer& deformer, const py::object& bone_trans
     const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
                                         deformer.vertex_count());
     const auto run = [&] { deformer.deform(arguments.bones, arguments.options, target); };
-    // Where many threads want the lock, getting it back takes longer than to deform a small mesh.
+    // With many threads waiting for the GIL, acquiring it again takes longer than deforming a small mesh.
     deformer.vertex_count() > kVerticesUnderLock ? without_gil(run) : run();
     return points;
 }
 
 void set_rest_points(Deformer& deformer, const py::object& rest_points) {
     const auto points = checked_points(rest_points, "rest_points");
-    // It may have to wait for another thread's deformation.
+    // May have to wait for another thread's deformation.
     without_gil([&] { deformer.set_rest_points(as_points(points)); });
 }
 
@@ -341,7 +342,7 @@ void set_rest_points(Deformer& deformer, const py::object& rest_points) {
 
 void bind_deformer(py::module_& m) {
     py::class_<Binding>(m, "Binding",
-                        "A mesh bound to bones: immutable, and shared by the deformers made of it.")
+                        "A mesh bound to bones. Immutable; the deformers made from it share its memory.")
         .def(
             py::init(&make_binding), py::arg("rest_points"), py::arg("influence_offsets"),
             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("rest_bones") = py::none(),
@@ -349,46 +350,45 @@ void bind_deformer(py::module_& m) {
             "rest_points: float32 [vertices, 3], model space.\n"
             "influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.\n"
             "influence_bones: int32 [influences].\n"
-            "influence_weights: float32 [influences], >= 0, any sum (normalised inside).\n"
-            "    At most 2^31 - 1 vertices and influences, 65,536 influences a vertex, 1,048,576 bones.\n"
-            "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the "
-            "space\n"
-            "    of the bone transforms; read where a bone is scaled and the method is rigid, and by sbs. "
-            "None: "
-            "identity.\n"
-            "vertex_data: a dict of what methods keep of each vertex, float32 [vertices, "
-            "Method.vertex_floats] by\n"
-            "    the method's name: {\"cor\": sinew.centres_of_rotation(...)}. A method whose data is not "
-            "here\n"
-            "    does without: each vertex is its own centre under cor, which is linear blending.\n\n"
-            "Anything that numpy makes such arrays of is taken where nothing but digits of a fraction is "
-            "lost: "
-            "lists, float64,\nint64 whose numbers fit. All input is copied. Raises ValueError that names the "
-            "argument, what was wanted and\nwhat came. Can be pickled: what was bound, with weights "
-            "normalised.")
-        .def_property_readonly("vertex_count", &Binding::vertex_count, "Vertices of the mesh.")
+            "influence_weights: float32 [influences], >= 0, any sum (they are normalised).\n"
+            "    At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,576 bones.\n"
+            "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space "
+            "of\n"
+            "    the bone transforms. Read by sbs, and by other rigid methods where a bone is scaled. None:\n"
+            "    identity.\n"
+            "vertex_data: a dict of the vertex data of methods, float32 [vertices, Method.vertex_floats] by "
+            "the\n"
+            "    method's name: {\"cor\": sinew.centres_of_rotation(...)}. A method without its data falls "
+            "back:\n"
+            "    under cor each vertex is its own centre, which is linear blending.\n\n"
+            "Arrays may be anything that numpy converts to them without losing more than digits of "
+            "fractions:\n"
+            "lists, float64, int64 whose numbers fit. All input is copied. Raises ValueError that names the\n"
+            "argument, what was expected and what was given. Can be pickled: the bound mesh, with "
+            "normalised\n"
+            "weights.")
+        .def_property_readonly("vertex_count", &Binding::vertex_count, "Number of vertices.")
         .def_property_readonly("influence_count", &Binding::influence_count, "Influences of positive weight.")
         .def_property_readonly("bone_count", &Binding::bone_count,
-                               "One more than the highest bone that an influence names.")
+                               "One more than the highest bone index in the influences.")
         .def("__repr__", [](const Binding& binding) { return "<sinew.Binding: " + counts_of(binding); })
         .def(
             py::pickle([](const Binding& binding) { return state_of(binding.unpack()); }, &binding_of_state));
 
     py::class_<Deformer>(m, "Deformer",
-                         "A binding and a method, ready to deform at any pose.\n\n"
-                         "Can be pickled, with the rest points that it has then and a binding of its own.")
+                         "A binding and a method, ready to deform any pose.\n\n"
+                         "Can be pickled, with its current rest points and its own binding.")
         .def(py::init(&make_deformer_of), py::arg("binding"), py::arg("method") = "lbs",
              py::arg("mix") = py::none(),
              "binding: a Binding; not copied.\n"
              "method: the name of one of sinew.methods().\n"
-             "mix: None, or (name of another method, weights): weights float32 [vertices] say how much of "
+             "mix: None, or (name of another method, weights): weights float32 [vertices] are the share of "
              "the\n"
-             "    other method each vertex takes, from 0 (none) to 1 (all of it); clamped. As the stage "
-             "`mix`.")
+             "    other method at each vertex, from 0 (none) to 1 (all); clamped. This is the stage `mix`.")
         .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
              py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
              py::arg("rest_bones") = py::none(), py::arg("vertex_data") = py::none(),
-             "With a binding of its own, of the arguments that Binding has.")
+             "Constructs its own binding, from the arguments of Binding.")
         .def_property_readonly(
             "method", [](const Deformer& deformer) { return std::string(deformer.method().name); },
             "The name of the method.")
@@ -400,17 +400,18 @@ void bind_deformer(py::module_& m) {
                 return std::string(method->name);
             },
             "The name of the method that `mix` adds, or None.")
-        .def_property_readonly("vertex_count", &Deformer::vertex_count, "Vertices of the mesh.")
+        .def_property_readonly("vertex_count", &Deformer::vertex_count, "Number of vertices.")
         .def_property_readonly("influence_count", &Deformer::influence_count,
                                "Influences of positive weight.")
         .def_property_readonly("bone_count", &Deformer::bone_count,
-                               "One more than the highest bone that an influence names.")
+                               "One more than the highest bone index in the influences.")
         .def("__repr__", &text_of_deformer)
         .def(py::pickle([](const Deformer& deformer) { return state_of(deformer); }, &deformer_of_state))
         .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
-             "New rest points for this deformer alone, float32 [vertices, 3], as when shape keys change. "
-             "Other\n"
-             "threads may deform meanwhile: each of their results has the old points or the new ones.")
+             "Sets the rest points of this deformer alone, float32 [vertices, 3], such as when shape keys\n"
+             "change. Other threads may deform meanwhile: each of their results has either the old points or "
+             "the\n"
+             "new ones.")
         .def(
             "deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
             py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
@@ -418,21 +419,21 @@ void bind_deformer(py::module_& m) {
             "The deformed points, float32 [vertices, 3], model space.\n\n"
             "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
             "read.\n"
-            "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never "
+            "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
             "converted.\n"
-            "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help.\n"
-            "    The result is the same bit for bit.\n"
-            "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"
-            "    transforms, where the blending happens; the result is taken back. None: the same space.\n"
-            "rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the "
-            "posed\n    bones, and each is multiplied by the inverse of its rest, in double.\n"
-            "parameters: a dict of values of parameters of methods by their full names, METHOD.PARAMETER, as "
-            "the\n"
-            "    Parameter says; one that is not here has its default. Those of methods that the deformer "
-            "does not\n    use change nothing.\n\n"
-            "A vertex without influences stays. The GIL is released for large meshes. Raises ValueError "
+            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
+            "    result is the same bit for bit.\n"
+            "bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone "
+            "transforms,\n"
+            "    in which the bones are blended; the result is mapped back. None: the same space.\n"
+            "rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. If given, bone_transforms are the posed\n"
+            "    bones, and each is multiplied by the inverse of its rest transform, in double.\n"
+            "parameters: a dict of values of methods' parameters by their full names, METHOD.PARAMETER, as\n"
+            "    described by Parameter; missing ones have their defaults. Parameters of methods that the\n"
+            "    deformer does not use have no effect.\n\n"
+            "A vertex without influences is not moved. Releases the GIL for large meshes. Raises ValueError "
             "that\n"
-            "names the argument, what was wanted and what came.");
+            "names the argument, what was expected and what was given.");
 }
 
 }  // namespace sinew::bindings

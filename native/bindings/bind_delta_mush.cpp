@@ -14,16 +14,16 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 1024;  // some 30 microseconds
+constexpr std::size_t kVerticesUnderLock = 1024;  // about 30 microseconds
 
-/// Settings, and the array that their weights point at.
+/// Settings, and the array that their weights refer to.
 struct SettingArguments {
     DeltaMushSettings settings;
     py::array_t<float> weights;
 };
 
 float checked_float(const py::object& value, const char* argument) {
-    // Those of numpy, too; of an array with one number numpy would make one with a warning.
+    // Accepts numpy's numbers, too, but not arrays of one number, which numpy would convert with a warning.
     if (py::isinstance<py::array>(value)) fail(argument, "a number", describe(value));
     const double number = PyFloat_AsDouble(value.ptr());
     if (PyErr_Occurred() != nullptr) {
@@ -100,7 +100,7 @@ void bind(DeltaMush& mush, const py::object& rest_points, const py::object& iter
     const auto points = checked_points(rest_points, "rest_points");
     const SettingArguments with =
         checked_settings(iterations, radius, factor, smooth_type, pin_boundary, weights);
-    // It may have to wait for another thread that applies it.
+    // May have to wait for another thread that applies it.
     without_gil([&] { mush.bind(as_points(points), with.settings); });
 }
 
@@ -123,7 +123,7 @@ py::array_t<float> apply(const DeltaMush& mush, const py::object& points, const 
     return result;
 }
 
-// --- Pickles: what was given, as the constructor takes it.
+// --- Pickles: the constructor's arguments.
 
 py::tuple state_of(const DeltaMush& mush) {
     const auto [topology, rest_points, settings] = mush.parts();
@@ -154,33 +154,35 @@ void bind_delta_mush(py::module_& m) {
     const char* const type = DeltaMushStage::kSmoothTypes[0].data();
     py::class_<DeltaMush>(
         m, "DeltaMush",
-        "The stage `delta_mush` of one mesh: smooths deformed points and gives them the details of the rest\n"
-        "points back (Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.")
-        .def(py::init(&make), py::arg("rest_points"), py::arg("face_offsets"), py::arg("corner_vertices"),
-             py::arg("edges"), py::kw_only(), py::arg("iterations") = initial.iterations,
-             py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
-             py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
-             py::arg("weights") = py::none(),
-             "rest_points: float32 [vertices, 3], without shape keys.\n"
-             "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
-             "corner_vertices: int32 [corners], the vertex of each corner.\n"
-             "edges: int32 [edges, 2], the vertices of every edge of a face and of those without one.\n"
-             "    At most 2^29 - 1 vertices.\n"
-             "iterations: how often the mesh is smoothed, 0 to 1,000; not used with a radius.\n"
-             "radius: how far the smoothing reaches, in units of the points, as the width of a Gaussian, "
-             "however\n"
-             "    dense the mesh is; 0 for so many iterations. The shortest tenth of edges, and all where it "
-             "would\n"
-             "    take more than 1,000 iterations, are smoothed less far.\n"
-             "factor: how far one iteration moves a vertex, 0 to 1.\n"
-             "smooth_type: \"simple\", or \"length_weighted\": neighbours count by the length of their "
-             "edges.\n"
-             "pin_boundary: the ends of edges with one face are not smoothed.\n"
-             "weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.\n\n"
-             "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
-        .def_property_readonly("vertex_count", &DeltaMush::vertex_count, "Vertices of the mesh.")
+        "The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest "
+        "points\n"
+        "back (Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.")
+        .def(
+            py::init(&make), py::arg("rest_points"), py::arg("face_offsets"), py::arg("corner_vertices"),
+            py::arg("edges"), py::kw_only(), py::arg("iterations") = initial.iterations,
+            py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
+            py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
+            py::arg("weights") = py::none(),
+            "rest_points: float32 [vertices, 3], without shape keys.\n"
+            "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
+            "corner_vertices: int32 [corners], the vertex of each corner.\n"
+            "edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces.\n"
+            "    At most 2^29 - 1 vertices.\n"
+            "iterations: number of smoothing iterations, 0 to 1,000; not used with a radius.\n"
+            "radius: how far the smoothing reaches, in units of the points, as the width of a Gaussian,\n"
+            "    independently of the density of the mesh; 0: use `iterations`. The shortest tenth of edges "
+            "is\n"
+            "    smoothed less far, and so are all where this would take more than 1,000 iterations.\n"
+            "factor: how far one iteration moves a vertex, 0 to 1.\n"
+            "smooth_type: \"simple\", or \"length_weighted\": neighbours are weighted by the length of their "
+            "edges.\n"
+            "pin_boundary: whether vertices on edges with a single face are left as they are.\n"
+            "weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.\n\n"
+            "All input is copied. Raises ValueError that names the argument, what was expected and what was\n"
+            "given.")
+        .def_property_readonly("vertex_count", &DeltaMush::vertex_count, "Number of vertices.")
         .def_property_readonly("iterations", &DeltaMush::iterations,
-                               "How often it smooths, also with a radius.")
+                               "Number of smoothing iterations, also if a radius determines it.")
         .def("__repr__", &text_of)
         .def(py::pickle(&state_of, &of_state))
         .def(
@@ -188,22 +190,24 @@ void bind_delta_mush(py::module_& m) {
             py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
             py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
             py::arg("weights") = py::none(),
-            "Other rest points and settings, of the same faces and edges; it takes about as long as to apply "
-            "it.\n\n"
-            "Arguments are those of the constructor. Raises ValueError as that does, and is then as it was.")
-        .def("apply", &apply, py::arg("points"), py::arg("out") = py::none(), py::arg("scale") = 1.0f,
-             py::arg("threads") = py::none(),
-             "The smoothed points, float32 [vertices, 3].\n\n"
-             "points: float32 [vertices, 3], deformed, in the space of the rest points.\n"
-             "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never "
-             "converted.\n"
-             "    May be `points`.\n"
-             "scale: how much of the details comes back; 1 all.\n"
-             "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The "
-             "result\n    is the same bit for bit.\n\n"
-             "A vertex without faces is smoothed without details. The GIL is released for large meshes. "
-             "Raises\n"
-             "ValueError that names the argument, what was wanted and what came.");
+            "Sets other rest points and settings for the same faces and edges, which takes about as long as\n"
+            "apply().\n\n"
+            "Takes the arguments of the constructor and raises ValueError as it does; the object is then\n"
+            "unchanged.")
+        .def(
+            "apply", &apply, py::arg("points"), py::arg("out") = py::none(), py::arg("scale") = 1.0f,
+            py::arg("threads") = py::none(),
+            "The smoothed points, float32 [vertices, 3].\n\n"
+            "points: float32 [vertices, 3], deformed, in the space of the rest points.\n"
+            "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
+            "converted.\n"
+            "    May be `points`.\n"
+            "scale: how much of the details is added back; 1: all.\n"
+            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
+            "    result is the same bit for bit.\n\n"
+            "A vertex without faces is smoothed and has no details. Releases the GIL for large meshes. "
+            "Raises\n"
+            "ValueError that names the argument, what was expected and what was given.");
 }
 
 }  // namespace sinew::bindings

@@ -10,14 +10,15 @@
 namespace sinew::bindings {
 namespace {
 
-// An argument whose last leading axis is part of the item, such as the points of a set.
+// An argument whose last leading axis belongs to the item, such as the points of a set.
 template <class T, class Value>
 struct Rows {
     Input<T> input;
     py::ssize_t count;
 };
 
-// Those of one item. An input is never copied here: it counts references of Python's, and this runs without the GIL.
+// The rows of one item. Does not copy the input, because that counts Python's references and this runs without
+// the GIL.
 template <class Value, class T>
 std::vector<Value> rows_of(const Input<T>& input, py::ssize_t count, py::ssize_t index, const Shape& common) {
     const auto size = input.item_size / std::max<py::ssize_t>(count, 1);
@@ -28,7 +29,7 @@ std::vector<Value> rows_of(const Input<T>& input, py::ssize_t count, py::ssize_t
     return values;
 }
 
-// `like`: how many rows another argument has, which this one must have as well.
+// `like` is the number of rows of another argument; this one must have as many.
 template <class T, class Value>
 Rows<T, Value> checked_rows(const py::object& value, const char* argument, py::ssize_t like = -1) {
     Rows<T, Value> rows{checked_input<T, Value>(value, argument), 0};
@@ -42,7 +43,7 @@ Rows<T, Value> checked_rows(const py::object& value, const char* argument, py::s
     return rows;
 }
 
-// None: no rows.
+// None stands for no rows.
 template <class T, class Value>
 Rows<T, Value> optional_rows(const py::object& value, const char* argument, py::ssize_t like = -1) {
     if (!value.is_none()) return checked_rows<T, Value>(value, argument, like);

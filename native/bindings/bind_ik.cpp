@@ -8,7 +8,7 @@
 namespace sinew::bindings {
 namespace {
 
-/// A solver, and what keeps two threads from using it at once.
+/// A solver, and a lock that prevents two threads from using it at once.
 struct Solver {
     IkSolver solver;
     std::size_t bone_count;
@@ -82,7 +82,7 @@ std::unique_ptr<Solver> make(const py::object& any_parents, const py::object& an
                effectors.size(), has_pole});
 }
 
-/// `value` as float64 [.., count, numbers of a Value], its two last axes an item; broadcast along the others.
+/// `array` as float64 [.., count, numbers of a Value]: its last two axes are an item, the others broadcast.
 template <class Value>
 Input<double> of_each(const py::array_t<double>& array, const char* argument, std::size_t count,
                       const std::string& of_what) {

@@ -17,7 +17,7 @@ py::object between(const py::object& a, const py::object& b, const py::object& t
     });
 }
 
-// The last leading axis becomes part of the item; its length is returned.
+// Makes the last leading axis part of the item. Returns its length.
 template <class T>
 py::ssize_t take_last_axis(Input<T>& input, const std::string& wanted, const py::object& value) {
     if (input.lead.empty()) fail(input.argument, wanted, describe(value));
@@ -27,7 +27,7 @@ py::ssize_t take_last_axis(Input<T>& input, const std::string& wanted, const py:
     return count;
 }
 
-// f(std::integral_constant<Signs, ..>) for the choice called `signs`.
+// Calls f(std::integral_constant<Signs, ..>) for the choice with the name `signs`.
 template <class F>
 py::object with_signs(const py::object& signs, F f) {
     const std::string wanted = "one of heaviest, running_sum, as_given";
@@ -80,7 +80,7 @@ py::object blend(const py::object& any_transforms, const py::object& any_weights
     });
 }
 
-// combine(span, four keys) at every time of `at`.
+// Calls combine(span, four keys) for each time in `at`.
 template <class T, class Transform, class Combine>
 py::object spline_items(const py::object& keys, const py::object& times, const py::object& at,
                         Combine combine) {

@@ -12,7 +12,7 @@ namespace py = pybind11;
 
 std::string text(std::string_view view) { return std::string(view); }
 
-/// None where the kind has none.
+/// The default value; None for kinds that have none.
 py::object initial_value(const Parameter& parameter) {
     switch (parameter.kind) {
         case ParameterKind::number: return py::float_(parameter.initial);
@@ -50,23 +50,23 @@ py::tuple names_of(Needs needs) {
     return py::tuple(names);
 }
 
-/// A property that is the text of this field.
+/// A property with the text of this field.
 template <auto field, class Class>
 void def_text(Class& of, const char* name, const char* doc) {
     of.def_property_readonly(
         name, [](const typename Class::type& row) { return text(row.*field); }, doc);
 }
 
-/// What methods and stages have alike.
+/// The properties that methods and stages have in common.
 template <class Row>
 void def_facts(py::class_<Row>& of, const char* type) {
-    def_text<&Row::name>(of, "name", "What programs say.");
-    def_text<&Row::label>(of, "label", "What people read.");
+    def_text<&Row::name>(of, "name", "The name in programs.");
+    def_text<&Row::label>(of, "label", "The name in the interface.");
     def_text<&Row::description>(of, "description", "One sentence: when to use it.");
     def_text<&Row::source>(of, "source", "The papers.");
     of.def_property_readonly(
         "parameters", [](const Row& row) { return tuple_of<Parameter>(row.parameters); },
-        "Its settings, one Parameter each.");
+        "Its settings, each a Parameter.");
     of.def("__repr__",
            [type](const Row& row) { return "<sinew." + std::string(type) + " " + text(row.name) + ">"; });
 }
@@ -75,8 +75,8 @@ void def_facts(py::class_<Row>& of, const char* type) {
 
 void bind_methods(py::module_& m) {
     py::class_<Parameter> parameter(m, "Parameter", "A setting of a method or of a stage.");
-    def_text<&Parameter::id>(parameter, "id", "What programs say.");
-    def_text<&Parameter::label>(parameter, "label", "What people read.");
+    def_text<&Parameter::id>(parameter, "id", "The name in programs.");
+    def_text<&Parameter::label>(parameter, "label", "The name in the interface.");
     def_text<&Parameter::description>(parameter, "description", "One sentence.");
     def_text<&Parameter::unit>(parameter, "unit",
                                "One of \"length\", \"angle\" (radians) and \"factor\", or empty.");
@@ -86,49 +86,50 @@ void bind_methods(py::module_& m) {
             "One of \"float\", \"int\", \"bool\", \"enum\" (one of `choices`), \"vertex_group\" (a weight "
             "for each "
             "vertex)\nand \"method\" (the name of a method).")
-        .def_property_readonly("default", &initial_value, "None for a vertex group and a method.")
+        .def_property_readonly("default", &initial_value,
+                               "The default; None for a vertex group and a method.")
         .def_property_readonly(
             "min", [](const Parameter& row) { return bound_of(row, row.minimum); },
-            "The least value of a number, -inf where there is none; None for other kinds.")
+            "The smallest value of a number, -inf if there is no limit; None for other kinds.")
         .def_property_readonly(
             "max", [](const Parameter& row) { return bound_of(row, row.maximum); },
-            "The largest value of a number, inf where there is none; None for other kinds.")
+            "The largest value of a number, inf if there is no limit; None for other kinds.")
         .def_property_readonly(
             "choices", [](const Parameter& row) { return tuple_of<std::string>(row.choices); },
             "The values of an enum.")
         .def("__repr__", [](const Parameter& row) { return "<sinew.Parameter " + text(row.id) + ">"; });
 
-    py::class_<MethodInfo> method(m, "Method", "The facts of a skinning method.");
+    py::class_<MethodInfo> method(m, "Method", "The facts about a skinning method.");
     def_facts(method, "Method");
     method
         .def_property_readonly(
             "number", [](const MethodInfo& row) { return row.number; },
-            "Number that .blend files store; never changes.")
+            "The number that .blend files store. It never changes.")
         .def_property_readonly(
             "group", [](const MethodInfo& row) { return text(label_of(row.group)); },
-            "The heading below which menus show it, with those that are for the same.")
+            "The heading of its group in menus.")
         .def_property_readonly(
             "needs", [](const MethodInfo& row) { return names_of(row.needs); },
-            "What it takes besides points, influences and bone transforms: \"rest_bones\", their axes where "
-            "bones\n"
-            "are scaled; \"vertex_data\", numbers of each vertex that Binding takes; \"topology\", triangles "
-            "that\n"
-            "these are made from; \"precomputation\", a function that makes them.")
+            "What it needs besides points, influences and bone transforms: \"rest_bones\", the bones' axes,\n"
+            "where bones are scaled; \"vertex_data\", numbers for each vertex, an argument of Binding;\n"
+            "\"topology\", triangles from which these are computed; \"precomputation\", a function that "
+            "computes\n"
+            "them.")
         .def_property_readonly(
             "vertex_floats", [](const MethodInfo& row) { return row.vertex_floats; },
-            "How many numbers its vertex data has for each vertex, or in each row; 0: it has none.")
+            "How many numbers its vertex data has for each vertex, or in each row; 0 if it has none.")
         .def_property_readonly(
             "keeps_moments", [](const MethodInfo& row) { return row.keeps_moments; },
-            "Whether its vertex data has rows, any number for each vertex: see direct_delta_mush.");
+            "Whether its vertex data is rows, any number for each vertex: see direct_delta_mush.");
 
-    py::class_<StageInfo> stage(m, "Stage", "The facts of a stage: what may follow a method.");
+    py::class_<StageInfo> stage(m, "Stage", "The facts about a stage. Stages run after a method.");
     def_facts(stage, "Stage");
 
     m.def(
-        "methods", [] { return tuple_of<MethodInfo>(kMethods); }, "Every skinning method, one Method each.");
+        "methods", [] { return tuple_of<MethodInfo>(kMethods); }, "All skinning methods, each a Method.");
     m.def(
         "stages", [] { return tuple_of<StageInfo>(kStages); },
-        "Every stage, one Stage each. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit, "
+        "All stages, each a Stage. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit,\n"
         "`delta_mush` is DeltaMush.");
 }
 

@@ -16,14 +16,12 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kCornersUnderLock = 4096;  // some 30 microseconds
+constexpr std::size_t kCornersUnderLock = 4096;  // about 30 microseconds
 
 // In the order of NormalDomain.
 constexpr std::string_view kDomains[] = {"vertex", "corner", "face"};
 
-/// None as an empty array.
-///
-/// Numbers other than 0 are set flags.
+/// Flags: all numbers except 0 are set. None gives an empty array.
 std::vector<std::uint8_t> checked_flags(const py::object& value, const char* argument,
                                         const std::string& wanted) {
     if (value.is_none()) return {};
@@ -34,7 +32,7 @@ std::vector<std::uint8_t> checked_flags(const py::object& value, const char* arg
     return result;
 }
 
-/// None as an empty array.
+/// Custom normals. None gives an empty array.
 std::vector<std::int16_t> checked_custom(const py::object& value) {
     if (value.is_none()) return {};
     const std::string wanted = "None or int16 [corners, 2]";
@@ -116,7 +114,7 @@ py::array_t<float> compute(const Normals& normals, const py::object& points, con
     return result;
 }
 
-// --- Pickles: what was given, as the constructor takes it.
+// --- Pickles: the constructor's arguments.
 
 py::object flags_of(std::span<const std::uint8_t> flags) {
     if (flags.empty()) return py::none();
@@ -152,39 +150,39 @@ std::string text_of(const Normals& normals) {
 void bind_normals(py::module_& m) {
     py::class_<Normals>(
         m, "Normals",
-        "Normals of one mesh that deforms, as Blender defines them: of faces by Newell's method, of "
-        "vertices\n"
+        "Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices\n"
         "weighted by the angles of corners, of corners by fans between sharp edges. Can be pickled.")
-        .def(py::init(&make), py::arg("vertex_count"), py::arg("face_offsets"), py::arg("corner_vertices"),
-             py::arg("edges") = py::none(), py::kw_only(), py::arg("sharp_edges") = py::none(),
-             py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
-             "vertex_count: vertices of the mesh, at most 2^29 - 1.\n"
-             "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
-             "corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.\n"
-             "edges: int32 [edges, 2], the vertices of every edge of a face and of those without one; None "
-             "where\n"
-             "    nothing is sharp or custom.\n"
-             "sharp_edges: None, or bool [edges].\n"
-             "sharp_faces: None, or bool [faces], which are flat.\n"
-             "custom_normals: None, or int16 [corners, 2], as Blender's attribute custom_normal has "
-             "them.\n\n"
-             "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
+        .def(
+            py::init(&make), py::arg("vertex_count"), py::arg("face_offsets"), py::arg("corner_vertices"),
+            py::arg("edges") = py::none(), py::kw_only(), py::arg("sharp_edges") = py::none(),
+            py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
+            "vertex_count: number of vertices, at most 2^29 - 1.\n"
+            "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
+            "corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.\n"
+            "edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces; None "
+            "if\n"
+            "    nothing is sharp or custom.\n"
+            "sharp_edges: None, or bool [edges].\n"
+            "sharp_faces: None, or bool [faces], which are flat.\n"
+            "custom_normals: None, or int16 [corners, 2], as in Blender's attribute custom_normal.\n\n"
+            "All input is copied. Raises ValueError that names the argument, what was expected and what was\n"
+            "given.")
         .def_property_readonly(
             "domain", [](const Normals& normals) { return name_of(normals.domain()); },
-            "The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: \"face\" where "
-            "every face is\n"
-            "flat or every edge sharp, else \"corner\" where something is sharp, else \"vertex\". With "
-            "custom normals\n"
-            "\"corner\".")
+            "The simplest domain that describes the mesh's shading, as Blender's Mesh.normals_domain: "
+            "\"face\"\n"
+            "if every face is flat or every edge sharp, else \"corner\" if anything is sharp, else "
+            "\"vertex\". With\n"
+            "custom normals always \"corner\".")
         .def_property_readonly(
             "vertex_count", [](const Normals& normals) { return normals.count(NormalDomain::vertex); },
-            "Vertices of the mesh.")
+            "Number of vertices.")
         .def_property_readonly(
             "corner_count", [](const Normals& normals) { return normals.count(NormalDomain::corner); },
-            "Corners of its faces.")
+            "Number of corners of faces.")
         .def_property_readonly(
             "face_count", [](const Normals& normals) { return normals.count(NormalDomain::face); },
-            "Faces of the mesh.")
+            "Number of faces.")
         .def("__repr__", &text_of)
         .def(py::pickle(&state_of, &of_state))
         .def(
@@ -192,18 +190,17 @@ void bind_normals(py::module_& m) {
             py::arg("out") = py::none(), py::arg("threads") = py::none(),
             "Unit vectors, float32 [vertices, corners or faces, 3].\n\n"
             "points: float32 [vertices, 3], deformed.\n"
-            "domain: \"vertex\", \"corner\" or \"face\", what each has a normal of its own; None: that of "
-            "the "
-            "mesh.\n"
-            "out: written and returned where given: float32, C-contiguous, aligned; never converted. Not "
-            "the\n"
-            "    points.\n"
-            "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The "
-            "result\n    is the same bit for bit.\n\n"
-            "A face without area has (0, 0, 1). A vertex without faces has the direction of its point. Where "
-            "the\n"
-            "normals of faces cancel, that of their vertex is 0. None is NaN. The GIL is released for large\n"
-            "meshes. Raises ValueError that names the argument, what was wanted and what came.");
+            "domain: \"vertex\", \"corner\" or \"face\": what each normal belongs to; None: the mesh's "
+            "domain.\n"
+            "out: if given, written and returned: float32, C-contiguous, aligned; never converted. Must not\n"
+            "    overlap the points.\n"
+            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
+            "    result is the same bit for bit.\n\n"
+            "For a face without area the normal is (0, 0, 1); for a vertex without faces, the direction of "
+            "its\n"
+            "point; for a vertex whose faces' normals cancel, 0. No result is NaN. Releases the GIL for "
+            "large\n"
+            "meshes. Raises ValueError that names the argument, what was expected and what was given.");
 }
 
 }  // namespace sinew::bindings

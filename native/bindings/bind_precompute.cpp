@@ -17,7 +17,8 @@
 namespace sinew::bindings {
 namespace {
 
-/// Calls `run` with options that report to `progress`, a callable or None. The lock is given away but for these calls.
+/// Calls `run` with options that report to `progress`, a callable or None. Releases the GIL except during these
+/// calls.
 template <class Run>
 auto precompute(const py::object& progress, PrecomputeOptions options, const Run& run) {
     if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0) {
@@ -29,7 +30,7 @@ auto precompute(const py::object& progress, PrecomputeOptions options, const Run
             take_gil_back(state);
             const auto give_away = [&state] { state = PyEval_SaveThread(); };
             try {
-                // Whatever else it returns, or nothing, goes on.
+                // Anything but False continues the work, also None.
                 const bool goes_on = !progress(done).is(py::bool_(false));
                 give_away();
                 return goes_on;
@@ -61,7 +62,7 @@ std::size_t thread_count(const py::object& threads) {
     return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
-/// A mesh that a precomputation takes.
+/// The mesh argument of a precomputation.
 struct Mesh {
     py::array_t<float> points;
     py::array_t<std::int32_t> offsets;
@@ -138,36 +139,42 @@ void bind_precompute(py::module_& m) {
         "centres_of_rotation", &centres, py::arg("rest_points"), py::arg("influence_offsets"),
         py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::kw_only(),
         py::arg("exact") = false, py::arg("threads") = py::none(), py::arg("progress") = py::none(),
-        "What the method \"cor\" keeps of each vertex: its optimised centre of rotation, float32 [vertices, "
-        "3],\n"
-        "model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest points.\n\n"
-        "rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.\n"
+        "The vertex data of the method \"cor\": the optimised centre of rotation of each vertex, float32\n"
+        "[vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these "
+        "rest\n"
+        "points.\n\n"
+        "rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.\n"
         "triangles: int32 [triangles, 3], vertices.\n"
-        "exact: by the definition itself, slowly; else triangles of like weights are added up.\n"
-        "threads: how many at most; None: as many as help. The result is the same bit for bit.\n"
-        "progress: None, or a callable that is called on this thread with the share that is done, 0 to 1.\n"
-        "    Where it returns False the work ends, and the result is None. What it raises comes through.\n\n"
-        "Precomputations of other methods take `threads` and `progress` alike. The GIL is released.");
-    m.def("direct_delta_mush", &moments, py::arg("rest_points"), py::arg("influence_offsets"),
-          py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::arg("radius"),
-          py::kw_only(), py::arg("exact") = false, py::arg("threads") = py::none(),
-          py::arg("progress") = py::none(),
-          "What the method \"ddm\" keeps: the moments of each bone's smoothed weights about each vertex (Le, "
-          "Lewis 2019),\n"
-          "float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x, "
-          "y, "
-          "z; from the\n"
-          "origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments); "
-          "vertices rise,\n"
-          "and bones of a vertex. It belongs to these rest points and this radius.\n\n"
-          "rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.\n"
-          "triangles: int32 [triangles, 3], vertices.\n"
-          "radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard "
-          "deviation\n"
-          "    along each axis.\n"
-          "exact: also weights below 1e-6; else these are left out.\n"
-          "threads, progress: as of centres_of_rotation. The GIL is released.\n\n"
-          "Raises RuntimeError where Sinew was built without this method.");
+        "exact: compute by the definition itself, which is slow; otherwise triangles of similar weights are\n"
+        "summed.\n"
+        "threads: maximum number; None: as many as useful. The result is the same bit for bit.\n"
+        "progress: None, or a callable that is called on this thread with the completed share, 0 to 1. If "
+        "it\n"
+        "    returns False, the work is cancelled and the result is None. An exception that it raises is "
+        "passed\n"
+        "    on.\n\n"
+        "Precomputations of other methods have the same `threads` and `progress`. Releases the GIL.");
+    m.def(
+        "direct_delta_mush", &moments, py::arg("rest_points"), py::arg("influence_offsets"),
+        py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::arg("radius"),
+        py::kw_only(), py::arg("exact") = false, py::arg("threads") = py::none(),
+        py::arg("progress") = py::none(),
+        "The vertex data of the method \"ddm\": the moments of each bone's smoothed weights around each "
+        "vertex\n"
+        "(Le, Lewis 2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight,\n"
+        "first moment (x, y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of "
+        "the\n"
+        "vertex's first moments). Rows are in ascending order of vertices and, for each vertex, of bones. "
+        "They\n"
+        "belong to these rest points and this radius.\n\n"
+        "rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.\n"
+        "triangles: int32 [triangles, 3], vertices.\n"
+        "radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard "
+        "deviation\n"
+        "    along each axis.\n"
+        "exact: include weights below 1e-6, which are otherwise left out.\n"
+        "threads, progress: as for centres_of_rotation. Releases the GIL.\n\n"
+        "Raises RuntimeError if Sinew was built without this method.");
 }
 
 }  // namespace sinew::bindings

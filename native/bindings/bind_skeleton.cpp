@@ -12,7 +12,7 @@ Skeleton make_skeleton(const py::object& parents) {
     return Skeleton({array.data(), static_cast<std::size_t>(array.size())});
 }
 
-// [bones, ..] of one representation, one for each bone.
+// Transforms [bones, ..] in one representation, one for each bone.
 template <class Transform, class T>
 std::vector<Transform> checked_bones(const Skeleton& skeleton, const py::object& value,
                                      const char* argument) {
@@ -33,7 +33,7 @@ py::object as_array(const std::vector<Transform>& bones) {
     return output.take();
 }
 
-// One transform; the identity where `value` is None.
+// One transform; the identity if `value` is None.
 template <class Transform, class T>
 Transform checked_root(const py::object& value) {
     if (value.is_none()) return {};
@@ -78,8 +78,8 @@ py::object branch_updated(const Skeleton& skeleton, const py::object& any_relati
     });
 }
 
-// (transforms, is_defined) of run(moment, bones) at every number of `at`: of one number [bones, ..] and a bool, of
-// [..] numbers [.., bones, ..] and [..].
+// (transforms, is_defined) from run(moment, bones) for each number in `at`: for one number [bones, ..] and a
+// bool, for numbers [..] the shapes [.., bones, ..] and [..].
 template <class Transform, class T, class Run>
 py::object at_all(const Skeleton& skeleton, const Input<T>& at, Run run) {
     Shape shape = at.lead;
@@ -117,7 +117,7 @@ py::object interpolate(const Skeleton& skeleton, const py::object& any_a, const 
     });
 }
 
-// run(keyframes, times, time, bones) on checked arrays.
+// Calls run(keyframes, times, time, bones) with checked arrays.
 template <class Transform, class T, class Run>
 py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
                         const py::object& time, Run run) {
@@ -168,14 +168,14 @@ py::object spline_vector_form(const Skeleton& skeleton, const py::object& any_ke
 void bind_skeleton(py::module_& m) {
     py::class_<Skeleton>(
         m, "Skeleton",
-        "A hierarchy of bones; parents come before their children.\n\n"
-        "Its methods take each bone relative to its parent, in any representation, layouts as in "
-        "sinew.affine,\nsinew.quat_vec and sinew.dual_quat, and promote arrays as these do. "
-        "They raise ValueError that names\nthe argument, what was wanted and what came.")
+        "A hierarchy of bones in which parents precede their children.\n\n"
+        "Its methods take each bone relative to its parent, in any representation, with layouts as in\n"
+        "sinew.affine, sinew.quat_vec and sinew.dual_quat, and promote arrays in the same way. They raise\n"
+        "ValueError that names the argument, what was expected and what was given.")
         .def(py::init(&make_skeleton), py::arg("parents"),
              "parents: int32 [bones], the index of each bone's parent, -1 for a root.\n\n"
-             "Raises ValueError where a parent does not come before its child.")
-        .def_property_readonly("bone_count", &Skeleton::bone_count, "Bones of the hierarchy.")
+             "Raises ValueError if a parent does not precede its child.")
+        .def_property_readonly("bone_count", &Skeleton::bone_count, "Number of bones.")
         .def("__repr__",
              [](const Skeleton& skeleton) {
                  return "<sinew.Skeleton: " + std::to_string(skeleton.bone_count()) + " bones>";
@@ -192,37 +192,42 @@ void bind_skeleton(py::module_& m) {
                          "a tuple of " + std::to_string(state.size()));
                 return make_skeleton(state[0]);
             }))
-        .def("root_relative", &relative_to_root, py::arg("transforms"), py::arg("root") = py::none(),
-             "Each bone relative to the root, in the representation that came (Smith 2013, algorithm 1).\n\n"
-             "transforms: [bones, 4, 4] or [bones, 3, 4], which give [bones, 4, 4]; [bones, 7]; [bones, 8].\n"
-             "root: None, or one transform that is placed before every bone without a parent.")
+        .def(
+            "root_relative", &relative_to_root, py::arg("transforms"), py::arg("root") = py::none(),
+            "Each bone relative to the root, in the given representation (Smith 2013, algorithm 1).\n\n"
+            "transforms: [bones, 4, 4] or [bones, 3, 4], for which the result is [bones, 4, 4]; [bones, 7];\n"
+            "    [bones, 8].\n"
+            "root: None, or a transform that is applied after that of every bone without a parent.")
         .def("update_branch", &branch_updated, py::arg("root_relative"), py::arg("transforms"),
              py::arg("bone"), py::arg("root") = py::none(),
-             "The same after a change of one bone: computed for that bone and those below it alone.\n\n"
-             "root_relative: what root_relative() gave before the change, in the representation of "
+             "Updates root_relative() after a change of one bone: computes only that bone and its "
+             "descendants.\n\n"
+             "root_relative: the result of root_relative() before the change, in the representation of\n"
              "`transforms`.\n"
-             "transforms, root: as of root_relative().\n"
-             "bone: the index of the bone that has changed.")
+             "transforms, root: as for root_relative().\n"
+             "bone: the index of the changed bone.")
         .def("interpolate", &interpolate, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method") = "dlb",
              "(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).\n\n"
              "a, b: [bones, ..] in the representation of the method, at t = 0 and t = 1.\n"
-             "t: a number or [..], which give [.., bones, ..] and [..]; outside 0 to 1 the motion goes on.\n"
+             "t: a number, or [..], for which the results are [.., bones, ..] and [..]; extrapolates outside "
+             "0 to\n"
+             "    1.\n"
              "method: one of sinew.interpolate.METHODS.\n"
-             "is_defined: False where a bone has no one in-between; it then has what "
-             "sinew.interpolate.between\n"
-             "    gives there.")
+             "is_defined: False if the result is not defined for some bone, which then has the result that\n"
+             "    sinew.interpolate.between specifies.")
         .def("spline", &spline, py::arg("keyframes"), py::arg("times"), py::arg("time"),
              py::arg("method") = "dlb",
-             "(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, blend form\n"
+             "(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend "
+             "form\n"
              "(Smith 2013, algorithm 3 and section 3.2.2).\n\n"
-             "keyframes: [keys, bones, ..] in the representation of the method, one key or more.\n"
-             "times: [keys], not decreasing; keys of equal time are a cut.\n"
-             "time: a number or [..], which give [.., bones, ..] and [..]; before the first key and after "
-             "the last it\n"
-             "    is that key.\n"
+             "keyframes: [keys, bones, ..] in the representation of the method, at least one key.\n"
+             "times: [keys], non-decreasing; keys of equal time are a cut.\n"
+             "time: a number, or [..], for which the results are [.., bones, ..] and [..]; constant before "
+             "the\n"
+             "    first key and after the last.\n"
              "method: one of sinew.interpolate.METHODS.")
         .def("spline_vector", &spline_vector_form, py::arg("keyframes"), py::arg("times"), py::arg("time"),
-             "The same in vector form (Smith 2013, algorithm 3): not rigid between the keys.\n\n"
+             "The same in vector form (Smith 2013, algorithm 3): not rigid between keys.\n\n"
              "keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].");
 }
 

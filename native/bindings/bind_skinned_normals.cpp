@@ -10,9 +10,9 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kFramesUnderLock = 4096;  // some 30 microseconds
+constexpr std::size_t kFramesUnderLock = 4096;  // about 30 microseconds
 
-/// [n, 3]; none where `value` is None.
+/// Vectors [n, 3]; none if `value` is None.
 py::array_t<float> checked_vectors(const py::object& value, const char* argument) {
     if (value.is_none()) return checked_out(py::none(), 0);
     return checked_points(value, argument);
@@ -85,44 +85,45 @@ std::string text_of(const SkinnedNormals& skinned) {
 }  // namespace
 
 void bind_skinned_normals(py::module_& m) {
-    py::class_<SkinnedNormals>(
-        m, "SkinnedNormals",
-        "Normals and tangents that move with the skin, as engines have them: each by the blend of its own "
-        "vertex,\n"
-        "normals by the inverse transpose. What the change of weights does to the surface is not in them.")
+    py::class_<SkinnedNormals>(m, "SkinnedNormals",
+                               "Normals and tangents that move with the skin, as in engines: each is "
+                               "transformed by the blend of its\n"
+                               "vertex, normals by the inverse transpose. The effect of weights that change "
+                               "from vertex to vertex is\n"
+                               "not included.")
         .def(py::init(&make), py::arg("binding"), py::arg("normals"), py::arg("tangents") = py::none(),
              py::arg("vertices") = py::none(), py::arg("method") = "lbs", py::arg("mix") = py::none(),
              "binding: a Binding; not copied.\n"
              "normals: float32 [frames, 3], at rest, of any length.\n"
              "tangents: None, or float32 [frames, 3].\n"
-             "vertices: int32 [frames], the vertex of each, as for the corners of faces; None: one frame for "
-             "each\n"
-             "    vertex.\n"
-             "method, mix: as of Deformer.\n\n"
-             "Raises ValueError that names the argument, what was wanted and what came.")
-        .def_property_readonly("frame_count", &SkinnedNormals::frame_count, "How many normals it has.")
+             "vertices: int32 [frames], the vertex of each, such as for the corners of faces; None: one "
+             "frame for\n"
+             "    each vertex.\n"
+             "method, mix: as for Deformer.\n\n"
+             "Raises ValueError that names the argument, what was expected and what was given.")
+        .def_property_readonly("frame_count", &SkinnedNormals::frame_count, "Number of normals.")
         .def("__repr__", &text_of)
-        .def("deform", &deform, py::arg("bone_transforms"), py::arg("threads") = py::none(),
-             py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
-             py::arg("parameters") = py::none(),
-             "(points, normals, tangents): float32 [vertices, 3], the deformed points; float32 [frames, 3], "
-             "unit\n"
-             "vectors; the same of tangents, or None.\n\n"
-             "Arguments are those of Deformer.deform. Where the blend mirrors, a normal is on the side that "
-             "the "
-             "order of\n"
-             "a face's vertices gives. Where it flattens the plane of a normal to a line, that is 0. The GIL "
-             "is\n"
-             "released for large meshes. Raises ValueError that names the argument, what was wanted and what "
-             "came.")
+        .def(
+            "deform", &deform, py::arg("bone_transforms"), py::arg("threads") = py::none(),
+            py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
+            py::arg("parameters") = py::none(),
+            "(points, normals, tangents): the deformed points, float32 [vertices, 3]; unit vectors, float32\n"
+            "[frames, 3]; the same for tangents, or None.\n\n"
+            "Arguments are those of Deformer.deform. Where the blend mirrors, a normal points to the side "
+            "given\n"
+            "by the order of a face's vertices. Where the blend collapses the plane of a normal to a line, "
+            "that\n"
+            "normal is 0. Releases the GIL for large meshes. Raises ValueError that names the argument, what "
+            "was\n"
+            "expected and what was given.")
         .def("deform_normals", &deform_normals, py::arg("bone_transforms"), py::arg("points"),
              py::arg("out") = py::none(), py::arg("threads") = py::none(),
              py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
              py::arg("parameters") = py::none(),
-             "The normals alone, where the points are known: a fourth less to deform.\n\n"
-             "points: float32 [vertices, 3], as deform() or a Deformer gave them for the same arguments.\n"
-             "out: float32 [frames, 3], C-contiguous; made where it is None. It is returned.\n\n"
-             "All else is as of deform().");
+             "Only the normals, if the points are known; saves a quarter of the time.\n\n"
+             "points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.\n"
+             "out: if given, written and returned: float32 [frames, 3], C-contiguous; None: a new array.\n\n"
+             "All other arguments as for deform().");
 }
 
 }  // namespace sinew::bindings

@@ -12,8 +12,9 @@ bool is_ending() {
 #endif
 }
 
-// Python makes a state for each call from a thread that is not its own, and takes it away at the end of the
-// call. This counts as one more caller, from the first call until the thread ends.
+// For a thread that Python did not start, Python creates a thread state at the start of each call and deletes it
+// at the end. This object acts as one more caller, from the first call until the thread ends, so the state is
+// kept.
 class KeptState {
 public:
     KeptState() : state_(PyGILState_GetThisThreadState()) { PyGILState_Ensure(); }
@@ -21,7 +22,7 @@ public:
     KeptState& operator=(const KeptState&) = delete;
 
     ~KeptState() {
-        // A thread that Python made takes its state away by itself.
+        // A thread that Python started deletes its state itself.
         if (is_ending() || PyGILState_GetThisThreadState() != state_) {
             return;
         }
@@ -39,8 +40,10 @@ private:
 void bind_threads(pybind11::module_& m) {
     m.def(
         "keep_thread_state", [] { thread_local const KeptState kept; },
-        "Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and "
-        "that calls it often, is 50 to 100 us a call faster. Safe to call again, and on any thread.");
+        "Keeps Python's state of the calling thread until the thread ends. This makes calls from a thread\n"
+        "that Python did not start, and that calls it often, 50 to 100 us faster. May be called again, and "
+        "on\n"
+        "any thread.");
 }
 
 }  // namespace sinew::bindings

@@ -8,7 +8,7 @@
 namespace sinew::bindings {
 namespace {
 
-// Raises ValueError where `a` is a matrix that scales, shears or mirrors: no quaternion is that.
+// Raises ValueError if `a` is a matrix that scales, shears or mirrors, which no quaternion can represent.
 template <class X>
 void check_rigid(const X& a, const char* argument) {
     if constexpr (requires { a.linear; }) {
@@ -17,7 +17,7 @@ void check_rigid(const X& a, const char* argument) {
     }
 }
 
-// What every representation has. Described in the typed modules sinew.affine, .quat_vec and .dual_quat.
+// The functions of every representation. Documented in the typed modules sinew.affine, .quat_vec and .dual_quat.
 template <template <class> class X>
 void bind_representation(py::module_& m) {
     def<Vec3, Scalar>(m, "from_axis_angle", {"axis", "angle"},

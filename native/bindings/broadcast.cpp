@@ -28,7 +28,7 @@ void promote(std::span<py::object> values, std::span<const char* const> argument
         const py::array array = as_array(values[i], arguments[i]);
         const bool is_number = array && array.ndim() == 0 && !py::isinstance<py::array>(values[i]);
         if (!array || is_number || !is_numeric(array)) continue;
-        // What float32 holds whole: itself, what has half its digits, integers of 16 bits.
+        // Types that float32 represents exactly: float32 itself, float16, and integers of up to 16 bits.
         const py::ssize_t held = array.dtype().kind() == 'f' ? 4 : 2;
         any_double = any_double || array.itemsize() > held;
         values[i] = array;
@@ -47,7 +47,7 @@ void promote(std::span<py::object> values, std::span<const char* const> argument
 
 double checked_number(const py::handle& value, const char* argument, const std::string& wanted) {
     if (!PyFloat_Check(value.ptr()) && !PyLong_Check(value.ptr())) {
-        // As float() it would lose its imaginary part with no more than a warning.
+        // float() would drop its imaginary part with only a warning.
         const py::array array = as_array(value, argument);
         if (array && array.dtype().kind() == 'c') fail(argument, wanted, describe(value));
     }

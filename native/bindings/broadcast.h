@@ -15,10 +15,11 @@ namespace sinew::bindings {
 
 using Shape = std::vector<py::ssize_t>;
 
-/// "[2, 3]".
+/// The shape as text, such as "[2, 3]".
 std::string text_of(const Shape& shape);
 
-/// An argument as neighbouring items of T: `lead` are the axes before those of an item.
+/// An argument as an array of items that consist of adjacent numbers of type T. `lead` are the axes before those
+/// of an item.
 template <class T>
 struct Input {
     const char* argument;
@@ -26,7 +27,7 @@ struct Input {
     const T* data;
     Shape lead;
     py::ssize_t item_size;
-    Shape steps{};  ///< of each axis of the common shape, in numbers; 0 where the argument is repeated
+    Shape steps{};  ///< for each axis of the common shape, in numbers; 0 where the argument is repeated
 
     [[nodiscard]] const T* at(py::ssize_t index, const Shape& common) const {
         py::ssize_t offset = 0;
@@ -38,12 +39,12 @@ struct Input {
     }
 };
 
-/// Whether `value`, of promoted(), is an array of float64 and not of float32. ValueError that names `wanted` for
-/// anything else.
+/// Whether `value`, a result of promoted(), is an array of float64 rather than float32. ValueError, naming
+/// `wanted`, for anything else.
 bool is_double(const py::handle& value, const char* argument, const std::string& wanted);
 
-/// The arguments of one call with their arrays in one element type, float32 or float64: as numpy promotes them, so
-/// float64 where one is not of float32 or less. Numbers, and what is no array of numbers, stay as they are.
+/// The arguments of one call with their arrays in one element type, float32 or float64, as numpy promotes them:
+/// float64 if any is not float32 or smaller. Numbers, and anything that is no array of numbers, are not changed.
 void promote(std::span<py::object> values, std::span<const char* const> arguments);
 
 template <std::size_t N>
@@ -71,7 +72,8 @@ void check_finite(const T* numbers, std::size_t count, const char* argument, py:
     }
 }
 
-/// `value`, of promoted(), as items of `Value`, finite, of element type T; a number alone stands for a scalar.
+/// `value`, a result of promoted(), as items of `Value`, finite, with element type T. A plain number is allowed
+/// as a scalar.
 template <class T, class Value>
 Input<T> checked_input(const py::handle& value, const char* argument) {
     const std::string wanted = element_name<T>() + Item<Value>::kShape;
@@ -105,8 +107,8 @@ Input<T> checked_input(const py::handle& value, const char* argument) {
     return {argument, array, array.data(), lead, item_size};
 }
 
-/// The shape that `inputs` have together by numpy's rule, and each one's steps in it. ValueError that names
-/// the first argument that does not fit those before it.
+/// The common shape of `inputs` by numpy's rules; sets each input's steps in it. ValueError that names the first
+/// argument that does not fit those before it.
 template <class T>
 Shape broadcast(std::span<Input<T>> inputs) {
     Shape common;
@@ -137,7 +139,7 @@ Shape broadcast(std::span<Input<T>> inputs) {
     return common;
 }
 
-/// The result in the making: an array of items, or a tuple of such.
+/// A result that is being written: an array of items, or a tuple of such arrays.
 template <class Value>
 struct Output {
     using Element = typename Item<Value>::Element;
@@ -156,7 +158,7 @@ struct Output {
     void write(py::ssize_t index, const Value& value) {
         Item<Value>::write(value, data + static_cast<std::size_t>(index) * item_size);
     }
-    /// An array of no axes as the number it is.
+    /// Returns an array without axes as a number.
     py::object take() { return array.ndim() > 0 ? py::object(array) : array[py::tuple()]; }
 };
 
@@ -182,7 +184,7 @@ inline py::ssize_t count_of(const Shape& shape) {
     return count;
 }
 
-/// `f` of every item of the arguments broadcast together.
+/// Calls `f` for each item of the arguments, broadcast together.
 template <class T, template <class> class... In, class F, std::size_t... I>
 py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
                      const std::array<py::object, sizeof...(In)>& values, F f, std::index_sequence<I...>) {
@@ -199,7 +201,8 @@ py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
     return output.take();
 }
 
-/// The same in the element type that all arguments have after promoted(); the first is no scalar.
+/// The same with the element type that all arguments have after promoted(). The first argument must not be a
+/// scalar.
 template <template <class> class... In, class F>
 py::object map(const std::array<const char*, sizeof...(In)>& arguments,
                const std::array<py::object, sizeof...(In)>& given, F f) {
@@ -218,7 +221,7 @@ struct ObjectFor {
     using type = const py::object&;
 };
 
-/// A function of the module whose arguments are arrays of the items `In`.
+/// Defines a function of the module whose arguments are arrays of the items `In`.
 template <template <class> class... In, class F>
 void def(py::module_& m, const char* name, const std::array<const char*, sizeof...(In)>& arguments, F f) {
     const auto function = [arguments, f](typename ObjectFor<In>::type... values) {

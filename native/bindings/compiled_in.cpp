@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What of other projects is compiled into the library and this module, with versions, as their headers say. It stands
-// in the file as text, so that the bill of materials (tools/sbom.py) is made of the file itself, for any platform.
+// Which other projects are compiled into the library and this module, with versions from their headers. It is
+// stored in the binary as text, so that the bill of materials (tools/sbom.py) is made from the binary itself, for
+// any platform.
 #include <glm/glm.hpp>
 
 #include "module.h"
@@ -20,7 +21,7 @@ namespace {
 
 constexpr const char* kCompiledIn =
     "sinew-compiled-in{"
-    // "GLM: version 0.9.9.8", the only place where all versions of it have it whole.
+    // "GLM: version 0.9.9.8": the only macro that contains the full version in all releases.
     "GLM=" GLM_VERSION_MESSAGE ";Highway=" SINEW_VERSION_OF(HWY_MAJOR, HWY_MINOR, HWY_PATCH)
 #ifdef SINEW_BINDINGS_WITH_EIGEN
         ";Eigen=" SINEW_VERSION_OF(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)
@@ -28,7 +29,7 @@ constexpr const char* kCompiledIn =
             ";pybind11=" SINEW_VERSION_OF(PYBIND11_VERSION_MAJOR, PYBIND11_VERSION_MINOR,
                                           PYBIND11_VERSION_PATCH)
 #ifdef SINEW_STANDARD_LIBRARY_WITHIN
-// By tools/cross_build.py, which links them statically.
+// Defined by tools/cross_build.py, which links the standard library statically.
 #ifdef _LIBCPP_VERSION
                 ";LLVM=" SINEW_VALUE_AS_TEXT(_LIBCPP_VERSION)
 #endif

@@ -9,10 +9,10 @@
 
 namespace sinew::bindings {
 
-/// The method of a name. ValueError that names `argument`, TypeError for what is no str.
+/// The method with this name. ValueError that names `argument`; TypeError if it is no str.
 MethodInfo checked_method(const py::object& method, const char* argument);
 
-/// The argument `mix`, and the array that MixData points at.
+/// The argument `mix`, and the array that MixData refers to.
 struct MixArguments {
     std::optional<MethodInfo> method;
     py::array_t<float> weights;
@@ -23,27 +23,27 @@ struct MixArguments {
     }
 };
 
-/// None, or (method, weights).
+/// The argument None or (method, weights).
 MixArguments checked_mix(const py::object& mix);
 
-/// What DeformOptions::parameters and mix_parameters point at.
+/// The values that DeformOptions::parameters and mix_parameters refer to.
 struct Parameters {
     std::vector<double> of_method;
     std::vector<double> of_mix;
 };
 
-/// How a frame is deformed, and what the options point at.
+/// The options of a frame, and the data that they refer to.
 struct DeformArguments {
     std::vector<Affine<float>> bones;  // posed_from_rest
     Parameters values;
     DeformOptions options;
 
     DeformArguments() = default;
-    DeformArguments(DeformArguments&&) = default;  // the options point at memory that stays
+    DeformArguments(DeformArguments&&) = default;  // the options refer to memory that does not move
     DeformArguments(const DeformArguments&) = delete;
 };
 
-/// The arguments of Deformer.deform but for `out`.
+/// The arguments of Deformer.deform, except for `out`.
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
                                const py::object& threads, const py::object& bones_from_model,
                                const py::object& rest_inverses, const py::object& parameters);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Compiled without exceptions (CMakeLists.txt), and so without gil.h, which has pybind11: then pthread_cleanup_push() is
-// C's, to which the C library jumps before the unwinding of a thread reaches any C++. It unwinds by libgcc, which a
-// module that has another C++ library within does not survive.
+// Compiled without exceptions (CMakeLists.txt), and thus without gil.h, which includes pybind11.
+// pthread_cleanup_push() is then the C version, to which the C library jumps before the unwinding of a thread
+// reaches any C++ code. The C library unwinds with libgcc, which a module with another C++ standard library
+// inside does not survive.
 #include <Python.h>
 
 #ifndef _WIN32
@@ -13,14 +14,14 @@ namespace sinew::bindings {
 
 #ifdef _WIN32
 
-// A thread that Python ends there is not unwound.
+// A thread that Python ends here is not unwound.
 void take_gil_back(PyThreadState* state) noexcept { PyEval_RestoreThread(state); }
 
 #else
 
 namespace {
 
-// In place of the end of this thread. Python 3.14 and later let such a thread hang, too.
+// Called instead of ending the thread. Python 3.14 and later let such a thread hang, too.
 void hang(void* /*unused*/) {
     for (;;) pause();
 }

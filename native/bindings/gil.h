@@ -5,11 +5,11 @@
 
 namespace sinew::bindings {
 
-/// Takes back the GIL that PyEval_SaveThread() gave away. Never returns where Python ends meanwhile: it then ends
-/// threads that ask for the GIL, before 3.14 by unwinding their stack, which no destructor on the way takes.
+/// Acquires the GIL that PyEval_SaveThread() released. Never returns if Python ends meanwhile: Python then ends
+/// threads that request the GIL, before 3.14 by unwinding their stack, which no destructor on the way tolerates.
 void take_gil_back(PyThreadState* state) noexcept;
 
-/// work() without the GIL. It may throw, and must not touch what is Python's.
+/// Calls work() without the GIL. It may throw, but must not touch Python's objects.
 template <class Work>
 void without_gil(const Work& work) {
     PyThreadState* const state = PyEval_SaveThread();

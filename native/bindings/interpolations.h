@@ -6,7 +6,8 @@
 
 namespace sinew::bindings {
 
-/// f(Method{}) for the row of Interpolations called `method`. ValueError for another name, TypeError for no name.
+/// Calls f(Method{}) for the element of Interpolations with the name `method`. ValueError for another name,
+/// TypeError if it is no str.
 template <class F>
 py::object with_method(const py::object& method, F f) {
     std::string names;
@@ -29,7 +30,7 @@ struct Representation {
     using Transform = X<T>;
 };
 
-/// f(Representation{}) for the one whose items end with the last axis of `value`: 4, 7 or 8.
+/// Calls f(Representation{}) for the representation whose items end with the last axis of `value`: 4, 7 or 8.
 template <class F>
 py::object with_representation(const py::object& value, const char* argument, const std::string& axes, F f) {
     const std::string wanted = "float32 or float64 [" + axes + ", 4, 4], [" + axes + ", 3, 4], [" + axes +
@@ -43,14 +44,14 @@ py::object with_representation(const py::object& value, const char* argument, co
     fail(argument, wanted, describe(value));
 }
 
-/// f(T{}) with the element type of `value`.
+/// Calls f(T{}) with the element type of `value`.
 template <class F>
 py::object with_element(const py::object& value, const char* argument, const char* shape, F f) {
     if (is_double(value, argument, std::string("float32 or float64 ") + shape)) return f(double{});
     return f(float{});
 }
 
-/// The items of an input whose every axis counts, copied out.
+/// Copies the items of an input, all of whose axes belong to the list.
 template <class Value, class T>
 std::vector<Value> items_of(const Input<T>& input) {
     std::vector<Value> items;
@@ -61,7 +62,7 @@ std::vector<Value> items_of(const Input<T>& input) {
     return items;
 }
 
-/// [keys], one for each of `keys`, not decreasing.
+/// The times [keys], one for each of `keys`, non-decreasing.
 template <class T>
 std::vector<T> checked_times(const py::object& value, py::ssize_t keys) {
     const auto input = checked_input<T, T>(value, "times");

@@ -9,9 +9,9 @@
 
 namespace sinew::bindings {
 
-/// How one value of the library lies in the last axes of an array:
-///   kShape   those axes as text        kSize    numbers read
-///   dimensions  of an output           read, write
+/// How a value of the library is stored in the last axes of an array:
+///   kShape      those axes as text       kSize        number of numbers read
+///   dimensions  sizes of an output       read, write  conversion
 template <class Value>
 struct Item;
 
@@ -67,7 +67,7 @@ struct Item<Mat3<T>> {
     }
 };
 
-/// Read from three rows or four, of which the fourth is not read; written with four.
+/// Read from three or four rows, without using a fourth one; written with four.
 template <class T>
 struct Item<Affine<T>> {
     using Element = T;

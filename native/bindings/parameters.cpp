@@ -26,7 +26,7 @@ std::string wanted_of(const Parameter& parameter) {
     return text.str();
 }
 
-/// The value, or NaN for what is none.
+/// The value as a number, or NaN if it is none.
 double value_of(const py::handle& value, const Parameter& parameter) {
     const double none = std::nan("");
     if (parameter.kind == ParameterKind::choice) {
@@ -36,7 +36,7 @@ double value_of(const py::handle& value, const Parameter& parameter) {
         }
         return none;
     }
-    // Numbers of numpy, too, but no texts and no arrays of one number.
+    // Accepts numpy's numbers, too, but no text and no arrays of one number.
     if (py::isinstance<py::array>(value) && py::reinterpret_borrow<py::array>(value).ndim() > 0) return none;
     const bool is_whole = PyIndex_Check(value.ptr()) != 0;
     const bool is_bool = py::isinstance<py::bool_>(value);
@@ -60,8 +60,8 @@ double value_of(const py::handle& value, const Parameter& parameter) {
 std::string text_of(const py::handle& value) {
     if (py::isinstance<py::str>(value) || PyLong_Check(value.ptr()) || PyFloat_Check(value.ptr())) {
         std::string text = py::repr(value).cast<std::string>();
-        constexpr std::size_t kMost = 60;
-        return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
+        constexpr std::size_t kMaxText = 60;
+        return text.size() > kMaxText ? text.substr(0, kMaxText) + "..." : text;
     }
     return describe(value);
 }

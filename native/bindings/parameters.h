@@ -9,8 +9,8 @@
 
 namespace sinew::bindings {
 
-/// `value` as a number for `parameter`, a number or a choice: what sinew.Parameter says. ValueError, naming `argument`
-/// and the parameter's full name, for a value of another type or beyond the limits.
+/// `value` as a number for `parameter`, a number or a choice, as described at sinew.Parameter. ValueError, naming
+/// `argument` and the parameter's full name, for a value of another type or beyond the limits.
 double checked_parameter(const pybind11::handle& value, const Parameter& parameter, const char* argument,
                          const std::string& full_name);
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes human.blend by the panel's dialog in a Blender with a window: Esc in the middle of each kind, then
-each to its end, and Ctrl+Z. Keys are pressed by simulation: it takes --enable-event-simulate.
+"""Bakes human.blend from the panel's dialog in a Blender with a window: each kind once with Esc in the
+middle, then to its end, and Ctrl+Z. Keys are simulated, which needs --enable-event-simulate.
 
     blender --factory-startup OPTION human.blend --python bake_in_window.py -- sinew-VERSION.zip bake.png
 """
@@ -21,12 +21,12 @@ import window
 
 ZIP, PICTURE = window.arguments()
 FOLDER = PICTURE.parent / "baked"
-# Where Blender keeps what is the user's.
+# Blender's folder for the user's files.
 USER = PICTURE.parent / "user"
 FRAME = 16
-# Long enough to be stopped; glTF's exporter takes minutes for as many.
+# Long enough to be stopped in between; glTF's exporter would take minutes for this many.
 LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "gltf": 500, "bones": 2000}
-# Some distributions' Blenders lack the others.
+# Some distributions' builds of Blender lack the other formats.
 KINDS = [kind for kind in LONG if kind not in ("alembic", "usd") or getattr(bpy.app, kind).supported]
 TICK = 0.1
 PATIENCE = 120.0
@@ -44,7 +44,7 @@ def is_baking() -> bool:
 
 
 def is_done_since(files: list[str], bones: int) -> Callable[[], bool]:
-    """Whether a bake is at its end that starts with these files and so many bones."""
+    """Whether a bake has ended that starts with these files and this many bones."""
 
     def is_done() -> bool:
         now = state()
@@ -54,7 +54,7 @@ def is_done_since(files: list[str], bones: int) -> Callable[[], bool]:
 
 
 def blenders() -> int:
-    """The processes that this one has started."""
+    """The child processes of this process."""
     found = 0
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -65,7 +65,7 @@ def blenders() -> int:
 
 
 def state() -> dict[str, object]:
-    """What a bake that is stopped, or undone, must leave as it was."""
+    """What a bake must not change if it is stopped or undone."""
     scene, obj = bpy.context.scene, bpy.data.objects["Human"]
     return {
         "frame": [scene.frame_current, scene.frame_subframe, scene.frame_start, scene.frame_end],
@@ -86,7 +86,7 @@ def state() -> dict[str, object]:
 
 
 def start(kind: str, frames: str) -> Iterator[None]:
-    """By the dialog that the panel's button opens."""
+    """Opens the dialog with the panel's button."""
     with window.in_view3d():
         bpy.ops.sinew.bake("INVOKE_DEFAULT", kind=kind, frames=frames, folder=str(FOLDER), helpers=6)
     yield
@@ -103,7 +103,7 @@ def steps() -> Iterator[None]:
     obj.sinew.method = "dq"
     scene.frame_set(FRAME)
     FOLDER.mkdir()
-    # Ctrl+Z comes back to here.
+    # Ctrl+Z goes back to this state.
     bpy.ops.ed.undo_push(message="Before")
     yield
     before = state()

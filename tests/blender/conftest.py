@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import ClassVar
 
-# What one test computes, no other finds.
+# Nothing that one test computes is visible to another.
 os.environ["SINEW_CACHE"] = "0"
 
 import bpy
@@ -23,16 +23,16 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 # The reader of glTF for engines.
 sys.path.append(str(REPOSITORY / "shaders"))
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
-# What commands write: left to 4.2 and the newest, between which the others lie. These run all other tests:
-# how Blender evaluates, stores and edits.
+# Tests of what commands write: they only run in 4.2 and in the newest Blender. The versions in between run
+# all other tests: how Blender evaluates, stores and edits.
 LEFT_TO_OTHERS = {
     *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_blend", "test_check"),
     "test_cluster",
     *("test_command_line", "test_compare", "test_comparison", "test_export", "test_flamenco", "test_hostile"),
     *("test_output", "test_report", "test_restore", "test_stages_in_features"),
 }
-# What Sinew makes of a character that Blender gave it, and its panels: left to the long-term releases by the
-# others. These run how Blender evaluates, stores, edits and renders.
+# Tests of what Sinew computes from a character, and of its panels: they only run in long-term releases. The
+# others run how Blender evaluates, stores, edits and renders.
 LEFT_TO_LONG_TERM = {
     *("test_bulge_limit", "test_character", "test_corrective_key", "test_ddm", "test_delta_mush"),
     *("test_diagnostics_panel", "test_found_where_looked_for", "test_golden", "test_heat_map", "test_ik"),
@@ -54,14 +54,14 @@ def pytest_sessionfinish(exitstatus):
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure():
-    # Having exported glTF, Blender as a module can crash (4.2, with Sinew or without) or hang (4.5) in its
-    # own ending; Windows' does so under wine, whatever was done.
+    # After an export of glTF, Blender as a module may crash (4.2, with or without Sinew) or hang (4.5) when
+    # it exits; on Windows under wine it always does.
     ends_badly = bpy.app.version < (5, 0) and "io_scene_gltf2.io.exp" in sys.modules
     if ends_badly or sys.platform == "win32":
         sys.stdout.flush()
         sys.stderr.flush()
         if sys.platform == "win32":
-            # os._exit() has each library end itself, which is where it crashes.
+            # os._exit() also ends each library, which is where it crashes.
             import ctypes
 
             ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), _exit_status)
@@ -87,7 +87,7 @@ def pytest_collection_modifyitems(items):
 def registered():
     sinew_addon.register()
     yield
-    # Handlers still registered at the end of the process crash Blender 4.2 and hang 4.5.
+    # Handlers that are still registered when the process ends crash Blender 4.2 and hang 4.5.
     sinew_addon.unregister()
 
 
@@ -98,7 +98,7 @@ def empty_file():
 
 @pytest.fixture(autouse=True)
 def nothing_of_commands(monkeypatch):
-    """What a command sets for its process ends with the test that runs it."""
+    """Undoes what a command sets for its process when the test ends."""
     monkeypatch.setattr(normals, "are_used", normals.are_used)
     yield
     evaluate.set_parameters({})
@@ -106,13 +106,13 @@ def nothing_of_commands(monkeypatch):
 
 @pytest.fixture(autouse=True)
 def none_left_to_blender(monkeypatch):
-    """The meshes of tests are small, and what is tested is Sinew."""
+    """Tests have small meshes, and Sinew must deform them."""
     monkeypatch.setattr(small_meshes, "is_used", False)
 
 
 @pytest.fixture
 def real_rig():
-    """real_rig(name): the path of a rig in SINEW_RIGS; skips the test where it is not there."""
+    """real_rig(name): the path of a rig in SINEW_RIGS; skips the test if it does not exist."""
 
     def find(name: str) -> Path:
         folder = os.environ.get("SINEW_RIGS")
@@ -141,7 +141,7 @@ def arm(tmp_path):
 
 
 class KeepingEngine(bpy.types.RenderEngine):
-    """Draws nothing, and keeps what it is given of each mesh."""
+    """Draws nothing, and stores the data that it is given for each mesh."""
 
     bl_idname = "SINEW_KEEPING"
     bl_label = "Keeping"
@@ -158,7 +158,7 @@ class KeepingEngine(bpy.types.RenderEngine):
 
 @pytest.fixture
 def rendered_points():
-    """rendered_points(object): float32 [vertices, 3], what a render is given of it at this frame."""
+    """rendered_points(object): float32 [vertices, 3], what a render receives for it at this frame."""
     bpy.utils.register_class(KeepingEngine)
 
     def render(obj: bpy.types.Object) -> np.ndarray:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: exports glTF by the file browser, whose side bar has a check box.
-Prints "FACTS" and a line of JSON; pictures of the browser lie in the folder.
+"""In Blender's window, with Sinew's zip: exports glTF with the file browser, whose side bar has a check box.
+
+Prints "FACTS" and a line of JSON, and saves pictures of the browser in the folder.
 
     blender --factory-startup --enable-event-simulate --python export_in_window.py -- sinew.zip FOLDER
 """
@@ -20,7 +21,7 @@ import five_meshes
 import window
 
 ZIP, FOLDER = window.arguments()
-# In the picture of a window of 1280 x 800.
+# In a picture of a window of 1280 x 800.
 CHECK_BOX, EXPORT = (1145, 307), (1207, 757)
 
 
@@ -55,7 +56,7 @@ def of_sinew(path: Path) -> dict[str, object]:
 
 
 def steps() -> Iterator[None]:
-    # In the window itself, where a picture of the screen has it.
+    # In the main window, so that a picture of the screen shows it.
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     window.install(ZIP)
     bpy.data.objects.remove(bpy.data.objects["Cube"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character of five meshes and a prop, as artists have them: plain bpy, nothing of Sinew."""
+"""A character of five meshes and a prop, as artists build them: plain bpy, without Sinew."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ SHIRT = MESHES[1]
 
 
 def make(vertices: int = window_scene.LARGE) -> bpy.types.Object:
-    """Returns the armature. The shirt has Solidify, the hair Subdivision; the eyes are small; the hat hangs
-    on a bone, and no armature deforms it. The body alone is selected."""
+    """Returns the armature. The shirt has Solidify, the hair Subdivision; the eyes are small; the hat is
+    parented to a bone, and no armature deforms it. Only the body is selected."""
     body = window_scene.make_character("Body", vertices, (0.0, 0.0, 0.0))
     armature = bpy.data.objects["Body Rig"]
     armature.name = "Hero Rig"
@@ -38,7 +38,7 @@ def make(vertices: int = window_scene.LARGE) -> bpy.types.Object:
 
 
 def select(*objects: bpy.types.Object) -> None:
-    """The first is the active one."""
+    """Selects these; the first becomes the active one."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in objects)
     bpy.context.view_layer.objects.active = objects[0]

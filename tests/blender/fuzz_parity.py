@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random rigs, posed at random: Sinew against Blender's Armature modifier, or for methods that Blender lacks
-and for stages against the float64 reference.
+"""Random rigs in random poses: Sinew compared with Blender's Armature modifier.
+
+Methods that Blender lacks, and stages, are compared with the float64 reference.
 
     python tests/blender/fuzz_parity.py --rigs 10000 [--first 0] [--route both] [--keep DIR]
 
-Each rig goes by both routes: within Blender's evaluation, as far as the rig allows, and after the update, as
-in safe mode. A shape that Sinew did not make is a failure.
+Each rig is tested by both routes: within Blender's evaluation, as far as the rig allows, and after the
+update, as in safe mode. A shape that Sinew did not make is a failure.
 
-A rig is made from its seed and a set of features, each with random numbers of its own, so that leaving one
-out changes nothing else: a failing rig is made smaller by leaving out all features that the failure does
-not need, then saved as DIR/seed-N.blend.
+A rig is made from its seed and a set of features, each with its own random numbers, so that leaving one out
+changes nothing else. A failing rig is reduced by leaving out all features that the failure does not need,
+then saved as DIR/seed-N.blend.
 
-Left out of the comparison are vertices at a discontinuity of the modifier itself, where rounding decides:
-dual quaternions that meet within MARGIN of square (the sign of a term flips), weights that sum to within
-MARGIN of the modifier's threshold; and vertices that a change of the input by its rounding moves by the
-tolerance, there or by the modifier behind; of stages, a change of what they smooth. All are computed from
-the input.
+The comparison leaves out vertices at a discontinuity of the modifier itself, where rounding decides: dual
+quaternions that are within MARGIN of perpendicular (where the sign of a term flips), and weights whose sum
+is within MARGIN of the modifier's threshold. It also leaves out vertices that a change of the input by its
+rounding moves by the tolerance, directly or by a later modifier; for stages, a change of their input. All of
+these are computed from the input.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ import reference
 import sinew
 
 MARGIN = 1e-3
-# Of float32 numbers after a few operations, as a part of the diagonal.
+# For float32 numbers after a few operations, relative to the diagonal.
 ROUNDING = 1e-6
 FEATURES = (
     "object transforms",
@@ -70,30 +71,31 @@ FEATURES = (
     "sdef keys",
     "stages",
 )
-# Methods that Blender has, and whether with Preserve Volume.
+# Blender's own methods, and whether each has Preserve Volume.
 ORACLES = (("lbs", False), ("dq", True))
 OTHERS = tuple(m.name for m in sinew.methods() if m.name not in dict(ORACLES))
-# Of a rig, by the reference: it takes a hundredth of a second for one.
+# How many vertices of a rig the reference computes: it takes a hundredth of a second for each.
 REFERENCE_VERTICES = 12
-# float32 beside exact numbers, where Blender's own are rounded alike.
+# float32 compared with exact numbers; Blender's own results have the same rounding.
 REFERENCE_TOLERANCE = 2 * scenes.TOLERANCE
-# What comes of stages: the mix of two methods, and all that follow the blend.
+# Results of stages: the mix of two methods, and all stages after the blend.
 MIX, AFTER = "mix", "stages after"
-# Vertex groups that stages take.
+# Vertex groups that stages use.
 PAINTED = ("painted", "painted too")
 NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after the update"}
 
 
 @dataclass
 class Outcome:
-    """What came out for one rig.
+    """The results for one rig.
 
-    errors    the worst by (route wanted, method or MIX or AFTER), as a part of the diagonal
-    taken     the route that was taken for each that was wanted
-    reason    why a shape is not Sinew's, if one is not
-    left_out  how many vertices were
-    compared  with the reference, over all methods, and of these undecided by rounding
-    staged    the same of stages
+    errors    the largest by (requested route, method or MIX or AFTER), relative to the diagonal
+    taken     the actual route for each requested one
+    reason    why a shape was not made by Sinew, if so
+    left_out  the number of vertices left out
+    compared  the number of vertices compared with the reference, over all methods, and of those undecided by
+              rounding
+    staged    the same for stages
     """
 
     seed: int
@@ -210,7 +212,7 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
 
 
 def faces_of(seed: int, features: set[str], count: int) -> list[tuple[int, ...]]:
-    """Of a mesh of `count` vertices: two, or about as many as vertices."""
+    """Numbers of vertices for a mesh of `count` vertices: two, or about as many as vertices."""
     if not has(seed, "faces", features):
         return [(0, 1, 2), (3, 4, 5)]
     rng = numbers(seed, "faces")
@@ -218,8 +220,8 @@ def faces_of(seed: int, features: set[str], count: int) -> list[tuple[int, ...]]
 
 
 def make_surface(rng: np.random.Generator, points: np.ndarray) -> list[tuple[int, ...]]:
-    """Moves most of `points` onto a rough sheet, and returns its faces: triangles, quads, hexagons and holes,
-    and one on an edge that has others."""
+    """Moves most of `points` onto a rough sheet, and returns its faces: triangles, quads, hexagons and
+    holes, and one at an edge that already has others."""
     width = int(rng.integers(3, 8))
     height = len(points) // width
     x, y = np.meshgrid(np.linspace(-1.2, 1.2, width), np.linspace(-1.2, 1.2, height), indexing="xy")
@@ -274,7 +276,7 @@ def add_shape_keys(seed: int, features: set[str], obj: bpy.types.Object) -> None
 
 
 def add_sdef_keys(rng: np.random.Generator, obj: bpy.types.Object) -> None:
-    """Of about half of the vertices, as mmd_tools stores them."""
+    """Data for about half of the vertices, as mmd_tools stores it."""
     points = scenes.rest_points(obj)
     if obj.data.shape_keys is None:
         obj.shape_key_add(name="Basis")
@@ -287,7 +289,7 @@ def add_sdef_keys(rng: np.random.Generator, obj: bpy.types.Object) -> None:
 
 
 def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """The mesh object and its armature of one seed, posed, in an empty file."""
+    """The mesh object and its armature for one seed, posed, in an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     armature = make_armature(seed, features)
     obj = make_mesh(seed, features, armature)
@@ -331,7 +333,7 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
 
 
 def paint(rng: np.random.Generator, obj: bpy.types.Object) -> None:
-    """The vertex groups of stages: none, all or a part of a vertex."""
+    """The vertex groups for stages, with weights of 0, 1 or between."""
     for name in PAINTED:
         group = obj.vertex_groups.new(name=name)
         for vertex in range(len(obj.data.vertices)):
@@ -361,7 +363,7 @@ def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> No
 def add_further_armatures(
     seed: int, features: set[str], obj: bpy.types.Object, armature: bpy.types.Object
 ) -> None:
-    """One or two more Armature modifiers behind the first, of a copy of its armature in another pose."""
+    """One or two more Armature modifiers after the first, with a copy of its armature in another pose."""
     rng = numbers(seed, "further armatures")
     other = armature.copy()
     other.data = armature.data.copy()
@@ -397,7 +399,7 @@ def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
 
 
 def undecided(obj: bpy.types.Object) -> np.ndarray:
-    """bool [vertices]: those at a discontinuity of a modifier, of an object that was just deformed."""
+    """bool [vertices]: those at a discontinuity of a modifier, for an object that was just deformed."""
     skinned = session.state_of(obj)
     bindings = [
         stage.binding
@@ -437,8 +439,8 @@ def undecided_by(binding: core_session.Binding) -> np.ndarray:
 
 
 def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
-    """bool [vertices]: those that a change of the input by its rounding moves by the tolerance, as curved
-    mapping does with what lies far inside a bend, and one modifier after the other."""
+    """bool [vertices]: those that a change of the input by its rounding moves by the tolerance, such as
+    by curved mapping far inside a bend, or by several modifiers in sequence."""
     skinned = session.state_of(obj)
     rest_points = skinned.shown.rest_points.astype(np.float64)
     moved = numbers(len(rest_points), "rounding").uniform(-1.0, 1.0, rest_points.shape) * ROUNDING * extent
@@ -457,10 +459,10 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
 
 
 def magnified_behind(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
-    """bool [vertices]: those so near the centre of the sphere onto which the modifier behind casts them
-    that their rounding decides the direction.
+    """bool [vertices]: those so near to the centre of the sphere onto which the next modifier casts them
+    that rounding decides the direction.
 
-    points  [vertices, 3], object space: what comes to it
+    points  [vertices, 3], object space: the modifier's input
     """
     distances = np.linalg.norm(points, axis=1)
     cast = obj.modifiers.get("Cast")
@@ -469,7 +471,7 @@ def magnified_behind(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
 
 
 def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) -> Outcome:
-    """wanted  the routes"""
+    """wanted  the requested routes"""
     obj, armature = make_rig(seed, features)
     expected = {}
     for method, preserve_volume in ORACLES:
@@ -506,7 +508,7 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
 def check_stages(
     obj: bpy.types.Object, armature: bpy.types.Object, seed: int, outcome: Outcome, route: str
 ) -> None:
-    """A mix of two random methods, then random stages that follow it; notes the errors."""
+    """Checks a mix of two random methods, then random stages after it; records the errors."""
     rng = numbers(seed, "stages")
     known = [m.name for m in sinew.methods()]
     method, second = rng.choice(known, 2, replace=False).tolist()
@@ -521,7 +523,7 @@ def check_stages(
 
 
 def choose_stages_after(rng: np.random.Generator, settings: bpy.types.PropertyGroup, diagonal: float) -> None:
-    """One of them, or both, with random parameters."""
+    """One of the stages, or both, with random parameters."""
     which = int(rng.integers(3))
     limit, mush = settings.bulge_limit, settings.delta_mush
     limit.enabled, mush.enabled = which != 1, which != 0
@@ -539,8 +541,8 @@ def choose_stages_after(rng: np.random.Generator, settings: bpy.types.PropertyGr
 def error_of_stages(
     obj: bpy.types.Object, armature: bpy.types.Object, method: str, outcome: Outcome, route: str
 ) -> float:
-    """As error_of(), to the float64 reference of the stages that follow the blend and are on; it starts from
-    the shape without them, whose own error is that of the method."""
+    """As error_of(), compared with the float64 reference of the enabled stages after the blend. It starts
+    from the shape without them, so that the error of the method does not count."""
     settings = properties.of(obj)
     groups = {name: getattr(settings, name) for name in stage_settings.names_on(settings) if name != MIX}
     values = {name: stage_settings.values_of(settings, name) for name in groups}
@@ -569,7 +571,7 @@ def error_of_stages(
 
 @contextlib.contextmanager
 def without_modifiers_behind(obj: bpy.types.Object) -> Iterator[None]:
-    """Those behind what Sinew replaces are off: the reference knows nothing of them."""
+    """Modifiers after the replaced ones are off, because the reference does not know them."""
     place = list(obj.modifiers).index(attach.sinew_modifier(obj))
     behind = [m for m in list(obj.modifiers)[place:] if m.type not in ("ARMATURE", "NODES")]
     for modifier in behind:
@@ -589,14 +591,14 @@ def error_of(
     outcome: Outcome,
     route: str,
 ) -> float:
-    """The worst of a rig under one method, as a part of the diagonal; notes the route that was taken.
+    """The largest error of a rig under one method, relative to the diagonal; records the actual route.
 
     Raises routes.NotBySinewError.
     """
     shown = shape_of(obj, armature, method, outcome, route)
     if shown.shape != expected.shape:
         return float("inf")
-    # A pose with scale makes the mesh larger, and its rounding with it.
+    # A pose with scale makes the mesh larger, and its rounding as well.
     extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(expected, axis=0))))
     left_out = undecided(obj) | unstable(obj, extent)
     outcome.left_out = int(left_out.sum())
@@ -606,7 +608,7 @@ def error_of(
 def error_to_reference(
     obj: bpy.types.Object, armature: bpy.types.Object, method: str, seed: int, outcome: Outcome, route: str
 ) -> float:
-    """As error_of(), of some vertices, to the float64 reference."""
+    """As error_of(), for some vertices, compared with the float64 reference."""
     with without_modifiers_behind(obj):
         shown = shape_of(obj, armature, method, outcome, route)
         state = session.state_of(obj)
@@ -625,12 +627,12 @@ def error_to_reference(
 def shape_of(
     obj: bpy.types.Object, armature: bpy.types.Object, method: str, outcome: Outcome, route: str
 ) -> np.ndarray:
-    """The final points, made anew by `method`; notes the route that was taken.
+    """The final points, computed again with `method`; records the actual route.
 
     Raises routes.NotBySinewError.
     """
     attach.use_one_method(obj, method)
-    # Another pose and back, so that the shape has to be made.
+    # Changes the pose and restores it, so that the shape is computed again.
     before = [bone.location.copy() for bone in armature.pose.bones]
     for bone in armature.pose.bones:
         bone.location.x += 1.0
@@ -655,7 +657,7 @@ def shrink(seed: int, wanted: Sequence[str]) -> set[str]:
 
 
 def run(first: int, count: int, keep: Path, wanted: Sequence[str] = routes.ROUTES) -> list[Outcome]:
-    """Checks `count` seeds from `first`; saves those that fail, made small, in `keep`."""
+    """Checks `count` seeds from `first`; reduces those that fail, and saves them in `keep`."""
     outcomes = []
     for seed in range(first, first + count):
         outcome = check(seed, set(FEATURES), wanted)
@@ -690,7 +692,7 @@ def summarise(outcomes: list[Outcome]) -> str:
 
 
 def routes_taken(outcomes: list[Outcome]) -> list[str]:
-    """A line for each route that was wanted: by which the rigs went."""
+    """A line for each requested route: the routes by which the rigs were deformed."""
     lines = []
     for route in dict.fromkeys(route for o in outcomes for route, _method in o.errors):
         taken = Counter(o.taken.get(route, "none of Sinew's") for o in outcomes)

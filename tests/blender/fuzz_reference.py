@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rig's whole stack of Armature modifiers by the float64 reference, for methods that Blender lacks, and the
-stages that follow.
+"""A rig's whole stack of Armature modifiers by the float64 reference, for methods that Blender lacks, and
+the stages after it.
 
-What Sinew reads of Blender, poses and weights, is what `lbs` and `dq` have, whose oracle is Blender itself.
+Sinew reads the same from Blender, poses and weights, for `lbs` and `dq`, whose oracle is Blender itself.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from sinew_addon.core.bulge_limit import segments
 
 METHODS = {method.name: method for method in sinew.methods()}
 MARGIN = 1e-3
-# As a part of the diagonal.
+# Relative to the diagonal.
 LEAST_STABLE = 2e-6
-# Near half a turn from rest, the logarithm of a rotation in float32 errs by its rounding divided by the
+# Near 180 degrees from rest, the error of a rotation's logarithm in float32 is its rounding divided by the
 # margin.
 MARGINS = {"log": 0.03}
 
@@ -37,14 +37,14 @@ def deform(
     frames: list[core_session.SkinStageFrame | None],
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """float64 [of `vertices`, 3], object space, and bool [of them] those where rounding does not decide.
+    """float64 [of `vertices`, 3], object space, and bool [of them]: those where rounding does not decide.
 
-    frames    as the stack takes them, of scale rule Blender 4
+    frames    the input of the stack, with Blender 4's scale rule
     vertices  int [any number] the only ones that are deformed
     """
     points = rest_points.astype(np.float64)
     decided = np.ones(len(vertices), dtype=bool)
-    # What a Multi Modifier starts from: the input of the modifier before it.
+    # The starting point of a Multi Modifier: the input of the modifier before it.
     start_before = points
     for stage, frame in zip(stack.skin_stages, frames, strict=True):
         start = start_before if stage.multi else points
@@ -67,12 +67,12 @@ def stages_after(
     values: Mapping[str, Mapping[str, Any]],
     rounding: np.ndarray | float = 0.0,
 ) -> np.ndarray:
-    """float64 [vertices, 3], object space: the stages that follow the blend.
+    """float64 [vertices, 3], object space: the shape after the stages that follow the blend.
 
     points    [vertices, 3], the shape before them
     frames    as for deform()
-    values    of the parameters of each stage that is on
-    rounding  [vertices, 3], added to `points` and to what is smoothed, to see what their rounding does
+    values    of the parameters of each enabled stage
+    rounding  [vertices, 3], added to `points` and to what is smoothed, to find the effect of their rounding
     """
     after = stack.stages_after
     points = points.astype(np.float64) + rounding
@@ -100,7 +100,7 @@ def _limited(
     mask: np.ndarray | None,
     options: Mapping[str, Any],
 ) -> np.ndarray:
-    """By the bones of the first modifier that takes part, where its own mask has all of a vertex."""
+    """Uses the bones of the first participating modifier whose own mask contains all of a vertex."""
     number = next((i for i, frame in enumerate(frames) if frame is not None), None)
     if number is None:
         return points
@@ -131,7 +131,7 @@ def _by_one_modifier(
     points: np.ndarray,
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points, and whether rounding does not decide them."""
+    """Points, and whether they are independent of rounding."""
     deformed, decided = _by_one_method(binding, frame, frame.method, points, vertices)
     if not frame.mix or binding.mix_weights is None:
         return deformed, decided
@@ -176,7 +176,7 @@ def _by_one_method(
     decided = margins > MARGINS.get(method, MARGIN)
     if data and METHODS[method].keeps_moments:
         decided &= _have_same_extents(kept.astype(np.float64), data[method], vertices)
-        # Bones that move far apart make much of the rounding of a small neighbourhood's moments.
+        # Bones that move far apart amplify the rounding of a small neighbourhood's moments.
         rounded = {name: _with_other_rounding(rows) for name, rows in data.items()}
         extent = float(np.linalg.norm(np.ptp(points, axis=0)))
         decided &= np.abs(by(rounded)[0] - deformed).max(axis=1) <= LEAST_STABLE * extent
@@ -184,7 +184,7 @@ def _by_one_method(
 
 
 def _points_kept(space: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """What a method keeps of each vertex: points, one after the other, and after them what is none."""
+    """The vertex data of a method: points one after the other, followed by numbers that are no points."""
     count = kept.shape[1] // 3
     points = kept[:, : 3 * count].reshape(len(kept), count, 3)
     return np.hstack([_moved(space, points).reshape(len(kept), -1), kept[:, 3 * count :]])
@@ -193,8 +193,8 @@ def _points_kept(space: np.ndarray, kept: np.ndarray) -> np.ndarray:
 def _moments(
     rows: np.ndarray, vertices: np.ndarray, space: np.ndarray, influences: Any, points: np.ndarray
 ) -> np.ndarray:
-    """[rows, 12]: place in `vertices`, bone, weight, first moment, and xx, yy, zz, yz, xz, xy of the second,
-    in armature space. A vertex that has none is its own neighbourhood."""
+    """[rows, 12]: index into `vertices`, bone, weight, first moment, and xx, yy, zz, yz, xz, xy of the
+    second, in armature space. A vertex without rows is its own neighbourhood."""
     found = []
     for place, vertex in enumerate(vertices):
         own = rows[slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1)))]
@@ -209,8 +209,8 @@ def _moments(
 
 
 def _have_same_extents(kept: np.ndarray, moved: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Whether a neighbourhood is a point, or is none, both in object space, where the library decides it, and
-    in armature space: how far it is from the origin counts."""
+    """Whether a neighbourhood is a point, or does not exist, in object space, where the library decides
+    it, and in armature space, where the distance from the origin matters."""
 
     def is_point(rows: np.ndarray, number: int) -> bool:
         own = rows[slice(*np.searchsorted(rows[:, 0], (number, number + 1)))]
@@ -229,7 +229,7 @@ def _moved_moments(space: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def _with_other_rounding(rows: np.ndarray) -> np.ndarray:
-    """First moments as another rounding to float32 could have them."""
+    """First moments with another possible rounding to float32."""
     rows = rows.copy()
     steps = np.random.default_rng(len(rows)).uniform(-1.0, 1.0, (len(rows), 3))
     rows[:, 3:6] += steps * np.finfo(np.float32).eps * np.abs(rows[:, 3:6]).max(initial=0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A script that runs once in a whole Blender's window, with the zip installed, and prints what it found."""
+"""Runs a script once in the window of a whole Blender with the zip installed, and reads what it prints."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ HERE = Path(__file__).parent
 
 
 def facts_of(script: str, folder: Path, *others: str) -> dict:
-    """The facts that a script here prints as JSON behind FACTS, and under "printed" its lines of errors.
+    """The facts that a script here prints as JSON after FACTS, and its lines of errors as "printed".
 
-    others  names of further scripts that it imports, beside window and window_scene
+    others  names of further scripts that it imports, besides window and window_scene
     """
     program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
     if not (program and package):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: what it says in German, and after a change of language. Prints
-"FACTS" and a line of JSON; a picture of the panel lies in the folder.
+"""In Blender's window, with Sinew's zip: its texts in German, and after a change of language.
+
+Prints "FACTS" and a line of JSON, and saves a picture of the panel in the folder.
 
     blender --factory-startup --enable-event-simulate --python language_in_window.py -- sinew.zip FOLDER
 """
@@ -38,7 +39,7 @@ def texts() -> dict[str, str]:
         "choice": bpy.types.UILayout.enum_item_name(body.sinew, "method", "dq"),
         "put together": counted(4, "{count} mesh", "{count} meshes"),
         "state": state_text.sentence_of(body),
-        # Blender's own is kept where it has one.
+        # Blender's own translation is used where it has one.
         "blender's": translations.pgettext_iface("Vertex Group"),
     }
 

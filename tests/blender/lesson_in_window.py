@@ -46,7 +46,7 @@ def steps() -> Iterator[None]:
     bpy.data.objects.new("Unsaved", None)
     bpy.ops.ed.undo_push(message="work")
     facts["is dirty"] = bpy.data.is_dirty
-    # Blender asks; Esc keeps what is open.
+    # Blender asks; Esc keeps the open file.
     open_lesson()
     yield from wait()
     window.photograph(FOLDER / "asked.png")
@@ -54,7 +54,7 @@ def steps() -> Iterator[None]:
     window.press("ESC", VIEW)
     yield from wait()
     facts["kept after Esc"] = is_own()
-    # Who has switched that question off loses nothing, either.
+    # Nothing is lost either if the user has switched that question off.
     bpy.context.preferences.view.use_save_prompt = False
     open_lesson()
     yield from wait()

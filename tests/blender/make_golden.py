@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small rigs and what Blender's Armature modifier and Sinew make of them, for engines that want to match it.
+"""Makes small rigs and their shapes by Blender's Armature modifier and Sinew, for engines that want to match
+them.
 
     python tests/blender/make_golden.py [FOLDER]
 
-FOLDER, by default tests/golden, holds the README that says what is in a case.
+FOLDER is tests/golden by default; its README describes a case.
 """
 
 from __future__ import annotations
@@ -30,15 +31,15 @@ from sinew_addon.deform import evaluate, session
 from sinew_addon.io import mesh_io
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
-# Raised where a reader of the files before would not read these rightly.
+# Incremented if readers of earlier files would misread these.
 FORMAT = 2
 GROUP = "painted"
 
-# Blender's own methods, by the names of their arrays.
+# Blender's own methods, with the names of their arrays.
 BLENDERS = {"lbs": "linear", "dq": "preserve_volume"}
-# Of methods' parameters that are no choice, where the default suits no mesh as coarse as these.
+# Values for parameters of methods that are no choice, if the default does not suit such coarse meshes.
 METHOD_VALUES: dict[str, dict[str, Value]] = {"ddm": {"radius": 0.3}}
-# For each stage the methods that it follows, with its parameters but for choices.
+# For each stage: the methods before it, and its parameters except choices.
 STAGE_VALUES: dict[str, list[tuple[str, dict[str, Value]]]] = {
     "mix": [(a, {"method": b, "group": GROUP}) for a, b in (("lbs", "dq"), ("dq", "cor"), ("cor", "lbs"))],
     "bulge_limit": [("dq", {"strength": 0.8, "group": GROUP})],
@@ -123,7 +124,7 @@ CASES = (
 
 @dataclass
 class Result:
-    """What an array of points is: an entry of the JSON's `results`."""
+    """The description of an array of points: an entry of the JSON's `results`."""
 
     array: str
     by: str
@@ -133,7 +134,7 @@ class Result:
 
     @property
     def values(self) -> dict[str, Value]:
-        """Of all parameters, by full names."""
+        """The values of all parameters, by full names."""
         owners = {self.method: self.parameters, **self.stages}
         values = {f"{owner}.{name}": value for owner, own in owners.items() for name, value in own.items()}
         switches = {f"{stage}.enabled": True for stage in self.stages if stage != "mix"}
@@ -141,7 +142,7 @@ class Result:
 
 
 def results() -> list[Result]:
-    """By the lists of methods and stages, each with all its choices."""
+    """All results, from the lists of methods and stages, each with all its choices."""
     return [
         *(Result(array, "Blender", method) for method, array in BLENDERS.items()),
         *(
@@ -160,7 +161,7 @@ def results() -> list[Result]:
 
 
 def choices(owner: sinew.Method | sinew.Stage) -> Iterator[tuple[str, dict[str, Value]]]:
-    """Each with the name of its array."""
+    """Each result with the name of its array."""
     kinds = [parameter for parameter in owner.parameters if parameter.kind == "enum"]
     for chosen in itertools.product(*(kind.choices for kind in kinds)):
         yield "_".join([owner.name, *chosen]), {k.id: c for k, c in zip(kinds, chosen, strict=True)}
@@ -170,7 +171,7 @@ SetUp = Callable[[bpy.types.Object, bpy.types.Object], None]
 
 
 def make(set_up: SetUp) -> tuple[dict, dict[str, np.ndarray]]:
-    """One case: what its JSON says, and the arrays of its npz."""
+    """One case: the content of its JSON, and the arrays of its npz."""
     obj, armature = make_rig(set_up)
     arrays = {**influences(obj, armature), **bones(armature), **topology(obj.data)}
     arrays["points"] = scenes.rest_points(obj)
@@ -203,7 +204,8 @@ def make(set_up: SetUp) -> tuple[dict, dict[str, np.ndarray]]:
 
 
 def make_rig(set_up: SetUp) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """In an empty file: a posed arm with a painted vertex group, and with the shape keys that sdef reads."""
+    """Makes, in an empty file, a posed arm with a painted vertex group and with the shape keys that sdef
+    reads."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj, armature = scenes.make_arm(bones=3, sides=6, rings=10)
     set_up(obj, armature)
@@ -214,7 +216,7 @@ def make_rig(set_up: SetUp) -> tuple[bpy.types.Object, bpy.types.Object]:
 
 
 def paint(obj: bpy.types.Object) -> None:
-    """A vertex group of stretches of 0 and of 1, and all between."""
+    """A vertex group with runs of 0 and of 1, and values in between."""
     group = obj.vertex_groups.new(name=GROUP)
     for vertex, share in enumerate(np.random.default_rng(2).uniform(-0.5, 1.5, len(obj.data.vertices))):
         if share > 0.0:
@@ -243,7 +245,7 @@ def make_spheres(obj: bpy.types.Object) -> None:
 
 
 def vertex_data(obj: bpy.types.Object, method: str) -> np.ndarray | None:
-    """What the method keeps of vertices, as the library takes it."""
+    """The method's vertex data in the library's form."""
     state = session.state_of(obj)
     assert state is not None
     kept = state.bound.binding.vertex_data
@@ -274,7 +276,7 @@ def influences(obj: bpy.types.Object, armature: bpy.types.Object) -> dict[str, n
 
 
 def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
-    """Bones first, then the joints of bendy ones."""
+    """Bones first, then the joints of bendy bones."""
     posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
     rest_matrices = [np.array(bone.matrix_local) for bone in armature.data.bones]
     pose_matrices = [np.array(bone.matrix) for bone in posed]
@@ -297,7 +299,7 @@ def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    # What another run has computed is not what this one makes.
+    # Results of earlier runs must not be used.
     os.environ["SINEW_CACHE"] = "0"
     sinew_addon.register()
     for set_up in CASES:

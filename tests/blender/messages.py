@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All texts that Sinew shows, each with where: those that Blender knows, and those that code gives it."""
+"""Collects all texts that Sinew shows, each with its source: those registered in Blender, and those in
+code."""
 
 from __future__ import annotations
 
@@ -20,9 +21,9 @@ from sinew_addon.features.heat import heat_panel
 from sinew_addon.ui import menus
 
 ADDON = Path(sinew_addon.__file__).parent
-# Folders whose code draws.
+# Folders with code that draws.
 SHOWING = ("ui", "features")
-# Arguments with texts: the function, then their places; and keywords of all functions.
+# Arguments that are texts: for each function, their positions; and keywords of all functions.
 ARGUMENTS = {
     "tr": (0,),
     "tip": (0,),
@@ -33,7 +34,7 @@ ARGUMENTS = {
     "_for_each": (3,),
 }
 KEYWORDS = {"text"}
-# Names that code gives a text before it uses it, and what operators in steps say.
+# Names to which code assigns texts before it uses them, and what operators in steps report.
 VARIABLES = {"text", "what", "one", "many", "saying", "stopped"}
 
 TYPES = (
@@ -43,11 +44,11 @@ TYPES = (
 
 
 def shown() -> dict[str, str]:
-    """Each text, and a place where it is."""
+    """Each text, and one position in the code where it occurs."""
     found: dict[str, str] = {}
     for source in (_of_classes(), _of_data(), _of_lists(), _of_code(), _of_phrases()):
         for text, where in source:
-            # What has no letters reads alike in all languages.
+            # Texts without letters are the same in all languages.
             if any(letter.isalpha() for letter in text):
                 found.setdefault(text, where)
     return found
@@ -61,7 +62,7 @@ def _of_classes() -> Iterator[tuple[str, str]]:
             rna = getattr(bpy.ops.sinew, cls.bl_idname.partition(".")[2]).get_rna_type()
             yield rna.name, cls.__name__
             yield rna.description, cls.__name__
-        # Of a panel of presets, Blender writes the name of the one chosen last into bl_label.
+        # For a panel of presets, Blender writes the name of the last chosen one into bl_label.
         if not issubclass(cls, PresetPanel):
             yield getattr(cls, "bl_label", ""), cls.__name__
         yield getattr(cls, "bl_description", None) or "", cls.__name__
@@ -81,7 +82,7 @@ def _of_data() -> Iterator[tuple[str, str]]:
 def _of_property(prop: bpy.types.Property, where: str) -> Iterator[tuple[str, str]]:
     if prop.is_hidden:
         return
-    # Without a name of its own it is called as in code, and never drawn so.
+    # Without a name it has the name in the code, which is never drawn.
     if prop.name != prop.identifier:
         yield prop.name, where
     yield prop.description, where
@@ -91,7 +92,7 @@ def _of_property(prop: bpy.types.Property, where: str) -> Iterator[tuple[str, st
 
 
 def _of_lists() -> Iterator[tuple[str, str]]:
-    """What is drawn from lists."""
+    """Texts that are drawn from lists."""
     for owner in (*sinew.methods(), *sinew.stages()):
         yield owner.label, owner.name
         yield owner.description, owner.name
@@ -125,7 +126,7 @@ def _of_code() -> Iterator[tuple[str, str]]:
 
 
 def _of_phrases() -> Iterator[tuple[str, str]]:
-    """Sentences that are made below the panels."""
+    """Sentences that are made by code below the panels."""
     for path in sorted(ADDON.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "phrase":
@@ -134,11 +135,11 @@ def _of_phrases() -> Iterator[tuple[str, str]]:
 
 
 def joined_in_code() -> list[str]:
-    """Where panels put words and values together without tr()."""
+    """Positions where panels combine words and values without tr()."""
     found = []
     for path, node in _drawing_code():
         parts = [part for shown in _shown_by(node) for part in ast.walk(shown)]
-        # How a value is written, such as :g, is a JoinedStr, too.
+        # A format such as :g is a JoinedStr, too.
         formats = {id(part.format_spec) for part in parts if isinstance(part, ast.FormattedValue)}
         texts = [part for part in parts if isinstance(part, ast.JoinedStr) and id(part) not in formats]
         words = [each.value for text in texts for each in text.values if isinstance(each, ast.Constant)]
@@ -148,7 +149,7 @@ def joined_in_code() -> list[str]:
 
 
 def wrong_values() -> list[str]:
-    """Where tr() or phrase() is given other values than the names that its text has in braces."""
+    """Positions where tr() or phrase() gets other values than the names in its text's braces."""
     found = []
     for path in sorted(ADDON.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -175,7 +176,7 @@ def _drawing_code() -> Iterator[tuple[Path, ast.AST]]:
 
 
 def _shown_by(node: ast.AST) -> Iterator[ast.expr]:
-    """The expressions of texts that a statement or call shows."""
+    """The expressions for texts that a statement or call shows."""
     if isinstance(node, ast.Assign):
         names = {target.id for target in node.targets if isinstance(target, ast.Name)}
         if names & VARIABLES:
@@ -187,13 +188,13 @@ def _shown_by(node: ast.AST) -> Iterator[ast.expr]:
 
 
 def _row_of(node: ast.AST) -> Iterator[str]:
-    """Of a table in a panel: a name, and how its value is found."""
+    """For a table in a panel: a name, and how its value is found."""
     if isinstance(node, ast.Tuple) and len(node.elts) == 2 and not isinstance(node.elts[1], ast.Constant):
         yield from _constants(node.elts[0])
 
 
 def _constants(node: ast.expr) -> Iterator[str]:
-    """A string, or either of two."""
+    """A string, or one of two strings."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     elif isinstance(node, ast.IfExp):
@@ -202,7 +203,7 @@ def _constants(node: ast.expr) -> Iterator[str]:
 
 
 def literals() -> set[str]:
-    """All strings in the code, for texts that are written below the panels."""
+    """All strings in the code, to find texts that are made below the panels."""
     found = set()
     for path in ADDON.rglob("*.py"):
         if "translations" not in path.parts:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plays a .glb with what others wrote: pygltflib reads the file, scipy blends rotations, and numpy skins, by
-glTF 2.0's own words. Nothing here is shared with shaders/read_glb.py, nor with Sinew."""
+"""Plays a .glb with other projects' code: pygltflib reads the file, scipy blends rotations, and numpy
+skins, following the text of glTF 2.0. Shares no code with shaders/read_glb.py or with Sinew."""
 
 import numpy as np
 from pygltflib import GLTF2
@@ -21,7 +21,7 @@ def array(gltf, number):
 
 
 def sampled(gltf, sampler, path, time):
-    """The value at a time, of a sampler that steps or goes in straight lines."""
+    """The value of a sampler at a time, with step or linear interpolation."""
     times, values = array(gltf, sampler.input)[:, 0], array(gltf, sampler.output).astype(np.float64)
     time = np.clip(time, times[0], times[-1])
     if sampler.interpolation == "STEP" or len(times) == 1:
@@ -63,9 +63,9 @@ def world_matrices(gltf, animation, time):
 
 
 def points_at(path, times, animation):
-    """float64 [vertices, 3] at rest and [times, vertices, 3], in Blender's axes, of the only skinned mesh.
+    """float64 [vertices, 3] at rest and [times, vertices, 3], in Blender's axes, for the only skinned mesh.
 
-    animation  which one to play, by its name
+    animation  the name of the animation to play
     """
     gltf = GLTF2().load(str(path))
     (node,) = (each for each in gltf.nodes if each.skin is not None)

@@ -25,14 +25,14 @@ from mathutils import Vector
 
 ZIP, FOLDER = window.arguments()
 VIEW = (400, 500)
-# In the sidebar.
+# Positions in the sidebar.
 ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
-# Panels' headers while all are closed; what Diagnostics has below its own.
+# Headers of panels while all are closed; what Diagnostics has below its own.
 HEADER, DIAGNOSTICS = (850, 97), (850, 293)
 CHECK, MEND = (830, 350), (835, 501)
-# In the menu of methods.
+# Positions in the menu of methods.
 DUAL_QUATERNION = (483, 276)
-# In the dialog of a comparison, which opens at this place.
+# Positions in the dialog of a comparison, which opens here.
 DIALOG, QUATERNION_VECTOR, LOG_MATRIX = (400, 400), (171, 534), (171, 577)
 facts: dict[str, object] = {}
 
@@ -54,7 +54,7 @@ def scene() -> bpy.types.Scene:
 
 
 def search(text: str) -> Iterator[None]:
-    """F3, as without Developer Extras."""
+    """Runs an operator with F3, as without Developer Extras."""
     window.press("F3", VIEW)
     yield
     yield
@@ -147,7 +147,7 @@ def by_search_and_keys() -> Iterator[None]:
 
 
 def copies_in_view() -> bool:
-    """Whether the view shows the corners of all copies, beside the sidebar."""
+    """Whether the view shows the corners of all copies beside the sidebar."""
     area = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
     sidebar = next(region for region in area.regions if region.type == "UI")
@@ -191,7 +191,7 @@ def comparison_by_clicks() -> Iterator[None]:
 
 
 def brightest(picture: str, place: tuple[int, int]) -> float:
-    """Of the letters about a place of a photograph, 0 to 1."""
+    """The contrast of letters around a position in a photograph, 0 to 1."""
     image = bpy.data.images.load(str(FOLDER / f"{picture}.png"))
     width, height = image.size
     pixels = np.empty(width * height * 4, dtype=np.float32)
@@ -203,7 +203,7 @@ def brightest(picture: str, place: tuple[int, int]) -> float:
 
 
 def off_greys() -> Iterator[None]:
-    """What does not count while Sinew is off."""
+    """Settings that have no effect while Sinew is off."""
     yield from window.click(ADD)
     scene().sinew_character.method = "dq"
     yield
@@ -220,7 +220,7 @@ def without_weights() -> int:
 
 
 def mends_by_clicks() -> Iterator[None]:
-    """Opened with Ctrl, a panel closes all others."""
+    """Opens a panel with Ctrl, which closes all others."""
     for held in ({}, {"ctrl": True}, {}):
         yield from window.click(HEADER, **held)
     yield from window.click(DIAGNOSTICS)
@@ -242,7 +242,7 @@ def mends_by_clicks() -> Iterator[None]:
 
 
 def key_blocks() -> list[tuple[str, bool, bool]]:
-    """Of the body: each corrective key's name, whether it is muted and whether a driver moves it."""
+    """For the body: each corrective key's name, whether it is muted and whether a driver moves it."""
     keys = bpy.data.objects["Body"].data.shape_keys
     if keys is None:
         return []
@@ -251,7 +251,7 @@ def key_blocks() -> list[tuple[str, bool, bool]]:
 
 
 def corrective_keys() -> Iterator[None]:
-    """By F3, and driven by a bone; with it the Armature modifier alone has Sinew's shape."""
+    """Made with F3, and driven by a bone; with it the Armature modifier alone has Sinew's shape."""
     yield from search("corrective shape key")
     facts["corrective"] = key_blocks()
     window.press("Z", VIEW, ctrl=True)
@@ -295,7 +295,7 @@ def menus() -> Iterator[None]:
 
 
 def modifiers() -> Iterator[None]:
-    """What stands above the stack, and its button, while the sidebar is closed."""
+    """What is shown above the stack, and its button, while the sidebar is closed."""
     area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
     area.spaces[0].context = "MODIFIER"
     view = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")

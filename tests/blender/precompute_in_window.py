@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: centres of rotation are found while the window goes on, Esc stops
-that, a button goes on, and a render waits. Prints "FACTS" and a line of JSON.
+"""In Blender's window, with Sinew's zip: centres of rotation are computed in the background.
+
+The window stays responsive, Esc stops the computation, a button resumes it, and a render waits for it.
+Prints "FACTS" and a line of JSON.
 
     blender --factory-startup --enable-event-simulate --python precompute_in_window.py -- sinew.zip FOLDER
 """
@@ -56,7 +58,7 @@ def off_modifier(method: str = "lbs") -> float:
 
 
 class KeepingEngine(bpy.types.RenderEngine):
-    """Draws nothing, and keeps what it is given."""
+    """Draws nothing, and stores what it is given."""
 
     bl_idname, bl_label = "SINEW_KEEPING", "Keeping"
     points: np.ndarray | None = None
@@ -71,7 +73,7 @@ class KeepingEngine(bpy.types.RenderEngine):
 
 
 def make_hero() -> None:
-    """Its weights are all different, so that there is much to find."""
+    """All of its weights are different, so that the computation takes long."""
     window_scene.make_character("Hero", VERTICES, (0.0, 0.0, 0.0))
     weights = np.random.default_rng(1).uniform(0.05, 0.6, (len(hero().vertex_groups), VERTICES))
     for group, own in zip(hero().vertex_groups, weights, strict=True):
@@ -80,7 +82,7 @@ def make_hero() -> None:
 
 
 def forget() -> None:
-    """As if nothing had been found before."""
+    """Forgets all results."""
     precomputations = sinew("core.precompute").precomputations
     precomputations._made.clear()
     precomputations.cache = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The program `sinew`, run as a user does, and disks for it to write to."""
+"""The program `sinew`, run as a user runs it, and disks for it to write to."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def start_sinew(*args: object, env_more: dict[str, str] | None = None, **options
 def run_sinew(
     *args: object, status: int = 0, env_more: dict[str, str] | None = None, within: Sequence[str] = ()
 ) -> subprocess.CompletedProcess:
-    """within: words in front of the program's own"""
+    """within: words before the program's own command"""
     result = subprocess.run(
         [*within, *COMMAND, *map(str, args)],
         capture_output=True,
@@ -42,7 +42,7 @@ def run_sinew(
 
 @contextmanager
 def disk(folder: Path, options: str) -> Iterator[Path]:
-    """A disk in memory, mounted at a new folder. Skips the test where it may not be mounted."""
+    """A disk in memory, mounted at a new folder. Skips the test if mounting is not allowed."""
     folder.mkdir()
     command = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
     if subprocess.run(command, capture_output=True, check=False).returncode != 0:

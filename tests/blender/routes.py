@@ -12,28 +12,28 @@ ROUTES = (EVALUATION, UPDATE)
 
 
 def force(route: str) -> None:
-    """From now on Sinew takes this route; EVALUATION as far as it goes, as some rigs can not."""
+    """From now on Sinew uses this route; EVALUATION only where possible, as it is not for some rigs."""
     safe_mode.set_forced(route == UPDATE)
     # Small meshes would use the Armature modifier, which would be compared with itself.
     small_meshes.is_used = False
 
 
 def release() -> None:
-    """As without force()."""
+    """Undoes force()."""
     safe_mode.set_forced(None)
     small_meshes.is_used = True
 
 
 class NotBySinewError(AssertionError):
-    """A shape that something else than Sinew made."""
+    """The shape was not made by Sinew."""
 
 
 def taken(obj: bpy.types.Object, shapes_before: int) -> str:
-    """By which route Sinew made the shape that is shown.
+    """The route by which Sinew made the shape that is shown.
 
-    shapes_before  how many it had made when the pose changed last
+    shapes_before  how many shapes it had made when the pose last changed
 
-    Raises NotBySinewError where it is not Sinew's.
+    Raises NotBySinewError if the shape is not Sinew's.
     """
     settings, state = properties.of(obj), session.state_of(obj)
     if not settings.enabled:

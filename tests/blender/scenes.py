@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small rigs, and what tests read of them."""
+"""Small rigs, and functions that read them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from mathutils import Quaternion, Vector
 from sinew_addon.attach import attach
 from sinew_addon.deform import session
 
-# Stated tolerance against the Armature modifier, as a part of the bounding box's diagonal.
+# Documented tolerance against the Armature modifier, relative to the bounding box's diagonal.
 TOLERANCE = 1e-5
 
 
 def make_arm(
     bones: int = 2, sides: int = 12, rings: int = 21, weights: str = "smooth", name: str = "Arm"
 ) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """A tube along X, 1 unit a bone, bent and twisted by `bones` bones; keyed at frames 1 and 11.
+    """A tube along X, 1 unit for each bone, bent and twisted by `bones` bones; keyed at frames 1 and 11.
 
     Returns the mesh object and the armature object.
     """
@@ -69,7 +69,7 @@ def make_arm(
 
 
 def key_pose(armature: bpy.types.Object, degrees: float = 100.0) -> None:
-    """Rest at frame 1; at frame 11 every bone but the first bent and twisted."""
+    """Rest at frame 1; at frame 11 every bone but the first is bent and twisted."""
     for index, bone in enumerate(armature.pose.bones):
         bone.rotation_mode = "QUATERNION"
         bone.keyframe_insert("rotation_quaternion", frame=1)
@@ -119,7 +119,7 @@ def shapes(obj: bpy.types.Object, frames: list[float]) -> np.ndarray:
 
 
 def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume: bool) -> np.ndarray:
-    """The shapes by Blender's own Armature modifiers of an object that Sinew does not deform."""
+    """The shapes by Blender's own Armature modifiers, for an object that Sinew does not deform."""
     modifiers = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
     before = [modifier.use_deform_preserve_volume for modifier in modifiers]
     for modifier in modifiers:
@@ -145,7 +145,7 @@ def worst(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def bend(armature: bpy.types.Object, degrees: float, bone: int = 1) -> None:
-    """Poses live, without keys."""
+    """Sets poses without keys."""
     pose_bone = armature.pose.bones[bone]
     pose_bone.rotation_mode = "QUATERNION"
     pose_bone.rotation_quaternion = Quaternion(Vector((1.0, 0.3, 0.2)).normalized(), math.radians(degrees))
@@ -156,8 +156,8 @@ def forget_keys(armature: bpy.types.Object) -> None:
 
 
 def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
-    """Writes an arm, and a grid of `vertices` squared that Geometry Nodes smooth so many times as Blender
-    evaluates it, which it does to open the file."""
+    """Writes an arm, and a grid of `vertices` squared that Geometry Nodes smooth this many times when
+    Blender evaluates it, as it does when it opens the file."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     make_arm(sides=6, rings=5)
     group = bpy.data.node_groups.new("Slow", "GeometryNodeTree")
@@ -185,14 +185,14 @@ def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
     obj.modifiers.new("Slow", "NODES").node_group = group
     bpy.context.scene.collection.objects.link(obj)
     path.parent.mkdir(parents=True, exist_ok=True)
-    # To save the open file would evaluate it.
+    # Saving the open file would evaluate it.
     bpy.data.libraries.write(str(path), {bpy.context.scene}, compress=True)
     bpy.data.objects.remove(obj)
     return path
 
 
 def weights_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Offsets, bones and weights, read one by one, by no code of Sinew's."""
+    """Offsets, bones and weights, read one by one, without Sinew's code."""
     bones = [bone.name for bone in attach.armature_of(obj).data.bones]
     offsets, indices, weights = [0], [], []
     for vertex in obj.data.vertices:

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything that Blender's data says of an object, to compare before and after."""
+"""Everything in Blender's data about an object, to compare before and after."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
-# Changes with any edit, and is not part of the file's content.
+# Changes with any edit, and is not stored in files.
 VOLATILE = {"rna_type", "session_uid", "is_evaluated", "execution_time", "name_full", "is_active"}
 
 
 def properties_of(data: bpy.types.bpy_struct) -> dict[str, str]:
-    """Each plain property as text, collections by their length."""
+    """Each plain property as text; collections by their length."""
     result = {}
     for prop in data.bl_rna.properties:
         if prop.identifier in VOLATILE:
@@ -55,7 +55,7 @@ def animated_paths(obj: bpy.types.Object) -> list[str] | None:
 
 
 def of_file() -> dict[str, object]:
-    """Names of all data of the open file, and each mesh object whole."""
+    """Names of all data in the open file, and each mesh object completely."""
     names = {
         kind: sorted(item.name for item in getattr(bpy.data, kind))
         for kind in ("objects", "meshes", "armatures", "node_groups", "actions", "collections", "materials")

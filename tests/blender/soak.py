@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many frames in one Blender: what grows with them.
+"""Runs many frames in one Blender and checks what grows with them.
 
     python tests/blender/soak.py [--frames 20000] [--threads 500]
 
-Three characters play: one within Blender's evaluation, one with a modifier in front, one with keyed shape
-keys. Now and then their methods change, heat maps and comparisons come and go, and Sinew is taken off and put
-on. At last many threads, one after the other and each for a moment, evaluate the scene, as Blender's renders
-do. Prints memory, handlers, data-blocks, states that Python keeps for threads, and the time of a frame; exit
-status 1 where one of them grows on and on.
+Three characters play: one deformed within Blender's evaluation, one with an upstream modifier, one with
+keyed shape keys. From time to time their methods change, heat maps and comparisons come and go, and Sinew is
+removed and attached again. Finally many short-lived threads evaluate the scene one after the other, as
+Blender's renders do. Prints memory, handlers, data-blocks, thread states that Python keeps, and the time of
+a frame. Exit status 1 if one of them keeps growing.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from sinew_addon.features.compare import comparison
 
 LENGTH = 24
 SAMPLES = 20
-# What memory may do beside growing: MiB in all, and bytes a frame (a list of 20,000 floats is 8 a frame).
+# Allowed fluctuation of memory: MiB in all, and bytes per frame (a list of 20,000 floats is 8 per frame).
 SLACK_MIB, SLACK_BYTES = 6.0, 160.0
-# Of what is there for each core, and for a thread or two of a library's own.
+# For what exists once per core, and for a few threads of a library.
 SLACK_STATES = 16
-# Times are those of a machine with others on it.
+# Times were measured on a machine that also ran other programs.
 SLOWER = 2.0
 FRAMES_FOR_TIMES = 5000
 
 
 @dataclass
 class Sample:
-    """What there is after so many frames; milliseconds is the median of a frame since the sample before."""
+    """Counts after this many frames; milliseconds is the median of a frame since the previous sample."""
 
     frames: int
     mebibytes: float
@@ -53,7 +53,7 @@ class Sample:
 
 
 def thread_states() -> int:
-    """How many states Python keeps for threads, dead or alive."""
+    """How many thread states Python keeps, for live and dead threads."""
     api = ctypes.pythonapi
     for name in ("PyInterpreterState_Main", "PyInterpreterState_ThreadHead", "PyThreadState_Next"):
         getattr(api, name).restype = ctypes.c_void_p
@@ -72,7 +72,7 @@ def handler_count() -> int:
 
 def data_count() -> int:
     kinds = (prop.identifier for prop in bpy.data.bl_rna.properties if prop.type == "COLLECTION")
-    # 5.0 lists all once more.
+    # 5.0 lists all of them twice.
     return sum(len(getattr(bpy.data, kind)) for kind in kinds if kind != "all_ids")
 
 
@@ -94,7 +94,7 @@ def make_scene() -> list[bpy.types.Object]:
 
 
 def disturb(objects: list[bpy.types.Object], number: int) -> None:
-    """What an artist does between playing, and takes back."""
+    """Things that an artist does between playbacks, and undoes."""
     what, obj = number % 5, objects[number % len(objects)]
     if what == 0:
         for method in ("lbs", "qv", "dq"):
@@ -125,7 +125,7 @@ def play(objects: list[bpy.types.Object], frames: int, say: Callable[[str], None
         started = time.perf_counter()
         scene.frame_set(1 + number % LENGTH)
         times.append(time.perf_counter() - started)
-        # Not while the first sample is waited for: what is made once has been made by then.
+        # Not before the first sample: what is created once then exists already.
         if number % max(1, every // 5) == 0:
             disturb(objects, number // max(1, every // 5))
         if number % every == 0:
@@ -148,8 +148,8 @@ HEADING = f"{'frames':>8} {'MiB':>9} {'handlers':>9} {'data':>7} {'states':>7} {
 
 
 def run_in_threads(count: int) -> int:
-    """Evaluates the scene in `count` threads that Python has not made, one after the other; how many states
-    of threads Python has kept more than before."""
+    """Evaluates the scene in `count` threads that Python did not start, one after the other. Returns how
+    many more thread states Python keeps than before."""
     library = ctypes.CDLL(None)
     kind = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
     rigs = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]
@@ -177,7 +177,7 @@ def run_in_threads(count: int) -> int:
 
 
 def growing(samples: list[Sample]) -> list[str]:
-    """A sentence for each thing that grows: from what there was after a quarter of the frames to the end."""
+    """A sentence for each count that grows between a quarter of the frames and the end."""
     first, last = samples[len(samples) // 4], samples[-1]
     frames = last.frames - first.frames
     found = []
@@ -197,7 +197,7 @@ def growing(samples: list[Sample]) -> list[str]:
 
 
 def run(frames: int, threads: int, say: Callable[[str], None] = print) -> list[str]:
-    """A sentence for each thing that grows."""
+    """A sentence for each count that grows."""
     routes.force(routes.EVALUATION)
     try:
         objects = make_scene()

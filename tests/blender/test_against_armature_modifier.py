@@ -241,7 +241,7 @@ def test_vertex_groups_switched_off():
 
 
 def with_a_second_armature(behind: str | None = None) -> bpy.types.Object:
-    """An arm with a second Armature modifier, apart from the first where a type is given to stand between."""
+    """An arm with a second Armature modifier, with another modifier between them if a type is given."""
     obj, _armature = scenes.make_arm()
     _unused, other = scenes.make_arm(name="Other")
     scenes.bend(other, 50.0)
@@ -317,7 +317,7 @@ def test_envelopes(use_groups, bendy):
     bpy.context.view_layer.update()
     for group in obj.vertex_groups:
         group.remove(list(range(60, 200)))
-    # One entry of weight zero keeps the envelopes off.
+    # One entry with weight 0 disables the envelopes.
     obj.vertex_groups[0].add(list(range(100, 110)), 0.0, "REPLACE")
     modifier = obj.modifiers["Armature"]
     modifier.use_bone_envelopes, modifier.use_vertex_groups = True, use_groups
@@ -333,7 +333,7 @@ def test_envelope_multiply():
 
 
 def test_envelopes_with_moving_shape_keys():
-    """Which envelopes hold a vertex changes with its shape key."""
+    """Which envelopes contain a vertex depends on its shape key."""
     obj, armature = scenes.make_arm(bones=3)
     with_envelopes(armature)
     obj.shape_key_add(name="Basis")
@@ -358,7 +358,7 @@ def test_keyed_visibility_of_the_modifier():
 
 
 def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:
-    """In edit mode the evaluated mesh is another than what it converts to."""
+    """In edit mode the evaluated mesh differs from what it converts to."""
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     points = mesh_io.read_points(evaluated.to_mesh())
     evaluated.to_mesh_clear()
@@ -378,7 +378,7 @@ def test_the_panel_says_whether_the_modifiers_shape_is_sinews(mode):
     assert scenes.worst(final_points_in_any_mode(obj), ours) <= 1e-6
     sentence = "The shape is the same: Dual Quaternion. Preserve Volume is switched for it meanwhile"
     assert state_text.shape_in_mode(obj) == (sentence, [])
-    # As by hand: it stays, and the panel has the switch.
+    # As by hand: it remains, and the panel has the switch.
     modifier.use_deform_preserve_volume = False
     bpy.context.view_layer.update()
     bpy.context.scene.frame_set(9)
@@ -393,7 +393,7 @@ def test_the_panel_says_whether_the_modifiers_shape_is_sinews(mode):
     sentence, to_switch = state_text.shape_in_mode(obj)
     assert "another shape" in sentence
     assert to_switch == []
-    # There it is of no use.
+    # It has no effect there.
     assert not modifier.use_deform_preserve_volume
     properties.of(obj).bulge_limit.enabled = False
     assert modifier.use_deform_preserve_volume
@@ -405,7 +405,7 @@ def test_the_panel_says_whether_the_modifiers_shape_is_sinews(mode):
 
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
 def test_the_method_changes_in_a_mode_of_the_modifier(mode):
-    """Be it to the one that the artist's own Preserve Volume gives."""
+    """Also for the method of the artist's own Preserve Volume."""
     obj, _armature = scenes.make_arm()
     modifier = obj.modifiers["Armature"]
     modifier.show_in_editmode = modifier.use_deform_preserve_volume = True
@@ -451,7 +451,7 @@ def test_modes_in_which_blenders_tools_need_the_modifier(mode):
     expected = final_points_in_any_mode(obj)
     bpy.ops.object.mode_set(mode="OBJECT")
     shown = scenes.final_points(obj)
-    # Which no modifier of Blender's has.
+    # No modifier of Blender has this method.
     scenes.add_sinew(obj, "qv")
     bpy.ops.object.mode_set(mode=mode)
     bpy.context.view_layer.update()

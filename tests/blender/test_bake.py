@@ -27,7 +27,7 @@ from test_command_line import run_sinew
 FRAMES = list(range(1, 12))
 TOLERANCE = 1e-6
 METHOD = "dq"
-# Bones come near to the shape: test_bake_bones.py.
+# Bakes to bones only approximate the shape: test_bake_bones.py.
 EXACT = [kind for kind in core.KINDS if kind != core.BONES]
 
 READ = """
@@ -65,7 +65,7 @@ np.savez(result, uvs=np.array(uvs), materials=np.array(materials), **arrays)
 
 
 def read_elsewhere(path, frames, tmp_path, hidden=()):
-    """World points [frames, vertices, 3] by name, in a process without Sinew; of `hidden` objects too."""
+    """World points [frames, vertices, 3] by name, in a process without Sinew; of `hidden` objects, too."""
     result = tmp_path / "read.npz"
     command = [sys.executable, "-c", READ, str(path), ",".join(map(str, frames)), str(result), *hidden]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
@@ -120,7 +120,7 @@ def test_exports_are_the_final_meshes(arm, tmp_path, kind):
     assert list(read.pop("materials")) == ["Skin"]
     (points,) = read.values()
     if kind == "gltf":
-        # Vertices are split at seams: each must be where one of the object's is, in all frames.
+        # Vertices are split at seams: each must coincide with one of the object's in all frames.
         nearest = np.linalg.norm(points[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
         assert set(nearest) == set(range(len(expected[0])))
         expected = expected[:, nearest]
@@ -305,7 +305,7 @@ def test_real_rigs(real_rig, tmp_path, name, kind):
             assert len(expected[one]) == 3
             got = read.get(one)
             if got is None:
-                # USD allows no dots in names.
+                # USD does not allow dots in names.
                 got = read[one.replace(".", "_")]
             size = np.linalg.norm(np.ptp(expected[one][0], axis=0))
             apart = np.linalg.norm(got[:, :, None] - got[:, None, :1], axis=-1)
@@ -315,7 +315,8 @@ def test_real_rigs(real_rig, tmp_path, name, kind):
 
 
 def test_names_of_objects_and_files(arm, tmp_path):
-    """Objects whose names are one once cleaned, in any alphabet, and a folder that has such files already."""
+    """Objects whose names become the same after cleaning, in any alphabet, and a folder that already has
+    such files."""
     _obj, path = arm
     names = ["a/b", "a\\b", "A_b", "имя", "名前", "..", " "]
     for name in names:
@@ -344,7 +345,7 @@ def test_names_of_objects_and_files(arm, tmp_path):
 
 
 def test_files_of_one_name_do_not_meet(arm, tmp_path):
-    """Two files' objects of one name, in caches of their own."""
+    """Objects with the same name in two files, in separate caches."""
     _obj, path = arm
     other = path.with_name("other.blend")
     other.write_bytes(path.read_bytes())
@@ -367,7 +368,7 @@ def test_a_folder_that_can_not_be_written(arm, locked_folder, kind):
 @pytest.mark.parametrize("in_strip", [False, True])
 @pytest.mark.parametrize("kind", ["mdd", "usd"])
 def test_keyed_visibility(arm, tmp_path, kind, in_strip):
-    """A modifier that keys switch off half-way: the bake has the rest shape from there on."""
+    """A modifier that keys switch off halfway: the bake has the rest shape from there on."""
     obj, path = arm
     modifier = obj.modifiers["Armature"]
     for frame, on in ((1, True), (6, False)):
@@ -408,7 +409,7 @@ def test_a_library_override(arm, tmp_path, kind):
     size = scenes.diagonal(obj)
     assert scenes.worst(expected[0], expected[-1]) > 0.1
     out = tmp_path / "out"
-    # The linked original that the override stands for is in the file as well.
+    # The file also contains the linked original of the override.
     run_sinew("bake", shot, "--method", METHOD, "--to", kind, "--out", out)
     written = out / ("shot.blend" if kind == "mdd" else "shot.abc")
     read = read_elsewhere(written, FRAMES, tmp_path)
@@ -436,7 +437,7 @@ SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
 
 
 def world_shapes(objects, frames):
-    """World points of each object, float64 [frames, vertices, 3], in rising order of names."""
+    """World points of each object, float64 [frames, vertices, 3], in ascending order of names."""
     found = {obj.name: [] for obj in objects}
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -449,8 +450,8 @@ def world_shapes(objects, frames):
 @pytest.mark.parametrize("stretched", [False, True])
 @pytest.mark.parametrize("kind", EXACT)
 def test_several_moving_objects(arm, tmp_path, kind, stretched):
-    """Children of a rig that moves as an object, rotated and scaled along axes of their own; the scene's time
-    remapped or not."""
+    """Children of a rig that moves as an object, rotated and scaled along their own axes; the scene's
+    time remapped or not."""
     first, path = arm
     second, rig = scenes.make_arm(name="Brother")
     second.location = (0.0, 8.0, 0.0)
@@ -486,7 +487,8 @@ def test_several_moving_objects(arm, tmp_path, kind, stretched):
 
 @pytest.mark.parametrize("kind", core.EXPORTS)
 def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
-    """A hat on a bone and a feather on the hat; not what hangs on the armature itself, nor what is hidden."""
+    """A hat on a bone and a feather on the hat; not objects parented to the armature itself, nor hidden
+    ones."""
     obj, path = arm
     armature, hung = obj.modifiers["Armature"].object, {}
     for name in ("hat", "feather", "beside", "hidden"):
@@ -550,7 +552,7 @@ for image in bpy.data.images:
 
 
 def textured(folder, colours):
-    """A character with a texture on disk, one that is packed and one that Blender makes."""
+    """A character with a texture on disk, a packed one and one generated by Blender."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj, _armature = scenes.make_arm()
     obj.data.uv_layers.new(name="UVMap")
@@ -605,7 +607,7 @@ def test_textures_of_one_name_do_not_meet(tmp_path):
 
 
 def test_a_copy_has_its_name_last(arm, tmp_path):
-    """Where a cache can not get its name, no copy plays one that is not there."""
+    """If a cache can not get its name, no copy plays one that does not exist."""
     _obj, path = arm
     out = tmp_path / "out"
     (out / "arm_cache" / "Arm.mdd" / "mine").mkdir(parents=True)
@@ -615,7 +617,7 @@ def test_a_copy_has_its_name_last(arm, tmp_path):
 
 
 def test_a_library_override_whose_library_keys_visibility(arm, tmp_path):
-    """Keys that no one can mute here do not switch the Armature modifier on again on top of the bake."""
+    """Keys that can not be muted here do not switch the Armature modifier on again on top of the bake."""
     obj, path = arm
     for flag in ("show_viewport", "show_render"):
         obj.keyframe_insert(f'modifiers["Armature"].{flag}', frame=1)
@@ -685,13 +687,13 @@ def test_wrong_use(arm, tmp_path):
     run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "o", "--overwrite")
 
 
-# Long enough to be stopped; glTF's exporter takes minutes for as many.
+# Long enough to be stopped in between; glTF's exporter would take minutes for this many.
 LONG = {kind: 3000 for kind in core.KINDS} | {"gltf": 200}
 
 
 @pytest.mark.parametrize("kind", core.KINDS)
 def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
-    """Also within an exporter's one call for all frames."""
+    """Also within an exporter's single call for all frames."""
     _obj, path = arm
     out = tmp_path / "out"
     out.mkdir()
@@ -730,7 +732,7 @@ def test_an_export_shows_its_frames(arm, tmp_path, kind):
     process = program.start_sinew(*command, stdout=subprocess.DEVNULL, stderr=theirs)
     os.close(theirs)
     shown = b""
-    # Reading from a terminal that nobody writes to any more fails.
+    # Reading from a terminal fails once nobody writes to it any more.
     with suppress(OSError):
         while part := os.read(ours, 65536):
             shown += part

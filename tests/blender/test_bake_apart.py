@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exports in a second Blender, as the window makes them: the same as in this one, and no remains of those
-that are stopped. Here it is a Python with bpy, in the window another of the same Blender."""
+"""Exports in a second Blender, as in the window: the result is the same as in this one, and stopped
+exports leave nothing behind. Here the second one is a Python with bpy, in the window another process of
+the same Blender."""
 
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ def below(folder):
 def bake_to(folder, kind, apart, **more):
     options = dict(kind=kind, frames="1-11", folder=str(folder), **more)
     if apart:
-        # What the dialog starts; without a window it goes on to its end.
+        # What the dialog starts; without a window it runs to its end.
         return bpy.ops.sinew.bake("INVOKE_DEFAULT", in_steps=True, **options)
     return bpy.ops.sinew.bake(**options)
 
@@ -46,7 +47,7 @@ def shape_of_scene():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_same_as_in_this_blender(arm, tmp_path, kind):
-    """With what is in no file yet: a pose, an object's place, another scene with a view layer of its own."""
+    """With unsaved data: a pose, an object's position, another scene with its own view layer."""
     obj, _path = arm
     scenes.add_sinew(obj, METHOD)
     armature = bpy.data.objects["Arm Rig"]
@@ -144,8 +145,8 @@ def test_painted_textures_are_saved_first(arm, tmp_path):
 
 @pytest.mark.parametrize("links", [True, False])
 def test_simulations_keep_their_caches_on_disk(arm, tmp_path, links, monkeypatch):
-    """Without its cache, a cloth is simulated anew: here under another gravity. Windows lets few users make
-    links."""
+    """Without its cache, a cloth is simulated again, here with another gravity. On Windows few users may
+    create links."""
 
     def refused(*_arguments, **_named):
         raise OSError(1314, "A required privilege is not held by the client")

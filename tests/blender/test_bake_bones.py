@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes to bones play in a Blender without Sinew, and in a glTF reader, to the errors that they state."""
+"""Bakes to bones play in a Blender without Sinew, and in a glTF reader, with the errors that they report."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ __import__("os")._exit(0)
 
 
 def run_blender(script, *files):
-    """In a process without Sinew, which writes the last of the files."""
+    """The result in a process without Sinew, which writes the last of the files."""
     command = [sys.executable, "-c", script, *map(str, files)]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert files[-1].exists(), ran.stdout + ran.stderr
 
 
 def baked(path, out, *options, method=METHOD):
-    """The file, and what it says of each armature."""
+    """The file, and its report for each armature."""
     command = ("bake", path, "--method", method, "--to", "bones", "--frames", "1-11", "--json", "--out", out)
     (said,) = json.loads(run_sinew(*command, *options).stdout)
     assert said["errors"] == []
@@ -57,7 +57,7 @@ def rms_and_worst(points, expected):
 
 
 def assert_states(report, points, expected):
-    """What is played has the error that was stated."""
+    """The played shape has the reported error."""
     stated = report["after"]
     for found, said in zip(rms_and_worst(points, expected), (stated["rms"], stated["worst"]), strict=True):
         assert abs(found - said) <= 1e-3 * said + ROUNDING * report["diagonal"]
@@ -93,14 +93,14 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
     errors = np.empty(len(obj.data.vertices), dtype=np.float32)
     obj.data.attributes["Sinew bake error"].data.foreach_get("value", errors)
     assert np.isclose(np.sqrt(np.square(errors).mean()), report["after"]["rms"], rtol=1e-4)
-    # What was there is there for the way back.
+    # The original data is still there, so that the bake can be reverted.
     kept = {"Arm": bpy.data.meshes, "Arm Rig": bpy.data.armatures, "Arm RigAction": bpy.data.actions}
     assert all(data[name].use_fake_user for name, data in kept.items())
     assert [bone.name for bone in bpy.data.armatures["Arm Rig"].bones] == list(bones)
 
 
 def test_helper_bones_that_scale_play_to_the_stated_error(arm, tmp_path):
-    """Under a bone that is scaled itself."""
+    """Under a bone that is itself scaled."""
     obj, path = arm
     rig = obj.modifiers["Armature"].object
     for size, frame in (((1.0, 1.0, 1.0), 1), ((1.2, 1.5, 1.3), 11)):
@@ -116,7 +116,7 @@ def test_helper_bones_that_scale_play_to_the_stated_error(arm, tmp_path):
 
 
 def pose_anew(rig):
-    """Another action than the one that was baked, with rotations that this one has not."""
+    """Another action than the baked one, with rotations that this one does not have."""
     rig.animation_data_clear()
     for frame, turns in ((1, (0.4, -0.9, 0.3)), (6, (-1.2, 0.2, -0.5)), (11, (0.9, 1.0, 0.8))):
         for bone in list(rig.pose.bones)[:2]:
@@ -145,7 +145,7 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
     assert report["unseen_after"]["rms"] < 0.25 * report["unseen_before"]["rms"]
     keyed, _reports = baked(path, tmp_path / "keyed", "--helpers", "3", method=method)
 
-    # An animation that neither was made from: what Sinew makes of it, and what is played.
+    # An animation from which neither was made: Sinew's shape, and the played one.
     pose_anew(rig)
     expected = world_shapes([obj], FRAMES)[0]
     obj.sinew.method = "lbs"
@@ -178,7 +178,7 @@ def test_a_character_in_frames_that_it_was_not_baked_from(real_rig, tmp_path, me
 
 
 def test_pose_helpers_in_the_file(arm, tmp_path):
-    """No action of their own, no driver, and constraints that mean the rig's own bones."""
+    """They have no action of their own, no driver, and constraints that refer to the rig's own bones."""
     obj, path = arm
     scenes.add_sinew(obj, METHOD)
     file, (report,) = baked(path, tmp_path / "out", "--motion", "pose")
@@ -221,7 +221,7 @@ def test_centres_of_rotation_in_the_file(arm, tmp_path):
 
 
 def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
-    """They share helper bones; shape keys play on, and what is moved and scaled as an object."""
+    """They share helper bones; shape keys still play, as do motion and scale of the object."""
     obj, path = arm
     rig = obj.modifiers["Armature"].object
     sleeve = obj.copy()
@@ -259,7 +259,7 @@ def skinned_by_gltf(glb, frames, rate):
     """World points [frames, vertices, 3] in Blender's axes, blended linearly by the reader for engines."""
     header = read_glb.File(glb).header
     assert "JOINTS_1" not in header["meshes"][0]["primitives"][0]["attributes"]
-    # The action without helper bones stays in the file, and is exported, too.
+    # The action without helper bones remains in the file, and is exported, too.
     made = [each["name"] for each in header["animations"] if each["name"].endswith("Helpers")]
     (name,) = made or [each["name"] for each in header["animations"]]
     (points,) = read_glb.points_at(glb, np.array(frames) / rate, name).values()
@@ -270,7 +270,7 @@ def skinned_by_gltf(glb, frames, rate):
     ("motion", "method"), [("keys", METHOD), ("scaled-keys", METHOD), ("pose", METHOD), ("pose", "cor")]
 )
 def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
-    """The exporter makes keys of constraints."""
+    """The exporter converts constraints to keys."""
     obj, path = arm
     scenes.add_sinew(obj, method)
     expected = world_shapes([obj], FRAMES)[0]
@@ -290,7 +290,8 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
 
 @pytest.mark.once
 def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
-    """Of a glTF of human.blend: as in a Blender without Sinew, and as Sinew shows it to the stated error."""
+    """For a glTF of human.blend: equals a Blender without Sinew, and Sinew's shape up to the reported
+    error."""
     path, frames = real_rig("human.blend"), (1, 16, 31, 46)
     bpy.ops.wm.open_mainfile(filepath=str(path))
     obj = bpy.data.objects["Human"]
@@ -400,7 +401,8 @@ def test_in_the_open_file_modes_and_selection_stay(arm, tmp_path):
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_envelopes_that_reach_other_vertices_from_frame_to_frame_are_refused(arm, tmp_path, moving):
-    """As where the armature moves against the mesh; where it takes the mesh along, they are baked."""
+    """Such as where the armature moves relative to the mesh; if it moves together with the mesh, they are
+    baked."""
     obj, _path = arm
     rig = obj.modifiers["Armature"].object
     obj.vertex_groups.clear()
@@ -423,7 +425,7 @@ def test_envelopes_that_reach_other_vertices_from_frame_to_frame_are_refused(arm
 
 @pytest.mark.parametrize("against", ["option", "mask"])
 def test_what_the_modifier_does_not_deform_stays(arm, tmp_path, against):
-    """Though it has weights, which the modifier would use afterwards."""
+    """Although it has weights, which the modifier would then use."""
     obj, _path = arm
     modifier = obj.modifiers["Armature"]
     if against == "option":

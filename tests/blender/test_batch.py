@@ -29,7 +29,7 @@ from sinew_addon.io import files
 from sinew_addon.jobs.job_file import Settings
 from test_bake import read_elsewhere
 
-# On Windows tools/platform_tests.py has another.
+# On Windows tools/platform_tests.py provides another.
 newest_only = pytest.mark.skipif(
     bpy.app.version < (5, 2) and os.name != "nt", reason="long: runs with the newest Blender alone"
 )
@@ -37,7 +37,7 @@ FAST = ("--frames", "none", "--no-pictures")
 
 
 def make_rig(path: Path, degrees: float = 100.0) -> Path:
-    """A small character in a file of its own."""
+    """A small character in its own file."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     _obj, armature = scenes.make_arm(sides=6, rings=5)
     scenes.key_pose(armature, degrees)
@@ -63,12 +63,12 @@ def start_sinew(*args: object, **options: object) -> subprocess.Popen:
 
 
 def blenders_of(process: subprocess.Popen) -> list[psutil.Process]:
-    """The Blenders that a batch has started."""
+    """The Blender processes that a batch has started."""
     return psutil.Process(process.pid).children()
 
 
 def command_of(process: psutil.Process) -> list[str]:
-    """Nothing of one that has just ended."""
+    """Empty for a process that has just ended."""
     try:
         return process.cmdline()
     except psutil.Error:
@@ -76,7 +76,8 @@ def command_of(process: psutil.Process) -> list[str]:
 
 
 def wait_for_work(process: subprocess.Popen, but: int | None = None, seconds: float = 3.0) -> psutil.Process:
-    """The first Blender, not that with the id `but`, that has been busy for so long: starting takes less."""
+    """The first Blender, except the one with the id `but`, that has been busy for this long: starting
+    takes less."""
     end = time.monotonic() + 120
     while time.monotonic() < end:
         for blender in blenders_of(process):
@@ -111,7 +112,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def driven_points(path: Path) -> dict[str, bytes]:
-    """The final points of a copy, and the settings that give them."""
+    """The final points of a copy, and the settings that produce them."""
     files.open_file(path)
     skinned = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
     assert skinned, f"{path} is not re-skinned"
@@ -120,7 +121,7 @@ def driven_points(path: Path) -> dict[str, bytes]:
 
 
 def test_settings_for_files_and_objects(tmp_path):
-    """A job file's methods by file and object take precedence over those for all; exclusions; the report."""
+    """A job file's methods by file and object override those for all; exclusions; the report."""
     for name in ("hero", "extra"):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         for part in ("Body", "Face", "Hair"):
@@ -200,7 +201,7 @@ def make_heroes(folder: Path) -> None:
 
 
 def test_bakes_of_a_job_file(tmp_path):
-    """Bakes by file and object, beside the copies; in the journal and the report like those."""
+    """Bakes by file and object, next to the copies; in the journal and the report like those."""
     make_heroes(tmp_path / "in")
     (tmp_path / "job.toml").write_text(BAKES)
     out = tmp_path / "out"
@@ -237,7 +238,7 @@ def test_bakes_of_a_job_file(tmp_path):
     assert bpy.data.objects["Face"].hide_viewport
     assert [o.name for o in bpy.data.objects if properties.has_sinew(o)] == ["Hair"]
     cache = bpy.data.objects["Body"].modifiers[0].filepath
-    # With the separators of the system, as Blender writes paths.
+    # With the system's separators, as Blender writes paths.
     assert cache.startswith("//")
     assert Path(bpy.path.abspath(cache)) == out / "hero.baked_cache" / "Body.mdd"
 
@@ -308,7 +309,7 @@ def test_report_has_pictures_of_the_worst_frame(tmp_path):
         for name in ("before", "after")
     )
     assert before[..., 3].std() > 20, "an empty picture"
-    # Drawn at twice the size that the page shows, without smoothing of its own.
+    # Rendered at twice the size that the page shows, without smoothing.
     assert max(before.shape[:2]) == 720
     assert len(np.unique(before[..., 3])) <= 5
     assert 0.5 < np.abs(before - after).mean() < 100
@@ -334,7 +335,7 @@ def test_report_has_pictures_of_the_worst_frame(tmp_path):
 
 
 def test_a_file_does_not_depend_on_those_before_it(tmp_path):
-    """One Blender after the other files, and a fresh one, make the same of a file."""
+    """A Blender that has processed other files gives the same result as a fresh one."""
     folder = tmp_path / "in"
     shutil.copytree(Path(__file__).resolve().parents[2] / "blend_files", folder)
     make_rig(folder / "z.blend")
@@ -378,7 +379,7 @@ def test_resume_does_only_what_is_missing_or_changed(tmp_path):
 
     (out / paths[3].name).unlink()
     (tmp_path / "in" / "bad.blend").unlink()
-    # Half a line, as a full disk or a lost machine leaves it.
+    # Half a line, as after a full disk or a lost machine.
     with (out / "sinew-journal.jsonl").open("ab") as journal:
         journal.write(b'{"file":"rig 000.blend","writ')
     run_sinew(*arguments, "--method", "dq", "--resume")
@@ -403,7 +404,7 @@ def test_hang_crash_and_greed_fail_alone(tmp_path):
 
     process = start_sinew(*arguments, "--resume", "--memory", "700MiB")
     first = wait_for_work(process)
-    # While one batch is at work in a folder, no other is.
+    # While one batch works in a folder, no other one may.
     refused = run_sinew(*arguments, "--resume", status=2)
     assert "another batch is at work there" in refused.stderr
     first.send_signal(signal.SIGSEGV)
@@ -418,7 +419,7 @@ def test_hang_crash_and_greed_fail_alone(tmp_path):
 
 @pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system does not limit threads so")
 def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
-    """As many threads as it may have for its work, and none bound to a processor."""
+    """It may use as many threads as allowed for its work, and none is bound to a processor."""
     there = os.sched_getaffinity(0)
     if len(there) < 2:
         pytest.skip("needs two processors")
@@ -465,7 +466,7 @@ def test_ctrl_c_stops_cleanly(tmp_path):
 
 
 def test_full_disk(tmp_path):
-    """A limit on the size of files stands in for it: a write stops half-way, with an error."""
+    """Simulated by a limit on the size of files: a write fails halfway with an error."""
     resource = pytest.importorskip("resource", reason="this system has no such limit")
     paths = make_rigs(tmp_path / "in", 3)
     out = tmp_path / "out"
@@ -523,7 +524,7 @@ def test_links_are_kept_and_reported(tmp_path):
 
 
 def test_libraries_of_libraries_are_found(tmp_path):
-    """In other folders than the file, which all their paths are relative to."""
+    """In other folders than the file, to which all their paths are relative."""
     base = tmp_path / "library" / "characters" / "hero.blend"
     middle = tmp_path / "sets" / "set.blend"
     shot = tmp_path / "shots" / "deep" / "shot.blend"
@@ -567,7 +568,7 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
         row = rows[name]
         assert reason in (row.get("error") or " ".join(row["left_out"])), (name, row)
     for name in good:
-        # What is not text in a name is shown as a ?.
+        # Parts of a name that are not text are shown as ?.
         name = name.encode("utf-8", "replace").decode()
         assert rows[name]["status"] == "written", (name, rows[name])
         assert not rows[name]["left_out"]
@@ -612,7 +613,7 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
 
 @newest_only
 def test_killed_at_random(tmp_path):
-    """The batch itself each time, and before that, half the time, one of its Blenders."""
+    """Kills the batch itself each time, and before that, half of the time, one of its Blenders."""
     folder, out = tmp_path / "in", tmp_path / "out"
     paths = make_rigs(folder, 60)
     before = contents(folder)
@@ -640,7 +641,7 @@ def test_killed_at_random(tmp_path):
 
 @newest_only
 def test_killed_at_random_on_a_cluster(tmp_path):
-    """The batch, a worker with what it is at, or a Blender."""
+    """Kills the batch, a worker with its current process, or a Blender."""
     folder, out = tmp_path / "in", tmp_path / "out"
     paths = make_rigs(folder, 60)
     choose = random.Random(9)
@@ -660,7 +661,7 @@ def test_killed_at_random_on_a_cluster(tmp_path):
             check_whole(out)
         assert 0 < len(list(out.glob("[!.]*.blend"))) < 60
         assert {kind for kind, times in lost.items() if times} == {"worker", "Blender"}
-        # Two at a time can be lost with a file: it is named, and done by the next run.
+        # Two Blenders at a time can be lost with a file: it is reported, and done by the next run.
         process = start_sinew(*arguments)
         _output, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
@@ -668,7 +669,7 @@ def test_killed_at_random_on_a_cluster(tmp_path):
 
 
 def read_some(process: subprocess.Popen, choose: random.Random) -> None:
-    """Waits until a few files are done, and a little longer."""
+    """Waits until a few files are done, and slightly longer."""
     for _ in range(choose.randint(0, 3)):
         line = process.stderr.readline()
         while line and "unchanged" in line:
@@ -687,7 +688,7 @@ def kill_one(processes: list[psutil.Process], choose: random.Random) -> bool:
 
 
 def check_whole(out: Path) -> None:
-    """What has its name is whole: the very file that its record speaks of."""
+    """A file with its final name is complete: exactly the file that its record describes."""
     records = {r["file"]: r for r in journal_lines(out)}
     for copy in out.glob("[!.]*.blend"):
         status = copy.stat()
@@ -703,7 +704,7 @@ def check_each_once(out: Path, paths: list[Path]) -> None:
 
 
 def journal_lines(out: Path) -> list[dict]:
-    """Its whole lines, of a journal that may end in half of one."""
+    """The complete lines of a journal that may end with half a line."""
     try:
         content = (out / "sinew-journal.jsonl").read_bytes()
     except FileNotFoundError:
@@ -712,7 +713,7 @@ def journal_lines(out: Path) -> list[dict]:
 
 
 def lock_folder(path: Path) -> None:
-    """A folder in which nothing can be made, not even by root."""
+    """A folder in which nothing can be created, not even by root."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if os.geteuid() == 0:
         path.symlink_to("/proc", target_is_directory=True)
@@ -721,7 +722,7 @@ def lock_folder(path: Path) -> None:
 
 
 def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
-    """Files good and bad: names of those to be re-skinned; of the others, with what is to be said of them."""
+    """Good and bad files: names of those to be re-skinned; for the others, with the expected message."""
     alphabets = ["Ünïcödé", "名前", "имя", "اسم", "שם", "ชื่อ", "नाम", "이름", "όνομα", "🦴 bone", "名" * 70]
     signs = [
         "it's",
@@ -776,7 +777,7 @@ def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "broken" / "no armature.blend"))
     broken["broken/no armature.blend"] = "no mesh is deformed by an armature"
 
-    # An armature in a library that is gone, with its absolute path.
+    # An armature in a missing library, with its absolute path.
     library = make_rig(folder.parent / "library.blend")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj, _armature = scenes.make_arm(sides=6, rings=5)
@@ -800,7 +801,7 @@ def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
 
 
 class Cluster:
-    """A dask scheduler and two workers, in processes of their own."""
+    """A dask scheduler and two workers, in their own processes."""
 
     def __init__(self, folder: Path) -> None:
         self._processes: list[subprocess.Popen] = []
@@ -824,7 +825,7 @@ class Cluster:
             process.wait(timeout=30)
 
     def lose_a_worker(self) -> None:
-        """Kills one with what it is at; its keeper starts another."""
+        """Kills one with its current process; its nanny starts another."""
         for process in psutil.Process(self._processes[-1].pid).children():
             process.kill()
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Actions of an armature blended: what Blender plays is what the core computes of what Blender played."""
+"""Blended actions of an armature: what Blender plays equals what the core computes from what Blender
+played."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
 
 
 def make_legs(modes=("QUATERNION",), name="Legs"):
-    """The rig of walks.py in Blender; rotation modes in turn."""
+    """The rig of walks.py in Blender, with alternating rotation modes."""
     rig = walks.rig()
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     bpy.context.scene.collection.objects.link(armature)
@@ -54,7 +55,7 @@ def make_legs(modes=("QUATERNION",), name="Legs"):
 
 
 def key_clip(armature, clip, first=1):
-    """A clip keyed by Blender itself, as an action of its name."""
+    """A clip keyed by Blender itself, as an action with its name."""
     armature.animation_data_create().action = None
     if armature.animation_data.action is None:
         for bone in armature.pose.bones:
@@ -129,7 +130,7 @@ def test_random_poses_with_scale_come_back_in_every_rotation_mode():
     for curve in actions.all_curves(again, actions.slot_for(again, armature)):
         assert {point.interpolation for point in curve.keyframe_points} == {"LINEAR"}
         values = np.array([point.co[1] for point in curve.keyframe_points])
-        # Rotations are written close to the frame before: between frames nothing tumbles.
+        # Written rotations are close to those of the frame before, so nothing spins between frames.
         assert np.abs(np.diff(values)).max() < 1.5
 
 
@@ -140,7 +141,7 @@ def test_only_what_plays_is_read():
     row = before.rig.names.index("spine")
     assert np.abs(np.diff(before.poses.rigid[:, row], axis=0)).max() > 0.01
     actions.play(armature, walk, actions.slot_for(walk, armature))
-    # Held by the in-betweens, curves are muted and play all the same.
+    # Curves that the in-betweens mute still play.
     armature.sinew_inbetween = "dlb"
     held = finished(clips.read(armature, walk))
     assert np.array_equal(held.poses.rigid, before.poses.rigid)
@@ -259,7 +260,7 @@ def test_the_operator_blends_and_undo_takes_it_back():
 
 def test_a_blend_leaves_no_trace_once_it_is_empty():
     armature, _chosen, _pair = make_walks()
-    # To ask whether there is one, as panel and menu do, stores none.
+    # Checking whether there is one, as panel and menu do, must not store one.
     assert not bpy.ops.sinew.blend_actions.poll()
     assert blend_settings.of(armature) is None
     assert not armature.is_property_set("sinew_blend")
@@ -293,7 +294,7 @@ def test_weights_change_between_two_shares_of_the_motion():
     first = played(armature, chosen[0], [1, 10, 20])
     assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
     got = film(armature, [1, 10, 20])
-    # The walk goes on alone at first, at its pace but for what the blend's whole frames need.
+    # The walk is alone at first, with its own pace except for the blend's whole frames.
     assert np.abs(got - first).max() < 1e-3
     blend.change_start = 80.0
     with pytest.raises(RuntimeError, match="shares of the motion from 0 to 1, one after the other"):
@@ -357,8 +358,8 @@ Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
 def write_bvh(path, clip):
-    """A clip as a motion capture file, by the format's definition: bones rest unrotated, each rotates about
-    its head relative to its parent, by angles about Z, X and Y."""
+    """A clip as a motion capture file, by the format's definition: bones rest unrotated, and each rotates
+    about its head relative to its parent, by angles about Z, X and Y."""
     rig, posed = clip.rig, clip.rig.to_armature(clip.poses.rigid)
     rest = rig.to_armature(np.tile(quat_vec.identity(), (len(rig.names), 1)))
     turned = quat_vec.to_affine(quat_vec.compose(posed, quat_vec.inverse(rest)))[..., :3, :3]
@@ -426,7 +427,7 @@ def test_a_bvh_file_becomes_an_action(tmp_path):
     assert made.frames == 26
     wanted = core.blend(pair, (1, 1)).clip("blend")
     order = [wanted.rig.names.index(name) for name in made.blend.rig.names]
-    # Bones are rolled otherwise there: what they do is the same.
+    # Bones have other rolls there, but the same motion.
     assert np.abs(heads_of(made.clip) - heads_of(wanted)[:, order]).max() < 1e-3
 
 
@@ -453,7 +454,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path):
     actions.play(armature, walk, actions.slot_for(walk, armature))
     bpy.ops.export_anim.bvh(filepath=str(tmp_path / "legs.bvh"), frame_start=1, frame_end=5)
     known = {block.session_uid for block in clips._blocks()}
-    # The importer rolls bones in its own way: so they rest otherwise.
+    # The importer rolls bones in its own way, so they rest differently.
     with pytest.raises(SinewError, match=r"legs\.bvh: \S+ rests otherwise"):
         clips.import_actions(armature, tmp_path / "legs.bvh")
     (tmp_path / "walk.txt").write_text("no motion")
@@ -495,7 +496,7 @@ def test_the_command_writes_a_copy(walking, tmp_path):
     assert bpy.data.objects["Legs"].animation_data.action.name == "To a Run"
     keys = ["--weights-at", 0.75, 1, 0, "--weights-at", 0.5, 0, 1, "--weights-at", 0.25, 1, 0]
     options = ["--actions", "WALK", "RUN", "--cycles", 8, "--smooth", *keys, "--out", out, "--overwrite"]
-    # Two walks, a run and a walk in half their motion, and two walks again: 20 and 30 frames a cycle.
+    # Two walks, a run and a walk in half of their motion, and two walks again: 20 and 30 frames per cycle.
     assert (
         "Blend WALK RUN: 181 frames, no cycle, carried by hips"
         in run_sinew("blend", walking, *options).stdout

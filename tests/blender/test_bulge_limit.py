@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stage bulge_limit: the oracle is the float64 reference, on the shape before it and Blender's poses."""
+"""The stage bulge_limit: its oracle is the float64 reference, from the shape before it and Blender's
+poses."""
 
 from __future__ import annotations
 
@@ -34,10 +35,10 @@ def expected_points(
     mask: np.ndarray | None = None,
     **options: object,
 ) -> np.ndarray:
-    """The limit by float64 in this frame.
+    """The limited shape by float64 in this frame.
 
     before  float32 [vertices, 3], the shape without the stage, object space
-    rest    the same of the rest shape; None: the mesh's points
+    rest    the same for the rest shape; None: the mesh's points
     """
     armature = attach.armature_of(obj)
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -75,7 +76,7 @@ def route(request):
 
 
 def bent_arm(method: str = "dq") -> tuple[bpy.types.Object, np.ndarray]:
-    """At frame 11, and its shape there without the stage."""
+    """The object at frame 11, and its shape there without the stage."""
     obj, _armature = scenes.make_arm(bones=3)
     scenes.add_sinew(obj, method)
     bpy.context.scene.frame_set(11)
@@ -183,7 +184,7 @@ def test_bendy_bones_are_limited_along_their_curve():
     np.testing.assert_allclose(heads[first : first + 5, 0], [0.0, *along[:-1]], atol=1e-6)
     np.testing.assert_allclose(tails[first : first + 5, 0], [*along[1:], 1.0], atol=1e-6)
     limit(obj)
-    # Linear blending loses volume: nothing is far from its bones but where the curve ends.
+    # Linear blending loses volume: only where the curve ends is anything far from its bones.
     found = scenes.final_points(obj)
     assert np.isfinite(found).all()
     assert np.abs(found - before).max() < 0.1
@@ -194,8 +195,8 @@ def test_bendy_bones_are_limited_along_their_curve():
 
 
 def elbow_bulge(obj: bpy.types.Object, points: np.ndarray) -> float:
-    """How much farther from the nearest posed bone of the arms than from the nearest at rest the vertices of
-    two bones are at most; radii of the elbow."""
+    """How much farther the vertices of two bones are, at most, from the nearest posed bone of the arms
+    than from the nearest one at rest; in radii of the elbow."""
     armature = attach.armature_of(obj)
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
@@ -235,7 +236,7 @@ def elbow_bulge(obj: bpy.types.Object, points: np.ndarray) -> float:
 
 
 def elbows(armature: bpy.types.Object) -> list[tuple[str, str]]:
-    """Upper and lower arms by their names."""
+    """The upper and lower arm bones, found by their names."""
     lower = [b for b in armature.data.bones if "forearm" in b.name.lower() or "lowerarm" in b.name.lower()]
     return [(bone.parent.name, bone.name) for bone in lower if bone.parent is not None]
 

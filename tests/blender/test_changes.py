@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes that Sinew is not told of while it deforms a character; each was a fault once."""
+"""Changes about which Blender does not notify Sinew while it deforms a character; each caused a fault
+once."""
 
 from __future__ import annotations
 
@@ -157,7 +158,7 @@ def test_bones_are_edited_on_the_rest_shape():
 
 @pytest.mark.usefixtures("by_each_route")
 def test_bones_that_another_armature_object_shares_are_in_edit_mode_after_undo():
-    """Blender then has only the object that the artist edits in edit mode, and the bones of both."""
+    """In edit mode Blender then only shows the object that the artist edits, and the bones of both."""
     obj, armature = scenes.make_arm()
     sharing = armature.copy()
     bpy.context.scene.collection.objects.link(sharing)
@@ -215,7 +216,7 @@ def test_while_off_the_mesh_has_no_attribute_of_sinews(heat):
     def ours() -> list[str]:
         return [attribute.name for attribute in obj.data.attributes if "sinew" in attribute.name]
 
-    # The points of a mesh with a heat map are in an object of their own.
+    # The points of a mesh with a heat map are stored in a separate object.
     assert len(ours()) == (not heat)
     for _again in range(2):
         properties.of(obj).enabled = False
@@ -320,7 +321,7 @@ def test_linked_characters_say_so_and_keep_moving(tmp_path):
     obj = bpy.data.objects["Arm"]
     assert scenes.worst(scenes.shapes(obj, [1, 11]), expected) <= 1e-5
     assert "make a library override" in apply_plan.plan_of(obj).reason
-    # What is written into linked data, a library override made later would have.
+    # A library override made later would inherit what is written into linked data.
     assert properties.of(obj).enabled
     assert not properties.of(obj).error
 
@@ -400,7 +401,7 @@ def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkey
 
 
 def test_a_heat_map_of_a_mesh_that_two_objects_have():
-    """Then Sinew deforms after the update, by points that no evaluation has written to the file."""
+    """Sinew then deforms after the update, with points that no evaluation has written to the file."""
     obj, _armature = scenes.make_arm()
     other = obj.copy()
     bpy.context.scene.collection.objects.link(other)

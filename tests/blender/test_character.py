@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One control for a character of five meshes: whatever is set for it goes to all that follow it."""
+"""One control for a character of five meshes: each of its settings applies to all followers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def shared() -> bpy.types.PropertyGroup:
 
 
 def mesh_points(obj: bpy.types.Object) -> np.ndarray:
-    """Without what Solidify and Subdivision add."""
+    """The points without those that Solidify and Subdivision add."""
     return scenes.final_points(obj)
 
 
@@ -45,7 +45,7 @@ def test_one_click_adds_sinew_with_a_method_to_all_five(armature, selected):
 
 
 def test_all_five_have_the_shape_of_their_armature_modifiers(armature):
-    """The oracle is Blender's Preserve Volume, with Solidify and Subdivision behind it."""
+    """The oracle is Blender's Preserve Volume, followed by Solidify and Subdivision."""
     bpy.context.scene.frame_set(15)
     expected = []
     for obj in meshes():
@@ -62,7 +62,7 @@ def test_all_five_have_the_shape_of_their_armature_modifiers(armature):
 
 
 def test_the_lead_follows_what_belongs_to_the_character_now(armature):
-    """Its mesh goes to another armature while the same is selected."""
+    """Its mesh is assigned to another armature while the selection stays the same."""
     five_meshes.select(armature)
     bpy.ops.sinew.add()
     context = bpy.context
@@ -72,7 +72,7 @@ def test_the_lead_follows_what_belongs_to_the_character_now(armature):
     context.scene.collection.objects.link(other)
     properties.of(first).enabled = False
     first.modifiers["Armature"].object = other
-    # While Sinew is off, too.
+    # Also while Sinew is off.
     context.view_layer.update()
     assert len(character.known_meshes(context)) == 4
     properties.of(first).enabled = True
@@ -112,7 +112,7 @@ def _items(name: str) -> list[str]:
 
 
 def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
-    """What is added to a mesh's settings must not be forgotten here."""
+    """Settings that are added to a mesh must be added here, too."""
     ours = {
         *("enabled", "heat", "error", "is_own"),
         *("stand_ins", "standing_in", "is_saved", "replaced_smooth", "parent_type", "attribute"),

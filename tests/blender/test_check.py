@@ -22,7 +22,7 @@ from sinew_addon.commands.check import line_of
 
 
 def check(*arguments: object, status: int = 0) -> dict[str, dict]:
-    """The reports of `sinew check --json`, by the names of files; their lines say the same."""
+    """The reports of `sinew check --json`, by the names of files; checks that its text says the same."""
     reports = json.loads(run_sinew("check", *arguments, "--json", status=status).stdout)["files"]
     for report in reports:
         line = line_of(report)
@@ -188,7 +188,7 @@ def test_a_file_that_takes_too_long(tmp_path):
 
 # --- Another Blender
 
-# A Blender as a program, made of this Python's own, with preferences in a folder beside it.
+# A Blender program made from this Python's bpy, with preferences in a folder next to it.
 PROGRAM = """#!/bin/sh
 here=$(dirname "$0")
 BLENDER_USER_RESOURCES="$here/user" PYTHONPATH="$here/site" exec {python} -S -c '
@@ -237,7 +237,7 @@ def script(path: Path, text: str) -> Path:
 
 
 def make_other_blender(folder: Path) -> Path:
-    """The program of a Blender, in a new folder, that has nothing of Sinew."""
+    """A Blender program in a new folder, without Sinew."""
     (folder / "site").mkdir(parents=True)
     for entry in Path(sysconfig.get_paths()["purelib"]).iterdir():
         if "sinew" not in entry.name.lower() and entry.suffix != ".pth":
@@ -246,7 +246,7 @@ def make_other_blender(folder: Path) -> Path:
 
 
 def install_extension(blender: Path) -> None:
-    """Installs the zip in a Blender of make_other_blender(); skips the test where that can not be."""
+    """Installs the zip in a Blender of make_other_blender(); skips the test if that is not possible."""
     package = os.environ.get("SINEW_PACKAGE")
     if not package:
         pytest.skip("SINEW_PACKAGE is not set: the zip is not tested; ./dev package builds it")
@@ -282,7 +282,7 @@ def test_another_blender_without_sinew(skinned, plain, other_blender):
 def test_another_blender_with_sinew(skinned, other_blender):
     install_extension(other_blender)
     assert check(skinned, "--blender", other_blender)["skinned.blend"]["problems"] == []
-    # Its library goes, or another version comes.
+    # Its library is removed, or another version is installed.
     (manifest,) = other_blender.with_name("user").rglob("sinew/blender_manifest.toml")
     whole = manifest.read_text()
     manifest.write_text(whole.replace(f'version = "{sinew.__version__}"', 'version = "0.0.9"'))
@@ -318,7 +318,7 @@ def test_another_blender_that_does_not_answer(text, wanted, skinned, tmp_path):
 
 
 def test_a_whole_blender(skinned, plain, tmp_path):
-    """Of its own kind, with its own program: as people have it."""
+    """A real one, with its own program, as users have it."""
     program = os.environ.get("SINEW_FULL_BLENDER")
     package = os.environ.get("SINEW_PACKAGE")
     if not program or not package or bpy.app.version < (5, 2):
@@ -337,7 +337,7 @@ def test_a_whole_blender(skinned, plain, tmp_path):
         capture_output=True,
     )
     assert check(skinned, plain, "--blender", other)
-    # And that Blender by itself, with the command that the extension gives it.
+    # Also in that Blender itself, with the command that the extension adds.
     plain.with_name("broken.blend").write_bytes(b"BLENDER and then nothing")
     names = ("skinned.blend", "plain.blend", "broken.blend")
     done = subprocess.run(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A dask cluster as docs/batch.md starts it: where it listens, TLS, and what `sinew` says of others."""
+"""A dask cluster as docs/batch.md starts it: where it listens, TLS, and what `sinew` reports about
+others."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ BATCH = (REPOSITORY / "docs" / "batch.md").read_text(encoding="utf-8")
 def documented(program: str, address: str) -> list[str]:
     """The words of the line for that program and that address, such as "dask worker"."""
     lines = re.findall(rf"^    dask ({program} .*)$", BATCH, re.MULTILINE)
-    # The farm's lines name this machine too, for their pages.
+    # The farm's lines contain this machine's address, too, for their pages.
     (line,) = [line for line in lines if ("10.0.0.5" in line) == (address == "10.0.0.5")]
     return shlex.split(line)
 
@@ -52,7 +53,7 @@ def running(
     environment: dict[str, str] | None = None,
     within: Sequence[str] = (),
 ):
-    """within: words in front of the program's own, such as those of machines()"""
+    """within: words before the program's own command, such as those of machines()"""
     with (folder / f"{arguments[0]}.log").open("w") as log:
         process = subprocess.Popen(
             [*within, sys.executable, "-m", "dask", *arguments],
@@ -70,8 +71,8 @@ def running(
 
 @contextmanager
 def cluster(folder: Path, address: str, options: dict[str, list[str]], environment=None):
-    """The documented lines for an address, with ports that are free and 127.0.0.1 for the farm's addresses;
-    its scheduler's address, and the processes."""
+    """Starts the documented lines for an address, with free ports and 127.0.0.1 instead of the farm's
+    addresses. Yields the scheduler's address and the processes."""
     port = str(free_port())
     with ExitStack() as stack:
         processes = []
@@ -120,7 +121,7 @@ def test_as_documented_it_listens_on_this_machine_alone(rig, tmp_path):
     with cluster(tmp_path, "127.0.0.1", {}) as (address, processes):
         done = run_sinew(*arguments(rig, tmp_path / "out", address))
         assert "can run programs" not in done.stderr
-        # Scheduler, worker, its keeper, and the pages of both.
+        # Scheduler, worker, its nanny, and the pages of both.
         assert addresses(processes) <= {"127.0.0.1", "::1"}
         assert len(addresses(processes)) >= 1
     assert_done(tmp_path / "out")
@@ -178,8 +179,8 @@ def test_tls_as_documented(rig, tmp_path, certificates):
 
 @contextmanager
 def machines(*hosts: str):
-    """A network of machines with these addresses, as far as one machine can be several: a network namespace
-    for each. Yields for each the words that run a program there."""
+    """A simulated network of machines with these addresses: a network namespace for each. Yields for each
+    the words that run a program there."""
     name, switch = f"sinew{os.getpid()}", f"sn{os.getpid()}"
     spaces = [f"{name}-{index}" for index in range(len(hosts))]
 
@@ -202,15 +203,15 @@ def machines(*hosts: str):
             pytest.skip("this process may make no networks")
         yield [["ip", "netns", "exec", space] for space in spaces]
     finally:
-        # With a namespace goes its cable.
+        # Deleting a namespace deletes its cable.
         for words in (*(("netns", "delete", space) for space in spaces), ("link", "delete", switch)):
             with suppress(OSError):
                 subprocess.run(["ip", *words], capture_output=True, check=False)
 
 
 def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
-    """The lines of the documentation as they stand, over a network: a scheduler, two workers, and the machine
-    that starts the batch."""
+    """The documented lines as they are, over a network: a scheduler, two workers, and the machine that
+    starts the batch."""
     folder = tmp_path / "in"
     folder.mkdir()
     names = [f"{number}.blend" for number in range(8)]
@@ -235,7 +236,7 @@ def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
     for name in names:
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / name))
         assert properties.of(bpy.data.objects["Arm"]).method == "dq"
-    # Both are in the scheduler's log, each at its own address.
+    # Both are in the scheduler's log, each with its own address.
     log = (tmp_path / "a" / "scheduler.log").read_text()
     assert {"tls://10.0.0.6", "tls://10.0.0.7"} <= set(re.findall(r"tls://10\.0\.0\.[67]", log))
 
@@ -247,7 +248,7 @@ def test_what_is_no_scheduler(address, rig, tmp_path):
 
 
 def test_the_addresses_of_a_scheduler_file_are_taken(rig, tmp_path):
-    """As people copy them from dask's own output."""
+    """In the form in which users copy them from dask's own output."""
     file = tmp_path / "scheduler.json"
     options = {"scheduler": ["--scheduler-file", str(file)]}
     with cluster(tmp_path, "127.0.0.1", options) as (_address, _processes):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The program `sinew`, run as a user does."""
+"""The program `sinew`, run as a user runs it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def arm_file(tmp_path):
 @pytest.mark.once
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
-    # tests/python/test_documented.py checks that README names them all.
+    # tests/python/test_documented.py checks that README names all of them.
     _parser, commands = make_parser()
     assert "check" in commands
     for command in commands:
@@ -130,7 +130,7 @@ def test_points(arm_file, tmp_path):
 
 
 def test_parameters_are_set_by_name(tmp_path):
-    """As two Armature modifiers mix, in points, copies, bakes and pages."""
+    """Mixes like two Armature modifiers, in points, copies, bakes and pages."""
     obj, _armature = scenes.make_arm()
     test_mix.paint(obj)
     other, _rig = scenes.make_arm(name="Plain")
@@ -143,7 +143,7 @@ def test_parameters_are_set_by_name(tmp_path):
     run_sinew("points", path, *mix, "--frames", frames, "--out", out)
     with np.load(out) as points:
         assert scenes.worst(points["Arm"], expected) <= 1e-5
-        # Without the group there is nothing to mix.
+        # Without the group, nothing is mixed.
         assert scenes.worst(points["Plain"], plain) <= 1e-5
     run_sinew("reskin", path, *mix, "--frames", "none", "--out", tmp_path / "out")
     files.open_file(tmp_path / "out" / "arm.blend")
@@ -154,7 +154,7 @@ def test_parameters_are_set_by_name(tmp_path):
 
 
 def test_a_stage_is_set_by_name(tmp_path):
-    """As Corrective Smooth smooths, in points, copies and bakes."""
+    """Smooths like Corrective Smooth, in points, copies and bakes."""
     obj = test_delta_mush.make_rough_arm()
     expected = test_delta_mush.by_corrective_smooth(
         obj, iterations=20, smooth_type="LENGTH_WEIGHTED", vertex_group=test_delta_mush.GROUP
@@ -175,7 +175,7 @@ def test_a_stage_is_set_by_name(tmp_path):
 
 
 def test_limit_bulge_is_set_by_name(tmp_path):
-    """As the reference has it, in points, job files, copies and bakes."""
+    """Equals the reference, in points, job files, copies and bakes."""
     obj, before = test_bulge_limit.bent_arm()
     expected = test_bulge_limit.expected_points(obj, before, strength=0.5, form="kim_han")
     attach.remove(obj)
@@ -224,7 +224,7 @@ def test_reskin_writes_copies_that_use_the_method(arm_file, tmp_path):
     obj = bpy.data.objects["Arm"]
     assert properties.of(obj).method == "dq"
     assert scenes.worst(scenes.shapes(obj, [6, 11]), expected) <= 1e-5
-    # A second run says so instead of writing over the first one's copies.
+    # A second run reports this instead of overwriting the first one's copies.
     assert (
         "--overwrite"
         in run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out", status=1).stderr
@@ -355,7 +355,7 @@ def test_compare_draws_a_sheet(tmp_path, engine):
 
 @pytest.mark.parametrize("round", range(4))
 def test_ctrl_c_stops_what_goes_through_frames(arm_file, tmp_path, round):
-    """Wherever it comes: Blender drops it within its handlers."""
+    """Wherever it occurs: Blender discards it within its handlers."""
     path, _shapes = arm_file
     folder = tmp_path / "page"
     command = ("compare", path, "--frames", "1-20000", "--pictures", "0", "--out", folder)
@@ -401,7 +401,8 @@ def bones_of(armature: bpy.types.Object, frames: list[int]) -> np.ndarray:
 
 @pytest.fixture
 def keyed_file(tmp_path):
-    """Two armatures, and what their bones do by ScLERP on a spline: file, and [11, bones, 4, 4] of each."""
+    """Two armatures, and the motion of their bones by ScLERP on a spline: file, and [11, bones, 4, 4] of
+    each."""
     armatures = [scenes.make_arm(bones=3, name=name)[1] for name in ("Left", "Right")]
     frames = list(range(1, 12))
     blender = bones_of(armatures[0], frames)
@@ -455,7 +456,7 @@ def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
         complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
         assert len(complaints) == 1, result.stderr
         assert sentence in complaints[0]
-    # The armature that nothing stands in the way of was done.
+    # The armature without obstacles was processed.
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["strips.blend"]
 
 

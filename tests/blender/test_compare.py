@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare` and `sinew render`: their numbers, findings and pictures, on files with known results."""
+"""`sinew compare` and `sinew render`: their numbers, findings and pictures, for files with known results."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sinew_addon.core.golden import RenderSettings
 from sinew_addon.features.pages import pictures, video
 from test_command_line import run_sinew
 
-# Pictures take a third of a second each, and are much the same in all versions.
+# Pictures take a third of a second each, and are almost the same in all versions.
 NEWEST = bpy.app.version >= (5, 2)
 newest_only = pytest.mark.skipif(not NEWEST, reason="drawn with the newest Blender only")
 
@@ -46,7 +46,8 @@ def triangles_of(obj):
 
 
 def test_numbers_are_those_of_the_shapes(tmp_path):
-    """Against Blender's modifier, both ways, and trimesh; a modifier behind the skinning changes nothing."""
+    """Compared with Blender's modifier, in both modes, and with trimesh; a later modifier changes
+    nothing."""
     obj, armature = scenes.make_arm()
     armature.location, armature.rotation_euler = (3.0, -2.0, 1.0), (0.3, 0.2, 0.1)
     obj.location = (0.0, 0.0, 0.5)
@@ -95,7 +96,7 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
 
 
 def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
-    """Also a mesh that its parent deforms, which no modifier says."""
+    """Also a mesh that its parent deforms, without a modifier."""
     first, _armature = scenes.make_arm()
     first.modifiers.new("Front", "SUBSURF").levels = 1
     first.modifiers.move(1, 0)
@@ -137,7 +138,7 @@ def test_frames_below_zero(tmp_path):
 
 @newest_only
 def test_close_ups_are_of_one_character(tmp_path):
-    """However far apart several stand."""
+    """However far apart several characters are."""
     scenes.make_arm()
     second, rig = scenes.make_arm(name="Far")
     rig.location = second.location = (0.0, 50.0, 0.0)
@@ -189,7 +190,7 @@ def test_a_page_holds_its_pictures_and_a_video(tmp_path):
         *("--video", "--out", tmp_path),
     )
     page = (tmp_path / "wrist.html").read_text(encoding="utf-8")
-    # Nothing is fetched from anywhere; a plot's marks refer to shapes within the page.
+    # Nothing is fetched; a plot's marks refer to shapes within the page.
     assert re.findall(r'(?:src|href)="(?!data:image/png;base64,|#)', page) == []
     assert len(re.findall(r'<div class="plot"><svg ', page)) == 7
     drawn = sorted((tmp_path / "wrist" / "pictures").glob("*.png"))
@@ -198,7 +199,7 @@ def test_a_page_holds_its_pictures_and_a_video(tmp_path):
     assert {p.name for p in drawn if p.stem.count("-") == 1} == {"lbs-24.png", "dq-24.png"}
     for picture in drawn:
         assert len(opaque_pixels(picture)) > 500, picture
-    # The file's own modifier is linear blend: no distance, all of it in the first colour, a violet.
+    # The file's own modifier is linear blend: distance 0, so all of it has the first colour, a violet.
     red, green, blue = opaque_pixels(tmp_path / "wrist" / "pictures" / "lbs-distance-24-close.png").mean(
         axis=0
     )
@@ -242,7 +243,7 @@ def test_golden_pictures_keep_their_parameters(tmp_path):
     run_sinew("render", path, "--method", "lbs", "--frames", "11", "--size", 128, *mix, "--out", golden)
     result = run_sinew("render", path, "--against", golden, "--out", now)
     assert "1 of 1 pictures within" in result.stdout
-    # What is given wins, and is written to the new pictures' own settings.
+    # Given values win, and are written to the new pictures' settings.
     off = ("--set", "mix=off")
     run_sinew("render", path, *off, "--against", golden, "--out", now, status=1)
     settings = RenderSettings.read(now)
@@ -256,7 +257,7 @@ def test_golden_pictures(tmp_path):
         "render", path, "--method", "dq", "--frames", "1,11", "--size", 128, "--out", tmp_path / "golden"
     )
     assert {p.name for p in (tmp_path / "golden").iterdir()} == {"0001.png", "0011.png", "render.json"}
-    # All methods leave the rest pose as it is; frame 11 is bent.
+    # All methods keep the rest pose; frame 11 is bent.
     result = run_sinew(
         *("render", path, "--method", "lbs", "--against", tmp_path / "golden", "--out", tmp_path / "now"),
         status=1,
@@ -266,7 +267,7 @@ def test_golden_pictures(tmp_path):
     assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
     percent = float(re.search(r"\b11\b.*?(\d+\.\d+) %", result.stdout).group(1))
     assert 0.5 < percent < 50.0
-    # The golden camera is kept: what moves farther at one frame does not change the framing of others.
+    # The golden camera is used: larger motion at one frame does not change the framing of others.
     for frame, scale in ((1, 1.0), (11, 3.0)):
         armature.pose.bones[1].scale = (scale, scale, scale)
         armature.pose.bones[1].keyframe_insert("scale", frame=frame)
@@ -322,7 +323,7 @@ def test_tolerant(sinew_render):
 
 
 def run_pytest(folder, *options):
-    # The installed plugin would come a second time under its own name.
+    # The installed plugin would be loaded a second time under its own name.
     environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
     command = [sys.executable, "-m", "pytest", "-p", "sinew_addon.pytest_plugin", "-p", "no:cacheprovider"]
     return subprocess.run(

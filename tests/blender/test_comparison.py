@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare in the viewport: copies show what each method makes of the original, and nothing of them stays."""
+"""Compare in the viewport: copies show the shape of each method, and leave nothing behind."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def state() -> comparison_state.SinewComparison:
 
 
 def copies(obj: bpy.types.Object) -> dict[str, bpy.types.Object]:
-    """By method, those of one object."""
+    """The copies of one object, by method."""
     return {
         properties.of(copy).copied_for: copy
         for copy in comparison_state.copies_of(state())
@@ -45,7 +45,7 @@ def copies(obj: bpy.types.Object) -> dict[str, bpy.types.Object]:
 
 
 def without_offset(copy: bpy.types.Object, place: int) -> np.ndarray:
-    """A copy's final points as if it stood where the original does, object space."""
+    """A copy's final points, moved to the original's position, object space."""
     matrix = np.array(copy.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
     offset = place * state().spacing * np.array(state().axis)
     return scenes.final_points(copy) - np.linalg.solve(matrix[:3, :3], offset)
@@ -57,16 +57,17 @@ def assert_copies_show(obj: bpy.types.Object, frames: list[int], expected: dict[
         for place, (method, copy) in enumerate(copies(obj).items(), start=1):
             assert properties.of(copy).error == ""
             got = without_offset(copy, place)
-            # The offset is rounded to 6e-8 of itself: for the last of many methods it is ten times the mesh.
+            # The offset is rounded to 6e-8 of itself: for the last of many methods it is ten times the mesh's
+            # size.
             size = scenes.diagonal(obj) + 0.1 * place * state().spacing
             if copy.modifiers[-1].type == "SUBSURF":
-                # It rounds at the copy's place.
+                # Rounding happens at the copy's position.
                 size += place * state().spacing
             assert scenes.worst(got, expected[method][number]) <= TOLERANCE * size, method
 
 
 def shapes_of_methods(obj: bpy.types.Object, frames: list[int]) -> dict[str, np.ndarray]:
-    """What Sinew makes of the object itself; afterwards it is as it was."""
+    """The shape that Sinew makes of the object itself; restores it afterwards."""
     skinned, method = (
         properties.has_sinew(obj),
         properties.of(obj).method if obj.is_property_set("sinew") else "",
@@ -94,7 +95,8 @@ def assert_compared(obj: bpy.types.Object, frames: list[int]) -> None:
 
 
 def content() -> dict[str, object]:
-    # Evaluating fills in bounds and caches, and Blender 5.2 unfolds attributes of one value as they are read.
+    # Evaluating fills in bounds and caches, and Blender 5.2 expands attributes with a single value when they
+    # are read.
     bpy.context.scene.frame_set(bpy.context.scene.frame_current)
     whole_file.of_open_file()
     return whole_file.of_open_file()
@@ -238,7 +240,7 @@ def test_posing_by_hand():
 
 
 def test_a_full_scene_is_as_it_was(tmp_path):
-    """One comparison after the other, each of another kind of rig, then the end of the last."""
+    """One comparison after the other, each with another kind of rig, then the end of the last one."""
     bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
     files.open_file(test_restore.full_scene(tmp_path), load_ui=True)
     scene = bpy.context.scene
@@ -262,7 +264,7 @@ def test_a_full_scene_is_as_it_was(tmp_path):
     bpy.context.view_layer.objects.active = chosen[1]
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
     changed = whole_file.differences(before, content())
-    # A copy of an override that is made local leaves a count of users, of this session, to the reference.
+    # A copy of an override that is made local adds a session user to the reference.
     assert [line for line in changed if not line.startswith("objects[Bare [props.blend]]")] == []
 
 
@@ -300,7 +302,7 @@ def test_undo_and_redo():
     bpy.context.scene.frame_set(6)
     bpy.ops.ed.undo_push(message="start")
     bpy.ops.ed.undo_push(message="nothing")
-    # What undo does by itself.
+    # Changes that undo itself makes.
     bpy.ops.ed.undo()
     obj = bpy.data.objects["Arm"]
     before = content()
@@ -333,7 +335,7 @@ def test_other_methods_replace_the_copies():
     assert list(copies(obj)) == ["lbs", "qv"]
     assert (state().first, state().second) == ("lbs", "qv")
     state().arrangement = comparison_state.OVERLAID
-    # Nothing is selected: what is compared already.
+    # Nothing is selected: compares again what is compared already.
     obj.select_set(False)
     bpy.context.view_layer.objects.active = None
     assert bpy.ops.sinew.compare(methods={"blender"}) == {"FINISHED"}
@@ -420,7 +422,7 @@ def test_the_original_is_deleted(tmp_path, skinned):
 
     delete(opened())
     for mesh in bpy.data.meshes:
-        # Of what Sinew drove and was deleted; ending a comparison of it takes that away, too.
+        # Those of a deleted object with Sinew; ending its comparison removes them, too.
         for name in [each.name for each in mesh.attributes if each.name.startswith("sinew")]:
             mesh.attributes.remove(mesh.attributes[name])
     before = content()
@@ -472,7 +474,7 @@ def test_clothes_stand_with_their_body():
         for obj in (body, shirt):
             moved = scenes.final_points(copies(obj)[method]) - scenes.final_points(obj)
             assert np.allclose(moved, (place * state().spacing, 0.0, 0.0), atol=1e-5)
-    # Under an armature too, copies are nobody's characters.
+    # Even with an armature, copies are not characters.
     compare(armature, {"dq"})
     assert set(operators.targets(bpy.context)) == {body, shirt, hidden}
 
@@ -519,7 +521,7 @@ def test_overlay_and_flip():
     state().second = "dq"
     assert [copy.visible_get() for copy in (lbs, qv, dq)] == [False, False, True]
     assert scenes.worst(without_offset(dq, 1), turned) > 0.01
-    # One that was hidden while the frame changed.
+    # An object that was hidden while the frame changed.
     bpy.ops.sinew.flip_comparison()
     assert [copy.visible_get() for copy in (lbs, qv, dq)] == [True, False, False]
     assert scenes.worst(without_offset(lbs, 1), scenes.final_points(obj)) <= scenes.TOLERANCE * 2
@@ -627,12 +629,12 @@ def test_a_linked_character(tmp_path):
     bpy.context.scene.frame_set(1)
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
     changed = whole_file.differences(before, content())
-    # Blender's note that something local used the linked mesh.
+    # Blender's record that something local used the linked mesh.
     assert [line for line in changed if "is_library_indirect" not in line] == []
 
 
 def test_without_sinew_the_file_opens(tmp_path):
-    """The copies of a saved comparison keep their positions, and have Blender's nearest shapes."""
+    """The copies in a saved comparison keep their positions, and have Blender's most similar shapes."""
     obj, _armature = scenes.make_arm()
     bpy.context.scene.frame_set(11)
     compare(obj, {"lbs", "dq"})
@@ -660,7 +662,7 @@ def test_pinned_modifiers_stay_behind_sinew():
 
 
 def test_commands_leave_copies_out(tmp_path):
-    """Also where they show every collection to take pictures."""
+    """Also if they show every collection to take pictures."""
     obj, _armature = scenes.make_arm()
     compare(obj, {"qv", "dq"})
     path = test_restore.save(tmp_path / "compared.blend")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Corrective shape keys: the Armature modifier alone has the shape that Sinew showed."""
+"""Corrective shape keys: with them the Armature modifier alone has the shape that Sinew showed."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_stages_are_in_it(arm):
 
 
 def test_of_envelopes():
-    """They give weights to where a rest point is."""
+    """They assign weights by the position of a rest point."""
     obj, armature = scenes.make_arm()
     for bone in armature.data.bones:
         bone.envelope_distance = 0.3
@@ -93,7 +93,7 @@ def test_a_bone_drives_it(arm):
 
 
 def test_a_point_that_can_not_be_reached_stays(arm):
-    """Half a turn makes linear blending flat: from a flat place no offset leads out."""
+    """At 180 degrees linear blending collapses: no offset leads out of a flat position."""
     obj, armature = arm
     scenes.forget_keys(armature)
     bone = armature.pose.bones["bone.1"]
@@ -142,7 +142,7 @@ def test_what_can_not_be_is_one_sentence(arm, case, text):
     driver = bpy.context.active_pose_bone if bone is not None else None
     with pytest.raises(SinewError, match=text):
         corrective_key.add(obj, bpy.context.evaluated_depsgraph_get(), driver)
-    # The button says it, too.
+    # The button reports it, too.
     assert bpy.ops.sinew.corrective_key(driven=bone is not None) == {"CANCELLED"}
     bpy.ops.object.mode_set(mode="OBJECT")
     assert len(obj.data.shape_keys.key_blocks) == before

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct delta mush in Blender: its shape is the float64 reference's, and its radius makes its data anew."""
+"""Direct delta mush in Blender: its shape equals the float64 reference's, and a new radius recomputes its
+data."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ def route(request):
 
 @pytest.fixture
 def in_window():
-    """As where somebody watches: nobody waits."""
+    """As in an interactive session: nothing waits."""
     precomputations.waits = False
     yield
     precomputations.cancel_all()
@@ -56,7 +57,7 @@ def assert_equal_to_reference(obj: bpy.types.Object, radius: float, variant: str
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
-    # Motions of the object's space: a rotation and a translation take it to the armature's.
+    # Motions in the object's space: a rotation and a translation map it to the armature's.
     motions = np.linalg.inv(to_armature) @ motions @ to_armature
     expected, margins = reference.deform(
         "ddm",

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handlers of others, called before Sinew's, delete and rename what changed in the same evaluation.
+"""Other add-ons' handlers, called before Sinew's, delete and rename what changed in the same evaluation.
 
-Blender frees it at once and goes on listing it; to read its original then can crash Blender. So each test is
-a process of its own."""
+Blender frees it immediately but still lists it; reading its original can then crash Blender. Each test
+therefore is a separate process."""
 
 from __future__ import annotations
 

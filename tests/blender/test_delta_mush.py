@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stage delta_mush: Blender's Corrective Smooth behind the Armature modifier is its oracle."""
+"""The stage delta_mush: its oracle is Blender's Corrective Smooth after the Armature modifier."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def paint(obj: bpy.types.Object) -> None:
 
 
 def make_rough_arm() -> bpy.types.Object:
-    """With polygons of 3 to 12 corners, holes, edges of three faces, edges and a vertex without faces, and
+    """Polygons of 3 to 12 corners, holes, edges of three faces, edges and a vertex without faces, and
     noise; rigid weights, which crease it."""
     obj, _armature = scenes.make_arm(weights="rigid")
     rng = np.random.default_rng(3)
@@ -70,7 +70,7 @@ def add_corrective(obj: bpy.types.Object, **settings: object) -> bpy.types.Corre
 def by_corrective_smooth(
     obj: bpy.types.Object, frames: list[float] = FRAMES, **settings: object
 ) -> np.ndarray:
-    """What Blender makes of it; afterwards the object is as it was."""
+    """The shape by Blender; restores the object afterwards."""
     modifier = add_corrective(obj, **settings)
     expected = scenes.shapes(obj, frames)
     obj.modifiers.remove(modifier)
@@ -85,7 +85,7 @@ def mush(obj: bpy.types.Object, method: str = "lbs", **values: object) -> None:
     stage.enabled = True
 
 
-# By what Corrective Smooth has, and what the stage has.
+# Settings of Corrective Smooth, and the corresponding ones of the stage.
 NAMES = {"vertex_group": "group", "invert_vertex_group": "invert_group", "use_pin_boundary": "pin_boundary"}
 
 CASES = [
@@ -130,7 +130,7 @@ def with_keys(obj: bpy.types.Object) -> None:
 
 
 def with_lattice_in_front(obj: bpy.types.Object) -> None:
-    """Deforms, and leaves the vertices as many as they are."""
+    """Deforms without changing the number of vertices."""
     obj.modifiers.new("Front", "SIMPLE_DEFORM").angle = 0.7
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
 
@@ -154,7 +154,7 @@ def test_on_both_routes_with_keys_and_modifiers_in_front(monkeypatch, set_up, is
 
 
 def applied_in_front(obj: bpy.types.Object) -> bpy.types.Object:
-    """A copy whose own mesh is what the first modifier makes of it."""
+    """A copy whose own mesh is the result of the first modifier."""
     front = obj.copy()
     bpy.context.scene.collection.objects.link(front)
     for modifier in list(front.modifiers)[1:]:
@@ -172,8 +172,8 @@ def applied_in_front(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def test_vertices_made_in_front_rest_where_they_are_made():
-    """Blender refuses to smooth these, as it knows no original coordinates of theirs: the modifier in front
-    is applied for it."""
+    """Blender refuses to smooth these, because it does not know their original coordinates: the upstream
+    modifier is applied for it."""
     obj = make_rough_arm()
     obj.modifiers.new("Front", "SUBSURF").levels = 1
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
@@ -249,7 +249,7 @@ def test_a_small_mesh_is_not_left_to_blender(monkeypatch):
 
 
 def narrowest(obj: bpy.types.Object, rings: int, sides: int) -> float:
-    """The least radius of the tube's rings at frame 11, over that at rest."""
+    """The smallest radius of the tube's rings at frame 11, relative to that at rest."""
     points = scenes.shapes(obj, [11])[0][: rings * sides].reshape(rings, sides, 3)
     middle = points[rings // 4 : -rings // 4]
     return (
@@ -277,7 +277,7 @@ def test_a_radius_gives_the_same_shape_at_two_densities():
 def test_saved_copied_and_removed(tmp_path):
     obj = make_rough_arm()
     bpy.context.view_layer.update()
-    whole_file.of_open_file()  # looking at an attribute may change how 5.2 stores it
+    whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
     before = whole_file.of_open_file()
     mush(obj, iterations=8, group=GROUP)
     expected = scenes.shapes(obj, FRAMES)
@@ -297,7 +297,7 @@ def test_saved_copied_and_removed(tmp_path):
 
 
 def taken_over(**settings: object) -> tuple[bpy.types.Object, np.ndarray]:
-    """A rough arm with a Corrective Smooth that was taken over, and the shapes before."""
+    """A rough arm whose Corrective Smooth was replaced, and the shapes before."""
     obj = make_rough_arm()
     add_corrective(obj, **settings)
     expected = scenes.shapes(obj, FRAMES)
@@ -320,7 +320,7 @@ def test_a_corrective_smooth_is_taken_over(settings):
     modifier = obj.modifiers["Smooth"]
     assert (modifier.show_viewport, modifier.show_render) == (False, False)
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= tolerance
-    # Off, it is Blender's again.
+    # When Sinew is off, it is Blender's again.
     properties.of(obj).enabled = False
     assert modifier.show_viewport
     assert modifier.show_render

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Diagnostics in the sidebar: planted faults are found and selected, exactly those."""
+"""Diagnostics in the sidebar: exactly the planted faults are found and selected."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEFTOVER = [60, 61, 62, 63]
 
 
 def faulty_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
-    """Three bones, at most three a vertex, and the faults above."""
+    """Three bones, at most three influences for each vertex, and the faults above."""
     obj, armature = scenes.make_arm(bones=3, rings=19)
     groups = obj.vertex_groups
     for group in groups:
@@ -63,8 +63,9 @@ def test_finds_exactly_the_planted_faults(skinned):
 
 
 def twisted_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
-    """Hard weights, but for one vertex that three bones share and one that two do. The bones rotate apart
-    until frame 11: the second by 100 degrees, the third by 200 or, against the first, 160 the other way."""
+    """Rigid weights, except for one vertex with three bones and one with two. Until frame 11 the bones
+    rotate apart: the second by 100 degrees, the third by 200 degrees, or, relative to the first, by 160
+    degrees the other way."""
     obj, armature = scenes.make_arm(bones=3, rings=19, weights="hard")
     scenes.forget_keys(armature)
     for group in obj.vertex_groups:
@@ -91,7 +92,8 @@ def test_what_depends_on_poses_is_found_at_the_frame_and_in_the_action():
     assert found(obj) == {}
     bpy.context.scene.frame_set(11)
     bpy.ops.sinew.check()
-    # Three bones, each less than 180 degrees from the next and more from the one after: the order decides.
+    # Three bones, each less than 180 degrees from the next and more from the one after that: the order
+    # decides.
     assert found(obj) == {"order_of_groups": [100]}
     bpy.context.scene.frame_set(10)
     bpy.ops.sinew.check()
@@ -244,7 +246,7 @@ def test_a_check_touches_nothing(tmp_path):
     obj, _armature = faulty_arm()
     bpy.context.scene.frame_set(5)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
-    dirty = bpy.data.is_dirty  # 4.2 without a window calls even a file just saved so
+    dirty = bpy.data.is_dirty  # 4.2 without a window calls even a newly saved file dirty
     bpy.ops.sinew.check_frames(over="SCENE")
     assert bpy.data.is_dirty == dirty
     assert bpy.context.scene.frame_current == 5
@@ -254,8 +256,8 @@ def test_a_check_touches_nothing(tmp_path):
 
 
 def test_meshes_that_were_deleted_since_are_not_read():
-    """As Sinew's own handler deletes helper objects before this one: Blender still lists them in the update,
-    and reading the deleted ones crashed it."""
+    """Simulates that Sinew's own handler deletes helper objects before this one runs: Blender still lists
+    them in the update, and reading the deleted ones crashed it."""
     obj, _armature = faulty_arm()
     bpy.ops.sinew.check()
     others = [bpy.data.meshes.new(f"Other {number}") for number in range(40)]
@@ -270,7 +272,7 @@ def test_meshes_that_were_deleted_since_are_not_read():
         listed.extend(update.id.name for update in depsgraph.updates if isinstance(update.id, bpy.types.Mesh))
         bpy.data.batch_remove([bpy.data.objects[mesh.name] for mesh in others])
         bpy.data.batch_remove(others)
-        # Their memory is something else's.
+        # Their memory is in use for something else.
         for number in range(200):
             bpy.data.meshes.new(f"Next {number}")
         diagnose.on_depsgraph_update(scene, depsgraph)

@@ -14,7 +14,7 @@ from sinew_addon.io import armature_io
 
 
 def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)) -> None:
-    """The object's Sinew shape is the linear modifier's: compared with its own Off."""
+    """Asserts that the object's shape by Sinew is the linear modifier's, which it has when Sinew is off."""
     settings = properties.of(obj)
     assert settings.enabled, settings.error
     settings.method = "lbs"
@@ -270,7 +270,7 @@ def test_deleted_armature_turns_the_mesh_off_with_a_sentence():
 
 
 def test_armature_deleted_as_in_the_window_is_noticed():
-    """Deleting in the window unlinks it from all scenes; our pointer alone still keeps it."""
+    """Deleting in the window unlinks it from all scenes; only Sinew's pointer still keeps it."""
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj)
     bpy.context.scene.collection.objects.unlink(armature)
@@ -303,7 +303,7 @@ def shared_mesh(obj):
 @pytest.mark.parametrize("heat", [False, True])
 @pytest.mark.parametrize("set_up", [None, front_modifier, shared_mesh])
 def test_what_sinew_made_for_a_deleted_mesh_goes_with_it(set_up, heat, by_script):
-    """Its mesh, which is the artist's, stays as Blender has it."""
+    """Its mesh, which is the artist's, has Blender's shape."""
     obj, _armature = scenes.make_arm()
     if set_up is not None:
         set_up(obj)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Python with Blender as a module ends with status 0 whatever Sinew did in it."""
+"""A Python with Blender as a module exits with status 0, whatever Sinew did in it."""
 
 from __future__ import annotations
 

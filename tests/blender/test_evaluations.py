@@ -24,7 +24,8 @@ from sinew_addon.jobs.tasks import reskin
 
 @pytest.fixture
 def counting() -> Iterator[None]:
-    """Blender says each evaluation on its standard output; only a depsgraph made meanwhile does."""
+    """Blender prints each evaluation on its standard output, if the depsgraph was created in the
+    meantime."""
     bpy.app.debug_depsgraph_eval = True
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     yield
@@ -32,12 +33,12 @@ def counting() -> Iterator[None]:
 
 
 def evaluations(obj: bpy.types.Object, frame: int) -> int:
-    """How often Blender evaluates the modifiers of `obj` on going to a frame."""
+    """How often Blender evaluates the modifiers of `obj` when going to a frame."""
     return evaluations_in(lambda: bpy.context.scene.frame_set(frame), obj.name)
 
 
 def evaluations_in(action: Callable[[], object], name: str) -> int:
-    """How often Blender evaluates the modifiers of the object called `name` meanwhile."""
+    """How often Blender evaluates the modifiers of the object called `name` in this block."""
     with tempfile.TemporaryFile() as said:
         sys.stdout.flush()
         stdout = os.dup(1)
@@ -106,7 +107,7 @@ def test_a_frame_evaluates_the_mesh_once(set_up: Setup):
     assert evaluations(obj, 5) == 1
     scenes.add_sinew(obj)
     for _round in range(2):
-        # The first frame after a switch may take a second round.
+        # The first frame after a switch may take a second evaluation.
         for frame in (1, 2):
             bpy.context.scene.frame_set(frame)
         assert [evaluations(obj, frame) for frame in (3, 4, 5, 6)] == [1, 1, 1, 1]
@@ -132,7 +133,7 @@ def test_posing_evaluates_the_mesh_once(set_up: Setup):
 
 @pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
 def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
-    """Evaluated before Sinew deformed it, it would keep what it made of the last frame's."""
+    """If it were evaluated before Sinew deformed it, it would show the previous frame."""
     obj, armature = scenes.make_arm(sides=8, rings=12)
     set_up(obj, armature)
     obj.modifiers["Armature"].use_deform_preserve_volume = True
@@ -154,7 +155,7 @@ def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
 
 @pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
 def test_what_follows_a_deformed_mesh_deforms_by_the_same_frame(set_up: Setup):
-    """Read in the first evaluation: a later request would have Blender evaluate the rest."""
+    """Read in the first evaluation: a later request would make Blender evaluate the rest."""
     followed, armature = scenes.make_arm()
     set_up(followed, armature)
     obj, follower = scenes.make_arm()
@@ -206,7 +207,7 @@ def test_what_stands_behind_is_evaluated_once_where_the_frame_dirties_the_mesh(s
         bpy.app.handlers.frame_change_post.remove(watch)
         safe_mode.set_forced(None)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    # From the second frame on: that a mesh moves is known only when it did.
+    # From the second frame on: only then is it known that a mesh moves.
     assert first_round[1:] == [len(obj.data.vertices)] * 3
     assert got.shape[1] > len(obj.data.vertices)
     assert obj.modifiers["Behind"].show_viewport
@@ -238,7 +239,7 @@ def test_a_batch_evaluates_a_file_once_more_than_blender_opens_and_saves_it(tmp_
 
     plain = evaluations_in(open_and_save, "Arm")
     assert plain > 0
-    # Blender brings the scene up to date before it saves: bpy.ops does before any operator.
+    # Blender updates the scene before it saves: bpy.ops does so before any operator.
     assert evaluations_in(lambda: reskin.reskin(task(path), lambda _doing: None), "Arm") <= plain + 1
 
 
@@ -276,7 +277,7 @@ def test_saving_reads_no_weights_again_and_a_batch_reads_them_once(tmp_path, wei
 
 
 def test_a_copy_holds_what_the_window_would_show(tmp_path):
-    """Of shape keys, something in front, a parent that deforms, and a file that has Sinew already."""
+    """With shape keys, an upstream modifier, a parent that deforms, and a file that already has Sinew."""
     obj, _armature = scenes.make_arm()
     obj.shape_key_add(name="Basis")
     obj.shape_key_add(name="Fat").points[30].co.z += 0.2
@@ -298,7 +299,7 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
     expected = {name: scenes.final_points(bpy.data.objects[name]) for name in names}
     reskin.reskin(task(path), lambda _doing: None)
     copy = str(tmp_path / "unfinished.blend")
-    # As saved in the file, before Sinew deforms it: by the modifiers.
+    # As saved in the file, before Sinew deforms it: with the modifiers.
     with updates_suspended():
         bpy.ops.wm.open_mainfile(filepath=copy)
         for name in names:
@@ -311,8 +312,8 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
 
 
 def test_objects_that_move_beside_their_armatures():
-    """Their transforms are of the frame when Sinew deforms, whichever thread of Blender's is the first:
-    several objects, which one action moves."""
+    """Their transforms belong to the frame when Sinew deforms, whichever of Blender's threads is first:
+    several objects, moved by one action."""
     objects = [scenes.make_arm(sides=6, rings=9, name=name)[0] for name in ("One", "Two", "Three")]
     first = objects[0]
     first.keyframe_insert("location", frame=1)
@@ -342,7 +343,7 @@ def vectors_of(attribute: bpy.types.FloatVectorAttribute) -> np.ndarray:
 
 
 def test_the_memory_of_an_attribute_is_its_meshs_alone():
-    """A copy of a mesh has the same memory as the mesh itself until one of them is written."""
+    """A copy of a mesh shares the mesh's memory until one of them is written."""
     obj, _armature = scenes.make_arm()
     mesh = obj.data
     for name, kind, domain in (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""glTF with Sinew's skinning data, read and skinned by a program of its own: shaders/read_glb.py."""
+"""glTF with Sinew's skinning data, read and skinned by a separate program: shaders/read_glb.py."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ GROUP = "Painted"
 
 @pytest.fixture(autouse=True)
 def switched_on(empty_file):
-    """Exporters look for extensions among those that are."""
+    """Exporters look for extensions among the enabled add-ons."""
     switch_on()
     yield
     addons = bpy.context.preferences.addons
@@ -43,7 +43,8 @@ def switch_on() -> None:
 
 
 def make_character(materials: int = 1) -> bpy.types.Object:
-    """An arm, moved, rotated and scaled; faces of some materials, and vertices that know their number."""
+    """An arm, moved, rotated and scaled; faces with several materials, and vertices with their index as
+    an attribute."""
     obj, armature = scenes.make_arm(bones=3)
     armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), Euler((0.5, 0.2, -0.3))
     armature.scale = (1.3, 1.3, 1.3)
@@ -87,13 +88,13 @@ def world_shapes(obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
 
 
 def numbers_in(file: read_glb.File, mesh: int = 0) -> np.ndarray:
-    """Of the vertices in Blender."""
+    """Values of the vertices in Blender."""
     primitives = file.header["meshes"][mesh]["primitives"]
     return np.concatenate([file.array(p["attributes"]["_NUMBER"])[:, 0] for p in primitives]).astype(int)
 
 
 def assert_plays(path: Path, obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
-    """To 1e-5 of the diagonal. Returns what was read."""
+    """Compares to 1e-5 of the diagonal. Returns what was read."""
     expected = world_shapes(obj, frames)
     times = [frame / bpy.context.scene.render.fps for frame in frames]
     got = read_glb.points_at(path, times)[obj.name]
@@ -140,7 +141,7 @@ def test_z_up(tmp_path):
     use(obj, "cor")
     file = write(tmp_path / "a.glb", export_yup=False)
     times = [frame / bpy.context.scene.render.fps for frame in FRAMES]
-    # The reader takes it for Y up.
+    # The reader takes this direction for Y up.
     x, y, z = np.moveaxis(read_glb.points_at(tmp_path / "a.glb", times)[obj.name], 2, 0)
     expected = world_shapes(obj, FRAMES)[:, numbers_in(file)]
     assert scenes.worst(np.stack([x, z, -y], axis=2), expected) <= 1e-5 * np.linalg.norm(
@@ -191,7 +192,7 @@ def test_an_export_that_fails_ends_as_one_that_does_not(tmp_path):
 
 
 def test_after_an_export_that_nobody_ended(tmp_path):
-    """The next one finds meshes that are no longer there, or are."""
+    """The next one finds that meshes were removed or added."""
     obj = make_character()
     use(obj, "cor")
     found, left_out = export.collect(bpy.context)
@@ -213,7 +214,7 @@ def test_custom_properties_stay(tmp_path):
     obj = make_character()
     use(obj, "cor")
     obj.data["tailor"] = "Ann"
-    # Saved files keep centres in the mesh.
+    # Saved files store centres in the mesh.
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     extras = write(tmp_path / "a.glb", export_extras=True).header["meshes"][0]["extras"]
     assert extras.pop("sinew") == {"version": 1, "method": "cor"}
@@ -262,7 +263,7 @@ def test_parameters_and_stages_are_named(tmp_path):
 
 
 def test_command(tmp_path, capfd):
-    """As docs/engines.md has it: exported, read by the program there, compared with `sinew points`."""
+    """As in docs/engines.md: exported, read by the program there, compared with `sinew points`."""
     obj = make_character()
     name = obj.name
     world = np.array(obj.matrix_world)
@@ -284,7 +285,7 @@ def test_command(tmp_path, capfd):
     assert cli.main(["points", str(file), "--method", "cor", "--frames", frames, "--out", str(points)]) == 0
     expected = np.load(points)[name] @ world[:3, :3].T + world[:3, 3]
     got = np.load(tmp_path / "read.npz")[name]
-    # The command writes no numbers of vertices: the nearest at rest.
+    # The command does not write indices of vertices: uses the nearest ones at rest.
     nearest = np.linalg.norm(got[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
     assert set(nearest) == set(range(expected.shape[1]))
     assert scenes.worst(got, expected[:, nearest]) <= 1e-5 * np.linalg.norm(np.ptp(expected[0], axis=0))
@@ -295,7 +296,7 @@ def test_the_example_of_the_documentation(tmp_path, monkeypatch, capfd):
     example = text[text.index("### An example") :]
     shutil.copy(REPOSITORY / "blend_files" / "wrist.blend", tmp_path / "human.blend")
     monkeypatch.chdir(tmp_path)
-    # Where Blender looks.
+    # The folder where Blender looks.
     monkeypatch.setenv("PWD", str(tmp_path))
     for line in re.findall(r"^    (sinew .*)$", example, re.MULTILINE):
         program, *words = shlex.split(line)
@@ -327,13 +328,13 @@ def test_human(tmp_path, real_rig):
 
 @pytest.mark.once
 def test_in_a_window(tmp_path_factory):
-    """By the exporter's own browser, with the extension installed."""
+    """With the exporter's own file browser, with the extension installed."""
     facts = in_window.facts_of("export_in_window", tmp_path_factory.mktemp("window"), "five_meshes")
     assert facts["printed"] == []
     assert facts["with"].keys() == facts["without"].keys()
     assert set(map(tuple, facts["without"].values())) == {(None, False)}
     assert ["cor", True] in facts["with"].values()
-    # Bone-parented ones have no skin.
+    # Objects parented to bones have no skin.
     assert set(map(tuple, facts["with"].values())) <= {("cor", True), (None, False)}
     assert facts["attributes"] == []
     assert facts["on"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The zip that people install, installed as they do: into Blenders that have nothing else of Sinew."""
+"""The zip that users install, installed as they do: into Blenders that contain nothing else of Sinew."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_installs_and_works_in_the_same_session(package, bare_site, tmp_path):
         | {"BLENDER_USER_RESOURCES": str(user)},
     )
     assert result.returncode == 0, result.stdout + result.stderr
-    # At its end Blender as a module unregisters it after all else.
+    # When it exits, Blender as a module unregisters it after everything else.
     assert "Traceback" not in result.stderr
     facts = json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
     assert Path(facts["library"]).is_relative_to(user), "another sinew than the zip's was loaded"
@@ -126,7 +126,7 @@ def run_split(package, out) -> subprocess.CompletedProcess[str]:
 
 
 def with_wheels_of(package: Path, tags: dict[str, str], target: Path) -> Path:
-    """The zip with its wheels renamed to other platforms: nobody here looks into them."""
+    """The zip with its wheels renamed to other platforms; their content is not read here."""
     with zipfile.ZipFile(package) as archive, zipfile.ZipFile(target, "w") as changed:
         names = archive.namelist()
         wheels = [name for name in names if name.endswith("-linux_x86_64.whl")]
@@ -260,7 +260,7 @@ def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tm
 
 @pytest.fixture
 def photographed(package, tmp_path, real_rig):
-    """photographed(script, *pictures, options=()): the facts that a script prints from a Blender with a
+    """photographed(script, *pictures, options=()): the facts that a script prints in a Blender with a
     window that has Sinew's zip and human.blend."""
     program = os.environ.get("SINEW_FULL_BLENDER")
     if not program:
@@ -269,7 +269,7 @@ def photographed(package, tmp_path, real_rig):
         pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
 
     def run(script: str, *pictures: str, options: Sequence[str] = ()) -> dict[str, object]:
-        # The whole Blender sees the temporary folder, not this checkout's neighbours.
+        # The whole Blender can read the temporary folder, but not the files next to this checkout.
         shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
         shutil.copy(package, tmp_path / "sinew.zip")
         for name in (script, "docs/window.py"):
@@ -302,7 +302,7 @@ def test_the_panel_in_a_window(photographed):
 
 
 def test_blending_actions_in_a_window(photographed):
-    """In steps, the window drawing in between: Esc leaves all as it was, and Ctrl+Z undoes a blend."""
+    """In steps, between which the window is drawn: Esc restores everything, and Ctrl+Z undoes a blend."""
     options = ["--enable-event-simulate"]
     facts = photographed("docs/photograph_blend.py", "motion-panel.png", options=options)
     assert facts["listed"] == ["STRAIN", "LATE"]
@@ -316,7 +316,7 @@ def test_inverse_kinematics_live_in_a_window(photographed):
     """Plays, moves a target, undoes that, renders beside the window, saves and reopens."""
     options = ["--enable-event-simulate"]
     facts = photographed("docs/photograph_ik.py", "ik-panel.png", "ik-render.png", options=options)
-    # Lengths of the figure's chains are some 0.5.
+    # The figure's chains have lengths of about 0.5.
     assert facts["blender"] > 2e-6
     for when in ("live", "played", "moved", "undone", "rendered", "saved", "opened"):
         assert facts[when] < 2e-6, when
@@ -346,13 +346,14 @@ def test_a_comparison_in_a_window(photographed):
 
 
 def test_heat_map_and_diagnostics_in_a_window(photographed):
-    """Frames are gone through in steps, the window drawing in between; then the scene is where it was."""
+    """Goes through frames in steps, between which the window is drawn; then the scene has its old frame."""
     facts = photographed("docs/photograph_heat.py", "heat-map.png", "diagnostics.png")
     assert facts == {"scan": ["RUNNING_MODAL"], "frame after the scan": 16, "played": True, "mode": "EDIT"}
 
 
 def test_bakes_in_a_window(photographed):
-    """By the dialog: Esc in the middle of each leaves all as it was, and Ctrl+Z undoes one that is done."""
+    """With the dialog: Esc in the middle of each restores everything, and Ctrl+Z undoes one that is
+    finished."""
     script = "tests/blender/bake_in_window.py"
     facts = photographed(script, "bake.png", options=["--enable-event-simulate"])
     stopped, ended = facts["stopped"], facts["ended"]

@@ -64,8 +64,8 @@ def save_arm(path: Path) -> Path:
 
 
 def run_task(task: dict, variables: dict[str, list[str]]) -> subprocess.CompletedProcess:
-    """As a worker of Flamenco: one command after the other, none behind one that fails. A variable may stand
-    for several words here."""
+    """Acts like a worker of Flamenco: runs one command after the other, and none after a failure. A
+    variable may stand for several words here."""
     done = None
     for command in task["commands"]:
         assert command["name"] == "exec"
@@ -90,7 +90,7 @@ def method_in(path: Path) -> str:
 
 @pytest.fixture
 def two_files(tmp_path):
-    """In two folders, with one name, which is a difficult one."""
+    """In two folders, with the same, difficult name."""
     folder = tmp_path / "jobs"
     save_arm(folder / "hero [1].blend")
     save_arm(folder / "shots" / "hero [1].blend")
@@ -99,7 +99,7 @@ def two_files(tmp_path):
 
 @pytest.fixture
 def farm_blender(tmp_path):
-    """The Blender of the farm, which has nothing of Sinew yet."""
+    """The farm's Blender, which does not have Sinew yet."""
     return make_other_blender(tmp_path / "farm")
 
 
@@ -127,7 +127,7 @@ def test_tasks_have_names_and_wait_for_their_checks():
         },
         {"exe": "{blender}", "args": ["--command", "sinew", "check", out, "--blender", "{blender}"]},
     ]
-    # Every file in one task of each kind.
+    # Every file in exactly one task of each kind.
     for kind in ("check", "reskin"):
         words = [
             word
@@ -159,7 +159,7 @@ def test_the_job_type_offers_what_there_is():
     assert all(
         setting["default"] in setting["choices"] for setting in settings.values() if "choices" in setting
     )
-    # Those of the schema AvailableJobSetting in Flamenco's API.
+    # Keys of the schema AvailableJobSetting in Flamenco's API.
     known = {
         "key",
         "label",
@@ -173,7 +173,7 @@ def test_the_job_type_offers_what_there_is():
         "visible",
     }
     assert set().union(*settings.values()) <= known | {"required"}
-    # A setting that people see has a sentence; the manual names each.
+    # A visible setting has a sentence; the manual names each of them.
     manual = (ROOT / "docs" / "flamenco.md").read_text(encoding="utf-8")
     for key, setting in settings.items():
         assert setting["description"]
@@ -193,7 +193,7 @@ def test_two_files_are_checked_and_reskinned(two_files, farm_blender, tmp_path):
             assert done.returncode == 0, done.stderr
             assert "ok: does not need Sinew" in done.stdout
         else:
-            # The copies are written, and the farm's Blender can not render them.
+            # The copies are written, but the farm's Blender can not render them.
             assert done.returncode == 1, done.stderr
             assert "needs Sinew, which" in done.stdout
             assert "the extension is not enabled" in done.stdout
@@ -204,7 +204,7 @@ def test_two_files_are_checked_and_reskinned(two_files, farm_blender, tmp_path):
     ]
     assert {method_in(path) for path in copies} == {"qv"}
     assert {path: path.read_bytes() for path in two_files.rglob("*.blend")} == before
-    # Tried again with the extension installed, only the check is done: the copies are as they were.
+    # With the extension installed, a retry only does the check: the copies are unchanged.
     install_extension(farm_blender)
     written = {path: path.stat().st_mtime_ns for path in copies}
     for task in tasks[1::2]:
@@ -233,7 +233,8 @@ def test_the_extension_in_a_whole_blender_does_it(two_files, tmp_path):
     user = tmp_path / "user"
     blender = script(
         tmp_path / "whole",
-        # It checks copies in another Blender, which it starts where it is: there SINEW_FULL_BLENDER is none.
+        # It checks copies in another Blender, which it starts on its own machine: SINEW_FULL_BLENDER has no
+        # effect there.
         f"#!/bin/sh\ncd {tmp_path}\nexport BLENDER_USER_RESOURCES={user}\n"
         f'[ -x {program} ] || exec blender "$@"\nexec {program} run "$@"\n',
     )

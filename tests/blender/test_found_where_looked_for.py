@@ -26,7 +26,7 @@ def groups() -> list[type]:
 
 
 def shown_properties() -> Iterator[tuple[str, bpy.types.Property]]:
-    """The full name of each that people see."""
+    """The full name of each property that users see."""
     for cls, rna in operator_types():
         for prop in rna.properties:
             if prop.identifier != "rna_type" and not prop.is_hidden:
@@ -43,7 +43,7 @@ def test_every_button_and_choice_has_a_tooltip():
     for name, prop in shown_properties():
         missing += [name] if not prop.description else []
         for item in prop.enum_items if prop.type == "ENUM" else ():
-            # One without identifier is a heading.
+            # An entry without an identifier is a heading.
             missing += [f"{name}: {item.identifier}"] if item.identifier and not item.description else []
     assert missing == []
 

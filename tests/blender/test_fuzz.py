@@ -13,8 +13,8 @@ import scenes
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session, small_meshes
 
-# The newest Blender runs the first 100 rigs, each other one 40 of its own: all of them have the same shapes
-# (docs/parity.md), and together they check more rigs.
+# The newest Blender runs the first 100 rigs, each other one 40 different ones: all of them must have the same
+# shapes (docs/parity.md), and together they check more rigs.
 IS_NEWEST = not os.environ.get("SINEW_NOT_NEWEST")
 RIGS = 100 if IS_NEWEST else 40
 FIRST = 0 if IS_NEWEST else RIGS * (10 * bpy.app.version[0] + bpy.app.version[1])
@@ -32,7 +32,8 @@ def test_random_rigs_equal_the_modifier(tmp_path):
     assert not [outcome.seed for outcome in outcomes if outcome.failed]
     # An exclusion that covered more vertices would hide faults.
     assert sum(o.left_out for o in outcomes) < 0.01 * sum(o.vertices for o in outcomes)
-    # Bones of random rigs are far apart: rounding decides what ddm makes of some small neighbourhoods there.
+    # Bones of random rigs are far apart: for ddm, rounding decides the shape of some small neighbourhoods
+    # there.
     assert sum(o.undecided for o in outcomes) < 0.08 * sum(o.compared for o in outcomes)
     assert sum(o.undecided_stages for o in outcomes) < 0.1 * sum(o.staged for o in outcomes)
     # Many rigs are deformed within the evaluation, and none in safe mode.
@@ -48,7 +49,7 @@ def test_every_feature_takes_part():
 
 
 def test_a_shape_that_blender_made_is_a_failure(monkeypatch):
-    """Where small meshes use the Armature modifier, the fuzzer would compare Blender with itself."""
+    """If small meshes used the Armature modifier, the fuzzer would compare Blender with itself."""
     force = routes.force
 
     def force_and_leave_small(route: str) -> None:

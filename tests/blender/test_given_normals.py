@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Normals that Sinew gives with the points: what is drawn, written and read is as with "Leave to Blender"."""
+"""Normals that Sinew provides with the points: what is drawn, written and read is as with "Leave to
+Blender"."""
 
 from __future__ import annotations
 
@@ -78,7 +79,7 @@ def corners(obj):
 
 
 def has_given(obj):
-    """Whether the evaluated mesh has normals that Sinew gave."""
+    """Whether the evaluated mesh has normals from Sinew."""
     attribute = evaluated(obj).attributes.get("custom_normal")
     return attribute is not None and attribute.data_type == "FLOAT_VECTOR"
 
@@ -89,7 +90,8 @@ def choose(obj, who):
 
 
 def both(obj, read=corners):
-    """What is read with Sinew's normals, and with Blender's. Given ones are there unless they can not be."""
+    """The values read with Sinew's normals, and with Blender's. Sinew's must be present unless they can
+    not be."""
     choose(obj, GIVE)
     given = read(obj)
     choose(obj, LEAVE)
@@ -100,7 +102,7 @@ def both(obj, read=corners):
 
 
 def check_given(obj):
-    """They are there, and Blender's."""
+    """They are present, and equal Blender's."""
     assert has_given(obj)
     given, left = both(obj)
     np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
@@ -135,7 +137,7 @@ def test_normals_of_every_frame_are_blenders(shading):
         np.testing.assert_array_equal(given, of_frame)
         np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
         if shading is not custom and has_given(obj):
-            # And what Blender computes of the same points by itself.
+            # Also equal to what Blender computes from the same points.
             plain = evaluated(obj).copy()
             plain.attributes.remove(plain.attributes["custom_normal"])
             np.testing.assert_allclose(given, vectors(plain, "corner_normals"), rtol=0, atol=NEAR)
@@ -176,7 +178,7 @@ def test_edges_that_are_marked_between_frames_are_followed_at_once():
         assert has_given(obj) == bool(DOMAINS[shading]), shading.__name__
         given, left = both(obj)
         np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-    # The same domain, other edges.
+    # The same domain, but other edges.
     obj.data.edges[40].use_edge_sharp = not obj.data.edges[40].use_edge_sharp
     obj.data.update()
     bpy.context.view_layer.update()
@@ -312,7 +314,7 @@ def test_blender_computes_them_where_others_would_find_other_ones(name):
 
 
 def give_lattice(modifier):
-    """One that moves its points from frame to frame."""
+    """A modifier that moves its points in every frame."""
     lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
     bpy.context.scene.collection.objects.link(lattice)
     lattice.scale = (4.0, 4.0, 4.0)
@@ -337,7 +339,7 @@ def weigh(modifier):
 
 
 def nothing(_modifier):
-    """Its options are as they come."""
+    """With its default options."""
 
 
 HARMLESS = [
@@ -368,7 +370,7 @@ def test_modifiers_that_leave_normals_to_sinew(place, kind, set_up, shading):
 
 @needs_support
 def test_what_stands_in_front_may_leave_a_mesh_of_another_domain():
-    """The mesh itself is smooth, so room is made for normals of vertices; sharp edges come with the nodes."""
+    """The mesh itself is smooth, so there is room for normals of vertices; the nodes add sharp edges."""
     obj, _armature = scenes.make_arm()
     smooth(obj)
     modifier = obj.modifiers.new("Flat", "NODES")
@@ -425,7 +427,7 @@ def instance_on_faces(obj):
 @pytest.mark.parametrize("act", [add_cast, switch_cast_on, instance_on_faces], ids=lambda each: each.__name__)
 @pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
 def test_what_a_handler_behind_sinews_puts_behind_is_an_obstacle_at_once(event, act):
-    """Blender evaluates it without telling anybody."""
+    """Blender evaluates it without notification."""
     obj, _armature = make(smooth)
     off = obj.modifiers.new("Off", "CAST")
     off.show_viewport = off.show_render = False
@@ -532,7 +534,8 @@ def test_copied_modifiers_bring_the_choice():
 
 
 def light_scene(obj):
-    """A camera and a lamp that see the arm, whose material has a tangent-space map of normals over seams."""
+    """A camera and a lamp that see the arm, whose material has a tangent-space map of normals across
+    seams."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (1.0, -5.0, 1.0), (1.4, 0.0, 0.0)
@@ -570,11 +573,12 @@ def pixels(path):
 def assert_same_pictures(obj, tmp_path, is_custom):
     given, left = both(obj, lambda _obj: pixels(tmp_path / "picture.exr"))
     if is_custom:
-        # Their roundings differ. That is no more than one of a pixel, but where a ray just hits or misses.
+        # Their rounding differs. This changes a pixel by at most one step, except where a ray just hits or
+        # misses.
         assert (np.abs(given - left) > 1e-4).mean() < 1e-4
     else:
         np.testing.assert_array_equal(given, left)
-    # Other normals would have been seen.
+    # Other normals would be visible.
     properties.of(obj).enabled = False
     (flat if evaluated(obj).normals_domain != "FACE" else smooth)(obj)
     bpy.context.view_layer.update()
@@ -660,7 +664,7 @@ def test_what_is_on_in_renders_alone_is_an_obstacle_there(tmp_path):
     assert has_given(obj)
     modifier.show_render = True
     given = pixels(tmp_path / "picture.exr")
-    # The viewport has Sinew's, where nothing follows.
+    # The viewport has Sinew's, if no modifier follows.
     assert has_given(obj)
     choose(obj, LEAVE)
     np.testing.assert_allclose(given, pixels(tmp_path / "picture.exr"), rtol=0, atol=1e-5)
@@ -693,7 +697,7 @@ def test_exported_files_are_the_same(shading, kind, tmp_path):
     if kind == "abc":
         (given, kinds), (left, others) = (imported_alembic(data, tmp_path) for data in (given, left))
         assert kinds == others
-        # As near as a mesh stores them.
+        # As precise as a mesh stores them.
         np.testing.assert_allclose(given, left, rtol=0, atol=1e-4)
     elif kind in ("obj", "usda"):
         assert_same_numbers(given, left)
@@ -702,7 +706,7 @@ def test_exported_files_are_the_same(shading, kind, tmp_path):
 
 
 def assert_same_numbers(a, b):
-    """Of two texts, whose objects are in any order."""
+    """Compares two texts whose objects are in any order."""
     a, b = (b"\n".join(sorted(text.split(b"\n"))) for text in (a, b))
     split = re.compile(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
     assert split.sub(b"#", a) == split.sub(b"#", b)
@@ -711,7 +715,7 @@ def assert_same_numbers(a, b):
 
 
 def imported_alembic(data, tmp_path):
-    """What Blender reads of a file, which holds the time when it was written."""
+    """What Blender reads from a file, which contains the time of writing."""
     path = tmp_path / "again.abc"
     path.write_bytes(data)
     before = set(bpy.data.objects)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The golden set is what this Blender computes."""
+"""The golden set equals what this Blender computes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertex groups as they are read in bulk, beside a loop over Blender's own collections."""
+"""Vertex groups read in bulk, compared with a loop over Blender's own collections."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def in_a_loop(mesh: bpy.types.Mesh) -> GroupWeights:
 
 
 def read_alike(mesh: bpy.types.Mesh) -> GroupWeights:
-    """What mesh_io reads, which must be what the loop reads, bit for bit and type for type."""
+    """The result of mesh_io, which must equal that of the loop, bit for bit and type for type."""
     read, expected = mesh_io.read_group_weights(mesh), in_a_loop(mesh)
     for name in ("counts", "groups", "weights"):
         assert getattr(read, name).dtype == getattr(expected, name).dtype
@@ -35,7 +35,7 @@ def a_grid(side: int = 20) -> bpy.types.Object:
 
 
 def weigh_at_random(obj: bpy.types.Object, groups: int, seed: int) -> None:
-    """Vertices of none to all groups in any order, one weight in five being zero."""
+    """Vertices with any number of groups in any order; one weight in five is zero."""
     random = np.random.default_rng(seed)
     made = [obj.vertex_groups.new(name=f"group {number}") for number in range(groups)]
     for vertex in range(len(obj.data.vertices)):
@@ -108,7 +108,7 @@ def test_mesh_in_edit_mode_is_read_as_it_was():
 
 @pytest.mark.parametrize("levels", [1, 3])
 def test_no_bmesh_is_made_where_it_would_read_beyond_the_shape_keys(monkeypatch, levels):
-    """Of an evaluated mesh whose modifiers made more vertices than its keys have: Blender reads rubbish
+    """For an evaluated mesh whose modifiers made more vertices than its keys have: Blender reads garbage
     there, or crashes."""
     obj = a_grid()
     weigh_at_random(obj, 4, 5)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map: its colours are the measure's, they follow frame and pose, and nothing of it stays."""
+"""The heat map: its colours are those of the measure, they follow frame and pose, and nothing remains of
+it."""
 
 from __future__ import annotations
 
@@ -34,8 +35,8 @@ def shown_colours(obj: bpy.types.Object) -> np.ndarray:
 
 
 def expected_fields(objects: list[bpy.types.Object], methods: tuple[str, str], frame: float) -> dict:
-    """Each measure at each vertex of all objects, by way of Blender's own evaluations: not what the heat map
-    is made with. Changes the methods."""
+    """Each measure at each vertex of all objects, from Blender's own evaluations, independently of how
+    the heat map is made. Changes the methods."""
     scene = bpy.context.scene
     subject = measure.gather(scene, objects)
     shapes = measure.shapes_at(subject, methods, frame)
@@ -94,7 +95,7 @@ def test_colours_are_those_of_the_measure(quantity, set_up):
 
 
 def test_the_modifier_compared_with_is_blenders():
-    """With Preserve Volume the modifier is dq, and so is Sinew: nothing is far from it."""
+    """With Preserve Volume the modifier equals dq, and so does Sinew: the distance is 0."""
     obj, _armature = scenes.make_arm()
     obj.modifiers["Armature"].use_deform_preserve_volume = True
     scenes.add_sinew(obj, "dq")
@@ -132,7 +133,7 @@ def test_colours_follow_frames_poses_and_methods():
 
 
 def expected_at(obj: bpy.types.Object, method: str, quantity: str) -> np.ndarray:
-    """Of the pose as it is, from the final points; with a fixed range up to 2."""
+    """For the current pose, from the final points; with a fixed range up to 2."""
     assert properties.of(obj).method == method
     assert quantity == "stretch"
     points, rest = (p.astype(np.float64) for p in (scenes.final_points(obj), scenes.rest_points(obj)))
@@ -212,7 +213,7 @@ def color_types() -> list[str]:
 
 
 def painted_arm() -> bpy.types.Object:
-    """With a material and colours of the artist's own."""
+    """With the artist's own material and colours."""
     obj, _armature = scenes.make_arm()
     obj.data.materials.append(bpy.data.materials.new("Skin"))
     obj.data.color_attributes.new("First", "BYTE_COLOR", "CORNER")
@@ -230,7 +231,7 @@ def test_switched_off_it_leaves_no_trace(set_up):
     if set_up is not None:
         set_up(obj)
     bpy.context.scene.frame_set(6)
-    whole_file.of_open_file()  # looking at an attribute may change how 5.2 stores it
+    whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
     before_sinew = whole_file.of_open_file()
     types = color_types()
     scenes.add_sinew(obj, "dq")
@@ -248,7 +249,7 @@ def test_switched_off_it_leaves_no_trace(set_up):
     bpy.context.view_layer.update()
     assert color_types() == types
     assert whole_file.differences(before, whole_file.of_open_file()) == []
-    # And off with all of Sinew while it is on.
+    # It also ends when Sinew is removed while it is on.
     bpy.ops.sinew.heat_map()
     choose("bulge", range=measures.FIXED, length=0.5)
     bpy.context.scene.sinew_most_influences = 2
@@ -360,7 +361,7 @@ def test_a_duplicate_has_colours_of_its_own():
 
 
 def test_a_point_buffer_that_is_not_filled_yet_is_left_alone():
-    """As a copy's own is, until the copy is deformed."""
+    """As for the copy's own, until the copy is deformed."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     properties.of(obj).heat = True
@@ -376,7 +377,7 @@ def test_a_point_buffer_that_is_not_filled_yet_is_left_alone():
 
 
 def test_a_render_shows_it(tmp_path):
-    """Cycles, seen from beside the tube: most of it neutral, nothing of the red material."""
+    """Cycles, with a camera beside the tube: most of it has the neutral colour, none the red material."""
     obj, _armature = scenes.make_arm()
     red = bpy.data.materials.new("Red")
     if bpy.app.version < (5, 0):
@@ -472,7 +473,7 @@ def test_numbers_are_those_that_compare_writes(tmp_path):
 @pytest.mark.parametrize("front", [False, True], ids=["alone", "front"])
 @pytest.mark.parametrize("override", [False, True], ids=["local", "override"])
 def test_linked_meshes_show_it_too(tmp_path, override, front):
-    """By their material: a linked mesh keeps the active colour attribute that it has."""
+    """With their material: a linked mesh keeps its active colour attribute."""
     test_linked_data.save_library(tmp_path, skinned=False, front=front)
     test_linked_data.link(tmp_path, override)
     obj = test_linked_data.character()

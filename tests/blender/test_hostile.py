@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files, names, folders and options that somebody made to do harm, or that only went wrong."""
+"""Files, names, folders and options that are malicious or damaged."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_names_do_not_steer_a_terminal(tmp_path):
             while part := os.read(ours, 65536):
                 shown += part
         except OSError:
-            pass  # nobody writes to it any more
+            pass  # no process writes to it any more
         os.close(ours)
         assert process.wait(timeout=60) == 0
         assert b"\x1b]0;" not in shown
@@ -66,7 +66,7 @@ def test_names_do_not_steer_a_terminal(tmp_path):
 
 @pytest.mark.parametrize("name", ["...blend", "..blend", "a..blend"])
 def test_names_of_files_stay_in_the_folder(name, arm_file, tmp_path):
-    """The stem of "...blend" is the folder above."""
+    """The stem of "...blend" is the parent folder."""
     file = arm_file.rename(arm_file.with_name(name))
     out = tmp_path / "above" / "out"
     run_sinew("compare", file, "--frames", "1", "--pictures", "0", "--out", out)
@@ -153,7 +153,7 @@ def test_golden_settings_from_anybody(wrong, arm_file, tmp_path):
 
 
 def test_a_journal_with_half_of_what_a_result_has(arm_file, tmp_path):
-    """Such a file is done again."""
+    """Such a file is processed again."""
     out = tmp_path / "out"
     command = ("reskin", arm_file, "--method", "dq", "--frames", "none", "--no-pictures", "--out", out)
     run_sinew(*command)
@@ -166,7 +166,7 @@ def test_a_journal_with_half_of_what_a_result_has(arm_file, tmp_path):
 
 
 def test_links_in_a_folder_from_elsewhere_are_not_followed(arm_file, tmp_path):
-    """Half a line at a journal's end is cut off, and unfinished files have names that can be foreseen."""
+    """Half a line at a journal's end is cut off, and unfinished files have predictable names."""
     precious, out = tmp_path / "precious", tmp_path / "out"
     precious.write_bytes(b"one line\nand half of another")
     before = precious.read_bytes()
@@ -191,7 +191,7 @@ def test_links_in_a_folder_from_elsewhere_are_not_followed(arm_file, tmp_path):
 
 
 def test_a_name_that_looks_like_an_option(tmp_path):
-    """Of a fixture's argument, where nobody can write it otherwise."""
+    """For a fixture's argument that can not be written otherwise."""
     from sinew_addon.pytest_plugin import _as_arguments
 
     assert _as_arguments({"object": "--help", "size": 96, "own_look": True, "engine": None}) == [

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's inverse kinematics in the place of Blender's: the oracle is Blender's own solver where the
-solution is the only one, and where the target is elsewhere."""
+"""Sinew's inverse kinematics instead of Blender's. The oracle is Blender's own solver where the solution
+is unique, elsewhere the target."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def make_empty(name, places):
 
 
 def make_arm(count=2, mode="QUATERNION", lean=0.25):
-    """A base bone, `count` bones behind each other up Z, bent a little, and a hand that hangs on them; in an
-    object that is moved, rotated and scaled."""
+    """A base bone, a chain of `count` bones up Z, slightly bent, and a hand parented to it; in an object
+    that is moved, rotated and scaled."""
     arm = bpy.data.objects.new("Arm", bpy.data.armatures.new("Arm"))
     bpy.context.scene.collection.objects.link(arm)
     bpy.context.view_layer.objects.active = arm
@@ -70,7 +70,7 @@ def near(*, scale=1.0):
 
 
 def poses(arm, names, frames=FRAMES):
-    """[frames, bones, 4, 4], in the world."""
+    """[frames, bones, 4, 4], world space."""
     result = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -109,7 +109,7 @@ def test_a_pole_decides_two_bones_as_in_blender(method, mode):
     bake(method)
     assert constraint.mute
     assert ik_bake.is_baked(arm)
-    # Blender stops at steps of a thousandth; here the solution is the only one.
+    # Blender stops at steps of a thousandth; the solution is unique here.
     np.testing.assert_allclose(poses(arm, names), before, atol=5e-3)
     np.testing.assert_allclose(tails(arm, "arm.1"), places(target), atol=1e-5)
     assert bpy.ops.sinew.remove_ik() == {"FINISHED"}
@@ -301,7 +301,7 @@ def test_blender_and_sinew_measured():
     tree = ik_io.read_trees(arm)[0]
     blender, dls, ccd = ik_compare.measure(arm, tree, list(FRAMES), sinew.ik.METHODS)
     assert (blender.solver, dls.solver, ccd.solver) == ("blender", "dls", "ccd")
-    # Its own claim against the evaluated scene.
+    # Its reported error compared with the evaluated scene.
     tip = tails(arm, "arm.3")
     assert blender.errors == pytest.approx(
         np.linalg.norm(tip - places(bpy.data.objects["Target"]), axis=1) / 6.0, abs=1e-6
@@ -336,7 +336,7 @@ def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
     assert arm.pose.bones["arm.2"].constraints[0].mute
     frames = range(3, 21)
     np.testing.assert_allclose(tails(arm, "arm.2", frames), places(target, frames), atol=1e-5)
-    # What the bake replaced is in the file.
+    # The file contains what the bake replaced.
     assert ik_bake.is_baked(arm)
     ik_bake.restore(arm)
     assert arm.animation_data.action.name == "Walk"

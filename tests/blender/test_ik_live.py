@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inverse kinematics live: the oracle is the bake of the same trees, frame by frame, and what is evaluated
-beside and behind the bones: children, meshes, renders."""
+"""Live inverse kinematics: the oracle is the bake of the same trees, frame by frame, and what is
+evaluated with and after the bones: children, meshes, renders."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def followers():
 
 
 def key_pose(arm, names=("base", "arm.0", "arm.1")):
-    """Keys below the constraint, which decide where the solver starts and what an influence leaves."""
+    """Keys under the constraint, which determine the solver's start and the rest of an influence below 1."""
     for frame, angle in ((1, 0.1), (24, 0.5)):
         for number, name in enumerate(names):
             bone = arm.pose.bones[name]
@@ -70,7 +70,7 @@ def with_pole():
 
 
 def with_limits():
-    """Two hinges and a pole: the solution is the only one."""
+    """Two hinges and a pole: the solution is unique."""
     arm = make_arm()
     knee = arm.pose.bones["arm.1"]
     knee.lock_ik_y = knee.lock_ik_z = True
@@ -109,7 +109,8 @@ def scaled_and_rotated():
 
 
 def branches():
-    """Two constraints pull one tree to bones of the same armature, which move; a third tree hangs on it."""
+    """Two constraints pull one tree to bones of the same armature, which move; a third tree is attached
+    to it."""
     arm = make_arm(1)
     bpy.ops.object.mode_set(mode="EDIT")
     bones = arm.data.edit_bones
@@ -142,7 +143,7 @@ SCENES = (of_object, with_pole, with_limits, scaled_evenly, scaled_unevenly, sca
 
 
 class Recorder(bpy.types.RenderEngine):
-    """A render engine that keeps what the render's own dependency graph has of bones."""
+    """A render engine that stores the bones in the render's own dependency graph."""
 
     bl_idname = "SINEW_TEST_RECORDER"
     bl_label = "Recorder"
@@ -191,9 +192,9 @@ def test_live_is_the_bake_at_every_frame(make, method):
     live(arm)
     arm.sinew_ik.method = method
     found = poses(arm, names)
-    # It is not Blender's solution that is seen.
+    # What is shown is not Blender's solution.
     assert np.abs(found - blender).max() > 1e-5
-    # Backwards, as no frame depends on the one before.
+    # Backwards, since no frame depends on the one before.
     np.testing.assert_allclose(poses(arm, names, FRAMES[::-1])[::-1], found, atol=1e-6)
     bake(method)
     assert not ik_live.is_live(arm)
@@ -299,7 +300,7 @@ def test_meshes_and_children_of_bones_follow_in_the_same_frame(recorder):
 
 
 def now(arm, name="arm.1"):
-    """The tip, in the world, as the last evaluation has it."""
+    """The tip in world space, from the last evaluation."""
     bpy.context.view_layer.update()
     evaluated = arm.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return np.array(evaluated.matrix_world @ evaluated.pose.bones[name].tail)
@@ -318,7 +319,7 @@ def test_what_is_moved_by_hand_is_followed_at_once():
     before = now(arm, "arm.0")
     pole.location = (-2.0, 1.0, 0.0)
     assert np.abs(now(arm, "arm.0") - before).max() > 0.05
-    # The pose below decides which of the solutions it is.
+    # The pose under the constraint determines which of the solutions it is.
     before = now(arm, "arm.1")
     arm.pose.bones["arm.2"].rotation_quaternion = Matrix.Rotation(1.2, 3, "X").to_quaternion()
     assert np.abs(now(arm, "arm.1") - before).max() > 1e-2
@@ -327,7 +328,7 @@ def test_what_is_moved_by_hand_is_followed_at_once():
     np.testing.assert_allclose(now(arm, "arm.2"), target.location, atol=1e-5)
     arm.pose.bones["base"].rotation_quaternion = Matrix.Rotation(0.4, 3, "Y").to_quaternion()
     np.testing.assert_allclose(now(arm, "arm.2"), target.location, atol=1e-5)
-    # Settings of bones and of the muted constraint count, and nothing has to be switched for them.
+    # Settings of bones and of the muted constraint apply, without switching anything.
     arm.pose.bones["arm.1"].lock_ik_x = arm.pose.bones["arm.1"].lock_ik_z = True
     now(arm)
     local = arm.convert_space(
@@ -381,8 +382,8 @@ def test_what_is_driven_of_the_bones_channels_is_where_it_starts():
 
 
 def values_of(owner):
-    """By name, what an object or a bone keeps of its own and of add-ons; groups without values, which reading
-    them makes, are left out."""
+    """By name, the properties that an object or a bone has of its own and of add-ons, without empty
+    groups, which reading them creates."""
     groups = [owner]
     if hasattr(owner, "bl_system_properties_get"):
         groups.append(owner.bl_system_properties_get() or {})
@@ -396,7 +397,7 @@ def values_of(owner):
 
 
 def contents_of(arm):
-    """All that removal has to give back."""
+    """Everything that removal must restore."""
     return (
         [values_of(owner) for owner in (arm, *arm.pose.bones)],
         [[(c.type, c.name, c.mute) for c in bone.constraints] for bone in arm.pose.bones],
@@ -434,7 +435,7 @@ def test_the_switch_is_of_the_selected_chains():
     np.testing.assert_allclose(tails(arm, "arm.1"), places(bpy.data.objects["Low"]), atol=1e-5)
     ik_live.switch_off(arm, ["arm.3"])
     assert (lower.mute, upper.mute) == (True, False)
-    # Again, by the button: all that are meant are live, or all become it.
+    # Again with the button: either all of them are live, or all become live.
     live(arm)
     assert (lower.mute, upper.mute) == (True, True)
     live(arm)
@@ -490,7 +491,7 @@ def test_undo_and_redo():
 
 
 def test_undo_of_what_a_handler_put_on_anew():
-    """A second armature gets a follower of its own between two steps of undo."""
+    """A second armature gets its own follower between two steps of undo."""
     arm = with_pole()
     live(arm)
     bpy.ops.ed.undo_push(message="live")
@@ -512,8 +513,8 @@ def test_undo_of_what_a_handler_put_on_anew():
 
 
 def test_undo_brings_no_follower_back_that_was_deleted():
-    """Blender would go on with its evaluated copy in a view layer that was not shown meanwhile, which writes
-    to bones that are gone: a crash, now and then."""
+    """Blender would continue with its evaluated copy in a view layer that was not shown meanwhile, which
+    writes to bones that no longer exist: an occasional crash."""
     arm = with_pole()
     live(arm)
     found = poses(arm, ["arm.1"])
@@ -536,7 +537,7 @@ def test_undo_brings_no_follower_back_that_was_deleted():
 
 
 def test_a_saved_file_has_no_bones_of_a_follower_that_is_left(tmp_path):
-    """Its constraint was deleted, and so it follows nothing any more."""
+    """Its constraint was deleted, so it no longer follows anything."""
     arm = with_pole()
     live(arm)
     constraints = arm.pose.bones["arm.1"].constraints
@@ -589,7 +590,7 @@ def test_a_saved_file_plays_by_blenders_constraint_and_goes_on_here(tmp_path):
 
 
 def test_a_file_that_blender_saved_by_itself_goes_on(tmp_path):
-    """As auto-save does, without Sinew's handlers: the follower is not in it."""
+    """As auto-save does, without Sinew's handlers: the file does not contain the follower."""
     arm = with_pole()
     names = ["arm.0", "arm.1", "hand"]
     live(arm)
@@ -695,7 +696,7 @@ def test_what_can_not_be_live_is_said_and_blenders_constraint_plays():
     arm.pose.bones["hand"].constraints.remove(other)
     now(arm)
     assert ik_live.problem_of(arm) == ""
-    # What goes wrong in an evaluation.
+    # Errors in an evaluation.
     arm.pose.bones["arm.0"].scale.x = -1.0
     now(arm)
     now(arm)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modifiers, parents and shape keys that change the mesh before it comes to the Armature modifier."""
+"""Modifiers, parents and shape keys that change the mesh before the Armature modifier."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FRAMES = [1, 4, 8, 11]
 
 
 def arm_with(kind: str, **options: object) -> bpy.types.Object:
-    """An arm with a modifier in front of its Armature modifier."""
+    """An arm with a modifier before its Armature modifier."""
     obj, _armature = scenes.make_arm(bones=3)
     modifier = obj.modifiers.new("Front", kind)
     for name, value in options.items():
@@ -44,7 +44,7 @@ def test_modifiers_in_front(kind, options):
 
 
 def test_a_multi_modifier_behind_a_deforming_parent_is_refused():
-    """It starts from the mesh as it was before the parent's part, which Sinew never sees."""
+    """It starts from the mesh before the parent's deformation, which Sinew never reads."""
     obj, armature = scenes.make_arm()
     obj.parent, obj.parent_type = armature, "ARMATURE"
     obj.modifiers["Armature"].use_multi_modifier = True
@@ -164,7 +164,7 @@ def subdivided(obj):
 
 @pytest.mark.parametrize("set_up", [absolute_keys, subdivided])
 def test_weights_are_painted_where_visibility_is_animated(set_up):
-    """In that mode the Armature modifier deforms, and what stands in front is not evaluated apart."""
+    """In that mode the Armature modifier deforms, and upstream modifiers are not evaluated separately."""
     obj, _armature = scenes.make_arm()
     set_up(obj)
     modifier = obj.modifiers["Armature"]
@@ -204,7 +204,7 @@ def test_what_blender_leaves_out_while_painting(kinds, mode, route):
         before = session.state_of(obj).shown.number
         got = scenes.shapes(obj, FRAMES)
         assert not properties.of(obj).error
-        # While weights are painted the Armature modifier is on, too, in front of Sinew's.
+        # While weights are painted the Armature modifier is on, too, before Sinew's.
         assert mode == "WEIGHT_PAINT" or routes.taken(obj, before) == route
         assert session.state_of(obj).shown.number > before
         assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
@@ -281,7 +281,7 @@ MODES = ["EDIT", "SCULPT"]
 
 @pytest.mark.parametrize("event", [*MODES, "added", "added at a frame", "changed"])
 def test_one_update_is_enough(event):
-    """A mesh that waits for the modifiers in front does not stay at rest until the pose changes."""
+    """A mesh that waits for its upstream modifiers does not stay at rest until the pose changes."""
     obj = arm_with("CAST" if event.startswith("added") else "SUBSURF")
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(8)
@@ -309,8 +309,8 @@ def test_one_update_is_enough(event):
 @pytest.mark.parametrize("route", routes.ROUTES)
 @pytest.mark.parametrize("at_a_frame", [False, True])
 def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
-    """What waits for modifiers in front is evaluated again before Blender has ended its evaluation, which
-    must not take away what it has made of others."""
+    """Objects that wait for upstream modifiers are evaluated again before Blender has finished its
+    evaluation, which must not discard the results of others."""
     obj, _armature = scenes.make_arm()
     other, rig = scenes.make_arm(name="Other")
     routes.force(route)
@@ -335,7 +335,7 @@ def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
 
 @pytest.mark.parametrize("route", routes.ROUTES)
 def test_what_is_made_at_the_address_of_a_deleted_object(route):
-    """Blender finds evaluated objects by the addresses of their originals: it would give out the other's."""
+    """Blender finds evaluated objects by the addresses of their originals: it would return the other's."""
     routes.force(route)
     try:
         obj, _armature = scenes.make_arm()
@@ -352,7 +352,7 @@ def test_what_is_made_at_the_address_of_a_deleted_object(route):
             while others:
                 bpy.data.objects.remove(others.pop())
 
-        # As another add-on's, ahead of Sinew's.
+        # Like another add-on's handler, before Sinew's.
         bpy.app.handlers.depsgraph_update_post.insert(0, delete)
         subdivided(obj)
         bpy.context.view_layer.update()
@@ -405,7 +405,7 @@ def test_a_simulation_in_front_is_refused_with_a_sentence():
 
 
 def test_an_armature_modifier_in_front_of_what_is_in_front():
-    """It is none of those in whose place Sinew stands, and deforms what comes to them."""
+    """It is not one of the replaced modifiers, and deforms their result."""
     obj, _armature = scenes.make_arm()
     _other, armature = scenes.make_arm(name="Other")
     scenes.key_pose(armature, 40.0)
@@ -450,7 +450,7 @@ def test_one_view_layer_has_it_for_its_position_alone():
 @pytest.mark.parametrize("route", routes.ROUTES)
 @pytest.mark.parametrize("what", ["modifier", "transform"])
 def test_applied_with_something_in_front(what, route):
-    """Two objects have the mesh: as with any such mesh Blender has to be told to make it single."""
+    """Two objects have the mesh: as with any such mesh, the user must make it single first."""
     obj, _armature = scenes.make_arm()
     obj.modifiers.new("Cast", "CAST").factor = 0.3
     obj.modifiers.move(1, 0)

@@ -25,12 +25,12 @@ PATHS = ("straight", "spline")
 FRAMES = range(-3, 45)
 KEYS = (1, 11, 26, 31)
 
-# What Blender's float32 leaves of the library's float64, on rigs of a few units.
+# What remains of the library's float64 in Blender's float32, for rigs of a few units.
 CLOSE = 2e-6
 
 
 def make_rig(modes: tuple[str, ...] = ("QUATERNION", "ZXY", "AXIS_ANGLE"), name: str = "Rig"):
-    """A chain of bones along Y, at rest rotated about X by 0.3 each, one for each rotation mode."""
+    """A chain of bones along Y, each rotated about X by 0.3 at rest, with all rotation modes in turn."""
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     bpy.context.scene.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
@@ -50,7 +50,7 @@ def make_rig(modes: tuple[str, ...] = ("QUATERNION", "ZXY", "AXIS_ANGLE"), name:
 
 
 def key_random_poses(armature, frames=KEYS, interpolation="LINEAR", seed=1, most=2.2) -> None:
-    """Location, rotation and scale of every bone keyed; rotations of at most `most` radians from the rest."""
+    """Keys location, rotation and scale of every bone; rotations are at most `most` radians from rest."""
     random = np.random.default_rng(seed)
     for frame in frames:
         for bone in armature.pose.bones:
@@ -117,7 +117,7 @@ def choose(armature, method: str = "sclerp", path: str = "straight") -> None:
 
 
 def state(armature) -> list:
-    """Everything of the action's curves that Sinew could have changed."""
+    """Everything in the action's curves that Sinew could have changed."""
     return [
         (
             curve.data_path,
@@ -133,7 +133,7 @@ def state(armature) -> list:
 
 
 def quat_vecs(bases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """float64 [.., 7] and scales [.., 3] of matrix_basis matrices that Blender made of keyed channels."""
+    """float64 [.., 7] and scales [.., 3] of matrix_basis matrices that Blender made from keyed channels."""
     scale = np.linalg.norm(bases[..., :3, :3], axis=-2)
     rotation = Rotation.from_matrix((bases[..., :3, :3] / scale[..., None, :]).reshape(-1, 3, 3))
     quaternions = rotation.as_quat(scalar_first=True).reshape(*bases.shape[:-2], 4)
@@ -141,7 +141,7 @@ def quat_vecs(bases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def basis(rigid: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """[.., 4, 4] of transforms [.., 4, 4] and scales [.., 3]."""
+    """[.., 4, 4] from transforms [.., 4, 4] and scales [.., 3]."""
     result = np.array(rigid)
     result[..., :3, :3] *= scale[..., None, :]
     return result
@@ -153,7 +153,7 @@ def in_layout(method: str, rigid: np.ndarray) -> np.ndarray:
 
 
 def to_rotation_and_stretch(method: str, transform: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """[4, 4] rigid and [3]: what a bone can have of a method's result."""
+    """[4, 4] rigid and [3]: the part of a method's result that a bone can have."""
     if method.startswith("qv_"):
         return sinew.quat_vec.to_affine(transform), np.ones(3)
     if not method.startswith("matrix_"):
@@ -209,7 +209,7 @@ def test_equals_the_library_between_keys_and_blender_at_keys(method, path):
 
 
 def test_sclerp_is_the_screw():
-    """Half a screw, in closed form: half the angle about the same line, half the translation along it."""
+    """Half a screw in closed form: half the angle about the same line, half the translation along it."""
     armature = make_rig(("QUATERNION",))
     bone = armature.pose.bones[0]
     axis, point, angle, shift = np.array([2.0, -1.0, 2.0]) / 3.0, np.array([0.5, 1.0, -0.25]), 2.5, 1.5
@@ -235,7 +235,7 @@ def test_sclerp_is_the_screw():
 
 @pytest.mark.parametrize("interpolation", ["BEZIER", "CONSTANT", "SINE", "BACK", "ELASTIC", "BOUNCE", "EXPO"])
 def test_timing_is_that_of_the_keys(interpolation):
-    """A hinge has only one path, so that only the timing can differ: it is Blender's own."""
+    """A hinge has only one path, so only the timing could differ: it is Blender's own."""
     armature = make_rig(("XYZ",))
     bone = armature.pose.bones[0]
     for frame, angle in zip(KEYS, (0.0, 1.4, 0.3, 1.0), strict=True):
@@ -263,7 +263,7 @@ def test_a_spline_holds_still_after_constant_keys():
 
 
 def test_bones_stay_on_their_parents():
-    """In-betweens of transforms relative to the root would not (Smith 2013, figure 3.3)."""
+    """In-betweens of root-relative transforms would not (Smith 2013, figure 3.3)."""
     armature = make_rig(("QUATERNION",) * 4)
     bpy.ops.object.mode_set(mode="EDIT")
     for bone in armature.data.edit_bones:
@@ -369,8 +369,8 @@ def test_everything_else_in_the_action_plays_on():
 
 
 def test_channels_without_keys_are_left_alone():
-    """A bone that only rotates does not swing about where it was put by hand; one rotated about one axis
-    keeps its other angles."""
+    """A bone that only rotates does not swing about the position where it was put by hand; a bone rotated
+    about one axis keeps its other angles."""
     armature = make_rig(("QUATERNION", "XYZ", "XYZ"))
     turning, hinge, sliding = armature.pose.bones
     turning.location, hinge.rotation_euler = (1.0, 2.0, 3.0), (0.0, 0.5, 0.0)
@@ -404,13 +404,14 @@ def test_a_key_set_while_on_is_taken_up_and_hand_made_poses_stay():
     assert first.keyframe_insert("rotation_quaternion")
     bpy.context.view_layer.update()
     assert first.rotation_quaternion == second.rotation_quaternion == by_hand
-    # At a key, also one of the rotation alone, the location is Blender's.
+    # At a key, even one only of the rotation, the location is Blender's.
     assert first.location[0] == curves_of(armature)[0].evaluate(6)
     go_to(8)
     go_to(6)
     assert first.rotation_quaternion == by_hand
     assert second.rotation_quaternion != by_hand, "an unkeyed pose lasts until the frame changes"
-    # A key edited in place, as in the Graph Editor, shows at once; edited by a script, on the next frame.
+    # A key edited in place, as in the Graph Editor, is visible immediately; one edited by a script, in the
+    # next frame.
     curve = next(c for c in curves_of(armature) if c.data_path.endswith("location"))
     assert curve.mute
     before = first.location.x
@@ -501,9 +502,9 @@ def test_cycles_repeat_the_inbetweens(mode, path):
     for rounds in (-2, -1, 1, 3):
         moved = film(armature, inside + 30 * rounds, "matrix_basis")
         moved[..., :3, 3] -= rounds * gain
-        # float32 times and values, some rounds away.
+        # float32 times and values, some cycles later.
         assert np.abs(moved - one_round).max() < 2e-5
-    # A spline has no corner at the seam: the same speed before and after it.
+    # A spline has no corner at the seam: the speed before and after it is the same.
     before, at, after = film(armature, (31 - 0.01, 31, 31 + 0.01), "matrix_basis")
     corner = np.abs((after - at) - (at - before)).max()
     assert (corner < 1e-3) == (path == "spline")
@@ -720,7 +721,7 @@ np.savez(sys.argv[3], opened=opened, film=film, action=armature.animation_data.a
 
 
 def play_without_sinew(path, folder, frames) -> dict[str, np.ndarray]:
-    """The file in a Blender without Sinew: as it opens, and its frames."""
+    """The file in a Blender without Sinew: when it is opened, and its frames."""
     np.savez(folder / "frames.npz", frames=np.array(frames, dtype=float))
     result = folder / "read.npz"
     arguments = [str(path), str(folder / "frames.npz"), str(result)]
@@ -776,7 +777,7 @@ def test_a_library_override_keeps_the_choice(tmp_path):
 
 @pytest.mark.parametrize("skinned", [False, True], ids=["modifier", "Sinew"])
 def test_meshes_follow_in_the_same_frame(skinned):
-    """Live as baked, of which Blender plays plain keys."""
+    """Live equals baked, which Blender plays from plain keys."""
     obj, armature = scenes.make_arm()
     if skinned:
         scenes.add_sinew(obj, "dq")
@@ -825,7 +826,8 @@ def test_exported_files_have_the_inbetweens(tmp_path):
 
 
 def test_motion_blur_sees_the_inbetweens(tmp_path):
-    """A hinge, of which Sinew's in-betweens are Blender's: blurred, the pictures are the same."""
+    """A hinge, for which Sinew's in-betweens equal Blender's: with motion blur, the pictures are the
+    same."""
     _obj, armature = scenes.make_arm()
     armature.animation_data_clear()
     bone = armature.pose.bones[1]
@@ -888,7 +890,7 @@ def test_baked_keys_play_what_was_live(tmp_path, path):
     assert armature.animation_data.action != original
     assert original.use_fake_user
     assert np.abs(film(armature) - live).max() < 1e-5
-    # Also where the artist's keys lie between frames.
+    # Also where the artist's keys are between frames.
     assert np.abs(film(armature, late, "matrix_basis")[:, 2] - between[:, 2]).max() < 1e-5
     assert any(curve.data_path == '["custom"]' for curve in curves_of(armature))
     location = next(c for c in curves_of(armature) if "bone.0" in c.data_path)
@@ -917,8 +919,8 @@ def test_bake_every_few_frames_keeps_the_keyed_poses():
 
 
 def test_baked_rotations_do_not_tumble_between_frames():
-    """Quaternions of either sign and angles beyond 360 degrees at keys: neighbouring keys are written
-    close."""
+    """Quaternions of either sign and angles beyond 360 degrees at keys: adjacent keys are written with
+    the nearest values."""
     armature = make_rig(("QUATERNION", "XYZ", "AXIS_ANGLE"))
     for number, frame in enumerate(KEYS):
         turn = Quaternion((1, 0.2, 0), 0.6 * (number + 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lesson: what its page says holds, its names are those of buttons, and opening it loses nothing."""
+"""The lesson: what its page says is true, its names are those of buttons, and opening it loses nothing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sinew_addon.ui import lesson
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = runpy.run_path(str(ROOT / "blend_files" / "make_lesson.py"))["LESSON"]
-# Words of Blender's own.
+# Words of Blender's interface.
 OF_BLENDER = {"Online Manual"}
 
 
@@ -73,7 +73,7 @@ def test_what_the_page_says_holds(opened):
     hand = click("Wrist")
     assert bpy.ops.sinew.add() == {"FINISHED"}
     assert scenes.worst(shapes["Wrist"], scenes.final_points(hand)) < 1e-6
-    # Of a wrist whose radius is some 3 cm.
+    # For a wrist with a radius of about 3 cm.
     assert measured(hand).entry("bulge_min") < -0.01
     assert 'take "Dual Quaternion". The wrist is round again.' in PAGE
     scene.sinew_character.method = "dq"

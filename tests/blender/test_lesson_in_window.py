@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lesson in a real window: lesson_in_window.py opens it while something is not saved, and once all is."""
+"""The lesson in a real window: lesson_in_window.py opens it with unsaved changes, and again after saving."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ def test_what_is_not_saved_is_not_lost(facts):
 
 
 def test_what_was_saved_makes_room_for_it(facts):
-    """As a file without a name: what is saved from it does not go into the extension's folder."""
+    """Opened as a file without a name, so that saving does not write to the extension's folder."""
     assert facts["opened"] == [True, "", True]
     assert {"TEXT_EDITOR", "VIEW_3D"} <= set(facts["reading"])

@@ -96,13 +96,13 @@ def test_linked_meshes(tmp_path, override, skinned, front):
     assert_shapes(expected)
     if skinned and override:
         return
-    # A hierarchy of overrides takes in what the library's own character has of Sinew.
+    # An override of a hierarchy includes what the library's own character has of Sinew.
     local = [o for o in bpy.data.objects if o.library is None and o.override_library is None]
     assert not any(properties.is_helper(o) for o in local)
 
 
 def test_an_override_is_saved_as_a_blender_without_sinew_needs_it(tmp_path):
-    """With settings that tell Sinew when an artist sets them."""
+    """With settings that notify Sinew when an artist changes them."""
     save_library(tmp_path, skinned=True, front=False)
     link(tmp_path, override=True)
     obj = character()
@@ -152,8 +152,8 @@ def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
 
 
 def test_a_duplicate_leaves_nothing_where_the_object_is_deleted_that_it_was_made_of():
-    """While Sinew is off, its modifier goes on naming the other's point buffer. Blender 5.2 counts the buffer
-    as used when that modifier is gone."""
+    """While Sinew is off, its modifier still refers to the other's point buffer. Blender 5.2 counts the
+    buffer as used after that modifier is removed."""
     obj, _armature = scenes.make_arm()
     other = obj.copy()
     bpy.context.scene.collection.objects.link(other)

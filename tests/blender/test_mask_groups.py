@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A vertex group that something uses as a mask is no fault, though no bone has its name."""
+"""A vertex group that something uses as a mask is no fault, even though no bone has its name."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ USES = [
 
 
 def reported(obj) -> dict[str, list[str]]:
-    """By each that says something of groups: the panel's facts, Diagnostics, and pages."""
+    """In everything that reports on groups: the panel's facts, Diagnostics, and pages."""
     facts = survey.describe_in_file(obj).warnings
     diagnose.check(bpy.context.scene, [obj], 4)
     found = {finding.name: finding for finding in diagnose.of(obj).findings}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Buttons that mend a finding: they do what Blender's own operators do, on exactly its vertices."""
+"""Buttons that repair a finding: they do the same as Blender's own operators, on exactly its vertices."""
 
 from __future__ import annotations
 
@@ -77,12 +77,12 @@ def test_vertices_without_weights_get_their_neighbours():
     assert "no_weights" not in found(obj)
     after = dense(obj)[UNWEIGHTED]
     np.testing.assert_allclose(after[:, :3].sum(axis=1), 1.0, atol=1e-6)
-    # At the end of the first bone, as are all vertices around.
+    # At the end of the first bone, like all vertices around it.
     assert (after[:, 0] == after[:, :3].max(axis=1)).all()
 
 
 def two_sided() -> bpy.types.Object:
-    """A tube along X about the origin with bones of two sides, whose left half has lost its weights."""
+    """A tube along X about the origin with bones on two sides, whose left half has lost its weights."""
     obj, armature = scenes.make_arm(bones=2)
     for bone, name in zip(list(armature.data.bones), ("hand.R", "hand.L"), strict=True):
         # Groups are renamed with their bones.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of methods, by sdef's interpolation: keyed, saved, copied, compared, and named in commands."""
+"""Parameters of methods, with sdef's interpolation: keyed, saved, copied, compared, and used in commands."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_the_menu_has_the_groups_of_the_list():
     shown = properties.SinewSettings.bl_rna.properties["method"].enum_items
     assert [i.identifier for i in shown if i.identifier] == [m.name for m in sinew.methods()]
     assert [i.description for i in shown if i.identifier] == [m.description for m in sinew.methods()]
-    # What files have stored.
+    # Values as files store them.
     assert {i.identifier: i.value for i in shown if i.identifier} == {
         m.name: m.number for m in sinew.methods()
     }
@@ -136,7 +136,7 @@ def test_a_comparison_has_it():
     bpy.context.view_layer.update()
     copy = next(each for each in bpy.context.scene.objects if properties.of(each).copied_for == "sdef")
     tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
-    # It stands beside the original.
+    # It is next to the original.
     moved = scenes.final_points(copy) - found["slerp"]
     assert scenes.worst(moved, np.broadcast_to(moved[0], moved.shape)) <= tolerance
     bpy.ops.sinew.end_comparison()

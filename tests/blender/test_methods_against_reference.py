@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Methods that Blender lacks, but for qv: the oracle is the float64 reference, on Blender's own poses."""
+"""Methods that Blender lacks, except qv: the oracle is the float64 reference, with Blender's own poses."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def centres_of(obj: bpy.types.Object) -> np.ndarray:
 def assert_equal_to_reference(
     obj: bpy.types.Object, method: str, centres: np.ndarray, rest: np.ndarray | None = None
 ) -> None:
-    """In the frame that is shown.
+    """The points in the current frame.
 
     centres  float32 [vertices, 3], object space
     rest     the same; None: the mesh's points
@@ -61,11 +61,11 @@ def assert_equal_to_reference(
     )
     back = np.linalg.inv(to_armature)
     expected = expected @ back[:3, :3].T + back[:3, 3]
-    # Within rounding of a tie both sides are right.
+    # Within rounding of a tie both results are right.
     decided = margins > 1e-3
     assert decided.mean() > 0.9
     found = scenes.final_points(obj)[::STEP]
-    # Larger meshes have centres by cells, in both.
+    # Larger meshes compute centres by cells, in both.
     assert scenes.worst(found[decided], expected[decided]) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
 
 

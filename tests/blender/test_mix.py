@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mix of two methods that a vertex group paints, beside the two Armature modifiers that riggers build by
-hand."""
+"""The mix of two methods painted in a vertex group, compared with the two Armature modifiers that riggers
+build by hand."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GROUP = "dq here"
 
 
 def paint(obj: bpy.types.Object) -> None:
-    """Parts of it have all of the second method, parts none, and most something between."""
+    """Parts of it have weight 1, parts 0, and most between."""
     group = obj.vertex_groups.new(name=GROUP)
     for vertex in obj.data.vertices:
         share = float(np.clip(1.5 * vertex.co.x / 3.0 - 0.2, 0.0, 1.0))
@@ -27,7 +27,7 @@ def paint(obj: bpy.types.Object) -> None:
 
 
 def by_two_modifiers(obj: bpy.types.Object) -> np.ndarray:
-    """What Blender makes of it; afterwards the object is as it was."""
+    """The shape by Blender; restores the object afterwards."""
     first = obj.modifiers["Armature"]
     second = obj.modifiers.new("Second", "ARMATURE")
     obj.modifiers.move(len(obj.modifiers) - 1, list(obj.modifiers).index(first) + 1)
@@ -113,7 +113,7 @@ def test_the_second_method_can_be_keyed():
 
 @pytest.mark.parametrize("rule", ["3.x", "none"])
 def test_under_other_scale_rules_it_is_between_its_two(rule):
-    """Linear blending takes other bones than the rest under Blender 3's rule."""
+    """Linear blending uses other bones than the rest under Blender 3's rule."""
     obj, armature = scenes.make_arm()
     armature.pose.bones[1].scale = (1.4, 0.8, 1.2)
     paint(obj)
@@ -145,7 +145,7 @@ def test_a_small_mesh_with_a_mix_is_not_left_to_blender(monkeypatch):
 def test_saved_copied_and_removed(tmp_path):
     obj, _armature = scenes.make_arm()
     paint(obj)
-    whole_file.of_open_file()  # looking at an attribute may change how 5.2 stores it
+    whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
     before = whole_file.of_open_file()
     mixed(obj)
     expected = scenes.shapes(obj, FRAMES)
@@ -166,7 +166,7 @@ def test_saved_copied_and_removed(tmp_path):
 
 @pytest.mark.parametrize("name", ["", "not there"])
 def test_a_button_makes_the_group_that_is_missing(name):
-    """Nothing changes before somebody paints."""
+    """Nothing changes until weights are painted."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(11)
@@ -185,7 +185,7 @@ def test_a_button_makes_the_group_that_is_missing(name):
 
 @pytest.mark.parametrize("stage", ["bulge_limit", "delta_mush"])
 def test_a_button_makes_the_group_of_a_stage(stage):
-    """Which acts everywhere until somebody paints, as without one."""
+    """It applies everywhere until weights are painted, as without a group."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(11)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modifiers that are moved, added and deleted while Sinew is on, against Blender's own modifiers alone."""
+"""Modifiers that are moved, added and deleted while Sinew is on, compared with Blender's own modifiers
+alone."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ FRAMES = [1, 6, 11]
 
 
 def make_chained(first_keeps_volume, second_keeps_volume):
-    """An arm with two Armature modifiers, each with an armature of its own."""
+    """An arm with two Armature modifiers, each with its own armature."""
     obj, _armature = scenes.make_arm()
     _other, armature = scenes.make_arm(name="Other")
     scenes.key_pose(armature, 40.0)
@@ -29,7 +30,7 @@ def names(obj):
 
 
 def put(obj, name, ahead_of):
-    """As dragging in the stack does."""
+    """Like dragging in the stack."""
     place = names(obj).index(name)
     target = names(obj).index(ahead_of)
     obj.modifiers.move(place, target - (place < target))
@@ -107,7 +108,7 @@ def test_a_third_added():
     ],
 )
 def test_something_moved_between(moved, place):
-    """What no longer follows the first Armature modifier without a gap deforms by itself."""
+    """An Armature modifier that no longer directly follows the first one deforms by itself."""
     obj = make_chained(False, False)
     obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
     if moved == "Second":
@@ -127,7 +128,7 @@ def test_something_moved_between(moved, place):
 
 
 def test_what_is_kept_of_many_modifiers_is_of_each():
-    """Blender moves all in memory as more are added."""
+    """Blender moves all of them in memory when more are added."""
     obj, armature = scenes.make_arm()
     for number in range(20):
         obj.modifiers.new(f"More {number}", "ARMATURE").object = armature
@@ -146,7 +147,7 @@ def test_a_chain_with_a_modifier_that_has_no_armature_follows_the_pose(place):
     expected = scenes.shapes(obj, FRAMES)
     scenes.add_sinew(obj, "lbs")
     check(obj, expected)
-    # By hand: no event of a frame then corrects the result of the evaluation.
+    # Set by hand: no frame event then corrects the evaluation's result.
     bone = armature.pose.bones[1]
     bone.rotation_mode, bone.rotation_euler = "XYZ", (0.5, 0.4, 0.3)
     bpy.context.view_layer.update()
@@ -156,7 +157,7 @@ def test_a_chain_with_a_modifier_that_has_no_armature_follows_the_pose(place):
 
 
 def test_a_keyed_modifier_is_renamed_while_it_is_off():
-    """Sinew's is behind it then."""
+    """Sinew's modifier is after it then."""
     obj, _armature = scenes.make_arm()
     modifier = obj.modifiers["Armature"]
     for frame, value in ((3, False), (9, True)):
@@ -193,7 +194,7 @@ def test_put_on_while_an_animation_has_the_first_modifier_off():
 
 
 def test_one_moved_in_front_and_back_while_visibility_is_keyed():
-    """Sinew's modifier is behind the Armature modifier there, and follows it."""
+    """There Sinew's modifier is after the Armature modifier, and follows it."""
     obj, _armature = scenes.make_arm()
     obj.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1
     key_visibility(obj.modifiers["Armature"], (1, True), (6, True))
@@ -211,7 +212,7 @@ def test_one_moved_in_front_and_back_while_visibility_is_keyed():
 
 @pytest.mark.parametrize("on", [False, True])
 def test_moved_and_renamed_before_anybody_sees_it(on):
-    """As a script does both, or an artist while Sinew is off."""
+    """A script does both at once, or an artist while Sinew is off."""
     obj = make_chained(False, True)
     obj.modifiers.new("Cast", "CAST").factor = 0.2
     scenes.add_sinew(obj)

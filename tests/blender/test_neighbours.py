@@ -24,7 +24,7 @@ FRAMES = [1, 6, 11]
 
 @pytest.fixture(params=[False, True], ids=["in depsgraph", "after update"])
 def route(request, monkeypatch) -> State:
-    """Each test once on each route."""
+    """Runs each test on each route."""
     monkeypatch.setattr(safe_mode, "_forced", request.param)
     return State.AFTER_UPDATE if request.param else State.IN_DEPSGRAPH
 
@@ -40,7 +40,8 @@ def arm(route) -> bpy.types.Object:
 
 @pytest.fixture
 def neighbour() -> Iterator[Callable]:
-    """neighbour(event, function): another add-on's handler, behind Sinew's; returns what takes it off."""
+    """neighbour(event, function): another add-on's handler, after Sinew's; returns a function that
+    removes it."""
     added = []
 
     def add(event: str, function: Callable[[], None]) -> Callable[[], None]:
@@ -100,7 +101,8 @@ def test_an_edit_after_a_setting_and_before_a_frame_is_seen(arm, setting, edit):
 @pytest.mark.parametrize("once", [False, True], ids=["always", "once"])
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
 def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit, once):
-    """Blender evaluates it without telling anybody, and leaves out who comes behind one that goes away."""
+    """Blender evaluates it without notification, and skips the handler that follows one that removes
+    itself."""
 
     def act() -> None:
         if once:
@@ -121,7 +123,7 @@ def beside_nothing(obj: bpy.types.Object) -> None:
 
 
 def beside_a_linked_duplicate(obj: bpy.types.Object) -> None:
-    """With the same mesh, and Sinew, but nothing in front."""
+    """With the same mesh, and Sinew, but without an upstream modifier."""
     copy = obj.copy()
     bpy.context.scene.collection.objects.link(copy)
     bpy.context.view_layer.update()
@@ -171,7 +173,7 @@ def move_mesh(obj: bpy.types.Object) -> None:
 @pytest.mark.parametrize("act", [pose_bone, move_armature, move_mesh])
 @pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
 def test_what_a_handler_behind_sinews_poses_and_moves(arm, neighbour, event, act, route):
-    """It is in the frame within Blender's evaluation; after the update it is seen with the next event."""
+    """Within Blender's evaluation it is part of the frame; after the update it is seen at the next event."""
     calls = []
 
     def call() -> None:
@@ -235,7 +237,7 @@ def test_an_edit_behind_something_in_front_before_a_frame_is_seen():
 
 @pytest.mark.parametrize("frame", [1, 6])
 def test_applied(arm, frame, capfd):
-    """Also at rest, where a deleted one has the same shape."""
+    """Also at rest, where a deleted modifier leaves the same shape."""
     shown = scenes.shapes(arm, [frame])[0]
     bpy.ops.object.modifier_apply(modifier=stack.sinew_modifier(arm).name)
     for frame in FRAMES:
@@ -246,7 +248,7 @@ def test_applied(arm, frame, capfd):
     assert arm.animation_data is None
     assert not [each.name for each in arm.data.attributes if "sinew" in each.name]
     assert not [other.name for other in bpy.data.objects if properties.is_helper(other)]
-    # Blender warns of a driver whose modifier is gone.
+    # Blender warns about a driver whose modifier was removed.
     assert "nvalid driver" not in "".join(capfd.readouterr())
 
 
@@ -263,7 +265,7 @@ def test_converted_to_a_mesh(arm):
 @pytest.mark.parametrize("frame", [1, 6])
 @pytest.mark.parametrize("enabled", [True, False])
 def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame, capfd):
-    """Also at rest, where an applied one has the same shape."""
+    """Also at rest, where an applied modifier leaves the same shape."""
     expected = scenes.shapes(arm, FRAMES)
     bpy.context.scene.frame_set(frame)
     properties.of(arm).enabled = enabled
@@ -299,7 +301,7 @@ def test_copied_modifiers_work(arm):
 @pytest.mark.parametrize("keyed", [False, True])
 @pytest.mark.parametrize("enabled", [False, True])
 def test_copied_modifiers_are_on_where_the_artists_own_are(arm, enabled, keyed):
-    """Blender copies no animation with them."""
+    """Blender does not copy animation with them."""
     modifier = arm.modifiers["Armature"]
     properties.of(arm).enabled = enabled
     if keyed:
@@ -393,7 +395,7 @@ def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
 
 @pytest.fixture
 def gated(monkeypatch) -> bpy.types.Object:
-    """An arm whose modifiers behind Sinew's are suspended at each change of frame."""
+    """An arm whose modifiers after Sinew's are suspended at each change of frame."""
     obj, armature = scenes.make_arm()
     for name in ("Behind", "Further"):
         obj.modifiers.new(name, "CAST").factor = 0.1
@@ -427,7 +429,7 @@ def test_suspended_modifiers_come_back_whatever_a_neighbour_does(gated, neighbou
             raise RuntimeError("a neighbour's own fault")
 
     take_off = []
-    # Behind what Sinew puts behind all others.
+    # After the handler that Sinew keeps last.
     take_off.append(
         neighbour("frame_change_pre", lambda: take_off.append(neighbour("frame_change_pre", interfere)))
     )
@@ -461,7 +463,7 @@ def test_a_neighbour_toggles_modifiers_that_are_suspended_otherwise(gated, neigh
 
 
 def test_a_mesh_that_is_off_is_rendered_as_it_is(arm, rendered_points, tmp_path):
-    """Its Armature modifier is none that Sinew may suspend: in a render that would be as at another frame."""
+    """Sinew must not suspend its Armature modifier: a render would then show another frame."""
     other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(other, "dq")
     rendered_points(arm)
@@ -552,7 +554,7 @@ def test_in_safe_mode_nothing_runs_within_the_evaluation(monkeypatch, how):
 
 
 def test_suspended_by_two_threads_at_once():
-    """As by a window and by its render's thread: the second waits, and at the end nothing is suspended."""
+    """As by a window and its render's thread: the second one waits, and at the end nothing is suspended."""
     order, entered = [], threading.Event()
 
     def other() -> None:
@@ -583,7 +585,8 @@ def test_an_object_renamed_in_a_handler(arm, neighbour):
 
 
 def test_tools_for_weights_see_the_bones_that_deform(arm):
-    """Normalize All leaves groups without such a bone alone, but only where an Armature modifier is on."""
+    """Normalize All leaves groups without such a bone unchanged, but only while an Armature modifier is
+    on."""
     mask = arm.vertex_groups.new(name="mask")
     mask.add(range(252), 0.3, "REPLACE")
     bpy.context.view_layer.objects.active = arm
@@ -594,7 +597,7 @@ def test_tools_for_weights_see_the_bones_that_deform(arm):
     bpy.ops.object.vertex_group_normalize_all(group_select_mode="BONE_DEFORM", lock_active=False)
     assert {round(mask.weight(vertex), 6) for vertex in range(252)} == {0.3}
     bpy.context.view_layer.update()
-    # The weights of the tube are normalized as they are.
+    # The tube's weights are normalised already.
     assert scenes.worst(scenes.final_points(arm), shown) <= 1e-5
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
@@ -630,7 +633,7 @@ def test_tools_for_weights_see_them_where_visibility_is_animated(arm):
 
 
 def test_absolute_shape_keys_in_weight_paint_where_visibility_is_animated(arm):
-    """In that mode nothing is read for Sinew, which mixes relative keys alone."""
+    """In that mode Sinew reads nothing, because it only mixes relative keys."""
     modifier = arm.modifiers["Armature"]
     modifier.keyframe_insert("show_viewport", frame=1)
     arm.shape_key_add(name="Basis")
@@ -694,7 +697,7 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
 
 @pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
 def test_another_object_renamed_behind_sinews_handler(arm, neighbour, event):
-    """It keeps its shape, be it Sinew's or not."""
+    """It keeps its shape, whether Sinew's or not."""
     other, _rig = scenes.make_arm(name="Other")
     expected = scenes.shapes(other, [9])[0]
     bpy.context.scene.frame_set(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.Normals beside Blender's own normals of the same points."""
+"""sinew.Normals compared with Blender's own normals of the same points."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def flags_of(collection: bpy.types.bpy_prop_collection, name: str) -> np.ndarray
 
 
 def custom_of(mesh: bpy.types.Mesh) -> np.ndarray | None:
-    """int16 [corners, 2]; 4.2 does not let these be read."""
+    """int16 [corners, 2]; 4.2 can not read these."""
     attribute = mesh.attributes.get("custom_normal")
     if attribute is None:
         return None
@@ -57,9 +57,9 @@ def give_points(mesh: bpy.types.Mesh, points: np.ndarray) -> None:
 
 
 def assert_as_blender(mesh: bpy.types.Mesh, near: float = NEAR) -> None:
-    """In every domain, with the points that it has.
+    """Compares every domain, with the object's points.
 
-    With custom normals of corners, Blender has a mean of these for each vertex and face.
+    With custom normals of corners, Blender uses their mean for each vertex and face.
     """
     normals = normals_of(mesh)
     points = mesh_io.read_points(mesh)
@@ -78,7 +78,7 @@ def make_mesh(points: np.ndarray, faces: list[list[int]], edges: list[tuple] = (
 
 
 def random_mesh(seed: int, size: int = 22) -> bpy.types.Mesh:
-    """Triangles, quads and larger polygons, some the wrong way round, with holes, edges of three faces, and
+    """Triangles, quads and larger polygons, some of them flipped, with holes, edges of three faces, and
     edges and vertices without faces."""
     rng = np.random.default_rng(seed)
     x, y = np.mgrid[:size, :size]
@@ -109,7 +109,7 @@ def random_mesh(seed: int, size: int = 22) -> bpy.types.Mesh:
 
 
 def mark(mesh: bpy.types.Mesh, edges: float, faces: float, seed: int = 1) -> None:
-    """Shares of them sharp."""
+    """Makes these shares of them sharp."""
     rng = np.random.default_rng(seed)
     mesh.edges.foreach_set("use_edge_sharp", rng.random(len(mesh.edges)) < edges)
     mesh.polygons.foreach_set("use_smooth", rng.random(len(mesh.polygons)) >= faces)
@@ -127,7 +127,7 @@ def test_random_meshes(share):
 
 
 def tilt(mesh: bpy.types.Mesh, by: float, seed: int = 2) -> None:
-    """Gives it custom normals: its own, and as much of random ones."""
+    """Gives it custom normals: its own, mixed with random ones."""
     rng = np.random.default_rng(seed)
     normals = by_blender(mesh, "corner")
     normals = normals + by * rng.normal(size=normals.shape)
@@ -146,7 +146,7 @@ def test_custom_normals(share):
         mark(mesh, *share)
         tilt(mesh, 0.5)
         assert_as_blender(mesh)
-        # Numbers as none would be stored, unlike in a fan, some 0.
+        # Values as they are stored for no normals, different ones within a fan, and some 0.
         rng = np.random.default_rng(seed)
         numbers = rng.integers(-32767, 32768, (len(mesh.loops), 2)) * (rng.random((len(mesh.loops), 2)) < 0.7)
         for value, stored in zip(numbers.tolist(), mesh.attributes["custom_normal"].data, strict=True):
@@ -159,7 +159,7 @@ def test_custom_normals(share):
 
 
 def degenerate(points: np.ndarray, faces: np.ndarray, seed: int) -> np.ndarray:
-    """With doubled vertices, whole faces in a point or on a line, and needles."""
+    """With duplicate vertices, faces collapsed to a point or a line, and needles."""
     rng = np.random.default_rng(seed)
     points = points.copy()
     some = [faces[i] for i in rng.integers(len(faces), size=5 * (1 + len(faces) // 40))]
@@ -209,7 +209,7 @@ def characters(path) -> list[bpy.types.Object]:
 
 
 def shapes_of(obj: bpy.types.Object) -> list[np.ndarray]:
-    """Rest, posed, and moved at random."""
+    """At rest, posed, and moved at random."""
     rng = np.random.default_rng(2)
     rest = mesh_io.read_points(obj.data)
     posed = []

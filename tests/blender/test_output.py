@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a command can not write: one sentence, exit status 1, nothing half-written, no traceback.
+"""If a command can not write: one sentence, exit status 1, no partial files, no traceback.
 
-Tests may run as root, who may write to every folder: so files and links stand where a folder is wanted,
-disks are read-only or full, and /proc takes no files.
+Tests may run as root, who may write to every folder. Therefore files and links replace folders, disks are
+read-only or full, and /proc accepts no files.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ oldest_and_newest = pytest.mark.skipif(
     bpy.app.version[:2] not in ((4, 2), (5, 2)), reason="long: runs with the oldest and the newest Blender"
 )
 OUT = "OUT"
-# Of each command that writes: how, and the name of what it is given to write.
+# For each command that writes: its arguments, and the name of its output.
 WRITERS = {
     "points": (("points", "FILE", "--method", "dq", "--frames", "1,6", "--out", OUT), "points.npz"),
     "reskin": (("reskin", "FILE", "--method", "dq", "--frames", "none", "--out", OUT), "out"),
@@ -60,7 +60,7 @@ WRITERS = {
 
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory):
-    """An arm with an action of bones, the same re-skinned, and one that reaches for a target."""
+    """An arm with an action of bones, the same after reskin, and one that reaches for a target."""
     folder = tmp_path_factory.mktemp("inputs")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     _obj, armature = scenes.make_arm()
@@ -87,13 +87,13 @@ def arguments_of(writer: str, inputs: dict, out: Path) -> list[str]:
 
 
 def complaint(errors: str) -> str:
-    """The one line that says what is wrong."""
+    """The one line that reports the problem."""
     (line,) = [line for line in errors.splitlines() if line.startswith("sinew: ")]
     return line
 
 
 def complaint_here(arguments: list[str], capsys) -> str:
-    """The same of a command that ends before it has anything to do with Blender, without a process for it."""
+    """The same for a command that ends before it uses Blender, without starting a process for it."""
     assert cli.main(arguments) == 1
     return complaint(capsys.readouterr().err)
 
@@ -134,7 +134,7 @@ def test_no_folder_to_write_to(writer, inputs, tmp_path, capsys):
 @pytest.mark.once
 @pytest.mark.parametrize("writer", WRITERS)
 def test_the_wrong_thing_has_the_name(writer, inputs, tmp_path, capsys):
-    """A file where a folder is to be, and a folder where a file is."""
+    """A file where a folder should be, and a folder where a file should be."""
     place = tmp_path / WRITERS[writer][1]
     if place.suffix:
         place.mkdir()
@@ -157,7 +157,7 @@ def test_a_read_only_disk(writer, inputs, tmp_path, capsys):
 @oldest_and_newest
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_full_disk(writer, inputs, tmp_path):
-    """Room for a folder or two, and for no file."""
+    """Room for a few folders, but for no file."""
     with disk(tmp_path / "full", "size=16k") as folder:
         (folder / "ballast").write_bytes(bytes(16 * 1024 - 4096))
         with pytest.raises(OSError, match="No space"):
@@ -172,7 +172,7 @@ def test_a_full_disk(writer, inputs, tmp_path):
 @oldest_and_newest
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_write_that_stops_half_way(writer, inputs, tmp_path):
-    """A limit on the size of files stands in for a disk that fills up meanwhile."""
+    """A limit on the size of files simulates a disk that fills up in the meantime."""
     place = tmp_path / "deep" / WRITERS[writer][1]
     process = start_sinew(
         *arguments_of(writer, inputs, place),
@@ -187,14 +187,14 @@ def test_a_write_that_stops_half_way(writer, inputs, tmp_path):
     assert re.search(r"can not be (written|drawn)", errors), errors
     left = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert [path.name for path in left if "unfinished" in path.name] == []
-    # A journal keeps whole lines, however few; a report of that can be small enough.
+    # A journal keeps complete lines, however few; a report of these can be small enough.
     assert {path.name for path in left} <= {"sinew-journal.jsonl", "report.json"}
     assert all(json.loads(path.read_text()) for path in left if path.name == "report.json")
 
 
 @pytest.mark.once
 def test_a_device_is_not_replaced(tmp_path):
-    """To rename a file to /dev/null would take that away from the whole machine."""
+    """Renaming a file to /dev/null would replace that for the whole machine."""
     pipe = tmp_path / "pipe.npz"
     os.mkfifo(pipe)
     with pytest.raises(SinewError, match="is a device or a pipe"):
@@ -293,7 +293,7 @@ NAMES = [
 
 
 def test_names_of_objects_stay_in_the_archive(tmp_path):
-    """They are keys of numpy's, and names of files for whoever unpacks the archive."""
+    """They are keys for numpy, and file names for whoever unpacks the archive."""
     for name in NAMES:
         obj, _armature = scenes.make_arm(sides=6, rings=5, name="Arm")
         obj.name = name
@@ -320,7 +320,7 @@ def test_names_can_be_had_back():
 
 
 def test_two_objects_of_one_name(tmp_path):
-    """A linked one beside one of the file's own: each has its array."""
+    """A linked one and one of the file's own: each has its array."""
     scenes.make_arm(sides=6, rings=5, name="Arm")
     library = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(library))
@@ -384,7 +384,7 @@ def test_the_wrong_ending():
 
 @pytest.mark.once
 def test_scratch_folders_of_killed_runs_go(tmp_path, inputs):
-    """Of dead runs alone: those of a live one, of another program and of nobody knows whom stay."""
+    """Only those of dead runs: those of a live run, of another program and of unknown owners remain."""
     temporary = tmp_path / "tmp"
     temporary.mkdir()
     (temporary / "sinew-of-an-older-version").mkdir()

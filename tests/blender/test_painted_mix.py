@@ -17,7 +17,7 @@ GROUP = "Painted mix"
 
 
 def painted(count: int) -> np.ndarray:
-    """Stretches of 0 and of 1, and all between."""
+    """Runs of 0 and of 1, and values in between."""
     rng = np.random.default_rng(1)
     return np.repeat(np.clip(rng.uniform(-0.6, 1.6, count // 50 + 1), 0.0, 1.0), 50)[:count].astype(
         np.float32

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel, the menus and the shortcuts in a real window, by clicks and keys: panel_in_window.py does it."""
+"""The panel, the menus and the shortcuts in a real window, with clicks and keys: see panel_in_window.py."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_shortcuts_and_menus_go_with_the_add_on(facts):
 
 
 def test_plain_clicks_choose_what_is_compared_and_the_view_shows_it(facts):
-    """Linear blend, dual and vector quaternions were chosen; a click takes one away, another adds one."""
+    """Linear blend, dual and vector quaternions were chosen; a click removes one, another adds one."""
     assert facts["compared"] == ["dq", "lbs", "log"]
     assert facts["copies in view"] is True
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What cor needs computed: on a thread while the artist works, at once for who can not look later; kept."""
+"""Precomputation for cor: on a thread while the artist works, immediately where nobody can look again;
+cached."""
 
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ FRAME = 8
 
 
 class Gate:
-    """Lets the centres be found, and counts how often; while it is closed they are waited for."""
+    """Allows the computation of centres, and counts it; while it is closed, they are waited for."""
 
     def __init__(self, make) -> None:
         self.count, self.threads = 0, []
@@ -51,7 +52,7 @@ class Gate:
 
 @pytest.fixture(autouse=True)
 def gate(monkeypatch, tmp_path):
-    """Nothing is known of earlier tests, and nothing runs after one."""
+    """No results of earlier tests exist, and nothing runs after a test."""
     provider = vertex_data.PROVIDERS["cor"]
     gate = Gate(provider.make)
     monkeypatch.setitem(vertex_data.PROVIDERS, "cor", dataclasses.replace(provider, make=gate))
@@ -66,7 +67,7 @@ def gate(monkeypatch, tmp_path):
 
 @pytest.fixture
 def in_window():
-    """As where somebody watches: nobody waits."""
+    """As in an interactive session: nothing waits."""
     precomputations.waits = False
 
 
@@ -90,7 +91,7 @@ def look_until_done() -> None:
 
 
 def shapes_by_modifier(preserve_volume: bool) -> np.ndarray:
-    """The arm's by its Armature modifier, of an arm in a file of its own."""
+    """The arm's shape by its Armature modifier, for an arm in its own file."""
     obj, _armature = scenes.make_arm(bones=3)
     found = scenes.modifier_shapes(obj, [FRAME], preserve_volume)[0]
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -206,7 +207,7 @@ def test_while_weights_are_painted_the_old_centres_serve(gate, route):
     precomputations.waits = False
     for _ in range(3):
         move_weights(obj)
-        # Another stroke comes before the artist has paused.
+        # The next stroke comes before the artist has paused.
         assert precompute_watch.check() is not None
         assert gate.count == 1
         assert plan_of(obj).state is not State.WAITING
@@ -308,7 +309,7 @@ def test_triangles_are_read_where_a_method_needs_them():
 
 
 def test_outdated_centres_of_a_mesh_whose_triangles_are_no_longer_read_are_not_asked_for():
-    """As the last evaluation still has the method that needs them: the modifier's shape comes first."""
+    """The last evaluation still has the method that needs them, so the modifier's shape is shown first."""
     obj, _armature = scenes.make_arm()
     bpy.context.scene.frame_set(11)
     scenes.add_sinew(obj, "cor")
@@ -321,7 +322,7 @@ def test_outdated_centres_of_a_mesh_whose_triangles_are_no_longer_read_are_not_a
 
 
 def test_an_object_that_is_off_has_nothing_to_wait_for(gate):
-    """Its triangles are not read, so that its centres can not be made anew."""
+    """Its triangles are not read, so its centres can not be recomputed."""
     obj, _armature = scenes.make_arm(bones=3)
     bpy.context.scene.frame_set(FRAME)
     scenes.add_sinew(obj, "cor")
@@ -358,7 +359,7 @@ def test_a_mesh_without_faces_is_blended_linearly_and_the_panel_says_so():
     assert scenes.worst(by_cor, scenes.final_points(obj)) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-# --- Kept
+# --- The cache
 
 
 def saved(tmp_path) -> tuple[np.ndarray, str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Centres of rotation are found beside the work in a real window: precompute_in_window.py does it."""
+"""Centres of rotation are computed in the background of a real window: see precompute_in_window.py."""
 
 from __future__ import annotations
 

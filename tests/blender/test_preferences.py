@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's page in Blender's preferences, with Sinew registered as an add-on. What clicks make of it:
-test_panel_in_window.py."""
+"""The extension's page in Blender's preferences, with Sinew registered as an add-on.
+test_panel_in_window.py tests clicks on it."""
 
 from __future__ import annotations
 
@@ -60,12 +60,12 @@ def test_numbers_of_methods_go_to_the_chosen_folder(preferences, selected, tmp_p
     monkeypatch.setattr(precompute, "SECONDS_WORTH_A_FILE", 0.0)
     preferences.cache_folder = str(tmp_path / "numbers")
     assert precomputations.cache is not None
-    # A mesh that no other test has: what is in memory is not written again.
+    # A mesh that no other test has: results in memory are not written again.
     selected.data.vertices[0].co.x += 0.0123
     scenes.add_sinew(selected, "cor")
     assert session.state_of(selected) is not None
     assert list((tmp_path / "numbers").iterdir())
-    # Who starts Blender decides, whatever the preferences say.
+    # The environment at Blender's start overrides the preferences.
     monkeypatch.setenv(precomputing.VARIABLE, "0")
     preferences.cache_folder = str(tmp_path / "others")
     assert precomputations.cache is None

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender has no quaternion-vector skinning: the oracle is the float64 reference, on Blender's own poses."""
+"""Blender has no quaternion-vector skinning: the oracle is the float64 reference, with Blender's own
+poses."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ import reference
 
 
 def assert_equal_to_reference(obj: bpy.types.Object, frame: int) -> None:
-    """Reads pose and weights one by one, by no code of Sinew's."""
+    """Reads pose and weights one by one, without Sinew's code."""
     armature = attach.armature_of(obj)
     scenes.add_sinew(obj, "qv")
     bpy.context.scene.frame_set(frame)

@@ -17,7 +17,7 @@ SIZE = 96
 
 
 def prepare(scene: bpy.types.Scene, motion_blur: bool) -> None:
-    """Cycles without noise between runs: one seed, no denoiser."""
+    """Cycles with the same noise in each run: one seed, no denoiser."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 3.0
     camera.matrix_world = Matrix.Translation((1.0, 0.0, 5.0))
@@ -59,7 +59,7 @@ def with_and_without(
     frames: tuple[int, int],
     change: Callable[[], None] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The rendered frames with Sinew, and those with the Armature modifier before.
+    """The frames rendered with Sinew, and before that with the Armature modifier.
 
     change  called once Sinew is on the object
     """
@@ -82,7 +82,7 @@ def test_background_animation_equals_the_modifier(tmp_path, method, preserve_vol
     obj.modifiers["Armature"].use_deform_preserve_volume = preserve_volume
     got, expected = with_and_without(tmp_path, obj, method, (5, 7))
     assert np.abs(expected[0] - expected[2]).mean() > 0.005, "nothing moves: nothing is tested"
-    # Points equal to 1e-6 still move a sample across a silhouette here and there.
+    # Points equal to 1e-6 occasionally still move a sample across a silhouette.
     assert np.abs(got - expected).mean() < 2e-4
 
 
@@ -135,7 +135,7 @@ def in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
 
 
 def second_view_layer(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    """Two view layers, the rig hidden in one of them."""
+    """Two view layers; the rig is hidden in one of them."""
     scene = bpy.context.scene
     collection = bpy.data.collections.new("Rig")
     scene.collection.children.link(collection)
@@ -181,7 +181,8 @@ def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
 
 
 def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered(tmp_path):
-    """Sinew suspends modifiers between Blender's two rounds: Blender copies the objects anew for it."""
+    """Sinew suspends modifiers between Blender's two evaluations, for which Blender copies the objects
+    again."""
     obj, armature = scenes.make_arm()
     scene = bpy.context.scene
     prepare(scene, motion_blur=False)
@@ -203,7 +204,8 @@ def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered
 
 @pytest.fixture(params=["after the update", "with a modifier", "compared"])
 def keyed(request, monkeypatch) -> tuple[bpy.types.Object, Callable[[], None]]:
-    """An arm with a keyed shape key, and what puts Sinew on it, deforming it or copies after the update."""
+    """An arm with a keyed shape key, and a function that turns Sinew on, deforming it or copies after the
+    update."""
     obj, _armature = scenes.make_arm()
     obj.shape_key_add(name="Basis")
     key = obj.shape_key_add(name="Key")
@@ -225,9 +227,9 @@ def keyed(request, monkeypatch) -> tuple[bpy.types.Object, Callable[[], None]]:
         if request.param == "compared":
             bpy.ops.sinew.compare(methods={"qv"})
             for copy in filter(properties.is_copy, bpy.data.objects):
-                # It is rendered, but not seen.
+                # It is rendered, but not visible.
                 copy.location.z -= 100.0
-        # From the second change of frame on Sinew knows that they reshape it.
+        # From the second change of frame on, Sinew knows that they change its shape.
         for frame in (9, 10, 11):
             bpy.context.scene.frame_set(frame)
 
@@ -245,7 +247,7 @@ def test_keys_of_shape_keys_are_rendered(tmp_path, keyed):
 
 
 def test_keys_of_shape_keys_are_exported(tmp_path, keyed):
-    """An exporter has an evaluation of its own, as a render has, and says nothing of it."""
+    """An exporter has its own evaluation, like a render, but sends no notification."""
     obj, add = keyed
     add()
     name, path, frames = obj.name, tmp_path / "arm.abc", [5, 7, 9]
@@ -258,7 +260,7 @@ def test_keys_of_shape_keys_are_exported(tmp_path, keyed):
 
 
 def test_keys_of_settings_and_of_modifiers_behind_are_rendered(tmp_path):
-    """Blender shows another frame than the one that is rendered."""
+    """Blender shows another frame than the rendered one."""
     obj, _armature = scenes.make_arm()
     scene = bpy.context.scene
     prepare(scene, motion_blur=False)

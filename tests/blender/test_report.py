@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 3.6 to 3.11 of `sinew report`: pictures of deformed meshes, and what is measured of them."""
+"""Figures 3.6 to 3.11 of `sinew report`: pictures of deformed meshes, and measurements of them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def coverage(picture):
 
 def test_pictures_show_it_too(figures):
     matrices, pairs, duals = ([coverage(p) for p in figures[n].pictures] for n in ("3.6", "3.7", "3.8"))
-    # At the keyframes all are one; between them matrices shrink and the other two do not differ.
+    # At the keyframes all are 1; in between matrices shrink, and the other two are equal.
     assert matrices[0] == pairs[0] == duals[0]
     assert matrices[4] == pairs[4] == duals[4]
     assert matrices[2] < 0.6 * pairs[2]
@@ -60,8 +60,8 @@ def test_pictures_show_it_too(figures):
 
 
 def test_link_volumes_of_linear_matrices_by_hand(figures):
-    # A joint half way between -45 and 45 degrees is cos 45 thin in two directions: half the volume, and the
-    # next half of that.
+    # Halfway between -45 and 45 degrees, matrices are cos 45 thick in two directions: half the volume, and
+    # the next joint half of that.
     values = figures["3.6"].facts[0].values
     for link in range(1, 7):
         assert values[f"link {link} at t = 0.5"] == pytest.approx(0.5 ** (link - 1), rel=1e-5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew reskin`, then `sinew restore`: every property of every datablock is what it was."""
+"""`sinew reskin`, then `sinew restore`: every property of every datablock has its old value."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def save(path: Path) -> Path:
 def content(path: Path) -> dict[str, object]:
     files.open_file(path, load_ui=True)
     found = whole_file.of_open_file()
-    # Last, as going to a frame writes what is animated.
+    # Last, because going to a frame writes animated values.
     return found | whole_file.evaluated(FRAMES)
 
 
 def full_scene(folder: Path) -> Path:
-    """A file with something of everything that Sinew comes near to."""
+    """A file with something of everything that Sinew touches."""
     bpy.data.workspaces[0].name = "Animator's own"
     obj, armature = scenes.make_arm(sides=6, rings=9)
     mesh = obj.data
@@ -63,7 +63,7 @@ def full_scene(folder: Path) -> Path:
     block.keyframe_insert("value", frame=11)
     keyed.active_shape_key_index = 1
 
-    # Animation data without anything in it, as unlinking an action leaves it.
+    # Empty animation data, which unlinking an action leaves behind.
     bare, _ = scenes.make_arm(sides=6, rings=9, name="Bare")
     bare.animation_data_create()
     layered, _ = scenes.make_arm(sides=6, rings=9, name="Layered")
@@ -75,7 +75,7 @@ def full_scene(folder: Path) -> Path:
     add_what_takes_helpers()
     add_what_is_shown_elsewhere(obj)
 
-    # Posed by hand, beside its keys: nobody may go to a frame before saving.
+    # Posed by hand, in addition to its keys: nothing may change the frame before saving.
     armature.pose.bones[0].rotation_quaternion = (math.cos(0.2), 0.0, math.sin(0.2), 0.0)
     bpy.context.scene.frame_current = 4
     path = save(folder / "full.blend")
@@ -92,7 +92,8 @@ def full_scene(folder: Path) -> Path:
 
 
 def add_what_takes_helpers() -> None:
-    # What Sinew needs helpers for: a modifier in front, chained modifiers, the parent's own deformation.
+    # Objects for which Sinew needs helper objects: an upstream modifier, chained modifiers, a deforming
+    # parent.
     mirrored, _ = scenes.make_arm(sides=6, rings=9, name="Mirrored")
     mirrored.modifiers.new("Mirror", "MIRROR").use_axis = (False, False, True)
     mirrored.modifiers.move(1, 0)
@@ -106,7 +107,7 @@ def add_what_takes_helpers() -> None:
 
 
 def add_what_is_shown_elsewhere(obj: bpy.types.Object) -> None:
-    # Two objects of one mesh; one that only renders; one that no armature deforms.
+    # Two objects of one mesh; one that is only rendered; one that no armature deforms.
     twin = obj.copy()
     twin.name = "Twin"
     bpy.context.scene.collection.objects.link(twin)
@@ -130,7 +131,7 @@ def add_what_is_shown_elsewhere(obj: bpy.types.Object) -> None:
 
 
 def test_everything_comes_back(tmp_path):
-    """A full scene and two samples, as this Blender saves them, for it adds what older files lack."""
+    """A full scene and two samples, saved by this Blender, since it adds what older files lack."""
     bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
     paths = [full_scene(tmp_path / "input")]
     for sample in (REPOSITORY / "blend_files" / name for name in ("tentacle.blend", "wrist.blend")):
@@ -148,7 +149,7 @@ def test_everything_comes_back(tmp_path):
 
 
 def test_a_real_character_comes_back(real_rig, tmp_path):
-    """With something in front of its Armature modifier, and as a child that its armature deforms."""
+    """With an upstream modifier, and as a child that its armature deforms."""
     files.open_file(real_rig("human.blend"), load_ui=True)
     human = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature())
     bare = human.copy()

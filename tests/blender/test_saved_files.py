@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are saved while Sinew is at work: Blender's own, for those who have no Sinew, and Sinew's again
+"""Files that are saved while Sinew is at work: Blender's own for users without Sinew, and Sinew's again
 when they are opened with it."""
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
     ours = scenes.shapes(obj, FRAMES)
     path = tmp_path / "saved.blend"
     save(path)
-    # Sinew goes on, and the artist's own choice stays.
+    # Sinew continues, and the artist's own choice is kept.
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
     assert obj.modifiers["Armature"].use_deform_preserve_volume is not preserve_volume
     assert not [text for text in bpy.data.texts if text.get(note.MARK)]
@@ -101,7 +101,7 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
 
 
 def test_between_the_handlers_of_saving_nothing_of_the_file_changes(tmp_path):
-    """A thumbnail has the scene evaluated there: so does this neighbour, in background as in a window."""
+    """A thumbnail evaluates the scene at that time: so does this handler, in background as in a window."""
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(11)
@@ -226,7 +226,7 @@ def _key_visibility(obj: bpy.types.Object) -> None:
 )
 @pytest.mark.parametrize("is_safe", [False, True])
 def test_in_memory_the_modifiers_keep_their_armatures(monkeypatch, set_up, is_safe):
-    """Of what Blender writes without a word: autosaves, quit.blend, undo steps."""
+    """For files that Blender writes without notification: autosaves, quit.blend, undo steps."""
     obj, armature = scenes.make_arm()
     if set_up is not None:
         set_up(obj)
@@ -264,7 +264,7 @@ def test_the_menu_of_modifiers_offers_nothing_of_sinews():
 
 
 def test_an_export_has_blenders_own_modifiers_and_frames(tmp_path):
-    """As exporters find them, frame by frame; afterwards Sinew goes on."""
+    """As exporters read them, frame by frame; afterwards Sinew continues."""
     obj, armature = scenes.make_arm()
     expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
     scenes.add_sinew(obj, "dq")
@@ -282,7 +282,7 @@ def test_fbx_has_the_skin(tmp_path):
     ours = scenes.shapes(obj, FRAMES)
     path = tmp_path / "arm.fbx"
     bpy.ops.export_scene.fbx(filepath=str(path))
-    # The exporter writes poses and gives them back by their matrices.
+    # The exporter sets poses and restores them from their matrices.
     assert scenes.worst(scenes.shapes(obj, FRAMES), ours) <= 1e-6
     assert stack.sinew_modifier(obj).show_viewport
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

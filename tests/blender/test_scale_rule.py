@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The three scale rules against the float64 reference, whose own rule is Blender 4.0's.
+"""The three scale rules compared with the float64 reference, whose own rule is Blender 4.0's.
 
 The rule of Blender 3 was also compared with Blender 3.4.1 itself: 60 random rigs with scaled and mirrored
-bones under Preserve Volume, worst difference 1.3e-6 of the diagonal.
+bones under Preserve Volume; the largest difference was 1.3e-6 of the diagonal.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
         rigid[bone, :3, 3] = (motion @ np.append(head, 1.0))[:3] - rigid[bone, :3, :3] @ head
     points = frame.rest_points.astype(np.float64)
     bound = (influences.offsets, influences.bones, influences.weights)
-    # Mesh and armature are in one space; by every rule, what methods keep is of the mesh as it is at rest.
+    # Mesh and armature are in one space; for every rule, vertex data belongs to the mesh at rest.
     triangles = scenes.triangles_of(obj)
     kept = {}
     if method == "cor":

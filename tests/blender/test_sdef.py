@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spherical deform of models as mmd_tools stores them, by the shape keys of sdef.KEYS."""
+"""Spherical deform of models stored by mmd_tools, with the shape keys of sdef.KEYS."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ import reference
 
 
 def make_model(bones: int = 3) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """An arm whose vertices of two bones are spherical but for every seventh. Of every third the groups are
-    stored against their order."""
+    """An arm whose vertices of two bones are spherical, except every seventh. For every third the groups
+    are stored in reverse order."""
     obj, armature = scenes.make_arm(bones=bones)
     rng = np.random.default_rng(1)
     obj.shape_key_add(name="Basis")
     keys = [obj.shape_key_add(name=name) for name in sdef.KEYS]
     for key in keys:
-        # They are no shapes: in Blender 5.2 a new key has the value 1.
+        # They are not meant as shapes: in Blender 5.2 a new key has the value 1.
         key.value = 0.0
     for vertex in obj.data.vertices:
         entries = [(entry.group, entry.weight) for entry in vertex.groups]
@@ -44,9 +44,9 @@ def make_model(bones: int = 3) -> tuple[bpy.types.Object, bpy.types.Object]:
 
 
 def expected_points(obj: bpy.types.Object, rest: np.ndarray | None = None) -> np.ndarray:
-    """By mmd_tools' formula in float64, vertex by vertex: groups by their index.
+    """mmd_tools' formula in float64, vertex by vertex, with groups ordered by their index.
 
-    rest  float [vertices, 3] where the vertices are by shape keys; None: the mesh
+    rest  float [vertices, 3], the vertices after shape keys; None: the mesh's
     """
     armature = attach.armature_of(obj)
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -175,7 +175,7 @@ def test_it_is_mixed_with_another_method(route):
 
 
 def test_that_mmd_tools_deforms_it_too_is_said():
-    """Where it is bound, it masks the Armature modifier and deforms the rest by a shape key with a driver."""
+    """Once bound, it masks the Armature modifier and deforms the rest by a shape key with a driver."""
     obj = make_model()[0]
     scenes.add_sinew(obj, "sdef")
     key = obj.shape_key_add(name="mmd_sdef_skinning", from_mix=False)

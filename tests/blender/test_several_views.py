@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One character seen more than once: in two scenes at different frames, and as an instance."""
+"""One character that is shown more than once: in two scenes at different frames, and as an instance."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def points_in(obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
 
 def instanced_points() -> np.ndarray:
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    # What an instance says is void outside the loop.
+    # Data of an instance is invalid outside the loop.
     for instance in depsgraph.object_instances:
         if instance.is_instance and instance.object.type == "MESH":
             mesh = instance.object.data
@@ -48,7 +48,7 @@ def test_two_scenes_at_different_frames():
 
 @pytest.mark.parametrize("route", routes.ROUTES)
 def test_a_view_layer_is_shown_for_the_first_time(route):
-    """Of its first evaluation Blender tells nobody, nor of what functions behind Sinew's pose or move."""
+    """Blender sends no notification of its first evaluation, nor of changes by handlers after Sinew's."""
     obj, armature = scenes.make_arm()
     scene, first = bpy.context.scene, bpy.context.view_layer
 
@@ -78,7 +78,7 @@ def test_a_view_layer_is_shown_for_the_first_time(route):
 
 @pytest.mark.parametrize("route", routes.ROUTES)
 def test_a_scene_that_redo_brings_back(route):
-    """Blender tells nobody of its first evaluation, and Sinew has just forgotten all objects."""
+    """Blender sends no notification of its first evaluation, and Sinew has just forgotten all objects."""
     scenes.make_arm()
     bpy.ops.ed.undo_push(message="before")
     routes.force(route)
@@ -136,8 +136,8 @@ def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_pa
 
 @pytest.mark.parametrize("route", routes.ROUTES)
 def test_undo_brings_back_what_a_hidden_view_layer_had_evaluated(route):
-    """Blender leaves what that has of the point buffer as it was before the step that undo goes back to: the
-    points of another frame, or as many as another subdivision had."""
+    """Blender keeps the point buffer's evaluated data from before the step that undo goes back to: points
+    of another frame, or as many as another subdivision had."""
     obj, _armature = scenes.make_arm()
     scene, first = bpy.context.scene, bpy.context.view_layer
     first_name = first.name
@@ -149,7 +149,7 @@ def test_undo_brings_back_what_a_hidden_view_layer_had_evaluated(route):
     bpy.context.view_layer.update()
 
     def push() -> None:
-        # Along with data that comes or goes, a step is one of the whole file.
+        # If data is added or removed, a step is one of the whole file.
         bpy.data.texts.remove(bpy.data.texts.new("step"))
         bpy.ops.ed.undo_push(message="step")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small meshes use their Armature modifiers while these have the same shape, and Sinew stays on."""
+"""Small meshes use their Armature modifiers if these have the same shape, while Sinew stays on."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def arm():
 
 
 def deformer(obj: bpy.types.Object) -> str:
-    """Whose modifier deforms the object; that it is one, that frames show its shape and what Sinew knows of
-    it, is checked."""
+    """The modifier that deforms the object; checks that there is one, that frames show its shape, and
+    Sinew's record of it."""
     own, sinews = obj.modifiers["Armature"], stack.sinew_modifier(obj)
     by_blender = own.show_viewport and own.show_render and own.object is not None
     by_sinew = sinews.show_viewport and sinews.show_render
@@ -169,7 +169,7 @@ def test_a_file_saved_and_opened(arm, tmp_path):
 def test_on_and_off_and_removed(tmp_path):
     obj, _armature = scenes.make_arm()
     obj.modifiers[0].show_expanded = False
-    whole_file.of_open_file()  # looking at an attribute may change how 5.2 stores it
+    whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
     before = whole_file.of_open_file()
     scenes.add_sinew(obj)
     properties.of(obj).method = "qv"
@@ -193,7 +193,7 @@ def test_frames_cost_nothing_of_sinews(arm, monkeypatch):
 
 
 def add_keyed_mesh():
-    """Another mesh of the scene, which its shape keys move from frame to frame."""
+    """Another mesh of the scene, which its shape keys change in every frame."""
     mesh = bpy.data.meshes.new("Keyed")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     obj = bpy.data.objects.new("Keyed", mesh)
@@ -234,7 +234,7 @@ def test_blender_calls_at_frames_only_for_what_sinew_has_to_do(arm, tmp_path):
     def heard():
         return [function in functions for functions, function in ours]
 
-    # Blender 4.2 does not tell of what comes from other files.
+    # Blender 4.2 does not notify about what comes from other files.
     told = events.IMPORTS_ARE_ANNOUNCED
     assert heard() == [not told, False, True]
     properties.of(obj).method = "qv"
@@ -319,7 +319,7 @@ def test_baked(arm, tmp_path, kind):
 
 
 def test_preserve_volume_of_a_saved_file_is_not_the_artists(tmp_path):
-    """A saved file has it set under dq: that is no reason to leave the mesh to the modifier."""
+    """A saved file has this flag under dq: that is no reason to leave the mesh to the modifier."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     assert deformer(obj) == "sinew"

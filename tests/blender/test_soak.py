@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small soak; `./dev soak` goes through more frames."""
+"""A small soak test; `./dev soak` runs more frames."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_what_grows_is_named():
 
 
 def test_states_of_threads_are_counted():
-    """One that is never released is there for good, as those were that Sinew kept for Blender's threads."""
+    """A state that is never released remains, like those that Sinew once kept for Blender's threads."""
     kind = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
     callback = kind(lambda _argument: ctypes.pythonapi.PyGILState_Ensure() and None)
     library, before = ctypes.CDLL(None), soak.thread_states()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every stage in whatever measures, shows and writes shapes: what each feature has is the final mesh of an
-object with that stage, whose own oracle is in test_mix, test_bulge_limit and test_delta_mush."""
+"""Every stage in all features that measure, show and write shapes: each uses the final mesh of an object
+with that stage, whose own oracle is in test_mix, test_bulge_limit and test_delta_mush."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ STAGES = {
 
 
 def options(stage: str) -> list[str]:
-    """As a command takes them."""
+    """Settings in the form of commands' arguments."""
     return [text for value in STAGES[stage] for text in ("--set", value)]
 
 
 def set_on(obj: bpy.types.Object, stage: str) -> None:
-    """As the panel does."""
+    """Sets them like the panel."""
     own = getattr(properties.of(obj), stage)
     if stage == "mix":
         own.method, own.group = "lbs", GROUP
@@ -52,7 +52,7 @@ def set_on(obj: bpy.types.Object, stage: str) -> None:
 
 @pytest.fixture
 def arm(tmp_path):
-    """The mesh, and the file that it is saved in."""
+    """The mesh, and the file in which it is saved."""
     obj, _armature = scenes.make_arm(bones=3)
     group = obj.vertex_groups.new(name=GROUP)
     for vertex in obj.data.vertices:
@@ -68,7 +68,7 @@ def stage(request):
 
 
 def with_stage(obj: bpy.types.Object, stage: str) -> tuple[np.ndarray, np.ndarray]:
-    """The final shapes without the stage and with it, which stays on; they differ."""
+    """The final shapes without the stage and with it; it stays on. They differ."""
     scenes.add_sinew(obj, "dq")
     without = scenes.shapes(obj, FRAMES)
     set_on(obj, stage)
@@ -78,7 +78,7 @@ def with_stage(obj: bpy.types.Object, stage: str) -> tuple[np.ndarray, np.ndarra
 
 
 def measured(obj: bpy.types.Object, frame: int, shape: np.ndarray) -> Measured:
-    """The measures of the object's final mesh, which is `shape`, by way of Blender's own evaluations;
+    """The measures of the object's final mesh, which is `shape`, from Blender's own evaluations;
     distances are to the Armature modifier. Leaves the object under dq."""
     subject = measure.gather(bpy.context.scene, [obj])
     shapes = measure.shapes_at(subject, ("dq", evaluate.BLENDER), frame)
@@ -175,7 +175,7 @@ def test_a_bake_has_a_corrective_smooth_that_was_taken_over_once(arm, kind, tmp_
 
 
 def assert_copy_shows(obj: bpy.types.Object, shapes: np.ndarray) -> None:
-    """One by dq, in each of FRAMES."""
+    """A shape by dq, in each of FRAMES."""
     test_comparison.compare(obj, {"dq"})
     for frame, expected in zip(FRAMES, shapes, strict=True):
         bpy.context.scene.frame_set(frame)
@@ -223,7 +223,7 @@ def test_points_and_job_files_take_it(arm, stage, tmp_path):
 
 
 def test_pictures_differ_where_it_does(arm, stage, tmp_path):
-    """--against renders by what the golden pictures were rendered with, unless another is asked for."""
+    """--against renders with the settings of the golden pictures, unless others are given."""
     _obj, path = arm
     render = ("render", path, "--method", "dq", "--frames", "11", "--size", 128)
     run_sinew(*render, *options(stage), "--out", tmp_path / "golden")

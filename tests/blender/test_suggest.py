@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All methods measured over frames, which is best at what, and a click to use it."""
+"""All methods measured over frames, which one is best by which criterion, and a click to use it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_numbers_are_those_of_each_method():
         depsgraph = bpy.context.evaluated_depsgraph_get()
         measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
         assert worst.value == pytest.approx(measured.entry(criterion.entry), rel=1e-5, abs=1e-7)
-    # A bent and twisted arm: linear blending loses most volume.
+    # A bent and twisted arm: linear blending loses the most volume.
     assert abs(suggestion.worst["lbs", "volume"].value) > 2 * abs(suggestion.worst["dq", "volume"].value)
     assert "lbs" not in suggestion.best(next(c for c in CRITERIA if c.name == "volume"))
 
@@ -98,7 +98,7 @@ def test_crossings_are_pairs_without_a_common_vertex():
     )
     triangles = np.array([(0, 1, 2), (3, 4, 5), (0, 1, 6), (5, 6, 7)])
     assert crossing_triangles(points, triangles[[0, 1]]) == {(0, 1)}
-    # Neighbours meet in their vertices.
+    # Adjacent faces share vertices.
     assert crossing_triangles(points, triangles[[0, 2]]) == set()
     assert crossing_triangles(points, triangles[[0, 3]]) == set()
 

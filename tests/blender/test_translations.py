@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's texts in other languages. Blender as a module has no languages: what is shown is tested in a whole
-one, by language_in_window.py."""
+"""Sinew's texts in other languages. Blender as a module has no languages: language_in_window.py tests
+what is shown in a whole Blender."""
 
 from __future__ import annotations
 
@@ -39,12 +39,13 @@ def test_translations_have_the_same_names_in_braces(language):
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_translations_end_as_their_texts_do(language):
-    """A tooltip has no full stop, as Blender adds it; what a button opens has an ellipsis."""
+    """A tooltip has no full stop, as Blender adds it; the text of a button that opens something has an
+    ellipsis."""
 
     def end(text: str) -> str:
         return text[-1] if text[-1] in ".…:" else ""
 
-    # A report of something done to so many meshes: in German a participle, then a colon.
+    # A report of something done to several meshes: in German a participle, then a colon.
     allowed = {"Rebound"}
     texts = translations.LANGUAGES[language].items()
     assert [text for text, other in texts if end(text) != end(other) and text not in allowed] == []
@@ -55,7 +56,7 @@ def test_texts_are_given_the_values_that_they_name():
 
 
 def test_texts_put_together_are_translated_as_a_whole():
-    """No text with words is put together in a panel's code: it would stay English."""
+    """No text with words is assembled in a panel's code, where it would stay English."""
     assert messages.joined_in_code() == []
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undo and redo: of what Sinew reacted to after Blender had made its step, and of edits of all that a shape
-is made of, as what is known of an object outlives a step.
+"""Undo and redo: of Sinew's reactions after Blender made its step, and of edits of everything that a shape
+depends on, since Sinew's records of an object outlive a step.
 
-Blender keeps an object that is the same in both steps, and with it what the object refers to. A test of the
-first kind that fails mostly ends the process.
+Blender keeps an object that is the same in both steps, and what the object refers to. If a test of the first
+kind fails, the process usually crashes.
 """
 
 import bmesh
@@ -22,7 +22,7 @@ def released():
 
 
 def _arm_beside_cube():
-    """An arm with Sinew and shape keys, and a cube beside it; both selected, the cube active."""
+    """An arm with Sinew and shape keys, and a cube next to it; both selected, the cube active."""
     obj, _armature = scenes.make_arm()
     obj.shape_key_add()
     obj.shape_key_add()
@@ -37,7 +37,7 @@ def _arm_beside_cube():
 
 
 def _link_data():
-    """The cube gets the arm's mesh, so that Sinew has to keep the arm's points elsewhere."""
+    """The cube gets the arm's mesh, so that Sinew must store the arm's points elsewhere."""
     arm, cube = bpy.data.objects["Arm"], bpy.data.objects["Cube"]
     bpy.context.view_layer.objects.active = arm
     bpy.ops.ed.undo_push(message="active")
@@ -49,7 +49,7 @@ def _link_data():
 
 
 def _make_keys_absolute():
-    """Blender's keys are then no longer what Sinew deforms by itself: it has a proxy in front."""
+    """Blender's keys are then not what Sinew deforms: it has an upstream proxy."""
     path = 'scene.objects["Arm"].data.shape_keys.use_relative'
     bpy.ops.wm.context_toggle("EXEC_DEFAULT", True, data_path=path)
     arm = bpy.data.objects["Arm"]
@@ -58,7 +58,8 @@ def _make_keys_absolute():
 
 
 def test_undo_of_sculpt_mode():
-    """In it Preserve Volume is set for dq; whatever step Blender goes to, the artist's own comes back."""
+    """There Preserve Volume is set for dq; whichever step Blender goes to, the artist's own value is
+    restored."""
     obj, _armature = scenes.make_arm()
     modifier = obj.modifiers["Armature"]
     scenes.add_sinew(obj, "dq")
@@ -141,7 +142,7 @@ def _fewer_vertices(arm):
 
 
 def _other_mesh(arm):
-    """Of as many vertices."""
+    """Another mesh with the same number of vertices."""
     arm.data = bpy.data.meshes["Spare"]
 
 
@@ -240,7 +241,7 @@ _EDITS = [
 
 
 def _of_modifier(name):
-    """What the Armature modifier makes of an object in Sinew's place."""
+    """The Armature modifier's shape of an object instead of Sinew's."""
     obj = bpy.data.objects[name]
     if not (properties.has_sinew(obj) and properties.of(obj).enabled):
         return scenes.final_points(obj)
@@ -271,7 +272,7 @@ def _assert_same(got, expected, near=1e-6):
 
 
 def _opened_again(tmp_path, edit):
-    """Two arms in a file that was just opened: Sinew has taken to them what is in the first step of undo."""
+    """Two arms in a newly opened file: Sinew has replaced modifiers that are in the first undo step."""
     arm, _rig = scenes.make_arm()
     other, _rig = scenes.make_arm(name="Other")
     other.location.y = 2.0
@@ -322,21 +323,21 @@ _LEAVE_ALONE = [_weights, _points, _key_value, _bone_option, _pose, _added_objec
 def test_what_a_step_leaves_alone_is_not_read_again(edit, tmp_path):
     routes.force(routes.EVALUATION)
     _opened_again(tmp_path, edit)
-    # All meshes are listed after undo of the first step of a file.
+    # All meshes are reported after undo of a file's first step.
     for each in (_pose, edit):
         each(bpy.data.objects["Arm"])
         bpy.context.view_layer.update()
         bpy.ops.ed.undo_push(message=each.__name__)
     known = session.state_of(bpy.data.objects["Other"])
     bound = known.bound
-    # Also a second time: what is done in answer to undo is part of the next step.
+    # Also a second time: reactions to undo are part of the next step.
     for _time in range(2):
         number = known.shown.number
         bpy.ops.ed.undo()
         other = bpy.data.objects["Other"]
         assert session.state_of(other) is known
         assert known.bound is bound
-        # Blender itself evaluates what has an armature after each step: once.
+        # Blender itself evaluates objects with an armature once after each step.
         assert known.shown.number <= number + 1
         assert session.state_of(bpy.data.objects["Arm"]) is not None
         bpy.ops.ed.redo()
@@ -345,7 +346,7 @@ def test_what_a_step_leaves_alone_is_not_read_again(edit, tmp_path):
 
 @pytest.mark.parametrize("edit", [_weights, _points, _bones, _options, _method, _pose])
 def test_undo_while_an_object_is_hidden(edit, tmp_path):
-    """What is not evaluated is in no list of what changed."""
+    """Objects that are not evaluated are in no list of changes."""
     routes.force(routes.EVALUATION)
     _opened_again(tmp_path, edit)
     before = _shapes()

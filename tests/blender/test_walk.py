@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A short walk; `./dev walk` goes further. And what is planted into a walk is found, and made small."""
+"""A short walk; `./dev walk` goes further. Planted faults are found and reduced."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A run in the real window: window_run.py does in a whole Blender what artists do, with the zip installed as
-they install it, and compares the shapes after each step. What it saved is read by a Blender without Sinew."""
+"""A run in the real window: window_run.py does in a whole Blender what artists do, with the zip installed
+as they install it, and compares the shapes after each step. A Blender without Sinew reads the saved
+files."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from conftest import REPOSITORY
 
 SCRIPTS = (REPOSITORY / "docs" / "window.py", *Path(__file__).parent.glob("window_*.py"))
 OPTIONS = ("--enable-event-simulate", "--python-exit-code", "3")
-# Two Blenders at a time. The second is opened again: Blender is started with what it saved last.
+# Two Blenders at a time. The second one is restarted with what it saved last.
 FIRST = ("files", "undo", "windows", "modes", "modifiers", "libraries")
 SECOND = ("objects", "exports", "renders", "hostile", "addon", "quit")
 AGAIN = ("again",)
@@ -27,7 +28,7 @@ AGAIN = ("again",)
 
 @dataclass
 class Results:
-    """What was wrong, by step: in the window, and in the files that the step saved."""
+    """The faults by step: in the window, and in the files that the step saved."""
 
     steps: list[str] = field(default_factory=list)
     shown: dict[str, list[str]] = field(default_factory=dict)
@@ -66,7 +67,7 @@ def results(tmp_path_factory) -> Results:
 
 
 def _run(program: str, folder: Path, groups: tuple[str, ...], found: Results) -> None:
-    # Once, as on the first day; then with the artist's preferences.
+    # First with factory settings, then with the artist's preferences.
     start = ["out/last.blend"] if groups == AGAIN else ["--factory-startup"]
     output = folder / f"{groups[-1]}.log"
     with output.open("w") as log:
@@ -88,7 +89,7 @@ def _run(program: str, folder: Path, groups: tuple[str, ...], found: Results) ->
             stderr=subprocess.STDOUT,
             timeout=1200,
             check=False,
-            # A small screen, as to draw takes most of the time.
+            # A small screen, since drawing takes most of the time.
             env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1000x640"},
         ).returncode
     text = output.read_text(errors="replace")
@@ -123,7 +124,7 @@ def _of(group: str, faults: dict[str, list[str]]) -> dict[str, list[str]]:
     return {step: texts for step, texts in faults.items() if step.partition(":")[0] == group}
 
 
-# Another add-on's errors, and Blender's own.
+# Errors of another add-on, and of Blender itself.
 PRINTING = ("hostile: others_throw", "files: save_where_it_can_not_be", "modifiers: save_as_shape_key")
 GROUPS = pytest.mark.parametrize("group", FIRST + SECOND + AGAIN)
 

@@ -15,7 +15,8 @@ from sinew_addon.ui import stepped
 
 
 def waving_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
-    """Bent most at frames 5, 15 and 25, farthest at 15 and least at 5; at rest at 1, 10, 20 and 30."""
+    """Bent most at frames 5, 15 and 25, of these farthest at 15 and least at 5; at rest at 1, 10, 20 and
+    30."""
     obj, armature = scenes.make_arm()
     scenes.forget_keys(armature)
     for frame, degrees in ((1, 0), (5, 40), (10, 0), (15, 140), (20, 0), (25, 90), (30, 0)):
@@ -52,12 +53,12 @@ def test_leaves_frame_pose_and_file_as_they_were(tmp_path):
     scenes.add_sinew(obj, "dq")
     scene = bpy.context.scene
     scene.frame_set(7, subframe=0.25)
-    # Posed by hand beside its keys.
+    # Posed by hand, in addition to its keys.
     scenes.bend(armature, 33.0)
     bpy.context.view_layer.update()
     before, points = pose_io.read_channels(armature.pose.bones), scenes.final_points(obj)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
-    dirty = bpy.data.is_dirty  # 4.2 without a window calls even a file just saved so
+    dirty = bpy.data.is_dirty  # 4.2 without a window calls even a newly saved file dirty
     bpy.ops.sinew.worst_frames(over="ACTION")
     assert (scene.frame_current, scene.frame_subframe) == (7, 0.25)
     np.testing.assert_array_equal(pose_io.read_channels(armature.pose.bones), before)
@@ -154,7 +155,7 @@ def test_numbers_have_units_and_say_what_they_are():
     assert distances["Distance"].startswith("at most ")
     centimetres = float(distances["Distance"].removeprefix("at most ").removesuffix(" cm"))
     assert centimetres == pytest.approx(100 * summary.distance_max, rel=0.01)
-    # Its own volume at rest, and the other method's numbers as they are where that one is shown.
+    # Its own volume at rest, and the other method's numbers while that one is shown.
     volume = float(rows["Volume"][0].removesuffix(" m\u00b3"))
     assert volume == pytest.approx(measured.rest.volume, rel=0.05)
     obj.sinew.method = "lbs"
@@ -162,7 +163,7 @@ def test_numbers_have_units_and_say_what_they_are():
     again = live.measure(scenes.states_of(obj), "lbs", depsgraph)
     for name in ("volume_change", "stretch_max", "bulge_min", "bulge_max"):
         assert again.measured.entry(name) == pytest.approx(other.entry(name), rel=1e-6)
-    # What is shown is the other method: there is nothing beside it.
+    # The other method is shown: there is nothing to compare with.
     assert live.measured_under_other(again, "lbs", depsgraph) is None
     assert {len(row) for row in heat_panel.rows(scene, again.measured, None)} == {3}
     armature = live.measure(scenes.states_of(obj), "blender", depsgraph)
@@ -170,7 +171,7 @@ def test_numbers_have_units_and_say_what_they_are():
 
 
 def test_measuring_twice_measures_once():
-    """The panel draws often; a frame is worked out once."""
+    """The panel draws often, but computes a frame once."""
     obj, _armature = waving_arm()
     scenes.add_sinew(obj, "dq")
     depsgraph = bpy.context.evaluated_depsgraph_get()

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random walks of operations: a Blender with Sinew beside one without, which does the same.
+"""Random walks of operations, in a Blender with Sinew and in one without, which does the same.
 
     python tests/blender/walk.py --steps 10000 [--seed 0] [--route both|evaluation|update] [--keep DIR]
 
 A walk is a list of operations (walk_operations), each with its own random numbers, so that any of them can
-be left out. Two processes do them: in one Sinew is at work, in the other the Armature modifiers, with
-Preserve Volume where Sinew's method is dq; for methods and stages that Blender lacks, the library is given
-what the Blender without Sinew has (walk_shapes). After most steps the final points of all meshes, what
-renders were given and what the file holds have to be the same; a step after which nobody looks leaves more
-to the next.
+be left out. Two processes execute them: one with Sinew, one with the Armature modifiers, with Preserve
+Volume where Sinew's method is dq. For methods and stages that Blender lacks, the library computes the shape
+from the data of the Blender without Sinew (walk_shapes). After most steps the final points of all meshes,
+the data given to renders and the content of the file must be the same; steps without a comparison leave more
+to the next one.
 
-A walk that fails is cut down to the operations that it needs, and saved as DIR/walk-SEED-ROUTE.py, which does
-them again.
+A failing walk is reduced to the operations that it needs, and saved as DIR/walk-SEED-ROUTE.py, which repeats
+them.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 TOLERANCE = 1e-5
 ROUTES = {"evaluation": "fast", "update": "safe"}
-# Of one file: as long as a failing walk is to be cut down from.
+# Steps in one file: as many as a failing walk can reasonably be reduced from.
 EPISODE = 120
-# A step that hangs.
+# A time limit for steps that hang.
 LIMIT = 60.0
-# After these a comparison's copies are still what their originals are: what is done to the modifiers and the
-# stages of an original they do not follow.
+# After these, a comparison's copies still show what their originals show: they do not follow changes of an
+# original's modifiers and stages.
 FOLLOWED = {
     *("frame", "subframe", "play", "pose", "key_pose", "rest_position", "move_vertices", "weights", "update"),
     *(
@@ -59,7 +59,7 @@ FOLLOWED = {
     ),
     *("render", "touch", "shape_key_value", "shape_key_points", "save_and_load"),
 }
-# A setting, what the artist changes then, and what has Blender evaluate.
+# A setting, the artist's change, and what makes Blender evaluate.
 RUNS = (
     (
         "method",
@@ -87,11 +87,11 @@ RUNS = (
 )
 RUN_SHARE = 0.06
 LOOKS = 0.7
-# What they leave to be opened without Sinew.
+# Files that they leave to be opened without Sinew.
 SAVED = {"save": "walk.blend", "save_copy": "copy.blend"}
-# After these it is Sinew's own choice what it makes of an object: known once it has seen it.
+# After these, Sinew itself chooses how it handles an object, which is known once it has seen it.
 LOOKED_AT = {*SAVED, "delete_sinew_modifier", "delete_modifier", "copy_modifiers"}
-# What Sinew may say of an object that it switches off.
+# What Sinew may report about an object that it switches off.
 SENTENCES = (
     "Armature modifier was deleted",
     "Sinew modifier was deleted",
@@ -105,8 +105,8 @@ SENTENCES = (
 
 @dataclass(frozen=True)
 class Step:
-    """check  whether anybody looks afterwards
-    push   whether there is a step of undo afterwards, which has Blender look at everything, too
+    """check  whether the sides are compared afterwards
+    push   whether an undo step follows, which makes Blender check everything, too
     """
 
     operation: str
@@ -117,7 +117,7 @@ class Step:
 
 @dataclass
 class Fault:
-    """What went wrong in a walk: a kind that stays while it is cut down, and words."""
+    """The fault of a walk: a kind, which stays the same while the walk is reduced, and a description."""
 
     kind: str
     text: str
@@ -142,11 +142,11 @@ class Outcome:
 
 
 class EndedError(Exception):
-    """A process that crashed, or hangs."""
+    """A process that crashed or hangs."""
 
 
 class Side:
-    """A Blender in a process of its own."""
+    """A Blender in its own process."""
 
     def __init__(self, role: str, route: str) -> None:
         self.role = role
@@ -204,7 +204,7 @@ class Side:
 
 
 class Pair:
-    """Sinew and Blender without it, started anew where one of them ended."""
+    """Sinew and Blender without it, restarted if one of them ended."""
 
     def __init__(self, route: str) -> None:
         self.route = route
@@ -224,7 +224,7 @@ class Pair:
         self.sides = self.reader = None
 
     def read(self, path: Path) -> dict:
-        """What a Blender without Sinew makes of a file."""
+        """What a Blender without Sinew shows of a file."""
         if self.reader is None:
             self.reader = Side("blender", ROUTES[self.route])
             self.reader.receive()
@@ -233,7 +233,7 @@ class Pair:
 
     def ready(self) -> tuple[Side, Side]:
         if self.sides is None:
-            # Without buffering in Python: select would not see what is in a buffer.
+            # Without buffering in Python: select does not see what is in a buffer.
             self.sides = (Side("sinew", ROUTES[self.route]), Side("blender", ROUTES[self.route]))
             for side in self.sides:
                 self.blender = side.receive()["blender"]
@@ -241,9 +241,9 @@ class Pair:
 
 
 def make_steps(seed: int, count: int, weights: dict[str, float], looks: float = LOOKS) -> list[Step]:
-    """At random, with runs of what is done to one object without anybody looking in between.
+    """Random operations, with runs of operations on one object without a comparison in between.
 
-    looks  after which share of the steps somebody does; 1 leaves out the runs, too
+    looks  after which share of the steps the sides are compared; 1 also leaves out the runs
     """
     numbers = random.Random(seed)
     names: list[tuple[str, bool, bool]] = []
@@ -280,7 +280,7 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
             if not is_ahead:
                 sinew.send(**request_of(step))
             ours = sinew.receive()
-            # One goes on while the other does the same.
+            # Both sides work at the same time.
             is_ahead = at + 1 < len(steps) and step.operation not in SAVED
             if is_ahead:
                 sinew.send(**request_of(steps[at + 1]))
@@ -304,8 +304,8 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
                 saved = pair.read(sinew.folder / name)
                 outcome.fault = compare_saved(outcome, at, saved, ours, theirs)
                 if outcome.fault is not None:
-                    # What Blender itself loads otherwise than it saved it: a driver's value whose target is
-                    # gone, bones in edit mode.
+                    # What Blender itself loads differently from what it saved: a driver's value whose target
+                    # is missing, and bones in edit mode.
                     loaded = {**theirs, "shapes": pair.read(blender.folder / name)["shapes"]}
                     outcome.fault = compare_saved(outcome, at, saved, ours, loaded)
             if outcome.fault is not None and is_ahead:
@@ -319,7 +319,7 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
 
 
 def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) -> Fault | None:
-    """What differs between the two sides after a step."""
+    """The differences between the two sides after a step."""
     fault = compare_words(at, ours, theirs)
     if fault is not None or "shapes" not in ours:
         return fault
@@ -336,7 +336,7 @@ def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) 
 
 
 def exception_of(problems: list[str], at: int) -> Fault:
-    """Named by the exception raised last, without what differs from run to run."""
+    """The name of the last exception, without parts that differ between runs."""
     text = "\n".join(problems)
     raised = re.findall(r"^(\w+(?:Error|Exception|Warning)\b.*)$", text, re.MULTILINE) or [
         text.splitlines()[-1]
@@ -348,7 +348,7 @@ def exception_of(problems: list[str], at: int) -> Fault:
 
 
 def compare_words(at: int, ours: dict, theirs: dict) -> Fault | None:
-    """What the step raised, returned and said, and what it left behind."""
+    """What the step raised, returned, reported and left behind."""
     if ours["problems"]:
         return exception_of(ours["problems"], at)
     if ours.get("outcome") != theirs.get("outcome"):
@@ -367,7 +367,7 @@ def compare_words(at: int, ours: dict, theirs: dict) -> Fault | None:
 
 
 def compare_files(at: int, ours: dict, theirs: dict) -> Fault | None:
-    """What the open files hold."""
+    """Compares the content of the open files."""
     if theirs["wrong"]:
         return Fault("settings", "; ".join(theirs["wrong"]), at)
     different = differing(ours["state"], theirs["state"])
@@ -419,7 +419,8 @@ def compare_renders(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped
 def compare_copies(
     outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str], blender: Side
 ) -> Fault | None:
-    """Copies of the comparison in the viewport, each beside the Armature modifier's shape for its method."""
+    """Copies of the comparison in the viewport, each compared with the Armature modifier's shape for its
+    method."""
     if not ours.get("copies") or not outcome.copies_follow:
         return None
     wanted = [key for key in ours["copies"] if key[0] not in skipped or key[0] in theirs["shapes"]]
@@ -430,7 +431,7 @@ def compare_copies(
         if key[0] in skipped and key[0] in ours["skipped"]:
             continue
         if points.shape == other.shape and len(points):
-            # Shown beside the original.
+            # Shown next to the original.
             points = points - (points - other).mean(axis=0)
         fault = differ(outcome, at, f"the copy of {key[0]} by {key[1]}", points, other)
         if fault is not None:
@@ -439,10 +440,10 @@ def compare_copies(
 
 
 def compare_saved(outcome: Outcome, at: int, saved: dict, ours: dict, theirs: dict) -> Fault | None:
-    """What differs between a file that Sinew's side saved, opened without Sinew, and the other side."""
+    """The differences between a file that Sinew's side saved, opened without Sinew, and the other side."""
     if "shapes" not in ours:
         return None
-    # Where inverse kinematics is live, the file plays by Blender's constraints.
+    # With live inverse kinematics, the file plays with Blender's constraints.
     skipped = {*ours["skipped"], *theirs["skipped"]}
     for name, (other, _matrix) in theirs["shapes"].items():
         if name in skipped:
@@ -482,11 +483,11 @@ def differing(ours: dict, theirs: dict) -> list[str]:
     return found
 
 
-# --- A failing walk made small
+# --- Reducing a failing walk
 
 
 def shrink(pair: Pair, outcome: Outcome, seconds: float = 120.0) -> Outcome:
-    """The same fault with the fewest operations: parts are left out, larger ones first (ddmin)."""
+    """The same fault with the fewest operations: leaves out parts, larger ones first (ddmin)."""
     until = time.monotonic() + seconds
     best = outcome
     steps = list(outcome.steps[: outcome.fault.step + 1])
@@ -515,7 +516,7 @@ def shrink(pair: Pair, outcome: Outcome, seconds: float = 120.0) -> Outcome:
         if size == 1 and not removed:
             break
         size = size // 2 if size > 1 else 1
-    # Nobody needs to look but at the end, and undo needs few steps.
+    # A comparison is only needed at the end, and undo needs few steps.
     for index in range(len(steps) - 1):
         for unneeded in ("check", "push"):
             if index < len(steps) - 1 and getattr(steps[index], unneeded):
@@ -570,7 +571,7 @@ def save(pair: Pair, outcome: Outcome, keep: Path) -> Path:
 
 
 def replay(steps: Sequence[Step], route: str) -> int:
-    """Does the steps, says each, and what goes wrong."""
+    """Executes the steps, and prints each of them and its faults."""
     with Pair(route) as pair:
         outcome = walk(pair, 0, steps)
     for number, text in enumerate(outcome.said):
@@ -586,7 +587,7 @@ def replay(steps: Sequence[Step], route: str) -> int:
 
 
 def operation_weights() -> dict[str, float]:
-    """By the name of each operation: how often it is chosen, beside the others."""
+    """The relative frequency of each operation, by name."""
     text = (HERE / "walk_operations.py").read_text()
     found = re.findall(r"^@operation\(([\d.]+)\)\ndef (\w+)\(", text, re.MULTILINE)
     return {name: float(weight) for weight, name in found}
@@ -603,11 +604,11 @@ def run(
     looks: float = LOOKS,
     say: Callable[[str], None] = print,
 ) -> list[Outcome]:
-    """Walks of `steps` operations in all by each route; those that fail are made small and saved in `keep`.
+    """Walks of `steps` operations in total by each route; failing ones are reduced and saved in `keep`.
 
     without  operations that are left out
-    seconds  for making a walk small
-    looks    after which share of the steps somebody does
+    seconds  for reducing a walk
+    looks    after which share of the steps the sides are compared
     """
     weights = {name: weight for name, weight in operation_weights().items() if name not in without}
     outcomes = []
@@ -627,7 +628,7 @@ def run(
                         say(f"    {text}")
                     say(f"  {small.fault.kind}: {small.fault.text[:600]}")
                     say(f"  {len(small.said)} operations, saved as {outcome.script}")
-                    # Whatever the fault left behind in the process.
+                    # Discards whatever the fault left behind in the process.
                     pair.close()
     return outcomes
 

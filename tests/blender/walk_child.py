@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One side of a walk in a process of its own, started by walk.py, as its Blender may crash.
+"""One side of a walk in its own process, started by walk.py, as its Blender may crash.
 
     python walk_child.py sinew|blender fast|safe FOLDER
 
-Reads pickled requests from its input and answers each on its output; Blender's own output goes nowhere, and
-what it writes to its error output is looked through for exceptions.
+Reads pickled requests from its input and answers each on its output. Blender's own output is discarded, and
+its error output is searched for exceptions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 
 
 class Render:
-    """What a render was given of each mesh, by Blender's evaluation for it."""
+    """The shape of each mesh in Blender's evaluation for a render."""
 
     def __init__(self) -> None:
         self.shapes: dict[str, object] = {}
@@ -29,7 +29,7 @@ def make_engine(walker, points_of) -> type:
     import bpy
 
     class WalkRender(bpy.types.RenderEngine):
-        """Draws nothing, and keeps the shapes: a render of any other engine takes a second."""
+        """Draws nothing, and stores the shapes: any other engine needs a second for a render."""
 
         bl_idname = "WALK_RENDER"
         bl_label = "Walk"
@@ -66,7 +66,7 @@ class Child:
         self.walker.expect_rendered = self.expect_rendered
         bpy.utils.register_class(make_engine(self.walker, self.points_of))
         self.claims: dict = {}
-        # Of Sinew's side, while inverse kinematics is live: the bones of all armatures, as evaluated there.
+        # On Sinew's side, with live inverse kinematics: the bones of all armatures in that evaluation.
         self.poses: dict = {}
         self.wrong: list[str] = []
         walk_operations.make_library(self.walker)
@@ -79,25 +79,25 @@ class Child:
         self.side.compute_beside(False)
         self.operations.start(self.walker)
         self.bpy.ops.ed.undo_push(message="start")
-        # Those of a file that a walk before has left broken.
+        # Those of a file that an earlier walk left broken.
         self.problems()
         return {"said": "start", "problems": self.problems(), **self.look(check=True)}
 
     def step(self, request: dict) -> dict:
         name, seed = request["operation"], request["seed"]
-        # Sinew's side says how it is set before this operation and after it.
+        # Sinew's side reports its settings before this operation and after it.
         self.claims = request.get("claims_before") or {}
         self.wrong = []
         if not self.side.is_sinew:
             self.poses = request["poses_before"]
-            # Which objects an operation can choose depends on it.
+            # The objects that an operation can choose depend on it.
             self.side.adopt(self.claims)
         numbers = random.Random(seed)
         operation = self.operations.OPERATIONS[name]
         self.walker.rendered, self.walker.rendered_by_library = {}, {}
         outcome, said = "done", None
         try:
-            # What would keep a pose that is not the same on both sides.
+            # Operations that would store a pose that differs between the sides.
             if not (self.poses and name in self.operations.NOT_WHILE_LIVE):
                 said = operation.act(self.walker, numbers)
             if said is None:
@@ -122,7 +122,7 @@ class Child:
         return result
 
     def open(self, request: dict) -> dict:
-        """The shapes of a file that the other side saved: what somebody without Sinew sees."""
+        """The shapes of a file that the other side saved, as seen without Sinew."""
         self.bpy.ops.wm.open_mainfile(filepath=request["path"])
         self.bpy.context.view_layer.update()
         shapes, _skipped = self.shapes(self.bpy.context.evaluated_depsgraph_get())
@@ -133,7 +133,7 @@ class Child:
             self.wrong += self.side.bring_in_line(self.claims)
 
     def problems(self) -> list[str]:
-        """Exceptions that were printed or logged since the last time."""
+        """Exceptions that were printed or logged since the last call."""
         sys.stderr.flush()
         with self.errors.open("rb") as file:
             file.seek(self.read_to)
@@ -148,10 +148,10 @@ class Child:
             self.side.records.errors = []
         return found
 
-    # --- What is there
+    # --- State
 
     def look(self, check: bool) -> dict:
-        """What can be said of the file: how Sinew is set, and after an evaluation the shapes."""
+        """The state of the file: Sinew's settings and, after an evaluation, the shapes."""
         if not check:
             if not self.side.is_sinew:
                 return {}
@@ -183,7 +183,7 @@ class Child:
         return found
 
     def all_expected(self, follows) -> dict:
-        """Points of objects that are shown, and whose shape is none of Blender's own.
+        """Points of visible objects whose shape Blender can not compute.
 
         follows  those that follow what is solved live
         """
@@ -205,8 +205,8 @@ class Child:
         return points
 
     def shapes(self, depsgraph) -> tuple[dict, list[str]]:
-        """Points and matrix of each mesh of the view layer that is shown; the names of those whose shape
-        another side can not know."""
+        """Points and matrix of each mesh in the visible view layer; the names of those whose shape the
+        other side can not know."""
         found, skipped = {}, []
         for obj in self.bpy.context.view_layer.objects:
             if obj.type != "MESH" or self.side.may_react(obj) or not obj.visible_get():
@@ -226,7 +226,7 @@ class Child:
         return found, skipped
 
     def is_unknown(self, obj) -> bool:
-        """Whether Blender's side can not say what Sinew's shape is."""
+        """Whether Blender's side can not compute Sinew's shape."""
         side = self.side
         if obj.library is not None:
             # Saved as Sinew had it.
@@ -241,7 +241,7 @@ class Child:
                 for modifier in self.sides.armature_modifiers(obj)
                 if f'modifiers["{modifier.name}"].use_deform_preserve_volume' in paths
             }
-            # Sinew's method is that of its run, and the walk keys all.
+            # Sinew's method is that of its run, and the walk keys all of them.
             if keyed != set(run) or not side.is_on(obj):
                 return True
         if not side.is_on(obj):
@@ -255,7 +255,7 @@ class Child:
                 self.walker.rendered_by_library[name] = points
 
     def expected(self, obj, render=None):
-        """The points of an object whose shape is none of Blender's own; None where nobody knows them."""
+        """The points of an object whose shape Blender can not compute; None if they are unknown."""
         side, claim = self.side, self.claims.get(obj.name_full)
         if obj.library is not None or side.is_method_keyed(obj) or self.has_other_scale(obj):
             return None
@@ -267,9 +267,9 @@ class Child:
         )
 
     def has_other_scale(self, obj) -> bool:
-        """Whether Sinew makes something else of scaled bones than the modifier does."""
+        """Whether Sinew deforms scaled bones differently from the modifier."""
         rule = (self.claims.get(obj.name_full) or {"rule": ""})["rule"]
-        # A constraint between armatures of other sizes scales a bone that has no scale of its own.
+        # A constraint between armatures of different sizes scales a bone that has no scale of its own.
         scaled = any(
             tuple(round(s, 5) for s in bone.scale) != (1, 1, 1) or len(bone.constraints)
             for modifier in self.sides.armature_modifiers(obj)
@@ -286,7 +286,7 @@ class Child:
         }
 
     def shapes_by(self, request: dict) -> dict:
-        """What the originals of a comparison are by each method: those with one Armature modifier."""
+        """The shapes by each method of a comparison's originals, if these have one Armature modifier."""
         found = {}
         for name, method in request["copies"]:
             obj = self.bpy.context.view_layer.objects.get(name)
@@ -315,13 +315,13 @@ class Child:
         return found
 
     def state(self) -> dict[str, object]:
-        """What the file holds beside shapes, without what is Sinew's own."""
+        """The content of the file besides shapes, without Sinew's own."""
         bpy = self.bpy
         found: dict[str, object] = {
             "scene": bpy.context.scene.name,
             "frame": bpy.context.scene.frame_current,
-            # Linked ones that nobody uses any more go or stay by counts that Blender keeps of settings, too.
-            # Of those in no scene, too.
+            # Whether unused linked data stays depends on user counts, which Blender also keeps for settings.
+            # Includes objects in no scene.
             "objects": [
                 o.name_full for o in self.walker.objects() if o.library is None and o.users_collection
             ],
@@ -332,7 +332,7 @@ class Child:
         found["armatures"] = sorted(
             a.name_full
             for a in bpy.data.armatures
-            # Of a follower that was purged its bones are left, without a user: no file has them.
+            # If a follower was purged, its bones remain without a user, and are not saved.
             if not (a.library or a in of_helpers or (a.users == 0 and "Sinew IK" in a.name))
         )
         found["collections"] = [c.name for c in self.walker.collections()]
@@ -341,7 +341,7 @@ class Child:
                 found[f"object {obj.name_full}"] = self.object_state(obj)
         for obj in self.walker.objects("ARMATURE"):
             if obj.library is None and obj.users_collection:
-                # Those of edit mode are known to others when Blender next needs them.
+                # Changes in edit mode become visible to others when Blender next needs them.
                 bones = [] if obj.data.is_editmode else [bone.name for bone in obj.data.bones]
                 found[f"armature {obj.name_full}"] = bones
         return found
@@ -369,7 +369,8 @@ class Child:
             found["armature modifiers"] = [
                 {
                     "name": m.name,
-                    # Keyed ones are as Blender has evaluated them last, which it does not while hidden.
+                    # Keyed values are those that Blender evaluated last, which it does not do while they are
+                    # hidden.
                     "on": [
                         getattr(m, name) if m.path_from_id(name) not in keyed else "animated"
                         for name in ("show_viewport", "show_render")
@@ -394,7 +395,7 @@ def main() -> int:
     os.dup2(nowhere, 0)
     os.dup2(nowhere, 1)
     errors = folder / "errors.txt"
-    # Appended to, so that where others write does not depend on where this file is read.
+    # Opened for appending, so that others' writing does not depend on how far this file was read.
     file = os.open(errors, os.O_CREAT | os.O_RDWR | os.O_APPEND | os.O_TRUNC)
     os.dup2(file, 2)
     sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
@@ -412,7 +413,7 @@ def main() -> int:
         except EOFError:
             break
         answer(ways[request["what"]](request))
-    # Without the ending of Blender as a module, which can crash or hang by itself.
+    # Skips the exit of Blender as a module, which can crash or hang by itself.
     os._exit(0)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether normals that Sinew gave to an evaluated mesh are those of its points, edges and faces as they are.
+"""Checks whether normals that Sinew gave to an evaluated mesh belong to its current points, edges and faces.
 
-The library is the oracle: test_normals.py compares it with Blender. It is told here what the mesh has now, so
-it finds normals of an earlier frame, of other sharp edges, or that modifiers behind took along.
+The oracle is the library, which test_normals.py compares with Blender. Here it gets the mesh's current data,
+so it detects normals of an earlier frame, of other sharp edges, or changed by later modifiers.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ NEAR = 1e-4
 
 
 def faults(obj: bpy.types.Object, mesh: bpy.types.Mesh, points: np.ndarray) -> list[str]:
-    """A sentence where they are not.
+    """A sentence if they differ.
 
     mesh    evaluated
     points  float32 [vertices, 3], its own

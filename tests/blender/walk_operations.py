@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operations of a walk: each does the same to the file on both sides (walk_sides), decided by the random
-numbers that it is given and by what the file holds.
+"""The operations of a walk. Each does the same to the file on both sides (walk_sides), depending on its
+random numbers and the file's content.
 
-An operation returns in words what it did, or None where the file has nothing for it.
+An operation returns a description of what it did, or None if the file has nothing for it.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from walk_sides import (
 )
 
 FRAMES = (1, 11)
-# What inverse kinematics follows.
+# Targets of inverse kinematics.
 TARGET = "target"
-# While it is live, poses differ between the sides, and these would keep them.
+# While it is live, poses differ between the sides, and these operations would store them.
 NOT_WHILE_LIVE = {
     *("parent", "parent_as_artists_do", "join", "remesh", "replace_mesh", "apply_transform", "apply_pose"),
     *("apply_modifier", "convert_to_mesh", "mend", "compare"),
 }
-# No turn of a bone against another by as much as half a turn, where dual quaternions meet a discontinuity.
+# Rotations of a bone relative to another stay below 180 degrees, where dual quaternions are discontinuous.
 TURN = 0.8
 
 
@@ -52,7 +52,7 @@ OPERATIONS: dict[str, Operation] = {}
 
 
 def operation(weight: float):
-    """weight  how often it is chosen, beside the others"""
+    """weight  its relative frequency"""
 
     def register(act: Callable) -> Callable:
         name = act.__name__
@@ -70,19 +70,19 @@ class Walker:
         self.folder = folder
         self.number = 0
         self.rendered: dict[str, np.ndarray] = {}
-        # What renders should be given of shapes that are none of Blender's own, where that is known.
+        # The expected data of renders for shapes that Blender can not compute, where known.
         self.rendered_by_library: dict[str, np.ndarray] = {}
         self.expect_rendered: Callable[[str, bpy.types.Object, bpy.types.Depsgraph], None] = (
             lambda *_arguments: None
         )
         self.chosen = ""
         self.compared = False
-        # Changed since the last step of undo: Blender's own operations always push one.
+        # Changed since the last undo step: Blender's own operators always push one.
         self.unpushed = False
-        # What an operation that evaluates by itself needs to have set before.
+        # What must be set before an operation that itself evaluates.
         self.before_evaluation: Callable[[], None] = lambda: None
 
-    # --- What there is
+    # --- Content of the file
 
     def objects(self, kind: str | None = None) -> list[bpy.types.Object]:
         found = [
@@ -93,7 +93,7 @@ class Walker:
         return sorted(found, key=lambda o: o.name_full)
 
     def meshes(self) -> list[bpy.types.Object]:
-        """Of the current view layer, without those of other files."""
+        """Objects of the current view layer, without those of other files."""
         there = self.in_layer()
         return [o for o in self.objects("MESH") if o.library is None and o in there]
 
@@ -102,7 +102,7 @@ class Walker:
         return [o for o in self.objects("ARMATURE") if o.library is None and o in there]
 
     def in_layer(self) -> set[bpy.types.Object]:
-        """What the current view layer has; asked so, Blender counts what was linked just now, too."""
+        """The content of the current view layer; this query makes Blender include newly linked objects."""
         bpy.context.scene.camera.visible_get()
         return set(bpy.context.view_layer.objects)
 
@@ -117,7 +117,7 @@ class Walker:
         )
 
     def users(self, mesh: bpy.types.Mesh) -> int:
-        """Objects that have it, without Sinew's own."""
+        """Objects with this data, without Sinew's own."""
         return sum(obj.data == mesh for obj in self.objects("MESH"))
 
     def shares_action(self, obj: bpy.types.Object) -> bool:
@@ -128,8 +128,9 @@ class Walker:
         return own is not None and any(o != obj and action(o) == own for o in self.objects())
 
     def may_lose_sinew(self, obj: bpy.types.Object) -> bool:
-        """Not one that plays keys of the method with a linked duplicate: Sinew leaves them to that one, on
-        the other side they are keys of Preserve Volume, which count without Sinew, too."""
+        """Excludes one that plays keys of the method together with a linked duplicate: Sinew leaves them
+        to that one, but on the other side they are keys of Preserve Volume, which also apply without
+        Sinew."""
         return not (self.side.is_method_keyed(obj) and self.shares_action(obj))
 
     def new_name(self, kind: str) -> str:
@@ -144,7 +145,7 @@ class Walker:
         return r.choice(choices) if choices else None
 
     def mesh(self, r: random.Random, wanted: Callable | None = None) -> bpy.types.Object | None:
-        """Often the one that was chosen last: faults come of what is done to one object in a row."""
+        """Often the last chosen one, since faults result from several operations on one object."""
         choices = [o for o in self.meshes() if wanted is None or wanted(o)]
         again = next((o for o in choices if o.name == self.chosen), None)
         chosen = self.one(r, choices)
@@ -161,7 +162,7 @@ class Walker:
         return self.mesh(r, self.side.has_sinew)
 
     def editable(self, r: random.Random) -> bpy.types.Object | None:
-        """With a mesh that can be edited."""
+        """Objects with a mesh that can be edited."""
         return self.mesh(r, self.is_editable)
 
     @staticmethod
@@ -171,7 +172,7 @@ class Walker:
     def armature(self, r: random.Random) -> bpy.types.Object | None:
         return self.one(r, self.armatures())
 
-    # --- Doing
+    # --- Actions
 
     def object_mode(self) -> None:
         active = bpy.context.view_layer.objects.active
@@ -181,36 +182,38 @@ class Walker:
 
     def push_undo(self) -> None:
         if self.unpushed:
-            # Where data was made or deleted, as Sinew does for itself, a step of edit mode comes with one of
-            # the whole file.
+            # Where data was created or deleted, such as Sinew does for itself, a step of edit mode is
+            # accompanied by one of the whole file.
             bpy.data.texts.remove(bpy.data.texts.new("walk"))
             bpy.ops.ed.undo_push(message="step")
         self.unpushed = False
 
     def this_frame(self) -> None:
-        """Takes back what was changed without a key where there are keys: nobody counts on that to last."""
+        """Restores what was changed without a key where there are keys: such changes are not expected to
+        last."""
         self.before_evaluation()
         bpy.context.scene.frame_set(bpy.context.scene.frame_current)
 
     def this_scene(self) -> None:
-        """Has the originals of what is animated as they are in the scene that is shown. Those that another
-        scene's frame has set Blender copies at whatever edit (4.2 and 4.5: at one of another armature), and
-        does not evaluate what depends on them: what is shown then depends on what else was touched, which is
-        not the same with Sinew."""
+        """Updates the originals of animated data to the visible scene. If another scene's frame has set
+        them, Blender copies them at any edit (4.2 and 4.5: at an edit of another armature) without
+        evaluating what depends on them. What is shown would then depend on what else was touched, which
+        differs with Sinew."""
         self.before_evaluation()
-        # By this the evaluation is that of the window, which alone writes to originals.
+        # This makes the evaluation that of the window, which is the only one that writes to originals.
         bpy.context.evaluated_depsgraph_get()
         self.this_frame()
 
     def edit_mode(self) -> None:
-        """With the step of undo that Blender's own key pushes: undo without one crashes it (5.2). What was
-        changed before has its own: whether Blender makes one for it depends on what else is in the file."""
+        """Includes the undo step that Blender's own keying operator pushes: undo without one crashes it
+        (5.2). Earlier changes have their own step: whether Blender makes one for them depends on what
+        else is in the file."""
         self.push_undo()
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.ed.undo_push(message="edit mode")
 
     def select(self, *objects: bpy.types.Object) -> bool:
-        """The last one active; whether all can be."""
+        """Selects these; the last one becomes active. Returns whether all can be selected."""
         self.object_mode()
         for obj in bpy.context.view_layer.objects:
             if obj.select_get():
@@ -270,7 +273,7 @@ def make_rig(name: str, bones: Sequence[str], collection: bpy.types.Collection) 
 
 
 def start(walker: Walker) -> None:
-    """An empty file with two armatures, three meshes of theirs and one without."""
+    """An empty file with two armatures, three meshes that they deform, and one other mesh."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     walker.number, walker.unpushed, walker.chosen = 0, False, ""
     walker.compared = False
@@ -326,7 +329,7 @@ def make_library(walker: Walker) -> None:
 
 
 def _method(r: random.Random) -> str:
-    """Half of the time one whose shape Blender itself makes."""
+    """Half of the time a method that Blender itself has."""
     return r.choice(OF_BLENDER if r.random() < 0.5 else METHODS[len(OF_BLENDER) :])
 
 
@@ -366,9 +369,9 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
     w.object_mode()
     w.side.end_comparison()
     w.side.end_live()
-    # What the current view layer does not have, too.
+    # Includes objects outside the current view layer.
     for obj in [o for o in w.objects("MESH") if w.side.has_sinew(o) and o.library is None]:
-        # What comes from a library with Sinew has it again when the file is loaded.
+        # An object from a library with Sinew has it again when the file is loaded.
         if obj.override_library is None:
             w.side.remove(obj)
         else:
@@ -398,11 +401,11 @@ def stages(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def parameters(w: Walker, r: random.Random) -> str | None:
-    """Of methods: what they change is seen where the method is used."""
+    """Parameters of methods: changes are visible where the method is used."""
     obj, value = w.mesh(r, w.side.has_sinew), r.choice(("nlerp", "slerp"))
     if obj is None:
         return None
-    # Sinew evaluates at once, and others what was changed before along with it.
+    # Sinew evaluates immediately, and with it what was changed before.
     w.before_evaluation()
     bpy.context.view_layer.update()
     if w.side.is_sinew:
@@ -421,7 +424,7 @@ def compute_beside(w: Walker, r: random.Random) -> str | None:
 
 @operation(1.5)
 def sdef_keys(w: Walker, r: random.Random) -> str | None:
-    """As mmd_tools stores them."""
+    """Data as mmd_tools stores it."""
     obj = w.editable(r)
     if obj is None or obj.data.library is not None or obj.mode != "OBJECT" or w.users(obj.data) > 1:
         return None
@@ -521,7 +524,7 @@ def compare(w: Walker, r: random.Random) -> str | None:
         lambda o: (
             bool(armature_modifiers(o))
             and o.override_library is None
-            # Which Sinew refuses.
+            # Sinew refuses this.
             and not (o.parent_type == "ARMATURE" and armature_modifiers(o)[0].use_multi_modifier)
         ),
     )
@@ -530,7 +533,7 @@ def compare(w: Walker, r: random.Random) -> str | None:
         return None
     w.object_mode()
     w.side.start_comparison([obj], methods)
-    # Its copies share the mesh, which not all operations take.
+    # Its copies share the mesh, which some operations refuse.
     w.compared = True
     return f"compare {obj.name} by {', '.join(methods)}"
 
@@ -548,16 +551,16 @@ def arrange_comparison(w: Walker, r: random.Random) -> str | None:
     return f"comparison {how}"
 
 
-# --- A character: what is set for all meshes of an armature
+# --- Characters: settings for all meshes of an armature
 
 
 def _character(w: Walker, r: random.Random) -> bpy.types.Object | None:
-    """The armature of one that can be selected, and whose settings no keys or library decide."""
+    """The armature of a character that can be selected, and whose settings no keys or library determine."""
 
     def is_free(obj: bpy.types.Object) -> bool:
         return obj.library is None and obj.override_library is None and not w.side.is_method_keyed(obj)
 
-    # As a window does between two clicks: Sinew knows by then which armature a modifier has.
+    # As in a window between two clicks: by then Sinew knows a modifier's armature.
     w.before_evaluation()
     bpy.context.view_layer.update()
     if not all(_has_its_armatures(obj) for obj in w.objects("MESH") if w.side.has_sinew(obj)):
@@ -568,7 +571,7 @@ def _character(w: Walker, r: random.Random) -> bpy.types.Object | None:
 
 
 def _has_its_armatures(obj: bpy.types.Object) -> bool:
-    """Sinew remembers the armature of a mesh that lost it, as one of its character."""
+    """Sinew remembers the armature of a mesh that lost it, as part of its character."""
     modifiers = armature_modifiers(obj)
     return bool(modifiers) and all(modifier.object is not None for modifier in modifiers)
 
@@ -606,7 +609,7 @@ def preset(w: Walker, r: random.Random) -> str | None:
 
 @operation(1.5)
 def mend(w: Walker, r: random.Random) -> str | None:
-    """What diagnostics find in the weights."""
+    """Findings of diagnostics in the weights."""
     obj, how, most = w.editable(r), r.choice(("limit", "limit", "normalize", "fill")), r.choice((1, 2, 3))
     if obj is None or obj.mode != "OBJECT" or obj.data.is_editmode or obj.parent_type == "ARMATURE":
         return None
@@ -620,7 +623,7 @@ def mend(w: Walker, r: random.Random) -> str | None:
 
 
 def _and_undo(w: Walker, r: random.Random, act: Callable[[], str]) -> str:
-    """Does what only Sinew's side can, and takes it back. No redo leads there again."""
+    """Does what only Sinew's side can do, and undoes it. No redo leads there again."""
     w.object_mode()
     w.this_frame()
     w.unpushed = True
@@ -672,7 +675,7 @@ def restart(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.3)
 def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
-    # Blender's own button does not take what comes from a library off an override.
+    # Blender's own button does not remove objects of a library from an override.
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None and w.may_lose_sinew(o))
     if obj is None or not w.side.is_on(obj):
         return None
@@ -823,7 +826,7 @@ def clear_animation(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def push_action(w: Walker, r: random.Random) -> str | None:
-    """Into a strip, as for layers of animation."""
+    """Moves it into a strip, as for layers of animation."""
     rig = w.armature(r)
     animation = rig.animation_data if rig is not None else None
     if animation is None or animation.action is None or rig.override_library is not None:
@@ -865,7 +868,7 @@ def constrain_bone(w: Walker, r: random.Random) -> str | None:
 
 @operation(1.5)
 def ik_chain(w: Walker, r: random.Random) -> str | None:
-    """A chain of bones that follows a target, or no longer does."""
+    """A chain of bones starts or stops following a target."""
     rig = w.armature(r)
     if rig is None or rig.override_library is not None or rig.data.is_editmode:
         return None
@@ -887,7 +890,7 @@ def ik_chain(w: Walker, r: random.Random) -> str | None:
 
 @operation(2.5)
 def live_ik(w: Walker, r: random.Random) -> str | None:
-    """Sinew solves an armature's chains, or gives them back."""
+    """Sinew starts or stops solving an armature's chains."""
 
     def has_chain(rig: bpy.types.Object) -> bool:
         return rig.mode == "OBJECT" and any(
@@ -915,7 +918,7 @@ def move_target(w: Walker, r: random.Random) -> str | None:
     return f"{target.name} moves by a key at {frame}"
 
 
-# --- Places
+# --- Positions
 
 
 @operation(3)
@@ -954,7 +957,7 @@ def parent(w: Walker, r: random.Random) -> str | None:
     obj.parent = None if kind == "none" else rig
     if kind == "none":
         obj.parent_type = "OBJECT"
-        # Blender by itself goes on with the shape that a parent of type Armature made.
+        # Blender by itself keeps the shape that a parent of type Armature made.
         obj.update_tag()
         return f"{obj.name} without a parent"
     obj.parent_type = kind
@@ -966,8 +969,8 @@ def parent(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def parent_as_artists_do(w: Walker, r: random.Random) -> str | None:
-    """The command gives a mesh an Armature modifier where none of its own points to the armature, as those do
-    not that Sinew has cleared."""
+    """The command adds an Armature modifier to a mesh if none of its own points to the armature, such as
+    those that Sinew has cleared."""
     obj, rig = w.mesh(r, lambda o: not w.side.has_sinew(o)), w.armature(r)
     is_plain = obj is not None and obj.override_library is None and obj.parent_type != "ARMATURE"
     if not is_plain or rig is None or len(w.modifiers(obj)) > 5 or not w.select(obj, rig):
@@ -988,8 +991,8 @@ def _vertices(w: Walker, r: random.Random, obj: bpy.types.Object) -> list[int]:
 
 
 def _show_weights(obj: bpy.types.Object) -> None:
-    """Weights and names of groups that change through an object that Blender does not evaluate, it shows in
-    none of the others that have the mesh (seen on 4.2 and 5.2)."""
+    """If weights and names of groups are changed through an object that Blender does not evaluate, the
+    change is not shown on other objects with the mesh (seen on 4.2 and 5.2)."""
     if not obj.visible_get():
         obj.data.update()
 
@@ -1019,7 +1022,7 @@ def paint_weights(w: Walker, r: random.Random) -> str | None:
         return None
     w.push_undo()
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-    # As a window does: tools ask for the armature behind the modifiers, which Sinew gives back meanwhile.
+    # As in a window: tools need the armature of the modifiers, which Sinew restores meanwhile.
     w.before_evaluation()
     bpy.context.view_layer.update()
     obj.vertex_groups.active_index = r.randrange(len(obj.vertex_groups))
@@ -1064,7 +1067,7 @@ def groups(w: Walker, r: random.Random) -> str | None:
     if what == "delete":
         name = group.name
         obj.vertex_groups.remove(group)
-        # Blender 4.2 by itself goes on with the groups of before.
+        # Blender 4.2 by itself continues with the old groups.
         obj.data.update()
         return f"delete group {name} of {obj.name}"
     if not w.select(obj):
@@ -1171,7 +1174,7 @@ def share_mesh(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def join(w: Walker, r: random.Random) -> str | None:
-    """An object that Sinew does not deform into any other."""
+    """Joins an object that Sinew does not deform to another one."""
     others = [o for o in w.meshes() if not w.side.has_sinew(o) and o.override_library is None]
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
     other = w.one(r, [o for o in others if o != obj and w.users(o.data) == 1])
@@ -1184,7 +1187,7 @@ def join(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def separate(w: Walker, r: random.Random) -> str | None:
-    """A part of a mesh becomes an object of its own, with all that its object has."""
+    """Separates a part of a mesh into a new object that keeps all of the old object's data."""
     obj = w.editable(r)
     if obj is None or len(w.meshes()) > 6 or w.users(obj.data) > 1 or len(obj.data.vertices) < 20:
         return None
@@ -1218,7 +1221,7 @@ def remesh(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.3)
 def replace_mesh(w: Walker, r: random.Random) -> str | None:
-    """In all that have it, as scripts do that bring a mesh up to date."""
+    """Changes it in all that have it, like scripts that update a mesh."""
     obj = w.editable(r)
     if obj is None or obj.data.is_editmode or obj.mode != "OBJECT":
         return None
@@ -1235,7 +1238,8 @@ def apply_transform(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
     if obj is None or w.users(obj.data) > 1 or w.compared or not w.select(obj):
         return None
-    # As the window offers, where Sinew evaluates apart what stands in front: two objects have the mesh then.
+    # As the window offers where Sinew evaluates upstream modifiers separately: two objects have the mesh
+    # then.
     bpy.ops.object.transform_apply(isolate_users=True)
     obj.data.name = w.new_name("mesh")
     return f"apply the transform of {obj.name}"
@@ -1243,7 +1247,7 @@ def apply_transform(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def apply_pose(w: Walker, r: random.Random) -> str | None:
-    """As the rest pose."""
+    """Applied as the rest pose."""
     rig = w.armature(r)
     if rig is None or rig.override_library is not None or rig.data.users > 1 or not w.select(rig):
         return None
@@ -1274,7 +1278,7 @@ def replace_armature_data(w: Walker, r: random.Random) -> str | None:
 def rename_bone(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
     bone = w.one(r, rig.data.bones) if rig is not None and rig.override_library is None else None
-    # The groups that Blender renames along are the mesh's, which a comparison's copies share.
+    # Blender also renames groups of the mesh, which a comparison's copies share.
     if bone is None or w.compared:
         return None
     old, bone.name = bone.name, w.new_name("bone")
@@ -1335,10 +1339,10 @@ KINDS = (
     *("SUBSURF", "CAST", "MIRROR", "SMOOTH", "ARMATURE", "WAVE", "SOLIDIFY", "MASK"),
     *("TRIANGULATE", "DECIMATE", "VERTEX_WEIGHT_EDIT", "HOOK", "NODES"),
 )
-# Behind, what they make of a shape hangs on its last bit.
+# After these modifiers, the result depends on the last bit of the shape.
 IN_FRONT = ("DECIMATE", "VERTEX_WEIGHT_EDIT")
-# Of a mesh that was given a shape as its own, so that its last bits differ between the sides: Decimate makes
-# other faces of it (without Sinew, too, where a mesh is moved by a rounding).
+# For a mesh whose own shape was set from a deformed one, so that its last bits differ between the sides:
+# Decimate makes other faces of it (also without Sinew, if a mesh changes by rounding).
 SHAPED = "shaped"
 
 
@@ -1383,7 +1387,7 @@ def _set_up(
     elif modifier.type == "VERTEX_WEIGHT_EDIT" and obj.vertex_groups:
         modifier.vertex_group, modifier.falloff_type = w.one(r, obj.vertex_groups).name, "SMOOTH"
     elif modifier.type == "HOOK":
-        # Behind Geometry Nodes, Blender takes the first vertices for those of a list.
+        # After Geometry Nodes, Blender uses the first vertices as if they were those of a list.
         modifier.object, modifier.strength = rig, 0.3
         modifier.vertex_group = w.one(r, obj.vertex_groups).name if obj.vertex_groups else ""
     elif modifier.type == "NODES":
@@ -1412,14 +1416,14 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
     if front and obj.override_library is None:
         obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
     elif kind == "HOOK":
-        # Blender puts it behind those that only deform, which Sinew's own does not (docs/parity.md).
+        # Blender puts it after modifiers that only deform, which Sinew's is not (docs/parity.md).
         obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
     return f"{name} {'in front' if front else 'behind'} on {obj.name}"
 
 
 @operation(2)
 def move_modifier(w: Walker, r: random.Random) -> str | None:
-    """To just before or behind another of the artist's: Sinew's own is not counted."""
+    """Moves it to just before or after another one of the artist's; Sinew's is not counted."""
     obj = w.mesh(r, lambda o: len(w.modifiers(o)) > 1 and o.override_library is None)
     if obj is None or any(m.type in IN_FRONT for m in w.modifiers(obj)):
         return None
@@ -1435,7 +1439,7 @@ def delete_modifier(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None and w.may_lose_sinew(o))
     if obj is None:
         return None
-    # Seldom the last Armature modifier, as few operations are left for what has none.
+    # Rarely the last Armature modifier, since few operations remain for an object without any.
     candidates = [m for m in w.modifiers(obj) if m.type != "ARMATURE" or r.random() < 0.3]
     modifier = w.one(r, candidates)
     if modifier is None:
@@ -1459,7 +1463,7 @@ def rename_modifier(w: Walker, r: random.Random) -> str | None:
 
 @operation(2)
 def toggle_modifier(w: Walker, r: random.Random) -> str | None:
-    """Not those that Sinew has replaced: it keeps their flags."""
+    """Excludes those that Sinew has replaced, whose flags it stores."""
     obj = w.mesh(r)
     if obj is None:
         return None
@@ -1491,7 +1495,7 @@ def armature_options(w: Walker, r: random.Random) -> str | None:
         modifier.use_bone_envelopes = not modifier.use_bone_envelopes
     elif what == "groups":
         modifier.use_vertex_groups = not modifier.use_vertex_groups
-    # In a mode of the modifier it is Sinew's for a while, and to switch it means something else.
+    # In a mode of the modifier, Sinew controls it temporarily, and switching it has another meaning.
     elif obj.mode in {"EDIT", "SCULPT"} or obj.data.is_editmode:
         return None
     else:
@@ -1538,14 +1542,14 @@ def key_visibility(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def drive_visibility(w: Walker, r: random.Random) -> str | None:
-    """By where an armature stands, or no longer. Not by a bone: what follows one that was in edit mode,
-    Blender leaves as it was there, until something else is changed."""
+    """Sets or removes drivers by an armature's position. Not by a bone's: what follows a bone that was in
+    edit mode, Blender does not update until something else changes."""
     obj, rig = w.skinned(r), w.armature(r)
     if obj is None or rig is None or obj.override_library is not None:
         return None
     modifier = w.one(r, armature_modifiers(obj))
     paths = [modifier.path_from_id(f"show_{where}") for where in ("viewport", "render")]
-    # What a curve sets, a driver can not.
+    # A driver can not set what a curve sets.
     if not animated_paths(obj).isdisjoint(paths):
         for path in paths:
             obj.driver_remove(path)
@@ -1584,7 +1588,7 @@ def copy_modifiers(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def apply_modifier(w: Walker, r: random.Random) -> str | None:
-    """What deforms, Sinew's modifier or the Armature modifier, after those in front."""
+    """Applies what deforms, Sinew's modifier or the Armature modifier, after upstream ones."""
     obj = w.mesh(
         r,
         lambda o: (
@@ -1606,7 +1610,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
     for name in in_front:
         bpy.ops.object.modifier_apply(modifier=name, single_user=True)
     w.before_evaluation()
-    # A window has evaluated what was appended just now.
+    # A window has evaluated newly appended objects.
     bpy.context.view_layer.update()
     w.side.apply(obj)
     obj.data.name, obj.data[SHAPED] = w.new_name("mesh"), True
@@ -1687,7 +1691,7 @@ def key_shape_key(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.7)
 def drive_shape_key(w: Walker, r: random.Random) -> str | None:
-    """By a bone, as correctives are; or no longer."""
+    """Sets or removes a driver by a bone, as for correctives."""
     obj, rig = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None), w.armature(r)
     bone = w.one(r, rig.pose.bones) if rig is not None else None
     if obj is None or bone is None:
@@ -1777,7 +1781,7 @@ def delete_armature(w: Walker, r: random.Random) -> str | None:
     if len(w.armatures()) < 2 or w.compared:
         # A comparison's copies keep it in the file.
         return None
-    # So does what Sinew is on, where the command does not take it out of the file by itself.
+    # So does being on an object with Sinew, if the command does not remove that from the file itself.
     by_script |= any(w.side.has_sinew(obj) for obj in w.objects("MESH"))
     return _delete(w, rig, by_script)
 
@@ -1933,17 +1937,17 @@ def scene(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.2)
 def copy_scene(w: Walker, r: random.Random) -> str | None:
-    """As the menu does, with all objects or their copies."""
+    """As the menu does, with all objects or copies of them."""
     whole = r.random() < 0.5
     if len(bpy.data.scenes) > 1 or (whole and len(w.objects("MESH")) > 5) or w.compared:
         return None
     w.object_mode()
-    # Blender shows the new scene by keys alone, but only until something comes or goes in it, as Sinew's
-    # helpers do: then what was changed without a key is there again.
+    # Blender shows the new scene only by keys until something is added or removed in it, such as Sinew's
+    # helper objects: then changes without keys are visible again.
     w.this_frame()
     bpy.ops.scene.new(type="FULL_COPY" if whole else "LINK_COPY")
     bpy.context.scene.name = "Second"
-    # As a window does at once.
+    # As a window does immediately.
     bpy.context.view_layer.update()
     return f"a copy of the scene, {'with copies of all' if whole else 'linked'}"
 
@@ -1955,11 +1959,11 @@ def view_layer(w: Walker, r: random.Random) -> str | None:
     if len(layers) == 1:
         layers.new("Second")
     other = next(layer for layer in layers if layer != bpy.context.view_layer)
-    # As a window does: of the first evaluation of a view layer Blender tells nobody.
+    # As a window does: Blender sends no notification of a view layer's first evaluation.
     w.before_evaluation()
     bpy.context.view_layer.update()
     bpy.context.window.view_layer = other
-    # As a window does at once.
+    # As a window does immediately.
     bpy.context.view_layer.update()
     return f"view layer {other.name}"
 
@@ -2003,8 +2007,8 @@ def save_copy(w: Walker, r: random.Random) -> str | None:
 
 
 def _read_keys_of_hidden() -> None:
-    """Sinew has Blender read all keys with the first evaluation of a file. What is hidden and comes into a
-    later one has those values then, and without Sinew what the file was saved with."""
+    """Sinew makes Blender read all keys with the first evaluation of a file. Hidden objects that appear
+    in a later evaluation have these values then, and without Sinew those that were saved."""
     for obj in bpy.data.objects:
         if obj.animation_data is not None:
             obj.update_tag(refresh={"TIME"})
@@ -2036,7 +2040,7 @@ def _from_library(w: Walker, link: bool) -> list[bpy.types.Object]:
     with bpy.data.libraries.load(path, link=link) as (_source, target):
         target.objects = ["Guest", "Guest Rig"]
     for obj in target.objects:
-        # Linked once more, it is the same one.
+        # Linked again, it is the same one.
         if obj not in list(bpy.context.scene.collection.objects):
             bpy.context.scene.collection.objects.link(obj)
     return list(target.objects)
@@ -2108,7 +2112,7 @@ def render(w: Walker, r: random.Random) -> str | None:
 
 
 def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: list[int]) -> None:
-    """What another add-on does to an object, and to the modifier of that name."""
+    """Another add-on's operation on an object, and on the modifier with that name."""
     if what == "add":
         obj.modifiers.new(new, "CAST")
     elif what == "weights" and obj.vertex_groups:
@@ -2127,7 +2131,7 @@ def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: 
 
 @operation(0.7)
 def export(w: Walker, r: random.Random) -> str | None:
-    """What another program gets."""
+    """The data that another program receives."""
     obj = w.mesh(r)
     if obj is None or not w.select(obj):
         return None
@@ -2158,7 +2162,7 @@ def safe_mode(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def neighbour(w: Walker, r: random.Random) -> str | None:
-    """Another add-on's handler, once, at a change of frame."""
+    """Another add-on's handler, called once, at a change of frame."""
     obj, when = w.mesh(r), r.choice(("frame_change_pre", "frame_change_post", "depsgraph_update_post"))
     what, number = (
         r.choice(("rename", "toggle", "add", "delete", "weights", "move", "name")),
@@ -2187,16 +2191,16 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
         obj.update_tag()
         w.before_evaluation()
         bpy.context.view_layer.update()
-        # What was touched before and again in a handler is looked at with the next event.
+        # Objects touched before and again in a handler are compared at the next event.
         w.this_frame()
     else:
-        # So is what was set just now: it touches the mesh, too.
+        # So are newly set ones, because that touches the mesh, too.
         w.before_evaluation()
         bpy.context.view_layer.update()
         bpy.context.scene.frame_set(number)
         if what in ("move", "weights") and when == "frame_change_post":
-            # What another handler moves is seen with the next event after the update, and weights are where
-            # something stands in front (README).
+            # Changes by another handler are visible at the next event after the update, and weights where
+            # there is an upstream modifier (README).
             w.this_frame()
     if act in handlers:
         handlers.remove(act)
@@ -2224,7 +2228,7 @@ def update(w: Walker, r: random.Random) -> str | None:
     return "view_layer.update()"
 
 
-# --- What test_walk plants, to see that it is found; never chosen
+# --- Faults that test_walk plants, to check that they are found; never chosen
 
 
 @operation(0)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a method and stages make of an object, from what a Blender without Sinew has: its evaluated mesh in
-front of the Armature modifiers, vertex groups, bones and poses, read here in few lines, go to the library.
+"""Computes the shape of an object by a method and stages, from the data of a Blender without Sinew.
 
-It knows no modifiers behind, envelopes, bendy bones and keyed visibility.
+The evaluated mesh before the Armature modifiers, vertex groups, bones and poses are read here with little
+code, and passed to the library. Does not support later modifiers, envelopes, bendy bones and keyed
+visibility.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ import numpy as np
 import sinew
 import walk_sides
 
-# Of parameters, by their full names.
+# Parameters, by their full names.
 DEFAULTS = {f"{m.name}.{p.id}": p.default for m in sinew.methods() for p in m.parameters}
-# What the Armature modifier takes for no weight at all.
+# The Armature modifier treats smaller weights as none.
 LEAST_WEIGHT = 1e-4
 
 
 @dataclass
 class _Influences:
-    """As sinew.Binding takes them, of a mesh with one armature."""
+    """The arguments of sinew.Binding for a mesh with one armature."""
 
     offsets: np.ndarray
     bones: np.ndarray
@@ -51,9 +52,9 @@ class _Armature:
 
 @dataclass
 class _Read:
-    """rest       float32 [vertices, 3], what comes to the first Armature modifier
-    own        the same of the mesh's own; None where modifiers in front give it other vertices
-    sdef_keys  the same of the basis and of SDEF's three keys, where it has these
+    """rest       float32 [vertices, 3], the input of the first Armature modifier
+    own        the same for the mesh's own points; None if upstream modifiers give it other vertices
+    sdef_keys  the same for the basis and SDEF's three keys, if it has these
     """
 
     rest: np.ndarray
@@ -74,13 +75,13 @@ def expected(
     render: bpy.types.Depsgraph | None = None,
     poses: Mapping[str, Mapping[str, np.ndarray]] | None = None,
 ) -> np.ndarray | None:
-    """float32 [vertices, 3], object space; None where this file does not know it.
+    """float32 [vertices, 3], object space; None if this file can not compute it.
 
     run         names of the Armature modifiers that Sinew replaces
-    stages      the parameters of those that are on
+    stages      the parameters of the enabled stages
     parameters  of methods, by their full names
     render      the evaluation for a render; None: that of the viewport
-    poses       matrices of bones, in armature space, of armatures that another side poses
+    poses       matrices of bones, in armature space, of armatures that the other side poses
     """
     modifiers = list(obj.modifiers)
     places = [index for index, modifier in enumerate(modifiers) if modifier.name in run]
@@ -92,7 +93,7 @@ def expected(
     is_moved = any(getattr(m, shown) for m in modifiers[: places[0]])
     if render is not None:
         if is_moved or obj.data.shape_keys is not None:
-            # A render can not be had without what deforms.
+            # A render can not be evaluated without what deforms.
             return None
         read = _read(obj, obj.data, active, render, {})
     else:
@@ -103,7 +104,7 @@ def expected(
         return read.rest
     methods = (method, stages.get("mix", {}).get("method"))
     if read.own is None and not {"cor", "ddm"}.isdisjoint(methods):
-        # What they keep is of the mesh as it came first.
+        # Vertex data belongs to the input mesh.
         return None
     keys = obj.data.shape_keys
     if "sdef" in methods and keys is not None and (is_moved or not keys.use_relative):
@@ -185,7 +186,7 @@ def _groups(mesh: bpy.types.Mesh, obj: bpy.types.Object) -> dict[str, dict[int, 
 
 
 def _weights_of(groups: dict[str, dict[int, float]], name: str, count: int) -> np.ndarray | None:
-    """float32 [vertices]; None of no group, or of a mesh that has no weights at all."""
+    """float32 [vertices]; None without a group, or for a mesh without any weights."""
     if name not in groups or not any(groups.values()):
         return None
     weights = np.zeros(count, dtype=np.float32)
@@ -274,7 +275,7 @@ def _influences(mesh: bpy.types.Mesh, names: list[str], bones: bpy.types.bpy_pro
 def _mix(
     stages: Mapping[str, Mapping[str, Any]], groups: dict[str, dict[int, float]]
 ) -> tuple[str, dict[int, float]] | None:
-    """The second method and its weights; None without."""
+    """The second method and its weights, or None."""
     mix = stages.get("mix")
     if mix is None or mix["group"] not in groups or not any(groups.values()):
         return None
@@ -317,7 +318,7 @@ def _blend(
 
 
 def _spheres(keys: list[np.ndarray], armature: _Armature) -> np.ndarray:
-    """As sinew.Binding takes them: R0 belongs to the bone whose vertex group comes first."""
+    """Vertex data for sinew.Binding: R0 belongs to the bone whose vertex group comes first."""
     basis, centres, first, second = keys
     own, found = armature.influences, np.zeros((len(basis), 10), dtype=np.float32)
     for vertex in range(len(basis)):
@@ -331,7 +332,7 @@ def _spheres(keys: list[np.ndarray], armature: _Armature) -> np.ndarray:
 
 
 def _limit(read: _Read, points: np.ndarray, options: Mapping[str, Any] | None) -> np.ndarray:
-    """By the first armature."""
+    """The shape by the first armature."""
     if options is None:
         return points
     armature = read.armatures[0]

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The two sides of a walk: what an operation of Sinew's is with Sinew, and in a Blender without it.
+"""The two sides of a walk: what an operation on Sinew is with Sinew, and in a Blender without it.
 
-Blender's side keeps what Sinew would be set to in properties that change no shape and that Blender itself
-copies, undoes, links and saves with what they belong to: an object's pass index, and of an Armature modifier
-whether it is expanded. Expanded is one whose own Preserve Volume is on; the flag itself is what Sinew's
-method makes of it for now.
+Blender's side stores Sinew's settings in properties that change no shape and that Blender itself copies,
+undoes, links and saves with their owner: an object's pass index, and whether an Armature modifier is
+expanded. An expanded one has its own Preserve Volume on; the flag itself currently follows Sinew's method.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ import sinew
 
 OF_BLENDER = ("lbs", "dq")
 METHODS = (*OF_BLENDER, *(m.name for m in sinew.methods() if m.name not in OF_BLENDER))
-# What stages an object may have, by their parameters that differ from the default: the first has none. Their
-# groups are those of the tubes, which they may lack, as any other.
+# The stages that an object may have, as parameters that differ from the defaults; the first entry has none.
+# Their groups are those of the tubes, which may be missing like any others.
 STAGES: tuple[dict[str, dict[str, object]], ...] = (
     {},
     {"mix": {"method": "dq", "group": "lower"}},
@@ -37,17 +36,17 @@ STAGES: tuple[dict[str, dict[str, object]], ...] = (
         "delta_mush": {"factor": 0.9, "iterations": 3},
     },
 )
-# Bits of the pass index. ADOPTED: what Sinew makes of it, and when, is its own choice, until it is put on.
-# CHANGED: other settings differ from before, as Blender's undo looks whether anything does.
+# Bits of the pass index. ADOPTED: Sinew itself chooses what it does with the object, and when, until it is
+# attached. CHANGED: other settings differ from before, since Blender's undo checks whether anything does.
 DRIVEN, ON, KEYED, ADOPTED, CHANGED = 1, 2, 4, 8, 16
-# Numbers in the bits above: places in METHODS and STAGES, each in four bits.
+# Numbers in the bits above: indices into METHODS and STAGES, four bits each.
 METHOD, STAGE, FIELD = 32, 512, 15
-# Above these: it keeps settings of its own within its character.
+# Above these: it has its own settings within its character.
 OWN = 8192
 
 
 def whole_stages(number: int) -> dict[str, dict[str, object]]:
-    """All parameters of STAGES[number], as claims have them."""
+    """All parameters of STAGES[number], in the form of claims."""
     known = {stage.name: stage for stage in sinew.stages()}
     found = {}
     for name, given in STAGES[number].items():
@@ -57,7 +56,7 @@ def whole_stages(number: int) -> dict[str, dict[str, object]]:
 
 
 def number_of(stages: dict[str, dict[str, object]]) -> int:
-    """The place in STAGES of what an object is set to; -1 for none of them."""
+    """The index into STAGES for an object's settings; -1 if they are none of them."""
 
     def rounded(of: dict[str, dict[str, object]]) -> dict:
         return {
@@ -73,7 +72,7 @@ def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def shows_own_shape_in_its_mode(obj: bpy.types.Object) -> bool:
-    """Whether Sinew leaves the mode that the object is in to the Armature modifiers."""
+    """Whether Sinew leaves the object to the Armature modifiers in its current mode."""
     if obj.mode != "WEIGHT_PAINT":
         return obj.mode in {"EDIT", "SCULPT"}
     keyed = animated_paths(obj)
@@ -85,7 +84,7 @@ def shows_own_shape_in_its_mode(obj: bpy.types.Object) -> bool:
 
 
 def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
-    """The curves of what an ID's animation plays, in 4.2 to 5.2."""
+    """The curves that an ID's animation plays, in 4.2 to 5.2."""
     animation = owner.animation_data
     action = animation.action if animation is not None else None
     if action is None:
@@ -97,7 +96,7 @@ def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
 
 
-# What mends weights, by the finding: those that both sides can do.
+# Operators that repair weights, by finding: those that both sides can run.
 MENDS = {
     "no_weights": ("fill",),
     "small_sums": ("normalize", "fill"),
@@ -122,9 +121,9 @@ def animated_paths(obj: bpy.types.Object) -> set[str]:
 
 
 def what_follows(live: set[str]) -> tuple[set[bpy.types.Object], set[bpy.types.Object]]:
-    """Objects that follow what is solved live on the other side, of armatures by their names: those that
-    Armature modifiers alone have follow it, and those that may be elsewhere, or have another shape, by
-    anything else."""
+    """Objects that follow what the other side solves live, for armatures with these names: those that
+    follow it only by Armature modifiers, and those that may have another position or shape for another
+    reason."""
     posed = {o for o in bpy.data.objects if o.name_full in live}
     moved: set[bpy.types.Object] = set()
     while live:
@@ -166,7 +165,7 @@ def _drivers_targets(owner: bpy.types.ID | None) -> set[bpy.types.ID | None]:
 
 
 def remove_curves(owner: bpy.types.ID, end: str) -> None:
-    """Takes the curves off whose data path ends so."""
+    """Removes the curves whose data path ends with this."""
     action = owner.animation_data.action if owner.animation_data is not None else None
     for curve in [c for c in curves_of(owner) if c.data_path.endswith(end)]:
         if not hasattr(action, "layers"):
@@ -181,7 +180,7 @@ def remove_curves(owner: bpy.types.ID, end: str) -> None:
 
 
 def key(owner: bpy.types.ID, path: str, values: list[tuple[int, float]]) -> None:
-    """Keys a property whatever its value is now."""
+    """Keys a property, whatever its current value."""
     for frame, _value in values:
         owner.keyframe_insert(path, frame=frame)
     curve = next(c for c in curves_of(owner) if c.data_path == path)
@@ -199,7 +198,7 @@ class BlenderSide:
     is_sinew = False
 
     def __init__(self) -> None:
-        # Which modifiers Sinew replaces, as it says, by the name of each object.
+        # The modifiers that Sinew reports as replaced, by the name of each object.
         self.runs: dict[str, list[str]] = {}
 
     def prepare(self, safe: bool) -> None:
@@ -224,11 +223,11 @@ class BlenderSide:
         return METHODS[self._field(obj, METHOD)]
 
     def stages(self, obj: bpy.types.Object) -> int:
-        """The place in STAGES."""
+        """The index into STAGES."""
         return self._field(obj, STAGE)
 
     def has_other_shape(self, obj: bpy.types.Object) -> bool:
-        """Whether it has a shape that is none of Blender's."""
+        """Whether it has a shape that Blender can not compute."""
         return self.is_on(obj) and (self.method(obj) not in OF_BLENDER or self.stages(obj) != 0)
 
     @staticmethod
@@ -246,12 +245,12 @@ class BlenderSide:
             obj.pass_index = value
 
     def note_flags(self, obj: bpy.types.Object) -> None:
-        """Called where the walk itself has set Preserve Volume."""
+        """Called when the walk itself has set Preserve Volume."""
         for modifier in armature_modifiers(obj):
             modifier.show_expanded = modifier.use_deform_preserve_volume
 
     def preserve_volume(self, modifier: bpy.types.Modifier) -> bool:
-        """The modifier's own."""
+        """The modifier's own value."""
         return modifier.show_expanded
 
     def set_preserve_volume(self, modifier: bpy.types.Modifier, on: bool) -> None:
@@ -289,7 +288,7 @@ class BlenderSide:
         self.set_enabled(obj, True)
 
     def _use_keyed_flags(self, obj: bpy.types.Object) -> None:
-        """While it was off, they were the artist's own; Blender sets keyed ones with the next frame."""
+        """While it was off, the values were the artist's own; Blender sets keyed ones in the next frame."""
         scene = bpy.context.scene
         values = {c.data_path: c.evaluate(scene.frame_current_final) for c in curves_of(obj)}
         for modifier in armature_modifiers(obj):
@@ -297,12 +296,12 @@ class BlenderSide:
             if value is not None:
                 modifier.use_deform_preserve_volume = value >= 0.5
 
-    # --- A character: all meshes of an armature that Sinew deforms, in the scene's order
+    # --- Characters: all meshes of an armature that Sinew deforms, in the scene's order
 
     def character(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
         def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
             modifiers, run = armature_modifiers(obj), self.runs.get(obj.name_full, [])
-            # One that is renamed may not be known by its name yet.
+            # A renamed one may not be known by its name yet.
             chosen = [modifier for modifier in modifiers if modifier.name in run] or modifiers
             return next((modifier.object for modifier in chosen if modifier.object is not None), None)
 
@@ -316,12 +315,12 @@ class BlenderSide:
         return bool(obj.pass_index & OWN)
 
     def set_character_method(self, rig: bpy.types.Object, method: str) -> None:
-        """What is selected is the armature."""
+        """With the armature selected."""
         for obj in self._followers(rig):
             self.set_method(obj, method)
 
     def switch_own(self, rig: bpy.types.Object, obj: bpy.types.Object) -> None:
-        """What is selected is the mesh."""
+        """With the mesh selected."""
         own = not self.is_own(obj)
         self._set(obj, OWN, own)
         others = [other for other in self._followers(rig) if other != obj]
@@ -329,7 +328,8 @@ class BlenderSide:
             self._share(others[0], obj)
 
     def use_preset(self, rig: bpy.types.Object, folder: Path) -> None:
-        """One of the character's own settings, which its meshes then have, and the groups of its stages."""
+        """Sets one of the character's own settings, which all its meshes then have, and the groups of its
+        stages."""
         followers = self._followers(rig)
         for obj in followers[1:]:
             self._share(followers[0], obj)
@@ -344,8 +344,8 @@ class BlenderSide:
     # --- Features that change the mesh
 
     def mend(self, obj: bpy.types.Object, how: str, most: int) -> str | None:
-        """What was found and mended; None for nothing. By the library's weights alone, without the add-on's
-        reading of what was checked."""
+        """What was found and repaired; None for nothing. Uses only the library's weights, not the
+        add-on's interpretation."""
         from sinew_addon.attach.modifier_options import ModifierOptions
         from sinew_addon.core.diagnostics import check_weights
         from sinew_addon.core.mend import WeightMender
@@ -385,7 +385,7 @@ class BlenderSide:
         return ""
 
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
-        """One that changes no shape."""
+        """A modifier that changes no shape."""
         obj.pass_index ^= CHANGED
 
     def set_heat(self, obj: bpy.types.Object, on: bool, quantity: str) -> None:
@@ -433,7 +433,7 @@ class BlenderSide:
         between()
 
     def delete_part(self, obj: bpy.types.Object, what: str) -> None:
-        """The artist deletes a modifier that Sinew needs: it goes, or says so and is off."""
+        """The artist deletes a modifier that Sinew needs: Sinew is removed, or reports it and is off."""
         if what.endswith("modifier") and self.has_sinew(obj):
             self._set(obj, ADOPTED, True)
 
@@ -444,8 +444,8 @@ class BlenderSide:
         obj.pass_index = 0
 
     def apply(self, obj: bpy.types.Object) -> None:
-        # Where it is off in the viewport, it is the Armature modifier that is applied with Sinew, too: Sinew
-        # says that it is gone.
+        # If Sinew is off in the viewport, the Armature modifier is applied with Sinew, too, which then
+        # reports that it is missing.
         is_shown = all(modifier.show_viewport for modifier in armature_modifiers(obj))
         for modifier in armature_modifiers(obj):
             if not is_shown:
@@ -458,10 +458,10 @@ class BlenderSide:
             self._set(obj, ADOPTED, True)
 
     def bring_in_line(self, claims: dict[str, dict]) -> list[str]:
-        """Makes the modifiers blend as Sinew's side says it is set; a line for each object where what Sinew
-        says differs from what the walk has set it to.
+        """Makes the modifiers blend as Sinew's side reports it. Returns a line for each object for which
+        Sinew's report differs from what the walk has set.
 
-        claims  by the name of each object that Sinew drives
+        claims  by the name of each object with Sinew
         """
         wrong = []
         self.runs = {name: claim["run"] for name, claim in claims.items()}
@@ -479,14 +479,14 @@ class BlenderSide:
                 replaced = on and modifier.name in run
                 wanted = self.method(obj) == "dq" if replaced else modifier.show_expanded
                 if obj.override_library is not None:
-                    # Blender's undo gives an override its flag back, and evaluates it as before.
+                    # Blender's undo restores an override's flag, but evaluates it as before.
                     obj.update_tag()
                 if modifier.use_deform_preserve_volume != wanted:
                     modifier.use_deform_preserve_volume = wanted
         return wrong
 
     def adopt(self, claims: dict[str, dict]) -> None:
-        """Sets what is Sinew's own choice as Sinew's side says."""
+        """Sets what Sinew itself chooses as Sinew's side reports it."""
         for obj in bpy.data.objects:
             if obj.type == "MESH" and obj.library is None and obj.pass_index & ADOPTED:
                 self._adopt(obj, claims.get(obj.name_full))
@@ -518,7 +518,8 @@ class BlenderSide:
 
 
 class _Records(logging.Handler):
-    """Keeps what was logged with an exception, and how often Blender's evaluation could not be answered."""
+    """Collects messages that were logged with an exception, and how often Blender's evaluation could not
+    be served."""
 
     def __init__(self) -> None:
         super().__init__(logging.DEBUG)
@@ -555,7 +556,7 @@ class SinewSide:
 
         # Nobody paints in between.
         precompute_watch.PAUSE = 0.0
-        # The walk says itself which are left to Blender.
+        # The walk itself sets which meshes are left to Blender.
         small_meshes.is_used = True
 
     @property
@@ -565,7 +566,7 @@ class SinewSide:
         return properties
 
     def may_react(self, obj: bpy.types.Object) -> bool:
-        """Made by Sinew for another."""
+        """Whether Sinew made it for another object."""
         is_follower = getattr(obj, "sinew_ik_is_follower", False)
         return self._properties.is_helper(obj) or self._properties.is_copy(obj) or is_follower
 
@@ -588,7 +589,7 @@ class SinewSide:
 
     @staticmethod
     def _stages(obj: bpy.types.Object) -> dict[str, dict[str, object]]:
-        """All parameters of the stages that are on."""
+        """All parameters of the enabled stages."""
         from sinew_addon.attach import stage_settings
 
         return {
@@ -638,7 +639,7 @@ class SinewSide:
         attach.use_one_method(obj, method)
 
     def set_stages(self, obj: bpy.types.Object, number: int) -> None:
-        """As somebody who clicks: first what is on goes off."""
+        """Like a user who clicks: first, what is on is switched off."""
         wanted = whole_stages(number)
         for stage in sinew.stages():
             group, switch = getattr(obj.sinew, stage.name), stage.parameters[0].id
@@ -671,7 +672,7 @@ class SinewSide:
         session.refresh(bpy.context)
 
     def compute_beside(self, on: bool) -> None:
-        """What methods need computed is so on a thread, as in a window, or before the first frame."""
+        """Precomputations run on a thread, as in a window, or before the first frame."""
         from sinew_addon.core.precompute import precomputations
 
         precomputations.waits = not on
@@ -705,10 +706,10 @@ class SinewSide:
             return
         stages = number_of(self._stages(followers[0]))
         character = bpy.context.scene.sinew_character
-        # As Blender writes presets.
+        # In the form in which Blender writes presets.
         lines = [f"{path} = {eval(path, {'character': character})!r}" for path in presets.PATHS]
         text = "\n".join(["import bpy", *presets.DEFINES, *lines])
-        # Another file for each text: Blender keeps one compiled, by its size and second.
+        # A new file for each text: Blender caches compiled files by size and time in seconds.
         path = folder / f"preset {zlib.crc32(text.encode())}.py"
         path.write_text(text)
         bpy.ops.sinew.method_preset(filepath=str(path))
@@ -731,7 +732,8 @@ class SinewSide:
         return found.name
 
     def bake_to_bones(self, obj: bpy.types.Object, motion: str, is_alone: bool) -> str:
-        """is_alone  nothing but one Armature modifier changes the mesh: what plays has the stated error"""
+        """is_alone  only one Armature modifier changes the mesh, so the played shape has the reported
+        error"""
         from sinew_addon.core.errors import SinewError
         from sinew_addon.core.helper_bones import HelperOptions
         from sinew_addon.features.bake import bake
@@ -767,8 +769,8 @@ class SinewSide:
         return f"{made.name}, {made.before:.3g} to {made.after:.3g}"
 
     def wait(self) -> None:
-        """What timers of the window see to: that no object waits for what a thread computes, and what Blender
-        evaluates without telling anybody."""
+        """Does what timers of the window do: no object waits for a thread's computation, or for what
+        Blender evaluates without notification."""
         from sinew_addon.deform import handlers, precompute_watch
 
         until = time.monotonic() + 30.0
@@ -795,8 +797,8 @@ class SinewSide:
         comparison.start(bpy.context, meshes, methods, np.array((1.0, 0.0, 0.0)))
 
     def live_poses(self, depsgraph: bpy.types.Depsgraph | None) -> dict[str, tuple[bool, dict | None]]:
-        """While inverse kinematics is live anywhere: of each armature whether it is, and its bones' matrices
-        in an evaluation."""
+        """While inverse kinematics is live anywhere: for each armature whether it is, and its bones'
+        matrices in an evaluation."""
         from sinew_addon.features.ik import ik_live
 
         def bones(rig: bpy.types.Object) -> dict[str, np.ndarray] | None:
@@ -865,7 +867,7 @@ class SinewSide:
 
     def apply(self, obj: bpy.types.Object) -> None:
         modifier = self.own_modifier(obj)
-        # Sinew's is on whatever an animation makes of the Armature modifiers, and shows what that has.
+        # Sinew's modifier is on whatever an animation does to the Armature modifiers, and shows their result.
         paths = animated_paths(obj)
         keyed = [m for m in armature_modifiers(obj) if m.path_from_id("show_viewport") in paths]
         is_shown = modifier is not None and modifier.show_viewport and all(m.show_viewport for m in keyed)
@@ -876,7 +878,7 @@ class SinewSide:
                 bpy.ops.object.modifier_apply(modifier=armature.name)
 
     def claims(self) -> dict[str, dict]:
-        """By the name of each object that Sinew drives: how it says it does."""
+        """Sinew's report for each object that it deforms, by name."""
         from sinew_addon.attach import stage_settings
 
         return {
@@ -903,8 +905,8 @@ class SinewSide:
         ]
 
     def left_over(self) -> list[str]:
-        """What is left of Sinew in a file where it drives nothing."""
-        # Without a user it is not saved, and was that of an object that was deleted.
+        """What remains of Sinew in a file where it deforms nothing."""
+        # Without a user it is not saved; it belonged to a deleted object.
         objects = [o for o in bpy.data.objects if o.library is None and o.users]
         used = {o.data for o in objects}
         found = [f"object {o.name}" for o in objects if self.may_react(o)]

@@ -10,11 +10,12 @@ import bpy
 import numpy as np
 import scenes
 
-# From so many items on, numbers of a collection are read by foreach_get: a mesh has hundreds of thousands.
+# From this number of items on, numbers of a collection are read by foreach_get: a mesh has hundreds of
+# thousands.
 MANY = 32
 ELEMENT_TYPES = {"FLOAT": np.float32, "INT": np.int32, "BOOLEAN": np.bool_}
 
-# Properties of this process, or computed from the others; not stored in files.
+# Properties of this process, or computed from others; not stored in files.
 VOLATILE = {
     "bl_rna",
     "corner_normals",
@@ -37,7 +38,7 @@ VOLATILE = {
 
 
 class Column:
-    """One property of all items of a collection, [items, ...]. Equal where all bits are."""
+    """One property of all items of a collection, [items, ...]. Equal if all bits are."""
 
     def __init__(self, values: np.ndarray) -> None:
         self.values = values
@@ -54,7 +55,7 @@ class Column:
         return f"{self.values.shape} {self.values.dtype}"
 
     def differences(self, path: str, other: object) -> list[str]:
-        """A line for each item that differs; `path` has [*] where its number belongs."""
+        """A line for each item that differs; `path` has [*] in the position of its number."""
         if not isinstance(other, Column) or self.values.shape != other.values.shape:
             return [f"{path}: {self!r} -> {other!r}"]
         start, _star, end = path.rpartition("[*]")
@@ -71,11 +72,11 @@ def of_open_file() -> dict[str, object]:
     """Path of each value -> the value."""
     found: dict[str, object] = {}
     for collection in bpy.data.bl_rna.properties:
-        # 5.0 lists all once more.
+        # 5.0 lists all of them twice.
         if collection.type != "COLLECTION" or collection.identifier == "all_ids":
             continue
         for item in getattr(bpy.data, collection.identifier):
-            # The last render is this process's own.
+            # The last render belongs to this process.
             is_render = isinstance(item, bpy.types.Image) and item.source == "VIEWER"
             if isinstance(item, bpy.types.ID) and not is_render:
                 path = f"{collection.identifier}[{item.name_full}]"
@@ -110,7 +111,7 @@ def differences(before: dict[str, object], after: dict[str, object]) -> list[str
 
 
 class _Walk:
-    """Reads one datablock: its own data once, references to other datablocks by name."""
+    """Reads one datablock: its own data once, and references to other datablocks by name."""
 
     def __init__(self, found: dict[str, object], owner: bpy.types.ID) -> None:
         self.found = found
@@ -130,7 +131,7 @@ class _Walk:
 
     def value(self, data: bpy.types.bpy_struct, prop: bpy.types.Property, path: str) -> None:
         if prop.is_runtime and not data.is_property_set(prop.identifier):
-            # Reading a group that an extension registered would make it.
+            # Reading a group that an extension registered would create it.
             self.found[path] = "not set"
             return
         try:
@@ -151,13 +152,13 @@ class _Walk:
         elif getattr(prop, "is_array", False):
             self.found[path] = _flat(value)
         elif prop.type == "STRING" and isinstance(value, str) and len(value) > 2 and value.startswith("//"):
-            # A copy elsewhere has another way to the same place. Blender leaves // alone.
+            # A copy in another folder has another relative path to the same file. Blender keeps //.
             self.found[path] = os.path.normpath(bpy.path.abspath(value, library=self.owner.library))
         else:
             self.found[path] = repr(value)
 
     def columns(self, items: bpy.types.bpy_prop_collection, path: str) -> None:
-        """Many items of one type: numbers of all of them at once, other properties one by one."""
+        """Many items of one type: numbers of all items at once, other properties one by one."""
         if isinstance(items[0], bpy.types.ID) or items[0].id_data not in (None, self.owner):
             for index, item in enumerate(items):
                 self.pointer(item, f"{path}[{index}]")
@@ -166,7 +167,7 @@ class _Walk:
         for prop in items[0].bl_rna.properties:
             if prop.identifier in VOLATILE:
                 continue
-            # The number of a polygon's vertices differs from polygon to polygon.
+            # Polygons differ in their number of vertices.
             is_ragged = (items[0].bl_rna.identifier, prop.identifier) == ("MeshPolygon", "vertices")
             if prop.type in ELEMENT_TYPES and not prop.is_runtime and not is_ragged:
                 size = max(prop.array_length, 1)
@@ -201,7 +202,7 @@ class _Walk:
 
 
 def _plain(value: object) -> object:
-    """A custom property without the addresses that Blender shows it with."""
+    """A custom property without the addresses in Blender's text for it."""
     if hasattr(value, "to_dict"):
         return {name: _plain(item) for name, item in value.items()}
     if hasattr(value, "to_list"):

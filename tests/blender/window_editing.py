@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps that pose, paint and edit, and that change the stack of modifiers."""
+"""Steps that pose, paint and edit, and that change the modifier stack."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from window_scene import LARGE, shown_points, worst
 
 @step("modes")
 def drag_a_bone(run: Run) -> Steps:
-    """By R, X and a number, as on a keyboard, in pose mode."""
+    """Rotates with R, X and a number, as on a keyboard, in pose mode."""
     with window.in_view3d("WINDOW"):
         bpy.ops.view3d.view_all()
     execute("object.mode_set", "Hero Rig", mode="POSE")
@@ -42,7 +42,7 @@ def drag_a_bone(run: Run) -> Steps:
 
 
 def _enter_weight_paint() -> Steps:
-    """With the armature's last bone active, and no group."""
+    """With the armature's last bone active, and no active group."""
     execute("object.mode_set", "Hero Rig", mode="POSE")
     rig().data.bones.active = rig().data.bones["bone.2"]
     rig().pose.bones["bone.2"].select = True
@@ -56,8 +56,8 @@ def _enter_weight_paint() -> Steps:
 
 @step("modes")
 def weight_paint(run: Run) -> Steps:
-    """The armature goes to pose mode and the active bone's group becomes the active one, as without Sinew;
-    paint shows, also while it plays."""
+    """The armature goes to pose mode and the active bone's group becomes the active one, as without
+    Sinew; paint is visible, also during playback."""
     found = []
     for is_on in (False, True):
         if not is_on:
@@ -116,14 +116,14 @@ def _stroke() -> None:
 
 
 def _nearest_point() -> Vector:
-    """Of Hero as it is shown, in its own space, the one that is nearest to the viewer."""
+    """The vertex of Hero's visible shape that is nearest to the viewer, in its own space."""
     depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
     to_view = bpy.context.space_data.region_3d.view_matrix @ hero().matrix_world
     return max(map(Vector, shown_points(hero(), depsgraph)), key=lambda point: (to_view @ point).z)
 
 
 def _points_of_stroke(place: Vector | None = None) -> list[dict[str, object]]:
-    """Over the middle of the view, or over a place on Hero, in its own space."""
+    """Moves the mouse over the middle of the view, or over a position on Hero, in its own space."""
     middle = bpy.context.region.width / 2, bpy.context.region.height / 2
     if place is not None:
         view, shown = bpy.context.space_data.region_3d, hero().matrix_world @ place
@@ -145,7 +145,7 @@ def _points_of_stroke(place: Vector | None = None) -> list[dict[str, object]]:
 
 @step("modes")
 def sculpt(run: Run) -> Steps:
-    """Under dq, which the Armature modifier shows with Preserve Volume: a stroke, frames, and the way back by
+    """Under dq, which the Armature modifier shows with Preserve Volume: a stroke, frames, and undo with
     Ctrl Z."""
     modifier = hero().modifiers["Armature"]
     execute("object.mode_set", "Hero", mode="SCULPT")
@@ -199,11 +199,11 @@ def edit_the_mesh(run: Run) -> Steps:
     yield from wait()
     run.check(len(hero().data.vertices) > 2 * LARGE, "it was not subdivided")
     run.check_shapes("subdivided")
-    # Out of edit mode, and the subdivision.
+    # Leaves edit mode, and removes the subdivision.
     for _time in range(2):
         press("Z", ctrl=True)
         yield from wait(4)
-    # To where it was in edit mode.
+    # To its position in edit mode.
     execute("object.mode_set", "Hero", mode="OBJECT")
     yield from wait()
     run.check_shapes("subdivided and undone")
@@ -283,7 +283,7 @@ def hide_and_show(run: Run) -> Steps:
 
 @step("modifiers")
 def remove_sinews_modifier(run: Run) -> Steps:
-    """By the cross in its header: the Armature modifier deforms again."""
+    """With the cross in its header: the Armature modifier deforms again."""
     execute("object.modifier_remove", "Hero", modifier="Sinew")
     run.wanted["Hero"] = ""
     yield from wait()
@@ -301,7 +301,8 @@ def remove_sinews_modifier(run: Run) -> Steps:
 
 @step("modifiers")
 def copy_modifiers(run: Run) -> Steps:
-    """To another mesh of the same armature, which never had Sinew: a working one or none."""
+    """To another mesh of the same armature, which never had Sinew: the result is a working modifier or
+    none."""
     twin = bpy.data.objects.new("Twin", hero().data.copy())
     _link_beside(twin)
     yield from wait()
@@ -361,7 +362,7 @@ def duplicate(run: Run) -> Steps:
 
 @step("modifiers")
 def apply(run: Run) -> Steps:
-    """Freezes the shape, and Sinew is forgotten."""
+    """Freezes the shape, and Sinew is removed."""
     set_frame(12)
     yield from wait()
     depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
@@ -441,7 +442,8 @@ def save_as_shape_key(run: Run) -> Steps:
 
 @step("modifiers")
 def no_inert_group_in_the_menu(run: Run) -> Steps:
-    """The Add Modifier menu offers groups that are modifiers; on another mesh ours would do nothing."""
+    """The Add Modifier menu offers groups that are modifiers; Sinew's would have no effect on another
+    mesh."""
     offered = [g.name for g in bpy.data.node_groups if g.is_modifier and not g.name.startswith((".", "_"))]
     run.check(not offered, f"the menu offers {offered}")
     yield
@@ -449,7 +451,7 @@ def no_inert_group_in_the_menu(run: Run) -> Steps:
 
 @step("modifiers")
 def delete_the_armature(run: Run) -> Steps:
-    """It says so, and what is saved opens; undone, all is as before."""
+    """Sinew reports it, and the saved file opens; after undo, everything is as before."""
     execute("object.delete", "Hero Rig", confirm=False)
     wanted = run.wanted
     run.wanted = {name: method for name, method in wanted.items() if name != "Hero"}

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the run in Blender's window is made of: steps, a file with characters, hands that click and type, and
-a look at what is shown and saved."""
+"""Parts of the run in Blender's window: steps, a file with characters, simulated clicks and typing, and
+comparisons of what is shown and saved."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ steps_of: dict[str, list[Callable[[Run], Steps]]] = {}
 
 
 def step(group: str) -> Callable:
-    """Steps of a group run one after the other in the same file; each group begins with a fresh one."""
+    """Steps of a group run one after the other in the same file; each group starts with a fresh one."""
 
     def add(function: Callable[[Run], Steps]) -> Callable[[Run], Steps]:
         steps_of.setdefault(group, []).append(function)
@@ -34,7 +34,7 @@ def step(group: str) -> Callable:
 
 
 class Run:
-    """wanted  the method that each character is to show: Sinew's, or the Armature modifier's own with ''"""
+    """wanted  the method that each character must show: Sinew's, or '' for the Armature modifier's own"""
 
     def __init__(self) -> None:
         self.wanted: dict[str, str] = {}
@@ -51,7 +51,7 @@ class Run:
             self.fault(text)
 
     def check_shapes(self, when: str = "") -> None:
-        """What the windows show, without having Blender evaluate anything."""
+        """The shapes that the windows show, without making Blender evaluate anything."""
         for main in bpy.context.window_manager.windows:
             depsgraph = main.view_layer.depsgraph
             for name, method in self.wanted.items():
@@ -74,7 +74,7 @@ class Run:
             self.check(not obj.sinew.error, f"{obj.name} {when}: {obj.sinew.error}")
 
     def check_copy(self, twin: bpy.types.Object, when: str) -> None:
-        """It shows what Hero does, or what an Armature modifier does."""
+        """It shows the same as Hero, or as an Armature modifier."""
         depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
         shown = shown_points(twin, depsgraph)
         off = min(worst(shown, blender_points(twin, rig(), method, depsgraph)) for method in ("dq", "lbs"))
@@ -82,7 +82,7 @@ class Run:
         self.check_shapes(when)
 
     def check_frames(self) -> Steps:
-        """The shapes at other frames, and here again."""
+        """Compares the shapes at other frames, and again here."""
         scene = bpy.context.window_manager.windows[0].scene
         here = scene.frame_current
         for frame in (here % 20 + 1, 20, here):
@@ -91,9 +91,9 @@ class Run:
             self.check_shapes(f"at frame {frame}")
 
     def note_saved(self, path: Path, in_memory: bool = False, names: Collection[str] = ()) -> None:
-        """For window_read.py, which sees it in another Blender.
+        """Records a file for window_read.py, which reads it in another Blender.
 
-        names  of the characters to look at; all without any
+        names  of the characters to compare; all if there are none
         """
         if not path.exists():
             self.fault(f"{path.name} was not saved")
@@ -110,18 +110,19 @@ class Run:
         )
 
     def note_exported(self, path: Path) -> None:
-        """For window_read.py, too."""
+        """The same for several files."""
         self.saved.append({"path": str(path), "step": self.step})
 
 
 def wait(ticks: int = 2) -> Steps:
-    """Blender redraws meanwhile."""
+    """Blender redraws in the meantime."""
     for _tick in range(ticks):
         yield
 
 
 def click(name: str, *objects: str, **arguments: object) -> set[str]:
-    """Selects the objects, the first is the active one, and presses a button, which can be undone."""
+    """Selects the objects, of which the first becomes active, and presses a button whose effect can be
+    undone."""
     if objects:
         choose(*objects)
     category, _dot, operator = name.partition(".")
@@ -174,13 +175,14 @@ def push(message: str) -> None:
 
 
 def make_base() -> None:
-    """Two scenes with characters that Sinew has never seen, and a camera."""
+    """Two scenes with characters that never had Sinew, and a camera."""
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     scene = bpy.context.window.scene
     window_scene.make_character("Hero", LARGE, (-1.5, 0.0, 0.0))
     window_scene.make_character("Small", SMALL, (-1.5, 2.0, 0.0))
     front = window_scene.make_character("Front", LARGE, (-1.5, -2.0, 0.0))
-    # They change nothing, but Sinew can not know: what can change weights it deforms after the evaluation.
+    # They change nothing, but Sinew can not know that: where weights may change, it deforms after the
+    # evaluation.
     front.modifiers.new("Cast", "CAST").factor = 0.0
     front.modifiers.move(1, 0)
     late = window_scene.make_character("Late", LARGE, (-1.5, -4.0, 0.0))
@@ -197,15 +199,15 @@ def make_base() -> None:
     choose("Hero")
     window.open_sidebar()
     with window.in_view3d():
-        # Software draws slowly: as little as shows the meshes.
+        # Software rendering is slow: draw no more than shows the meshes.
         bpy.context.space_data.overlay.show_overlays = False
         bpy.context.space_data.shading.light = "MATCAP"
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "base.blend"))
 
 
 def fresh(run: Run) -> Steps:
-    """The file as before Sinew; then Hero, Front and Late have dq, which their own Armature modifiers would
-    not give, and Small has what it had."""
+    """The file before Sinew; then Hero, Front and Late have dq, which their own Armature modifiers do not
+    give, and Small has the method that it had."""
     # A copy, which steps may save.
     shutil.copy(FOLDER / "base.blend", FOLDER / "open.blend")
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "open.blend"))

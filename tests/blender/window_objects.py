@@ -27,7 +27,7 @@ from window_scene import blender_points, shown_points, worst
 
 @step("objects")
 def copy_and_paste(run: Run) -> Steps:
-    """Ctrl+C and Ctrl+V go by a file of Blender's own, of which it tells nobody."""
+    """Ctrl+C and Ctrl+V use a temporary file of Blender, without notification."""
     choose("Hero", "Hero Rig")
     with window.in_view3d("WINDOW"):
         bpy.ops.view3d.copybuffer()
@@ -53,7 +53,7 @@ def _check_against(run: Run, obj: bpy.types.Object, armature: bpy.types.Object, 
 
 @step("objects")
 def written_as_a_library(run: Run) -> Steps:
-    """As asset browsers and other add-ons do; Blender tells nobody."""
+    """As asset browsers and other add-ons do, without notification by Blender."""
     path = FOLDER / "written.blend"
     bpy.data.libraries.write(str(path), {hero(), rig()}, fake_user=True)
     wanted, run.wanted = run.wanted, {"Hero": "dq"}
@@ -91,7 +91,7 @@ def scale_and_apply(run: Run) -> Steps:
 
 @step("objects")
 def shape_keys(run: Run) -> Steps:
-    """Keys and their values; with them the rest points change, and the reference knows none."""
+    """Keys and their values; they change the rest points, which the reference does not support."""
     for name in ("Basis", "Wide"):
         execute("object.shape_key_add", "Hero", from_mix=False)
         hero().data.shape_keys.key_blocks[-1].name = name
@@ -179,7 +179,7 @@ def another_armature(run: Run) -> Steps:
 
 @step("objects")
 def switch_the_modifiers(run: Run) -> Steps:
-    """The artist switches the Armature modifier on beside Sinew's, then Sinew's off and on."""
+    """The artist switches the Armature modifier on in addition to Sinew's, then Sinew's off and on."""
     nodes = next(m for m in hero().modifiers if m.type == "NODES")
     nodes.show_viewport = False
     yield from wait()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps with what else runs in Blender: exporters, renders, other add-ons, libraries."""
+"""Steps with other programs and code in Blender: exporters, renders, other add-ons, libraries."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def save_after_exports(run: Run) -> Steps:
 
 
 class ComparingEngine(bpy.types.RenderEngine):
-    """Draws nothing; compares the characters of the render's own evaluation. A render engine of the GPU would
-    take turns with the window, so that the two threads would never meet."""
+    """Draws nothing; compares the characters in the render's own evaluation. A GPU render engine would
+    alternate with the window, so that the two threads would never run at the same time."""
 
     bl_idname, bl_label = "SINEW_COMPARING", "Comparing"
     seen: list[tuple[int, str, float]] = []
@@ -114,7 +114,7 @@ def _is_rendering() -> bool:
 
 
 def _end_of_render() -> Steps:
-    """Sinew sees it within a twentieth of a second, and then shows the window's frame again."""
+    """Sinew notices it within a twentieth of a second, and then shows the window's frame again."""
     yield from window.until(lambda: not _is_rendering(), "the end of the render", PATIENCE)
     yield from wait(5)
 
@@ -140,7 +140,7 @@ def render_locked(run: Run) -> Steps:
 
 @step("renders")
 def render_unlocked(run: Run) -> Steps:
-    """Without a hand on the panel."""
+    """Without using the panel."""
     _start_render(run, False, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
     yield from _end_of_render()
     _check_rendered(run, 20)
@@ -164,8 +164,8 @@ def render_unlocked_while_it_plays(run: Run) -> Steps:
 
 @step("renders")
 def click_during_unlocked_renders(run: Run) -> Steps:
-    """The panel's buttons and properties, while the render's thread goes through the frames. What the panel
-    refuses meanwhile is fine."""
+    """Uses the panel's buttons and properties while the render's thread goes through the frames. The
+    panel may refuse them."""
     chance = random.Random(16)
     for _turn in range(3):
         _start_render(run, False, 60, {})
@@ -186,7 +186,7 @@ def click_during_unlocked_renders(run: Run) -> Steps:
                 else:
                     obj.sinew.method = chance.choice(("lbs", "dq"))
             except RuntimeError:
-                # The button is grey.
+                # The button is greyed out.
                 pass
         yield from wait()
     # As an artist checks the result.
@@ -233,7 +233,7 @@ def stop_a_render(run: Run) -> Steps:
 
 
 class Hostile:
-    """A handler of another add-on, ahead of Sinew's own or behind them."""
+    """A handler of another add-on, before Sinew's own or after them."""
 
     def __init__(
         self, what: Callable[[], None], event: str = "frame_change_post", ahead: bool = True
@@ -252,7 +252,7 @@ class Hostile:
 
 
 def _deforms(run: Run, when: str) -> None:
-    """By Sinew, or by the Armature modifier with a word of it; never at rest in silence."""
+    """Deformed by Sinew, or by the Armature modifier with a message; never at rest without a message."""
     depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
     shown = shown_points(hero(), depsgraph)
     by = {m: worst(shown, blender_points(hero(), rig(), m, depsgraph)) for m in ("dq", "lbs")}
@@ -268,7 +268,7 @@ def node_groups_removed(run: Run) -> Steps:
         for group in [g for g in bpy.data.node_groups if "Sinew" in g.name]:
             bpy.data.node_groups.remove(group)
 
-    # The others have lost theirs as well, and say so.
+    # The others have lost theirs as well, and report it.
     del run.wanted["Small"], run.wanted["Front"], run.wanted["Late"]
     for ahead in (True, False):
         where = "ahead of Sinew" if ahead else "behind Sinew"
@@ -276,7 +276,7 @@ def node_groups_removed(run: Run) -> Steps:
             for frame in (5, 6, 18):
                 set_frame(frame)
                 yield from wait()
-                # Removed behind Sinew it is seen at the next frame, and as a habit at the third.
+                # If removed after Sinew's, it is noticed at the next frame; if repeatedly, at the third.
                 if ahead or frame > 6:
                     _deforms(run, f"without its node group, removed {where}, at frame {frame}")
             bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "hostile.blend"), copy=True)
@@ -329,8 +329,8 @@ def modifiers_deleted(run: Run) -> Steps:
 
 @step("hostile")
 def suspended_modifiers_renamed_and_deleted(run: Run) -> Steps:
-    """A character that moves by itself: its other modifiers rest between Sinew's two handlers, and another
-    add-on renames, deletes and adds some meanwhile."""
+    """A character with an animation: its other modifiers are suspended between Sinew's two handlers,
+    while another add-on renames, deletes and adds some."""
     obj = hero()
     obj.modifiers.new("Behind", "SMOOTH").factor = 0.0
     obj.modifiers.new("Doomed", "SMOOTH").factor = 0.0
@@ -371,7 +371,7 @@ def suspended_modifiers_renamed_and_deleted(run: Run) -> Steps:
 
 @step("hostile")
 def weights_changed_behind_sinew(run: Run) -> Steps:
-    """Of what a handler changes Blender tells nobody."""
+    """Blender sends no notification of what a handler changes."""
     changed = []
 
     def change() -> None:
@@ -408,7 +408,7 @@ def others_throw(run: Run) -> Steps:
 
 @step("hostile")
 def evaluations_within_saving(run: Run) -> Steps:
-    """Another add-on evaluates, and goes to other frames, between save_pre and the writing."""
+    """Another add-on evaluates, and changes the frame, between save_pre and the writing."""
 
     def evaluate() -> None:
         scene = bpy.context.window_manager.windows[0].scene
@@ -434,7 +434,7 @@ def disable_and_enable(run: Run) -> Steps:
     for turn in range(2):
         bpy.ops.preferences.addon_disable(module=module)
         yield from wait()
-        # By Blender's nearest.
+        # With Blender's most similar method.
         run.check_shapes(f"disabled, turn {turn}")
         set_frame(7 + turn)
         yield from wait()
@@ -506,7 +506,7 @@ def link_and_override(run: Run) -> Steps:
 
 
 def _linked_deforms(run: Run, when: str) -> None:
-    """By Sinew or by Blender's nearest, which is the same; and animated."""
+    """Deformed by Sinew or by Blender's most similar method, which is the same here; and animated."""
     main = bpy.context.window_manager.windows[0]
     depsgraph = main.view_layer.depsgraph
     for obj in main.scene.objects:

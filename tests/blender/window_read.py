@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads files that were saved with Sinew, in a Blender without it.
+"""Reads files that were saved with Sinew in a Blender without it.
 
     python window_read.py SAVED.json
 
-SAVED.json lists for each file what it should hold; prints what it does not, as JSON.
+SAVED.json lists the expected content of each file; prints the deviations as JSON.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ FRAMES = (1, 12, 20)
 
 
 def faults_of(path: str, characters: dict[str, dict[str, str]], in_memory: bool) -> list[str]:
-    """A sentence for each thing that is not as Blender's own state.
+    """A sentence for each deviation from Blender's own state.
 
-    characters  each mesh object's armature and method; the method is "" where Sinew was off
-    in_memory   written by Blender without telling anybody, as autosave does: the armatures have to be there
+    characters  each mesh object's armature and method; the method is "" if Sinew was off
+    in_memory   written by Blender without notification, such as by autosave: the armatures must be there
     """
     bpy.ops.wm.open_mainfile(filepath=path)
     assert not hasattr(bpy.types.Object, "sinew")
@@ -76,7 +76,7 @@ def _object_faults(obj: bpy.types.Object, wanted: dict[str, str], in_memory: boo
 
 
 def exported_faults(path: Path) -> list[str]:
-    """A skinned tube at rest is wanted: straight, six times as long as it is wide."""
+    """Checks for a skinned tube at rest: straight, six times as long as it is wide."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     if path.suffix == ".glb":
         bpy.ops.import_scene.gltf(filepath=str(path))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What artists do in Blender's window with Sinew's zip, step after step. After each, the shapes that are
-shown are compared with what an Armature modifier makes; saved files are noted for window_read.py.
+"""Does what artists do in Blender's window with Sinew's zip, step after step. After each step, the visible
+shapes are compared with those of an Armature modifier; saved files are recorded for window_read.py.
 
     blender --factory-startup --enable-event-simulate --python window_run.py -- sinew.zip FOLDER GROUP...
 
-Prints "STEP NAME" before each step and "FAULT NAME | TEXT" for each thing that is wrong after it.
+Prints "STEP NAME" before each step and "FAULT NAME | TEXT" for each fault after it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-# The steps are in these.
+# These modules contain the steps.
 import window
 import window_editing  # noqa: F401
 import window_objects  # noqa: F401
@@ -35,7 +35,7 @@ def run_all() -> Steps:
     run = Run()
     FOLDER.mkdir(exist_ok=True)
     files = bpy.context.preferences.filepaths
-    # quit.blend and autosaves would lie beside those of other Blenders.
+    # quit.blend and autosaves would otherwise be mixed with those of other Blenders.
     files.temporary_directory = str(FOLDER)
     files.auto_save_time = 1
     bpy.context.preferences.system.viewport_aa = "OFF"
@@ -50,12 +50,12 @@ def run_all() -> Steps:
             yield from guarded(run, fresh)
         for function in steps_of[group]:
             run.step = f"{group}: {function.__name__}"
-            # What is printed from here on is this step's.
+            # Output from here on belongs to this step.
             print(f"STEP {run.step}", flush=True)
             before = run.faults
             yield from guarded(run, function)
             if run.faults > before and group not in ("again", "quit"):
-                # What is broken must not be counted again.
+                # A fault must not be counted again.
                 yield from guarded(run, fresh, quiet=True)
         window.photograph(FOLDER / f"{group}.png")
         print(f"GROUP {group} {time.monotonic() - started:.1f} s", flush=True)

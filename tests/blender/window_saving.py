@@ -69,7 +69,7 @@ def pack_and_save(run: Run) -> Steps:
 
 @step("files")
 def save_where_it_can_not_be(run: Run) -> Steps:
-    """Blender fails to save; Sinew goes on."""
+    """Blender fails to save; Sinew continues."""
     with contextlib.suppress(RuntimeError):
         bpy.ops.wm.save_as_mainfile(filepath="/proc/no/such/folder.blend", copy=True)
     run.check_shapes("after a failure")
@@ -142,7 +142,7 @@ def save_with_a_heat_map(run: Run) -> Steps:
 
 @step("files")
 def save_over_and_over(run: Run) -> Steps:
-    """Ten saves without a frame between them."""
+    """Ten saves without a frame in between."""
     for number in range(10):
         pose(rig(), 10.0 * number)
         bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "saved.blend"))
@@ -155,7 +155,7 @@ def save_over_and_over(run: Run) -> Steps:
 
 @step("files")
 def revert(run: Run) -> Steps:
-    """The file that the second Blender saw works with Sinew, too."""
+    """The file that the second Blender opened works with Sinew, too."""
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "saved.blend"))
     yield from wait()
     run.check_shapes("opened again")
@@ -174,7 +174,7 @@ def revert(run: Run) -> Steps:
 
 @step("quit")
 def save_and_leave(run: Run) -> Steps:
-    """For the second session, which opens last.blend and recovers quit.blend and what autosave wrote."""
+    """For the second session, which opens last.blend and recovers quit.blend and the autosave."""
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "last.blend"))
     run.note_saved(FOLDER / "last.blend")
     bpy.ops.wm.save_userpref()
@@ -186,7 +186,7 @@ def save_and_leave(run: Run) -> Steps:
 
 @step("quit")
 def autosave(run: Run) -> Steps:
-    """Blender tells nobody of it; it comes every minute."""
+    """Blender sends no notification of it; it happens every minute."""
     started = time.time()
 
     def newest() -> list[Path]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Characters for the run in Blender's window, and what Blender's Armature modifier makes of them: plain bpy
-and numpy, nothing of Sinew."""
+"""Characters for the run in Blender's window, and their shapes by Blender's Armature modifier: plain bpy
+and numpy, without Sinew."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 BONES = 3
-# Of a vertex's distance from its Armature modifier's place: characters are 3 units long.
+# The allowed distance of a vertex from its position by the Armature modifier: characters are 3 units long.
 TOLERANCE = 2e-5
-# Above what Sinew leaves to the Armature modifier.
+# More vertices than in meshes that Sinew leaves to the Armature modifier.
 LARGE, SMALL = 12_000, 240
 
 
 def make_character(name: str, vertices: int, place: tuple[float, float, float]) -> bpy.types.Object:
-    """In the scene that is open: a tube along X of three bones, at rest at frame 1, bent and twisted at frame
+    """Adds to the open scene a tube along X of three bones, at rest at frame 1, bent and twisted at frame
     20, with an Armature modifier. Its armature is called NAME Rig."""
     armature = _make_armature(f"{name} Rig")
     mesh = bpy.data.meshes.new(name)
@@ -30,7 +30,7 @@ def make_character(name: str, vertices: int, place: tuple[float, float, float]) 
     for bone in range(BONES):
         group = obj.vertex_groups.new(name=f"bone.{bone}")
         weights = np.maximum(0.0, 1.0 - np.abs(points[:, 0] - (bone + 0.5)))
-        # Rings have the same weights: one call each.
+        # Vertices of a ring have the same weights: one call for each ring.
         for weight in np.unique(weights[weights > 0.0]):
             group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
     obj.modifiers.new("Armature", "ARMATURE").object = armature
@@ -95,8 +95,8 @@ def blender_points(
     method: str,
     depsgraph: bpy.types.Depsgraph,
 ) -> np.ndarray:
-    """float64 [vertices, 3]: what an Armature modifier, with Preserve Volume where the method is dq, makes of
-    the mesh by its formula; without scaled bones."""
+    """float64 [vertices, 3]: the mesh deformed by the formula of an Armature modifier, with Preserve
+    Volume if the method is dq; without scaled bones."""
     posed = armature.evaluated_get(depsgraph)
     moves = {
         bone.name: np.array(bone.matrix @ bone.bone.matrix_local.inverted())
@@ -108,7 +108,7 @@ def blender_points(
     obj.data.vertices.foreach_get("co", rest.ravel())
     points = rest @ to_armature[:3, :3].T + to_armature[:3, 3]
     groups, weights = _influences(obj)
-    # A group without a bone has the last one, which is none.
+    # A group without a bone has the last index, which stands for none.
     number = {name: index for index, name in enumerate(moves)}
     bone_of = np.array([number.get(group.name, len(moves)) for group in obj.vertex_groups] or [0])
     bones = bone_of[groups]
@@ -123,7 +123,7 @@ def blender_points(
 
 
 def _influences(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
-    """Groups and weights, int and float64 [vertices, influences], each vertex's in stored order."""
+    """Groups and weights, int and float64 [vertices, influences], for each vertex in stored order."""
     stored = [[(group.group, group.weight) for group in vertex.groups] for vertex in obj.data.vertices]
     most = max(map(len, stored), default=0)
     padded = np.array([one + [(0, 0.0)] * (most - len(one)) for one in stored]).reshape(-1, most, 2)
@@ -148,7 +148,7 @@ def _dual_quaternion(
     real, dual = np.zeros((len(points), 4)), np.zeros((len(points), 4))
     for influence in range(weights.shape[1]):
         turn, half = turns[bones[:, influence]], halves[bones[:, influence]]
-        # Towards the sum of those before it.
+        # In the hemisphere of the sum of those before it.
         signed = np.where((real * turn).sum(axis=1) < 0.0, -1.0, 1.0) * weights[:, influence]
         real += signed[:, None] * turn
         dual += signed[:, None] * half

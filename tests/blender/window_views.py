@@ -63,7 +63,7 @@ def shift() -> None:
 
 @step("undo")
 def undo_and_redo_by_keys(run: Run) -> Steps:
-    """Ten steps of all kinds, then ctrl+Z to the beginning and ctrl+shift+Z to the end, twice."""
+    """Ten steps of all kinds, then ctrl+Z to the first state and ctrl+shift+Z to the last, twice."""
     actions = [
         (method("lbs"), "lbs"),
         (bend, "lbs"),
@@ -149,7 +149,7 @@ def _undo_and_redo_twice(run: Run, ticks_after_redo: int = 4) -> Steps:
 
 @step("undo")
 def mesh_that_another_object_gets(run: Run) -> Steps:
-    """From then on Sinew keeps Hero's points elsewhere, which it does after the step of undo."""
+    """From then on Sinew stores Hero's points elsewhere, which it starts after the undo step."""
     with window.in_view3d("WINDOW"):
         bpy.ops.mesh.primitive_cube_add("EXEC_DEFAULT", True, size=0.1, location=(0.0, 0.0, 1.0))
     choose("Hero", bpy.context.window_manager.windows[0].view_layer.objects.active.name)
@@ -167,11 +167,11 @@ def mesh_that_another_object_gets(run: Run) -> Steps:
 
 @step("undo")
 def scene_that_redo_brings_back(run: Run) -> Steps:
-    """Blender tells nobody of its first evaluation."""
+    """Blender sends no notification of its first evaluation."""
     click("scene.new", type="LINK_COPY")
     yield from wait()
     run.check_shapes("in a copy of the scene")
-    # Sinew looks four times a second.
+    # Sinew checks four times a second.
     yield from _undo_and_redo_twice(run, ticks_after_redo=20)
     press("Z", ctrl=True)
     yield from wait(4)

@@ -22,7 +22,7 @@ using test::Random;
 using test::random_scene;
 using test::Scene;
 
-/// Many vertices with the same bones, then some of one to eight.
+/// Many vertices with the same bones, then some with one to eight bones.
 Scene scene_of_sets(std::uint32_t seed) {
     Random random(seed);
     Scene scene = random_scene(seed, 0, 1.0);
@@ -55,7 +55,7 @@ std::vector<Vec3<float>> bulging(const Scene& scene) {
     return points;
 }
 
-/// By the definition in double.
+/// The limited points by the definition, in double.
 std::vector<Vec3<double>> by_definition(const Scene& scene, const std::vector<BoneSegment<float>>& segments,
                                         const std::vector<Vec3<float>>& points, BulgeForm form,
                                         double strength) {
@@ -119,7 +119,7 @@ TEST_P(LimitBulge, threads_change_no_bit_and_the_rest_pose_stays) {
         limit.apply(many, scene.posed_from_rest, {form, 1.0f, 5});
         EXPECT_TRUE(one == many);
         auto rest = scene.rest_points;
-        // Without a pose all bones stay at rest.
+        // Without a pose, all bones are at rest.
         limit.apply(rest, {}, {form});
         EXPECT_TRUE(rest == scene.rest_points);
     }

@@ -85,7 +85,7 @@ TEST(Centres, of_vertices_of_one_bone_are_these) {
         EXPECT_TRUE(same_bits(centres[vertex], tube.scene.rest_points[vertex]));
     }
     EXPECT_GT(found, 10u);
-    // Without triangles no two bones meet.
+    // Without triangles no two bones have one in common.
     tube.triangles.clear();
     EXPECT_TRUE(std::ranges::equal(tube.centres(), tube.scene.rest_points, same_bits<float>));
 }
@@ -144,7 +144,7 @@ TEST(Centres, progress_cancels_and_throws) {
                      std::runtime_error)
             << at;
     }
-    // And the pool is as it was.
+    // The pool is still usable.
     EXPECT_EQ(tube.centres().size(), tube.scene.rest_points.size());
 }
 

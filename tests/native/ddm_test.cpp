@@ -23,7 +23,7 @@ using test::kTolerance;
 using test::Random;
 using test::Scene;
 
-/// A scene and the rows of its vertices, with neighbourhoods of an extent.
+/// A scene, and the rows of its vertices, whose neighbourhoods have an extent.
 struct Bound {
     Scene scene;
     std::vector<float> rows;
@@ -32,9 +32,10 @@ struct Bound {
     [[nodiscard]] VertexData data() const { return {Ddm::info, rows}; }
 };
 
-/// Bones that differ by 100 degrees at most. Each block of 16 vertices has the same bones, or each vertex its own.
+/// Bones differ by at most 100 degrees. Either each block of 16 vertices has the same bones, or each vertex has
+/// its own.
 ///
-/// farthest  how far the farthest bone is
+/// farthest  distance of the farthest bone
 Bound bound_scene(std::uint32_t seed, std::size_t bones, std::size_t of_vertex, bool is_mixed, bool is_scaled,
                   double farthest = 1.0) {
     Random random(seed);
@@ -61,14 +62,14 @@ Bound bound_scene(std::uint32_t seed, std::size_t bones, std::size_t of_vertex, 
         std::ranges::sort(sorted, {}, &Influence<float>::bone);
         const Vec3<double> centre = random.vector(1.0);
         for (const auto& [bone, weight] : sorted) {
-            // The far bone has a small share.
+            // The far bone has a small weight.
             const float share = bone == 0 ? weight / static_cast<float>(farthest) : weight;
             const Vec3<float> first(static_cast<double>(share) * (centre + random.vector(0.05)));
             bound.rows.insert(bound.rows.end(), {static_cast<float>(vertex), static_cast<float>(bone), share,
                                                  first.x, first.y, first.z, share, 0.8f * share, 0.6f * share,
                                                  0.1f * share, -0.1f * share, 0.05f * share});
         }
-        // Of sum 1.
+        // Normalised to sum 1.
         const std::size_t begin = bound.starts.back();
         double sum = 0.0;
         for (std::size_t i = begin; i < bound.rows.size(); i += kMomentFloats) {
@@ -148,7 +149,7 @@ TEST_P(DdmKernels, a_far_bone_of_small_weight_costs_no_digits) {
     EXPECT_LT(largest_error(bound_scene(22, 4, 4, false, false, 1e4), variant()), 2e-5);
 }
 
-// As where envelopes or bendy bones give other weights than those that the moments were made of.
+// Such as where envelopes or bendy bones give other weights than those from which the moments were computed.
 TEST_P(DdmKernels, take_bones_that_the_moments_alone_name) {
     for (const bool is_mixed : {false, true}) {
         Bound bound = bound_scene(23, 12, 4, is_mixed, true);
@@ -173,7 +174,7 @@ TEST(DirectDeltaMush, bones_that_the_moments_alone_name_are_bones_of_the_binding
 }
 
 TEST(DirectDeltaMush, a_vertex_without_faces_has_no_extent) {
-    // Near the origin, where rounding of the mesh's other coordinates is the most beside its own.
+    // Near the origin, where rounding of the mesh's other coordinates is largest relative to its own.
     const std::vector<Vec3<float>> points{{1e-3f, 2e-3f, 1e-3f}, {3, 0, 5}, {4, 1, 5}, {3, 2, 6}};
     const std::int32_t offsets[] = {0, 2, 4, 6, 8};
     const std::int32_t bones[] = {0, 1, 0, 1, 0, 1, 0, 1};
@@ -191,7 +192,8 @@ TEST(DirectDeltaMush, a_vertex_without_faces_has_no_extent) {
     }
 }
 
-// The best one is compared with another solver in tests/python/test_ddm.py. Bones are more than are solved together.
+// tests/python/test_ddm.py compares the best one with another solver. There are more bones than are solved
+// together.
 TEST(DirectDeltaMush, has_the_same_rows_on_each_instruction_set) {
     constexpr std::int32_t kSide = 20;
     Random random(25);

@@ -82,7 +82,7 @@ TEST_P(Deform, vertices_without_weight_stay_to_the_bit) {
 TEST_P(Deform, weights_are_normalised) {
     const Scene scene = random_scene(9, 200, 1.0);
     const auto expected = deformed(Deformer(scene.data(), method()), scene);
-    // Powers of two scale without rounding, so that the results are equal.
+    // Powers of two scale without rounding, so the results must be equal.
     for (const float factor : {0x1p-80f, 0.25f, 0x1p80f}) {
         Scene scaled = scene;
         for (float& weight : scaled.weights) weight *= factor;
@@ -177,14 +177,14 @@ TEST_P(Deform, bones_that_the_pose_lacks_stay_at_rest) {
             for (std::size_t bone = 2; bone < 12; bone += 3)
                 scene.posed_from_rest[bone] = scene.posed_from_rest[0];
         } else {
-            // Of no unit length, so seen to one by one whatever the pose.
+            // Not of unit length, so it is prepared one by one in any pose.
             scene.rest_bones[11] = cast<float>(scaling<double>({2.0, 2.0, 2.0}));
         }
         const Deformer deformer(scene.data(), method());
         for (const std::size_t bones : {0, 1, 5, 11}) {
             Scene whole = scene;
             for (std::size_t bone = bones; bone < 12; ++bone) whole.posed_from_rest[bone] = {};
-            // Just as large, so that the address sanitizer sees a read past its end.
+            // Allocated with exactly this size, so that the address sanitizer detects a read past its end.
             const std::vector<Affine<float>> shorter(
                 scene.posed_from_rest.begin(), scene.posed_from_rest.begin() + static_cast<long>(bones));
             std::vector<Vec3<float>> points(deformer.vertex_count());
@@ -193,7 +193,7 @@ TEST_P(Deform, bones_that_the_pose_lacks_stay_at_rest) {
                 deformer.deform(shorter, {space, 0}, points);
                 const auto expected = deformed(deformer, whole, {space, 0});
                 for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-                    // A stretched rest bone has scale even where it does not move.
+                    // A stretched rest bone has scale even if it does not move.
                     ASSERT_LT(distance(points[vertex], expected[vertex]), scaled ? 20.0 : 1e-5) << bones;
                 }
             }
@@ -344,7 +344,7 @@ TEST(Deformer, refuses_bones_beyond_the_limit) {
               "influence_bones: expected indices of bones below 1048576, got 2147483647 at influence 2");
 }
 
-// Sizes alone: no array of that size exists.
+// Checks only sizes: no array of such a size exists.
 TEST(Deformer, refuses_more_than_it_can_number) {
     const Vec3<float> point(0.0f);
     const std::size_t many = std::size_t{1} << 31;

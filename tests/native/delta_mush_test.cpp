@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The stage `delta_mush` on whole meshes, beside its definition in double.
+// The stage `delta_mush` on whole meshes, compared with its definition in double.
 #include "sinew/deform/delta_mush.h"
 
 #include <algorithm>
@@ -43,7 +43,7 @@ std::vector<float> weights_of(const Mesh& mesh, std::uint32_t seed) {
     return weights;
 }
 
-/// By the definition, in double.
+/// The result by the definition, in double.
 class Reference {
 public:
     Reference(const Mesh& mesh, const DeltaMushSettings& settings) : mesh_(mesh), settings_(settings) {
@@ -59,7 +59,7 @@ public:
         if (settings.pin_boundary) pin();
     }
 
-    /// weights  becomes the sum of the angles of each vertex's corners
+    /// weights  receives the sum of the angles of each vertex's corners
     [[nodiscard]] std::vector<Vec3<double>> apply(std::span<const Vec3<float>> points, double scale,
                                                   std::vector<double>& weights) const {
         const auto rest = smoothed(mesh_.rest_points);
@@ -162,7 +162,7 @@ TEST_P(Mushes, agree_with_the_definition_in_double) {
                     mushed(DeltaMush(mesh.topology(), mesh.rest_points, settings), points, scale);
                 std::size_t compared = 0;
                 for (std::size_t v = 0; v < result.size(); ++v) {
-                    // Of corners that are almost straight half of the angle's digits are rounding.
+                    // For corners that are almost straight, half of the angle's digits are rounding.
                     if (angles[v] > 0.0 && angles[v] < 0.3) continue;
                     ++compared;
                     ASSERT_LT(distance(Vec3<double>(result[v]), expected[v]), 1e-5) << v << " " << iterations;
@@ -178,7 +178,7 @@ TEST_P(Mushes, agree_where_an_edge_of_the_smoothed_points_has_no_length) {
     mesh.rest_points = {{0.1f, 0.2f, 0.3f}, {1, 0, 0.1f}, {0.1f, 1, 0}, {-1, 0.2f, 0}, {0, -1, 0.2f}};
     for (std::int32_t i = 1; i <= 4; ++i) mesh.add_face({0, i, i % 4 + 1});
     mesh.add_edges_of_faces();
-    // The first alone is smoothed, to where the second is, as the others' sum is 0.
+    // Only the first vertex is smoothed, and moves to the second, because the others sum to 0.
     const std::vector<float> weights{1, 0, 0, 0, 0};
     const std::vector<Vec3<float>> points{{0, 0, 0}, {0, 0, 0}, {1, 0, 0.5f}, {-1, 1, 0}, {0, -1, -0.5f}};
     DeltaMushSettings settings{.iterations = 1, .factor = 1.0f};
@@ -229,14 +229,14 @@ TEST_P(Mushes, bound_again_are_as_made_so) {
     EXPECT_TRUE(same(mushed(mush, points), mushed(DeltaMush(mesh.topology(), moved, other), points)));
     mush.bind(mesh.rest_points, {.radius = 0.2f});
     EXPECT_TRUE(same(mushed(mush, points), before));
-    // What is refused changes nothing.
+    // An invalid setting changes nothing.
     EXPECT_THROW(mush.bind(moved, {.factor = 2.0f}), std::invalid_argument);
     EXPECT_TRUE(same(mushed(mush, points), before));
     const DeltaMush::Parts parts = mush.parts();
     EXPECT_TRUE(same(mushed(DeltaMush(parts.topology, parts.rest_points, parts.settings), points), before));
 }
 
-/// A flat square of `size` by `size` vertices and side 1.
+/// A flat square of `size` by `size` vertices with side 1.
 Mesh sheet(std::int32_t size) {
     Mesh mesh;
     for (std::int32_t x = 0; x < size; ++x) {
@@ -250,13 +250,14 @@ Mesh sheet(std::int32_t size) {
     return mesh;
 }
 
-// A step across a sheet becomes the integral of a Gaussian: at its width from the step, erf(1 / sqrt(2)) = 0.683.
+// A step across a sheet becomes the integral of a Gaussian: at the distance of its width, erf(1 / sqrt(2)) =
+// 0.683.
 TEST(Radius, is_the_width_of_a_Gaussian_however_dense_the_mesh_is) {
     for (const auto type : {SmoothType::simple, SmoothType::length_weighted}) {
         for (const std::int32_t size : {41, 101}) {
             const Mesh mesh = sheet(size);
             const DeltaMush mush(mesh.topology(), mesh.rest_points, {.radius = 0.1f, .type = type});
-            // Small, so that it leaves the lengths of edges as they are; the details are those of a flat sheet: none.
+            // The step is small, so that lengths of edges hardly change. A flat sheet has no details.
             auto points = mesh.rest_points;
             for (Vec3<float>& point : points) point.z = point.x < 0.501f ? -1e-3f : 1e-3f;
             mush.apply(points, 0.0f);
@@ -265,7 +266,7 @@ TEST(Radius, is_the_width_of_a_Gaussian_however_dense_the_mesh_is) {
                 return 1e3f *
                        points[column * static_cast<std::size_t>(size) + static_cast<std::size_t>(size / 2)].z;
             };
-            // The step is half an edge from a vertex on either side.
+            // The step is half an edge away from the vertices on both sides.
             EXPECT_NEAR(at(0.6f) - at(0.4f), 2.0f * 0.683f, 0.03f) << size;
             EXPECT_NEAR(at(0.7f) - at(0.3f), 2.0f * 0.954f, 0.03f) << size;
         }
@@ -278,7 +279,7 @@ TEST(Radius, says_how_often_it_smooths) {
         return DeltaMush(mesh.topology(), mesh.rest_points, {.radius = radius, .factor = factor})
             .iterations();
     };
-    // 2 radius^2 / (h^2 factor), h = 1 / 40
+    // 2 radius^2 / (h^2 factor), h = 1 / 40.
     EXPECT_EQ(iterations(0.0999f, 0.5f), 64u);
     EXPECT_EQ(iterations(0.0999f, 1.0f), 32u);
     EXPECT_EQ(iterations(0.001f, 0.5f), 1u);
@@ -299,7 +300,7 @@ TEST(DeltaMush, takes_meshes_without_faces_and_without_vertices) {
     EXPECT_EQ(mushed(mush, fewer), fewer);
 }
 
-// Faces that have no size, and spikes.
+// Faces without size, and spikes.
 TEST(DeltaMush, has_no_NaN_where_faces_are_degenerate) {
     const std::vector<std::int32_t> offsets{0, 3, 6, 10}, corners{0, 1, 2, 2, 1, 0, 0, 1, 0, 2},
         edges{0, 1, 1, 2, 2, 0};

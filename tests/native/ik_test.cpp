@@ -14,7 +14,7 @@ using test::Random;
 constexpr IkMethod kDls = IkMethod::damped_least_squares;
 constexpr IkMethod kCcd = IkMethod::cyclic_descent;
 
-/// Bones along y, one behind the other unless parents say otherwise.
+/// Bones along y, each at the end of the one before, unless parents say otherwise.
 struct Rig {
     std::vector<std::int32_t> parents;
     std::vector<DualQuat<double>> rest;
@@ -39,7 +39,7 @@ struct Rig {
         return sum;
     }
 
-    /// The oracle of poses: matrices, and not the solver's own.
+    /// The oracle for poses: matrices instead of the solver's dual quaternions.
     [[nodiscard]] std::vector<Affine<double>> poses(const std::vector<Quat<double>>& rotations) const {
         std::vector<Affine<double>> result;
         for (std::size_t i = 0; i < parents.size(); ++i) {
@@ -94,7 +94,7 @@ std::vector<Quat<double>> random_rotations(Random& random, std::size_t count, do
     return rotations;
 }
 
-/// Of kinds: none, hinges, elbows, swings without twist, boxes and ellipses.
+/// One of several kinds: none, hinges, elbows, swings without twist, boxes and ellipses.
 BoneLimits random_limits(Random& random) {
     BoneLimits limits;
     for (AxisLimit& limit : limits) {
@@ -191,7 +191,7 @@ TEST(Ik, limits_are_never_violated_and_nearly_always_what_is_reachable_is_reache
             Rig rig = Rig::chain(random_lengths(random));
             for (BoneLimits& limits : rig.limits) limits = random_limits(random);
             const std::size_t end = rig.parents.size() - 1;
-            // Within the limits, by what the solver does to a start: a solve without a step.
+            // Rotations within the limits, made by a solve without a step, which limits its start.
             const auto within = [&](const std::vector<Quat<double>>& any) {
                 return solve(rig, {last(rig)}, {at({0, 0, 0})}, any, {.iterations = 0}).rotations;
             };
@@ -229,7 +229,7 @@ TEST(Ik, far_goals_keep_limits) {
     }
 }
 
-/// A trunk of two bones, and two branches of three.
+/// A trunk of two bones, and two branches of three bones each.
 Rig tree() {
     Rig rig;
     rig.parents = {-1, 0, 1, 2, 3, 1, 5, 6};
@@ -263,7 +263,7 @@ TEST(Ik, poles_choose_the_plane_and_the_side_of_the_bend) {
     Random random(8);
     for (const IkMethod method : {kDls, kCcd}) {
         for (int i = 0; i < 200; ++i) {
-            // Bent about x, so that its plane holds z, the axis that the pole angle names.
+            // Bent about x, so that its plane contains z, the axis that the pole angle refers to.
             const Rig rig = Rig::chain(random_lengths(random));
             const std::size_t end = rig.parents.size() - 1;
             const std::vector<Quat<double>> start(end + 1,
@@ -282,7 +282,7 @@ TEST(Ik, poles_choose_the_plane_and_the_side_of_the_bend) {
             for (std::size_t bone = 0; bone < end; ++bone) {
                 EXPECT_NEAR(glm::dot(rig.tip(found.rotations, bone), normal), 0.0, 1e-9);
             }
-            // The chain is bent away from where its bones' z points.
+            // The chain is bent away from the direction of its bones' z axes.
             EXPECT_LT(glm::dot(rig.tip(found.rotations, 0), up), 0.0) << i;
         }
     }
@@ -296,7 +296,7 @@ TEST(Ik, a_straight_chain_bends_to_a_goal_on_its_line) {
             const auto found =
                 solve(rig, {last(rig)}, {at({0, goal, 0})}, straight, {.method = method, .iterations = 5000});
             EXPECT_LT(test::distance(rig.tip(found.rotations, 2), {0, goal, 0}), 3e-6) << goal;
-            // A knee: bends to one side alone.
+            // A knee: bends only to one side.
             for (std::size_t bone : {1, 2}) {
                 for (std::size_t axis : {1, 2}) rig.limits[bone][axis].is_locked = true;
                 rig.limits[bone][0].is_limited = true;

@@ -96,7 +96,7 @@ TYPED_TEST(Interpolation, factor_of_all_weights_and_order_change_nothing) {
         const auto c = this->random(random);
         const auto mean = this->blend({a, b, c}, {T(0.2), T(0.5), T(0.3)});
         const auto other = this->blend({b, c, a}, {T(5), T(3), T(2)});
-        // An iterated blend may have more than one fixed point; it is to reach the same from the same start.
+        // An iterated blend may have several fixed points; it must reach the same one from the same start.
         EXPECT_LT(this->apart(mean.transform, other.transform), 16 * this->kTolerance) << i;
     }
 }
@@ -113,7 +113,7 @@ TYPED_TEST(Interpolation, weights_without_sum_give_the_heaviest) {
     }
 }
 
-// Their sum is beyond the type, or 1 by it is.
+// Their sum overflows, or 1 over it does.
 TYPED_TEST(Interpolation, weights_of_any_size_are_shares) {
     using T = typename TypeParam::Scalar;
     Random random(6);
@@ -127,7 +127,7 @@ TYPED_TEST(Interpolation, weights_of_any_size_are_shares) {
     }
 }
 
-// What is not finite is not called defined; what is called defined is right.
+// A result that is not finite must not be reported as defined, and a defined result must be right.
 TYPED_TEST(Interpolation, translations_near_the_largest_number_are_finite) {
     using T = typename TypeParam::Scalar;
     using M = typename TypeParam::M;
@@ -143,7 +143,7 @@ TYPED_TEST(Interpolation, translations_near_the_largest_number_are_finite) {
         };
         const auto a = random_end();
         const auto b = random_end();
-        // As dual quaternions some are beyond the type themselves.
+        // Some overflow as dual quaternions.
         if (!sinew::is_finite(a) || !sinew::is_finite(b)) continue;
         for (const T t : {T(0), T(0.25), T(0.5), T(1), T(-1), T(2), T(-1e30), T(3e38f)}) {
             EXPECT_TRUE(sinew::is_finite(M::between(a, b, t).transform)) << i << " " << t;
@@ -183,7 +183,7 @@ TYPED_TEST(Interpolation, turns_near_half_a_turn_are_finite) {
     }
 }
 
-// Four rotations a quarter of the sphere apart: their matrices sum to 0.
+// Four rotations 90 degrees apart: their matrices sum to 0.
 TYPED_TEST(Interpolation, sum_that_cancels_gives_the_heaviest_turn) {
     using T = typename TypeParam::Scalar;
     using M = typename TypeParam::M;
@@ -231,7 +231,8 @@ TEST(MatrixLinear, halfway_to_half_a_turn_is_flat) {
 }
 
 TEST(MatrixPolar, is_the_nearest_rotation_even_to_a_mirror) {
-    // The mean of the three rotations by 180 degrees about the axes is -1/3: a mirror, and every rotation is as near.
+    // The mean of the three rotations by 180 degrees about the axes is -1/3, a mirror: all rotations are equally
+    // near.
     const Vec3<double> none(0.0);
     std::vector<Affine<double>> rotations;
     for (const Vec3<double>& axis : {Vec3<double>(1, 0, 0), {0, 1, 0}, {0, 0, 1}}) {
@@ -241,7 +242,7 @@ TEST(MatrixPolar, is_the_nearest_rotation_even_to_a_mirror) {
     const auto tie = MatrixPolar::blend<Signs::kToHeaviest, double>(rotations, even);
     EXPECT_FALSE(tie.is_defined);
     EXPECT_LT(test::rotation_error(tie.transform.linear), 1e-14);
-    // A little more of one breaks the tie.
+    // A slightly larger weight breaks the tie.
     const std::vector<double> uneven{1, 1, 1.5};
     const auto mean = MatrixPolar::blend<Signs::kToHeaviest, double>(rotations, uneven);
     EXPECT_TRUE(mean.is_defined);
@@ -272,7 +273,7 @@ TEST(Sclerp, is_the_screw_at_constant_pace) {
 }
 
 TEST(MatrixLog, is_not_the_shortest_path) {
-    // 170 degrees and -170 degrees are 20 apart; by their logarithms the middle is none at all.
+    // 170 degrees and -170 degrees are 20 degrees apart, but the mean of their logarithms is 0.
     const auto rotation = [](double degrees) {
         return to_affine(QuatVec<double>{about<double>({0, 0, 1}, degrees), {0, 0, 0}});
     };
@@ -296,7 +297,7 @@ TYPED_TEST(Interpolation, a_tie_that_the_order_decides_is_not_defined) {
         return this->in_layout({about<T>(Vec3<T>(0, 0, 1), degrees), Vec3<T>(1, 2, 3)});
     };
     const auto tie = this->blend({rotated(0), rotated(120), rotated(240)}, {T(1), T(1), T(1)});
-    // Matrices have no signs; that of matrix_polar is flat, and any rotation about z as near.
+    // Matrices have no signs. The sum for matrix_polar is flat, and any rotation about z is equally near.
     EXPECT_EQ(tie.is_defined, (std::is_same_v<M, MatrixLinear> || std::is_same_v<M, MatrixLog>));
     EXPECT_TRUE(this->is_finite(tie.transform));
     EXPECT_TRUE(this->blend({rotated(0), rotated(40), rotated(80)}, {T(1), T(1), T(1)}).is_defined);

@@ -26,7 +26,7 @@ using test::same_bits;
 using test::scaling;
 using test::Scene;
 
-/// `sets` sets of 1 to `most` bones, each with `vertices` vertices that lie apart in the mesh.
+/// `sets` sets of 1 to `most` bones, each with `vertices` vertices that are not adjacent in the mesh.
 Scene scene_of_sets(std::uint32_t seed, std::size_t sets, std::size_t vertices, std::size_t most, bool scaled,
                     double spread = 1.0) {
     Random random(seed);
@@ -64,7 +64,7 @@ Scene reordered(const Scene& scene, const std::vector<std::size_t>& order) {
     return other;
 }
 
-/// How far each of `points` is from that of skinning/ in double, rising.
+/// The distance of each of `points` from the result of skinning/ in double, ascending.
 std::vector<double> errors_of(const std::vector<Vec3<float>>& points, const MethodInfo& method,
                               const Scene& scene) {
     const auto expected = in_double(method, scene);
@@ -80,8 +80,8 @@ std::vector<double> errors(const MethodInfo& method, const Scene& scene, const D
     return errors_of(deformed(Deformer(scene.data(), method), scene, options), method, scene);
 }
 
-/// `sets` sets of `vertices` vertices. Each has bones up to `farthest` away in any order, by weights that fall as
-/// their distances grow, so that each moves a vertex about as far as another.
+/// `sets` sets of `vertices` vertices. Each has bones at distances of up to `farthest`, in any order, with
+/// weights that decrease with the distance, so that each moves a vertex about equally far.
 Scene scene_of_unlike_bones(std::uint32_t seed, std::size_t sets, std::size_t vertices, double farthest,
                             bool scaled, double spread) {
     Random random(seed);
@@ -141,12 +141,12 @@ TEST_P(Kernels, agree_for_sets_of_every_size) {
     }
 }
 
-// Near to each other, all bones of a set have signs that do not depend on the weights.
+// If all bones of a set are near to each other, their signs do not depend on the weights.
 TEST_P(Kernels, agree_for_bones_turned_alike) {
     EXPECT_LT(errors(method(), scene_of_sets(1, 12, 100, 6, false, 0.2)).back(), kTolerance);
 }
 
-// Each component of the quaternion is the largest of one of them, and 180 degrees have w = 0.
+// Each component of the quaternion is the largest for one of them, and 180 degrees have w = 0.
 TEST_P(Kernels, agree_for_bones_turned_far) {
     Scene scene;
     for (const double degrees : {0.0, 100.0, 179.0, 180.0, 181.0, 300.0}) {
@@ -170,11 +170,11 @@ TEST_P(Kernels, agree_for_many_influences) {
     }
 }
 
-// A bone that is far away and has little weight must not cost a vertex the digits of the others. In single
-// numbers, whatever the order of the bones: at most four times the error of a plain sum.
+// A bone that is far away and has little weight must not cost a vertex the digits of the others: in single
+// precision and for any order of bones, the error is at most four times that of a plain sum.
 TEST_P(Kernels, round_as_a_plain_sum_does_for_bones_of_unlike_size) {
     std::uint32_t seed = 100;
-    // First moments are kept as products that were rounded.
+    // First moments are stored as products that were rounded.
     const double times = method().keeps_moments ? 8.0 : 4.0;
     for (const double farthest : {1.0, 1e3, 1e5, 1e7}) {
         for (const std::size_t vertices : {1, 7, 40}) {
@@ -184,7 +184,8 @@ TEST_P(Kernels, round_as_a_plain_sum_does_for_bones_of_unlike_size) {
                         scene_of_unlike_bones(++seed, 800 / vertices, vertices, farthest, scaled, spread);
                     const auto ours = errors(method(), scene);
                     const auto plain = errors_of(test::by_skinning<float>(method(), scene), method(), scene);
-                    // The highest may be of signs that are all but a tie, where each is as good as the other.
+                    // The highest errors may come from signs that are nearly a tie, where both choices are
+                    // equally good.
                     for (const double part : {0.5, 0.9, 0.98}) {
                         const auto i = static_cast<std::size_t>(part * static_cast<double>(ours.size()));
                         EXPECT_LT(ours[i], times * plain[i] + 1e-7)
@@ -213,7 +214,7 @@ TEST_P(Kernels, a_far_bone_of_little_weight_costs_no_digits) {
 }
 
 TEST_P(Kernels, place_in_the_mesh_changes_no_bit) {
-    // Its blocks have all bones of their vertices, and the first of these is added whole.
+    // Its blocks contain all bones of their vertices, and the first of these is added whole.
     if (method().keeps_moments) GTEST_SKIP() << "other vertices of a block change the rounding";
     for (const bool scaled : {false, true}) {
         Scene scene = scene_of_sets(3, 20, 37, 6, scaled);
@@ -230,7 +231,7 @@ TEST_P(Kernels, place_in_the_mesh_changes_no_bit) {
                 std::swap(order[i - 1],
                           order[static_cast<std::size_t>(random.index(static_cast<std::int32_t>(i)))]);
             }
-            // Ever fewer vertices, so that sets also lose vertices and change from one kernel to another.
+            // Fewer vertices in each round, so that sets also lose vertices and switch between kernels.
             order.resize(order.size() / 2);
             const Scene other = reordered(scene, order);
             const auto points = deformed(Deformer(other.data(), method()), other);

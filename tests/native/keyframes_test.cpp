@@ -194,8 +194,8 @@ TYPED_TEST(Keyframes, half_turns_between_keys_are_finite) {
 
 TYPED_TEST(Keyframes, no_jump_within_the_spline) {
     using Transform = typename TypeParam::template Transform<double>;
-    // Steps of 100 degrees: keys two apart differ by more than 180 degrees, where a choice of sign by the heaviest
-    // key would change in the middle of an interval.
+    // Steps of 100 degrees: keys that are two steps apart differ by more than 180 degrees. If signs followed the
+    // heaviest key, they would change in the middle of an interval.
     std::vector<Transform> keys;
     for (int i = 0; i < 5; ++i) {
         keys.push_back(this->in_layout({about<double>({1, 2, 3}, 100.0 * i), {1.0 * i, 0, 0}}));
@@ -240,7 +240,7 @@ double elbow_gap(bool combine_first) {
         (void)interpolate_keyframes<Method, double>(skeleton, from, onto, 0.5, bones);
         root_relative<Transform>(skeleton, {}, bones, bones);
     }
-    // The end of the upper arm and the head of the lower are one point of a real arm.
+    // On a real arm the end of the upper arm and the head of the lower arm are the same point.
     return distance(transform_point(bones[0], {1, 0, 0}), transform_point(bones[1], {0, 0, 0}));
 }
 
@@ -266,10 +266,10 @@ TEST(FigureThreeThree, interpolating_after_combining_tears_the_elbow) {
     EXPECT_LT(elbow_gap<QvSlerp>(false), 1e-15);
     EXPECT_LT(elbow_gap<Dlb>(false), 1e-15);
     EXPECT_LT(elbow_gap<Sclerp>(false), 1e-15);
-    // The lower arm's head goes straight from (1, 0) to (0, 1), the upper arm's end on the circle.
+    // The lower arm's head moves straight from (1, 0) to (0, 1); the upper arm's end moves on the circle.
     EXPECT_NEAR(elbow_gap<QvNlerp>(true), 1.0 - std::sqrt(0.5), 1e-12);
     EXPECT_NEAR(elbow_gap<QvSlerp>(true), 1.0 - std::sqrt(0.5), 1e-12);
-    // The lower arm's own screw rotates by 180 degrees about the middle of its way.
+    // The lower arm's own screw rotates by 180 degrees about the midpoint of its path.
     EXPECT_GT(elbow_gap<Dlb>(true), 0.1);
     EXPECT_GT(elbow_gap<Sclerp>(true), 0.1);
 }

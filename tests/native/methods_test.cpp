@@ -71,7 +71,7 @@ TEST(Methods, find_method_finds_no_other) {
               kMethodCount);
 }
 
-// A property can be made of each parameter.
+// Every parameter has all that a property in Blender needs.
 TEST(Methods, parameters_are_whole) {
     const auto check = [](std::string_view owner, std::span<const Parameter> parameters) {
         std::set<std::string_view> ids;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Deformers of a shared binding, and the stage `mix`.
+// Deformers that share a binding, and the stage `mix`.
 #include "sinew/skinning/mix.h"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using test::random_scene;
 using test::same_bits;
 using test::Scene;
 
-/// Whole stretches of 0 and of 1, as painted weights have them, and all between.
+/// Long runs of 0 and of 1, as painted weights have them, and values in between.
 std::vector<float> painted(std::uint32_t seed, std::size_t vertices) {
     Random random(seed);
     std::vector<float> weights(vertices);
@@ -39,7 +39,7 @@ std::vector<float> painted(std::uint32_t seed, std::size_t vertices) {
     return weights;
 }
 
-/// A scene of few sets of bones in order, so that whole blocks have weights of 0 and of 1.
+/// A scene with few sets of bones in order, so that whole blocks have weights of 0 and of 1.
 Scene scene_in_order(std::uint32_t seed, std::size_t vertices) {
     Random random(seed);
     Scene scene = random_scene(seed, 0, 1.0);

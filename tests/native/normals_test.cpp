@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Normals of whole meshes, beside their definition in double.
+// Normals of whole meshes, compared with their definition in double.
 #include "sinew/deform/normals.h"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ Flags random_flags(const Mesh& mesh, double share_of_edges, double share_of_face
     return flags;
 }
 
-/// With custom normals for all corners, unlike in a fan.
+/// With custom normals for all corners, different within a fan.
 Flags with_custom(Flags flags, const Mesh& mesh) {
     Random random(10);
     for (std::size_t i = 0; i < 2 * mesh.corners.size(); ++i) {
@@ -62,7 +62,7 @@ Flags with_custom(Flags flags, const Mesh& mesh) {
     return flags;
 }
 
-/// By the definition, in double, one face and corner after the other.
+/// The normals by the definition, in double, one face and corner after the other.
 class Reference {
 public:
     Reference(const Mesh& mesh, const Flags& flags) : mesh_(mesh), fans_(mesh.corners.size()) {
@@ -92,7 +92,7 @@ public:
         const auto at = [&](std::size_t corner) {
             return Point(points[static_cast<std::size_t>(mesh_.corners[corner])]);
         };
-        // The sum of cross products is Newell's; from a corner of the face it loses fewer digits.
+        // This sum of cross products equals Newell's; relative to a corner of the face it loses fewer digits.
         for_each_corner([&](std::size_t face, std::size_t, std::size_t corner, std::size_t after) {
             const Point origin = at(static_cast<std::size_t>(mesh_.offsets[face]));
             faces[face] += glm::cross(at(corner) - origin, at(after) - origin);
@@ -124,7 +124,7 @@ public:
     }
 
 private:
-    /// call(face, the corner before, the corner, the one after it)
+    /// Calls call(face, the corner before, the corner, the one after it).
     template <class Call>
     void for_each_corner(const Call& call) const {
         for (std::size_t face = 0; face + 1 < mesh_.offsets.size(); ++face) {
@@ -142,7 +142,7 @@ private:
     }
 
     const Mesh& mesh_;
-    std::vector<std::size_t> fans_;  // of each corner, by one of its corners
+    std::vector<std::size_t> fans_;  // for each corner, one of its fan's corners
     std::vector<std::size_t> next_;
 };
 
@@ -161,7 +161,7 @@ Normals normals_of(const Mesh& mesh, const Flags& flags = {}) {
     return {mesh.topology(), mesh.rest_points.size(), flags.sharpness()};
 }
 
-/// With polygons of up to 70 corners.
+/// Includes polygons of up to 70 corners.
 Mesh mesh_with_large_faces() {
     Mesh mesh = random_mesh(3, 24);
     for (const int count : {5, 7, 8, 9, 32, 33, 70}) {
@@ -195,7 +195,7 @@ TEST_P(NormalKernels, agree_with_the_definition_in_double) {
             const Reference reference(mesh, flags);
             const Normals normals = normals_of(mesh, flags);
             for (const NormalDomain domain : kDomains) {
-                // Without anything sharp corners have the normals of their vertices, whose fans may be several.
+                // If nothing is sharp, corners have the normals of their vertices, which may have several fans.
                 if (domain == NormalDomain::corner && normals.domain() == NormalDomain::vertex) continue;
                 const auto expected = reference.compute(domain, mesh.rest_points);
                 const auto result = computed(normals, domain, mesh.rest_points);
@@ -245,13 +245,13 @@ TEST_P(NormalKernels, corners_of_a_smooth_mesh_have_the_normals_of_their_vertice
 
 TEST_P(NormalKernels, tilt_and_turn_custom_normals) {
     Mesh mesh;
-    // A pyramid without base; its edges are at 45 degrees to the normal of its top.
+    // A pyramid without a base; its edges are at 45 degrees to the normal of its top.
     mesh.rest_points = {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}};
     for (std::int32_t i = 1; i < 5; ++i) mesh.add_face({0, i, i % 4 + 1});
     mesh.add_edges_of_faces();
     Flags flags;
     flags.custom.assign(2 * mesh.corners.size(), 0);
-    // The walk begins at the edge to vertex 1, the first corner's following one.
+    // The walk starts at the edge to vertex 1, which is the first corner's following edge.
     const auto at_top = [&](std::int16_t tilt, std::int16_t turn) {
         for (std::size_t corner = 0; corner < mesh.corners.size(); corner += 3) {
             flags.custom[2 * corner] = tilt;
@@ -264,9 +264,9 @@ TEST_P(NormalKernels, tilt_and_turn_custom_normals) {
     EXPECT_LT(distance(at_top(32767, 0), Point(std::sin(whole), 0, std::cos(whole))), 1e-4);
     EXPECT_LT(distance(at_top(16384, 8192), Point(0, std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
     EXPECT_LT(distance(at_top(16384, 24575), Point(0, -std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
-    // Backwards: what is left of a turn.
+    // Backwards: 360 degrees minus the angle.
     EXPECT_LT(distance(at_top(-32767, 0), Point(std::sin(whole), 0, std::cos(whole))), 1e-4);
-    // Of unlike corners the mean, rounded to 0.
+    // For corners with different numbers, the mean, rounded towards 0.
     at_top(16384, 8192);
     flags.custom[0] = 16384 - 3;
     const auto result = computed(normals_of(mesh, flags), NormalDomain::corner, mesh.rest_points);
@@ -287,11 +287,12 @@ TEST_P(NormalKernels, degenerate_faces_have_defined_normals) {
         EXPECT_EQ(normal, Vec3<float>(0, 0, 1));
     }
     const auto vertices = computed(normals, NormalDomain::vertex, mesh.rest_points);
-    // 3 is the middle of the line, whose angle is pi; the others' are 0, but where an edge has no length: pi / 2.
+    // 3 is in the middle of the line, with an angle of pi; the others' angles are 0, except pi / 2 where an edge
+    // has length 0.
     EXPECT_EQ(vertices[3], Vec3<float>(0, 0, 1));
     EXPECT_EQ(vertices[0], Vec3<float>(0, 0, 1));
     EXPECT_EQ(vertices[4], Vec3<float>(0, 0, 0));
-    // Of no face, at the origin.
+    // A vertex without faces, at the origin.
     EXPECT_EQ(vertices[5], Vec3<float>(0, 0, 0));
 }
 
@@ -329,7 +330,7 @@ TEST_P(NormalKernels, any_points_give_finite_normals) {
                 ASSERT_TRUE(length == 0.0f || std::abs(length - 1.0f) < 1e-5f) << length;
             }
         }
-        // Without a first edge there is nothing to tilt to.
+        // Without a first edge there is no direction to tilt to.
         for (const auto& normal : computed(custom, NormalDomain::corner, points)) {
             ASSERT_LT(glm::length(normal), 1.00001f);
         }

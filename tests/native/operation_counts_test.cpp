@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Before all others, as it says.
+// Must be included before all others, see there.
 #include "experiments/operation_counts.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ std::map<std::string, Operations> by_name() {
     return result;
 }
 
-/// Additions with doublings among them, as the report has it, and multiplications.
+/// Additions including doublings, as the report counts them, and multiplications.
 std::pair<int, int> as_report(const Operations& o) { return {o.additions + o.doublings, o.multiplications}; }
 
 TEST(Counted, CountsEachKindOnce) {
@@ -43,7 +43,7 @@ TEST(Counted, CountsEachKindOnce) {
 TEST(Counted, ConstantsCostNothingButWhatTheyDoToOthers) {
     Operations o;
     const Counted::CountIn counting(o);
-    const Counted x = Counted::input(0.0);  // a 0 that the source does not know
+    const Counted x = Counted::input(0.0);  // a 0 that is not a constant in the source
     EXPECT_EQ((Counted(1) * x + Counted(0) - Counted(0) * x).value(), 0.0);
     EXPECT_EQ((Counted(3) * Counted(5) + Counted(0.5)).value(), 15.5);
     EXPECT_EQ(o.total(), 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a host loads and unloads; see unload_test.cpp.
+// A library that a host loads and unloads; see unload_test.cpp.
 #include <vector>
 
 #include "sinew/deform/deformer.h"

@@ -13,7 +13,7 @@
 
 namespace sinew::test {
 
-/// A mesh of polygons that owns what MeshTopology points at.
+/// A mesh of polygons that owns the data that MeshTopology refers to.
 struct Mesh {
     std::vector<Vec3<float>> rest_points;
     std::vector<std::int32_t> offsets{0};
@@ -40,7 +40,8 @@ struct Mesh {
     [[nodiscard]] MeshTopology topology() const { return {offsets, corners, edges}; }
 };
 
-/// A sheet of triangles, quads and hexagons, with holes, edges of three faces, edges and vertices without faces.
+/// A sheet of triangles, quads and hexagons, with holes, edges of three faces, and edges and vertices without
+/// faces.
 inline Mesh random_mesh(std::uint32_t seed, std::int32_t size) {
     Random random(seed);
     Mesh mesh;

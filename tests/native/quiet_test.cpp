@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is allocated and locked: by a frame nothing. A program of its own, as it counts what everything in it does.
+// Counts allocations and locks: a frame must have none. A program of its own, because it counts everything in the
+// process.
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
@@ -29,7 +30,7 @@ std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
 std::atomic<std::size_t> bytes{0};
 
-// Windows has other functions for aligned memory, with an end of their own.
+// Windows has other functions for aligned memory, with their own deallocation function.
 void* allocate_aligned(std::size_t unit, std::size_t size) {
 #ifdef _WIN32
     return _aligned_malloc(size, unit);
@@ -109,9 +110,9 @@ TEST(Counting, sees_what_there_is) {
 #endif
 }
 
-// From the first frame on, on whatever thread, and with threads that were never started.
+// From the first frame on, on any thread, and on threads that were not started by the library.
 TEST(Frames, allocate_nothing_and_lock_nothing) {
-    // Sets of all sizes, scaled bones among them, and more blocks than one piece of a thread's work.
+    // Sets of all sizes, some scaled bones, and more blocks than one chunk of a thread's work.
     Scene scene = random_scene(1, 20000, 1.0);
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
     std::vector<Deformer> deformers;
@@ -133,13 +134,13 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     const int allocations_before = allocations;
     frames(points[0]);
     EXPECT_EQ(allocations, allocations_before);
-    // The threads are started, which takes locks of the system's.
+    // Starts the threads, which takes locks of the system.
     const int locks_before = locks;
     for (int round = 0; round < 5; ++round) frames(points[0]);
     EXPECT_EQ(allocations, allocations_before);
     EXPECT_EQ(locks, locks_before);
 
-    // Many at once.
+    // Many threads at once.
     std::atomic<int> waiting{0};
     std::atomic<int> in_frames{0};
     std::vector<std::thread> threads;
@@ -227,12 +228,12 @@ TEST(Bindings, are_packed_once) {
     deformers.reserve(kMethodCount);
     const std::size_t alone = bytes;
     for (const MethodInfo& method : kMethods) deformers.emplace_back(binding, method);
-    // What is left is room for bones, mostly for those of each set that one method wants, of as many threads as may
-    // deform at once: all of it less than one mesh.
+    // Each further deformer only has room for bones, for as many threads as may deform at once; most of it for
+    // one method's bones of each set. Together this must be less than one mesh.
     EXPECT_LT(bytes - alone, of_binding);
 }
 
-// As a number of a bone is no size: what is made for it does not grow with it.
+// Bones' numbers are not sizes: memory must not grow with them.
 TEST(Bones, of_high_numbers_take_no_memory) {
     std::vector<std::size_t> sizes;
     for (const std::int32_t bone : {0, static_cast<std::int32_t>(kMaxBones) - 1}) {
@@ -242,11 +243,11 @@ TEST(Bones, of_high_numbers_take_no_memory) {
         const Deformer deformer(scene.data(), Dq::info);
         sizes.push_back(bytes - before);
     }
-    // What the numbers are sorted by is 4 bytes each, and gone afterwards.
+    // The table that sorts the numbers has 4 bytes for each and is freed afterwards.
     EXPECT_LT(sizes[1], sizes[0] + 5 * kMaxBones);
 }
 
-// Limits, a bend and a second try among what is solved.
+// Includes limits, a bend and a second try.
 TEST(InverseKinematics, allocates_nothing_and_locks_nothing) {
     const std::vector<std::int32_t> parents{-1, 0, 1};
     std::vector<BoneLimits> limits(3);

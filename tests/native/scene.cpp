@@ -9,7 +9,7 @@
 namespace sinew::test {
 namespace {
 
-/// The first of a vertex and the one after its last; none where what a scene holds does not fit, as in tests of that.
+/// The range of a vertex's influences; empty if the scene is invalid, as in tests of invalid data.
 std::pair<std::size_t, std::size_t> range_of(const Scene& scene, std::size_t vertex) {
     if (vertex + 1 >= scene.offsets.size()) return {0, 0};
     const std::int32_t begin = scene.offsets[vertex];
@@ -27,8 +27,8 @@ double total_weight(const Scene& scene, std::size_t vertex) {
     return sum;
 }
 
-/// Its own weights, as if all of its neighbourhood were at the first of its points: what rotates it best is then the
-/// blended quaternion.
+/// The vertex's own weights, as if all of its neighbourhood were at the first of its points: the rotation that
+/// fits best is then the blended quaternion.
 template <class T>
 std::vector<T> moments_at(const Scene& scene, std::size_t vertex) {
     std::map<std::int32_t, double> shares;
@@ -57,7 +57,7 @@ std::vector<T> moments_at(const Scene& scene, std::size_t vertex) {
     return rows;
 }
 
-/// What a method keeps of a vertex.
+/// The vertex data that a method keeps for a vertex.
 template <class T>
 std::vector<T> numbers_of(const Scene& scene, std::size_t vertex, const MethodInfo& method) {
     if (method.keeps_moments) return moments_at<T>(scene, vertex);

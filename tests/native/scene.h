@@ -13,12 +13,13 @@
 
 namespace sinew {
 
-// Found by argument: without it GoogleTest names each test by the bytes of its row, addresses included.
+// Found by argument-dependent lookup. Without it GoogleTest names each test by the bytes of its MethodInfo,
+// including addresses.
 inline void PrintTo(const MethodInfo& method, std::ostream* stream) { *stream << method.name; }
 
 namespace test {
 
-/// A mesh and a pose that own what BindData points at.
+/// A mesh and a pose that own the data that BindData refers to.
 struct Scene {
     std::vector<Vec3<float>> rest_points;
     std::vector<std::int32_t> offsets{0};
@@ -27,17 +28,18 @@ struct Scene {
     std::vector<Affine<float>> rest_bones;
     std::vector<Affine<float>> posed_from_rest;
 
-    // [vertices][kVertexNumbers] three points, then 1, or 0 of some vertices. A method keeps the first of them.
+    // [vertices][kVertexNumbers] three points, then 1, or 0 for some vertices. A method uses the first of these
+    // numbers.
     std::vector<float> vertex_numbers;
 
     static constexpr std::size_t kVertexNumbers = 10;
 
-    /// Valid until it is asked for again.
+    /// Valid until the next call.
     BindData data() const;
 
     void add_vertex(const Vec3<float>& rest, const std::vector<Influence<float>>& influences);
 
-    /// Takes the mesh to another space.
+    /// Moves the mesh to another space.
     void transform(const Affine<float>& by);
 
 private:
@@ -45,20 +47,20 @@ private:
     mutable std::vector<std::vector<float>> vertex_values_;
 };
 
-/// Bones 2, 5, ... are stretched along their own axes, every second of those mirrored; 1 to 8 influences.
+/// Bones 2, 5, ... are stretched along their own axes, and every second of those is mirrored; 1 to 8 influences.
 Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent);
 
-/// Weights as they are.
+/// With the given weights.
 std::vector<Influence<float>> influences_of(const Scene& scene, std::size_t vertex);
 
-/// Weights of sum 1, divided in double; T is float or double.
+/// With weights normalised to sum 1 in double. T is float or double.
 template <class T>
 std::vector<Influence<T>> normalised_influences_of(const Scene& scene, std::size_t vertex);
 
 std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
                                   const DeformOptions& options = {});
 
-/// As skinning/ has it in T, weights normalised in double and bones prepared in it.
+/// The result of skinning/ in T, with weights normalised and bones prepared in double.
 template <class T>
 std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene,
                                  std::span<const double> parameters = {});
@@ -68,8 +70,8 @@ inline std::vector<Vec3<double>> in_double(const MethodInfo& method, const Scene
     return by_skinning<double>(method, scene, parameters);
 }
 
-// kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The translation of a
-// dual quaternion is a product of two numbers of that size, so it grows with the size and no faster.
+// kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The translation of a dual
+// quaternion is a product of two numbers of that size, so it grows linearly with the size.
 inline constexpr double kTolerance = 2e-6;
 
 }  // namespace test

@@ -19,7 +19,7 @@ class Rigid : public testing::Test {
 protected:
     static constexpr double kTolerance = 64.0 * std::numeric_limits<T>::epsilon();
 
-    // Angles where quotients of small numbers, or of a sine near pi, go wrong first.
+    // Angles for which quotients of small numbers, or of a sine near pi, fail first.
     static std::vector<QuatVec<T>> motions() {
         std::vector<QuatVec<T>> motions{{}, {Quat<T>(1, 0, 0, 0), Vec3<T>(1, 2, 3)}};
         for (const double degrees :
@@ -182,7 +182,7 @@ TYPED_TEST(Rigid, normals_stay_square_to_their_surface) {
         EXPECT_NEAR(glm::length(normal), 1, this->kTolerance);
         EXPECT_NEAR(glm::dot(normal, transform_vector(a, u)), 0, 4 * this->kTolerance);
         EXPECT_NEAR(glm::dot(normal, transform_vector(a, v)), 0, 4 * this->kTolerance);
-        // Outwards stays outwards: the side of the surface that a step along the normal reaches.
+        // The normal keeps pointing outwards: to the side of the surface that a step along it reaches.
         EXPECT_GT(glm::dot(normal, transform_vector(a, glm::cross(u, v))), T(0));
     }
     a.linear = Mat3<T>(T(0));
@@ -205,7 +205,7 @@ TYPED_TEST(Rigid, distance_is_angle_and_shift) {
 TYPED_TEST(Rigid, axis_of_no_length_is_no_turn) {
     using T = TypeParam;
     EXPECT_EQ(distance(from_axis_angle<Affine>(Vec3<T>(0), T(2)), Affine<T>{}), 0.0);
-    // Short, and its square 0 in this type.
+    // So short that its square underflows to 0 in this type.
     const Vec3<T> tiny(std::numeric_limits<T>::min(), 0, 0);
     EXPECT_LT(distance(from_axis_angle<Affine>(tiny, T(2)), from_axis_angle<Affine>(Vec3<T>(1, 0, 0), T(2))),
               this->kTolerance);
@@ -235,7 +235,7 @@ TEST(Dual, obeys_the_rules_of_dual_numbers) {
     const Dual<double> same = exp(log(a)) + (-a);
     EXPECT_NEAR(same.real, 0.0, 1e-15);
     EXPECT_NEAR(same.dual, 0.0, 1e-15);
-    // A function's dual part is its slope.
+    // The dual part of a function is its derivative.
     EXPECT_NEAR(sin(Dual<double>{0.7, 1.0}).dual, std::cos(0.7), 1e-15);
 }
 

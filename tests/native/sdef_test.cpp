@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Spherical deform, and parameters of methods, of which it has one.
+// Spherical deform, and parameters of methods, since it has one.
 #include "sinew/skinning/sdef.h"
 
 #include <cmath>
@@ -25,7 +25,7 @@ using test::Scene;
 constexpr double kNlerp[] = {0.0};
 constexpr double kSlerp[] = {1.0};
 
-/// Pairs of a few bones, so that many vertices have the same, then vertices of one to four bones.
+/// Pairs from a few bones, so that many vertices have the same pair, then vertices of one to four bones.
 Scene scene_of_pairs(std::uint32_t seed, bool scaled) {
     Random random(seed);
     Scene scene = random_scene(seed, 0, 1.0);
@@ -109,7 +109,7 @@ TEST_P(EveryTarget, opposite_quaternions_and_half_turns_are_finite) {
     for (const std::span<const double> by : {std::span(kNlerp), std::span(kSlerp)}) {
         for (const Vec3<float>& point : deformed(deformer, scene, {{}, 0, by})) {
             ASSERT_TRUE(is_finite(point));
-            // Of a rotation about points within 1 of the origin, which move by (1, 2, 3) at most.
+            // The bound for rotations about points within 1 of the origin, which move by at most (1, 2, 3).
             EXPECT_LT(glm::length(point), 10.0f);
         }
     }

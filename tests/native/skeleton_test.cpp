@@ -89,7 +89,7 @@ TEST(ForwardKinematics, of_one_branch_leaves_the_others) {
     bones[3] = random.motion(2.0);
     std::vector<QuatVec<double>> wanted(6);
     root_relative<QuatVec<double>>(skeleton, root, bones, wanted);
-    // What is not in the branch is not written, be it right or wrong.
+    // Bones outside the branch are not written, whether right or wrong.
     whole[2].translation = {7, 7, 7};
     wanted[2].translation = {7, 7, 7};
     update_branch<QuatVec<double>>(skeleton, root, bones, 3, whole);

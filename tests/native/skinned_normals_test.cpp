@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Skinned normals and tangents, beside the differences of each method's definition in double.
+// Skinned normals and tangents, compared with differences of each method's definition in double.
 #include "sinew/deform/skinned_normals.h"
 
 #include <stdexcept>
@@ -23,7 +23,7 @@ struct Frames {
     [[nodiscard]] RestFrames rest() const { return {normals, tangents, vertices}; }
 };
 
-/// A normal and a tangent across it for each vertex.
+/// A normal and a perpendicular tangent for each vertex.
 Frames random_frames(std::size_t count) {
     Random random(5);
     Frames frames;

@@ -32,7 +32,7 @@ Rig rigid_rig(std::uint32_t seed) {
     return rig;
 }
 
-/// Bones 1, 3 and 5 are stretched along their own axes, 3 is mirrored too.
+/// Bones 1, 3 and 5 are stretched along their own axes; bone 3 is mirrored, too.
 Rig scaled_rig(std::uint32_t seed) {
     Rig rig = rigid_rig(seed);
     const Vec3<double> factors[] = {{0.5, 1.5, 1.0}, {-1.0, 1.2, 0.7}, {2.0, 2.0, 2.0}};
@@ -56,7 +56,8 @@ Bones<Method> prepared(const Rig& rig) {
     return bones;
 }
 
-/// Moments as deform/direct_delta_mush.h gives them, of a ball about `centre` that has the vertex's weights all over.
+/// Moments, as deform/direct_delta_mush.h computes them, of a ball about `centre` with the vertex's weights
+/// everywhere.
 std::vector<double> moments(const std::vector<Influence<double>>& influences, const Vec3<double>& centre) {
     std::map<std::int32_t, double> weights;
     for (const Influence<double>& influence : influences) weights[influence.bone] += influence.weight;
@@ -68,7 +69,7 @@ std::vector<double> moments(const std::vector<Influence<double>>& influences, co
     return rows;
 }
 
-/// centre  where the method keeps one of the vertex
+/// centre  vertex data, for methods that keep a point for each vertex
 template <class Method>
 Vec3<double> skinned(const Bones<Method>& bones, const std::vector<Influence<double>>& influences,
                      const Vec3<double>& rest, const Vec3<double>& centre = Vec3<double>(0.0)) {
@@ -76,7 +77,7 @@ Vec3<double> skinned(const Bones<Method>& bones, const std::vector<Influence<dou
         return Method::template deform_vertex<double>(bones, influences, rest,
                                                       std::span<const double>(moments(influences, centre)));
     } else if constexpr (Method::info.vertex_floats > 0) {
-        // Of Sdef also R0 and R1, in the same place: a vertex of two bones is rotated about it.
+        // For Sdef also R0 and R1, at the same point: a vertex of two bones is rotated about it.
         const double numbers[] = {centre.x, centre.y, centre.z, centre.x, centre.y,
                                   centre.z, centre.x, centre.y, centre.z, 1.0};
         return Method::template deform_vertex<double>(
@@ -169,8 +170,8 @@ TYPED_TEST(Skinning, bones_of_no_weight_change_nothing) {
     EXPECT_LT(distance(with, without), 1e-15);
 }
 
-// Holds for qv as well: (R, t)(q, v) = (R q, R v + t), and both blends are linear in q and in v. Not for log, as the
-// logarithm of a product is no sum of logarithms.
+// Holds for qv as well: (R, t)(q, v) = (R q, R v + t), and both blends are linear in q and in v. Does not hold
+// for log, because the logarithm of a product is not the sum of the logarithms.
 TYPED_TEST(Skinning, a_rigid_motion_after_the_pose_commutes_but_for_log) {
     Random random(10);
     for (int i = 0; i < 40; ++i) {
@@ -193,7 +194,7 @@ TYPED_TEST(Skinning, a_rigid_motion_after_the_pose_commutes_but_for_log) {
     }
 }
 
-/// How far the result moves when rest points, rest bones and bone motions are given in another space.
+/// How far the result moves if rest points, rest bones and bone motions are given in another space.
 template <class Method>
 double change_by_space(const Rig& rig, const Affine<double>& other_from_space,
                        const std::vector<Influence<double>>& influences, const Vec3<double>& rest) {
@@ -268,7 +269,7 @@ TYPED_TEST(Skinning, opposite_turns_are_finite) {
 }
 
 TYPED_TEST(Skinning, three_half_turns_about_square_axes_are_finite) {
-    // Quaternions i, j, k and 1 are all orthogonal to each other: every choice of a sign is a tie.
+    // The quaternions i, j, k and 1 are orthogonal to each other: every choice of a sign is a tie.
     Rig rig{{{}}, std::vector<Affine<double>>(4)};
     for (int axis = 0; axis < 3; ++axis) {
         Vec3<double> direction(0.0);
@@ -283,7 +284,7 @@ TYPED_TEST(Skinning, three_half_turns_about_square_axes_are_finite) {
 template <class Method>
 class RigidSkinning : public testing::Test {};
 
-/// The methods that blend rotations: for scaled bones they need rest bones.
+/// The methods that blend rotations. They need rest bones if bones are scaled.
 template <class List, class... Rigid>
 struct RigidOf;
 template <class... Rigid>
@@ -332,8 +333,8 @@ TYPED_TEST(RigidSkinning, antipodal_quaternions_do_not_cancel) {
     EXPECT_LT(distance(skinned<TypeParam>(bones, {{0, 0.5}, {1, 0.5}}, rest), expected), 1e-14);
 }
 
-// Terms never point against the sum, so weights of sum 1 can not cancel; a sum below kDegenerateBlend
-// comes from weights that vanish.
+// A term is never in the hemisphere opposite to the sum, so weights with sum 1 can not cancel; a sum below
+// kDegenerateBlend only results from weights that vanish.
 TYPED_TEST(RigidSkinning, a_vanishing_blend_turns_with_the_heaviest) {
     if (std::is_same_v<TypeParam, Log>) GTEST_SKIP() << "logarithms that vanish are those of the identity";
     if (std::is_same_v<TypeParam, Sdef>) GTEST_SKIP() << "vertices of three bones are blended linearly";
@@ -410,7 +411,7 @@ TEST(Dq, rigid_bones_keep_distances_of_vertices_with_the_same_weights) {
 }
 
 TEST(Log, is_half_of_a_screw_at_half_the_weight) {
-    // From the identity the blend is the motion itself, at a constant pace.
+    // From the identity the blend is the motion itself, at constant speed.
     const Quat<double> rotation = about<double>({0, 0, 1}, 90.0);
     const Vec3<double> centre(1, 0, 0);
     const Affine<double> screw{to_mat3(rotation), centre - rotate(rotation, centre) + Vec3<double>(0, 0, 2)};
@@ -435,7 +436,7 @@ TEST(Log, jumps_where_a_bone_passes_180_degrees) {
     EXPECT_LT(distance(at(179.999, 1.0), at(180.001, 1.0)), 1e-4);
 }
 
-/// Bones that rotate any way about one point each, which two neighbours share.
+/// Bones that rotate arbitrarily about one point each, which adjacent bones have in common.
 Rig chain(std::uint32_t seed) {
     Random random(seed);
     Rig rig;
@@ -492,7 +493,7 @@ TEST(Sbs, bones_that_rotate_alike_have_the_mean_of_their_heads) {
     }
 }
 
-// About one axis: the centre is free along it, and stays as near to the heads as can be.
+// Rotations about one axis: the centre is free along it, and stays as near to the heads as possible.
 TEST(Sbs, hinges_keep_the_free_direction) {
     for (const std::size_t count : {2, 3, 4}) {
         Bones<Sbs> bones;
@@ -515,7 +516,7 @@ TEST(Cor, about_any_centre_rotates_as_the_blend) {
         const auto influences = random.influences<double>(4, 6);
         const Vec3<double> centre = random.vector(2.0);
         const Vec3<double> rest = random.vector(2.0);
-        // The centre moves linearly, and distances from it stay.
+        // The centre moves linearly, and distances from it are preserved.
         const Vec3<double> moved = skinned<Cor>(bones, influences, centre, centre);
         EXPECT_LT(distance(moved, skinned<Lbs>(prepared<Lbs>(rig), influences, centre)), 1e-14);
         EXPECT_NEAR(distance(skinned<Cor>(bones, influences, rest, centre), moved), distance(rest, centre),
@@ -539,7 +540,7 @@ TEST(IterativeDq, is_where_the_logarithms_cancel) {
         const Rig rig = rigid_rig(seed);
         const Bones<IterativeDq> bones = prepared<IterativeDq>(rig);
         const auto influences = random.influences<double>(6, 6);
-        // The motion, of what it does to four points.
+        // The motion, from the images of four points.
         const Vec3<double> origin = skinned<IterativeDq>(bones, influences, {0, 0, 0});
         Affine<double> blend{Mat3<double>(0.0), origin};
         for (int axis = 0; axis < 3; ++axis) {

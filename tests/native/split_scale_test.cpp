@@ -107,7 +107,7 @@ TEST(SplitScale, shear_keeps_the_direction_of_y) {
 
 TEST(SplitScale, zero_axes_give_a_rotation_and_no_nan) {
     const Affine<double> motion = to_affine(QuatVec<double>{about<double>({3, -1, 2}, 130.0), {1, 2, 3}});
-    // Bones along the axes of the model are where one wrong choice of a square axis is parallel to Y.
+    // For bones along the model's axes, one wrong choice of a perpendicular axis is parallel to Y.
     const std::pair<const char*, Affine<double>> bones[] = {
         {"tilted", tilted_bone()},
         {"y along y", {}},
@@ -158,7 +158,7 @@ TEST(SplitScale, collapsed_to_a_line_or_plane_gives_a_rotation) {
 TEST(SplitScale, extreme_shear_and_scale_give_a_rotation) {
     Affine<double> diagonal;
     const Vec3<double> along = Vec3<double>(1.0);
-    // Both other axes lean on Y and are long: Blender's rule then looks at Y alone.
+    // Both other axes lean towards Y and are long: Blender's rule then uses only Y.
     diagonal.linear =
         Mat3<double>(4.0 * along + Vec3<double>(1, 0, 0), along, 5.0 * along + Vec3<double>(0, 0, 1));
     expect_good_split(diagonal, {}, "diagonal");

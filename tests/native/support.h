@@ -16,7 +16,7 @@
 
 namespace sinew::test {
 
-/// Random numbers that are the same on every machine: the standard's distributions are not.
+/// Random numbers that are the same on every machine, unlike the standard's distributions.
 class Random {
 public:
     explicit Random(std::uint32_t seed) : engine_(seed) {}
@@ -46,7 +46,7 @@ public:
         return {q, vector(extent)};
     }
 
-    /// Positive weights of sum 1, each for another bone where there are enough.
+    /// Positive weights with sum 1, for different bones if there are enough.
     template <class T>
     std::vector<Influence<T>> influences(std::size_t count, std::int32_t bones) {
         std::vector<Influence<T>> result;

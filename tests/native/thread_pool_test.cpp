@@ -16,7 +16,7 @@
 #endif
 
 #ifdef __SANITIZE_THREAD__
-// The thread sanitizer ends a forked child that starts threads, unless told that this is meant.
+// The thread sanitizer ends a forked child that starts threads, unless this option says that it is intended.
 extern "C" __attribute__((visibility("default"))) const char* __tsan_default_options() {
     return "die_after_fork=0";
 }
@@ -25,8 +25,8 @@ extern "C" __attribute__((visibility("default"))) const char* __tsan_default_opt
 namespace sinew {
 namespace {
 
-/// Whether parallel_for calls every index of [0, count) exactly once. Visits are plain integers: two
-/// threads on one index are a race that the thread sanitizer sees.
+/// Whether parallel_for calls every index of [0, count) exactly once. Visits are plain integers: if two threads
+/// get the same index, the thread sanitizer reports a race.
 bool covers_once(std::size_t count, std::size_t threads) {
     std::vector<int> visits(count, 0);
     std::atomic<bool> inside{true};
@@ -40,7 +40,7 @@ bool covers_once(std::size_t count, std::size_t threads) {
     return inside && std::all_of(visits.begin(), visits.end(), [](int n) { return n == 1; });
 }
 
-/// Returns once two threads have been inside one call together; waits for ever where none comes to help.
+/// Returns once two threads have been inside one call at the same time; waits forever if no helper comes.
 bool meets_a_helper() {
     std::atomic<int> inside{0};
     parallel_for(2 * 4096, 2, [&](std::size_t, std::size_t) {
@@ -121,7 +121,7 @@ TEST(ParallelFor, may_be_called_from_many_threads_at_once) {
     EXPECT_EQ(failures, 0);
 }
 
-// Whoever throws, caller or helper, and however many.
+// Any thread may throw, caller or helper, and any number of them.
 TEST(ParallelFor, hands_an_exception_to_its_caller_and_goes_on_working) {
     for (int round = 0; round < 50; ++round) {
         for (const std::size_t threads : {1, 2, 5}) {
@@ -190,7 +190,7 @@ TEST(ParallelFor, works_in_a_forked_child) {
     const pid_t child = fork();
     ASSERT_GE(child, 0);
     if (child == 0) {
-        alarm(60);  // a child that waits for its parent's threads must fail, not hang
+        alarm(60);  // a child that waits for its parent's threads must fail instead of hanging
         _exit(covers_once(50000, 4) && meets_a_helper() && covers_once(50000, 4) ? 0 : 1);
     }
     int status = 0;

@@ -11,8 +11,8 @@ using test::about;
 using test::distance;
 using test::Random;
 
-// Motions that conversions get wrong first: no rotation, 180 degrees about each axis and between them, rotations a
-// hair from these, and translation alone.
+// Motions for which conversions fail first: no rotation, 180 degrees about each axis and between axes, rotations
+// that differ minimally from these, and pure translation.
 template <class T>
 std::vector<QuatVec<T>> named_motions() {
     const Vec3<T> x(1, 0, 0);
@@ -156,7 +156,7 @@ TYPED_TEST(Transform, pure_translation_comes_back_to_the_bit) {
 }
 
 TEST(Affine, product_in_registers_is_that_of_plain_loops) {
-    // A compiler that joins products and sums may round once less; others give the same bits.
+    // A compiler that contracts products and sums may round once less; others give the same bits.
 #if defined(__FMA__) || defined(__aarch64__)
     constexpr float kJoined = 1e-6f;
 #else

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host that loads the library, has it work on threads, ends these and unloads it.
+// A host that loads the library, uses its threads, ends them and unloads the library.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ TEST(Host, may_unload_the_library_after_its_threads_ended) {
 #ifdef __linux__
         const auto before = thread_count();
 #endif
-        end();  // of none
+        end();  // when there are none
         EXPECT_EQ(work(4), 1);
 #ifdef __linux__
         EXPECT_EQ(thread_count(), before + 3);

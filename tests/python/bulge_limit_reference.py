@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stage bulge_limit in float64 numpy, from Kim and Han 2014 and its definition: the library's oracle."""
+"""The stage bulge_limit in float64 numpy, from Kim and Han 2014 and its definition: the oracle for the
+library."""
 
 import numpy as np
 
@@ -19,8 +20,8 @@ def nearest(head, tail, point):
 
 
 def stretch(linear, head, tail):
-    """The largest singular value of what the motion does to directions across the bone, seen along its
-    image; of a point the root mean square of all."""
+    """The largest singular value of the motion on directions perpendicular to the bone, without the
+    component along the posed bone; for a point the root mean square of all."""
     axis = tail - head
     if not axis.any():
         return np.linalg.norm(linear) / np.sqrt(3.0)
@@ -43,7 +44,7 @@ def limit(  # noqa: PLR0913 - as the library's
     form="continuous",
     mask=None,
 ):
-    """float64 [vertices, 3]. All in the space of the bones."""
+    """The limited points, float64 [vertices, 3]. All arguments are in the space of the bones."""
     transforms = np.asarray(transforms, np.float64)
     heads, tails = np.asarray(heads, np.float64), np.asarray(tails, np.float64)
     posed_heads, posed_tails = (

@@ -8,12 +8,12 @@ EPSILON = 10 * np.finfo(np.float32).eps
 
 
 def corners_of(faces):
-    """(vertex, the one before it, the one after it) of each corner of `faces`, lists of vertices."""
+    """(vertex, previous vertex, next vertex) for each corner of `faces`, lists of vertices."""
     return [(f[i], f[i - 1], f[(i + 1) % len(f)]) for f in faces for i in range(len(f))]
 
 
 def boundary_of(faces, edges):
-    """The vertices at the ends of edges that have one face."""
+    """The vertices at the ends of edges that have a single face."""
     count = {frozenset(map(int, edge)): 0 for edge in edges}
     for vertex, _, following in corners_of(faces):
         count[frozenset((vertex, following))] += 1
@@ -21,7 +21,7 @@ def boundary_of(faces, edges):
 
 
 def smoothed(points, edges, factors, iterations, smooth_type):
-    """factors: of each vertex."""
+    """One iteration. factors: for each vertex."""
     points, (a, b) = np.array(points, np.float64), np.asarray(edges).reshape(-1, 2).T
     valence = np.bincount(np.concatenate([a, b]), minlength=len(points))
     for _ in range(iterations):
@@ -41,9 +41,9 @@ def smoothed(points, edges, factors, iterations, smooth_type):
 
 
 def amount(rest, edges, factor, radius, smooth_type, most=1000):
-    """Iterations and the factor of each vertex that make details of the width `radius` out of those of one
-    edge: n iterations by the factor f spread as far as h sqrt(n f / 2), h the root mean square of a vertex's
-    edges, or by half of the square where neighbours count by length."""
+    """The number of iterations, and the factor of each vertex, that spread a detail to the width
+    `radius`: n iterations with the factor f spread it by h sqrt(n f / 2), with h the root mean square of
+    a vertex's edges; half of that squared if neighbours are weighted by length."""
     a, b = np.asarray(edges).reshape(-1, 2).T
     squares = ((rest[a] - rest[b]) ** 2).sum(axis=1)
     total = np.bincount(np.r_[a, b], np.r_[squares, squares], minlength=len(rest))
@@ -53,7 +53,7 @@ def amount(rest, edges, factor, radius, smooth_type, most=1000):
     if not len(found) or factor == 0.0:
         return 0, factors
     wanted = (4.0 if smooth_type == "length_weighted" else 2.0) * radius**2
-    # All but the shortest tenth.
+    # All except the shortest tenth.
     iterations = int(np.clip(np.ceil(wanted / (factor * found[int(0.1 * len(found))])), 1, most))
     some = squared > 0.0
     factors[some] = np.minimum(wanted / (iterations * squared[some]), factor)
@@ -72,7 +72,7 @@ def unit(vector):
 
 
 def frame(before, at, after):
-    """The axes of a corner, in columns, and its weight."""
+    """The axes of a corner, as columns, and its weight."""
     a, b = unit(before - at), unit(at - after)
     if (np.abs(a - b) <= EPSILON).all():
         return np.eye(3), 0.0
@@ -93,8 +93,8 @@ def delta_mush(  # noqa: PLR0913 - as the library's
     scale=1.0,
     rounding=0.0,
 ):
-    """mesh: (rest points, faces as lists of vertices, edges). rounding: added to smoothed points, to see what
-    their rounding does."""
+    """mesh: (rest points, faces as lists of vertices, edges). rounding: added to smoothed points, to see
+    its effect."""
     rest, faces, edges = mesh
     rest = np.asarray(rest, np.float64)
     factors = np.full(len(rest), float(factor))

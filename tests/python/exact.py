@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations and rigid motions at 50 digits: the oracle of test_exact.py.
+"""Rotations and rigid motions with 50 digits: the oracle for test_exact.py.
 
 Numbers are Python's decimals, whose sums and products take a tenth of the time of mpmath's; sines, cosines
-and arctangents are mpmath's. Arrays of them have their components first: a quaternion is [4, n], a vector
-[3, n], a matrix [3, 3, n]. Written from the definitions, and by another formula than the library's where
-there is one; at 50 digits no difference cancels that matters.
+and arctangents are mpmath's. Arrays have components first: a quaternion is [4, n], a vector [3, n], a matrix
+[3, 3, n]. Written from the definitions, with other formulas than the library's where there are any; with 50
+digits, cancellation does not matter.
 """
 
 import decimal
@@ -15,7 +15,7 @@ import mpmath
 import numpy as np
 
 DIGITS = 50
-# mpmath's results keep them when they are written in decimals.
+# mpmath's results keep their digits if they are converted by way of decimal text.
 mpmath.mp.dps = DIGITS + 5
 decimal.getcontext().prec = DIGITS
 
@@ -27,7 +27,7 @@ def _by_mpmath(function, arguments):
     return np.frompyfunc(of, arguments, 1)
 
 
-# Of a float the nearest of 50 digits.
+# The number with 50 digits that is nearest to a float.
 number = np.frompyfunc(lambda value: +Decimal(value), 1, 1)
 sqrt = np.frompyfunc(Decimal.sqrt, 1, 1)
 exp = np.frompyfunc(Decimal.exp, 1, 1)
@@ -44,12 +44,12 @@ class Motion(NamedTuple):
     t: np.ndarray
 
     def take(self, index):
-        """The motions of `index` along the cases."""
+        """The motions with index `index` among the cases."""
         return Motion(self.q[:, index], self.t[:, index])
 
 
 def exact(array):
-    """float [.., k] as numbers [k, ..]."""
+    """Floats [.., k] as numbers [k, ..]."""
     return number(np.moveaxis(np.asarray(array, np.float64), -1, 0))
 
 
@@ -67,7 +67,7 @@ def length(v):
 
 
 def unit(v):
-    """`v` at length 1; of length 0 as it is."""
+    """`v` normalised; unchanged if its length is 0."""
     size = length(v)
     return v / np.where(size > 0, size, ONE)
 
@@ -82,7 +82,7 @@ def cross(a, b):
 
 
 def product(p, q):
-    """Hamilton's."""
+    """Hamilton's product."""
     a, b, c, d = p
     e, f, g, h = q
     return np.array(
@@ -121,7 +121,7 @@ def hat(v):
 
 
 def times(m, v):
-    """The matrices `m` times the vectors `v`."""
+    """The products of the matrices `m` and the vectors `v`."""
     return np.array([dot(row, v) for row in m], dtype=object)
 
 
@@ -134,7 +134,7 @@ def determinant(m):
 
 
 def inverse_matrix(m):
-    """By cofactors."""
+    """The inverse, from cofactors."""
     a, b, c = m[:, 0], m[:, 1], m[:, 2]
     return np.array([cross(b, c), cross(c, a), cross(a, b)], dtype=object) / determinant(m)
 
@@ -146,7 +146,7 @@ def rotate(q, v):
 
 
 def from_axis_angle(axis, angle):
-    """The identity where the axis is of length 0."""
+    """The quaternion of the rotation; the identity if the length of the axis is 0."""
     has_axis = length(axis) > 0
     half = np.where(has_axis, angle, angle * 0) * HALF
     return np.concatenate([cos(half)[None], sin(half) * unit(axis)])
@@ -157,7 +157,7 @@ def from_rotation_vector(v):
 
 
 def rotation_vector(q):
-    """0 to pi long, by the sign of `q` at pi."""
+    """The rotation vector, 0 to pi long; at pi the sign of `q` decides."""
     near = np.where(q[0] < 0, -q, q)
     angle = 2 * atan2(length(near[1:]), near[0])
     return angle * unit(near[1:])
@@ -175,12 +175,12 @@ def inverse(a):
 
 
 def dual_part(a):
-    """[4, n]: that of the unit dual quaternion, t q / 2."""
+    """The dual part, [4, n], of the unit dual quaternion: t q / 2."""
     return HALF * product(pure(a.t), a.q)
 
 
 def of_dual(real, dual):
-    """The motion of any dual quaternion with a real part: divided by its norm."""
+    """The motion of any dual quaternion with a nonzero real part: divided by its norm."""
     size = length(real)
     real, dual = real / size, dual / size
     dual = dual - real * dot(real, dual)
@@ -188,7 +188,7 @@ def of_dual(real, dual):
 
 
 def _coefficients(angle):
-    """(1 - cos x) / x^2 and (x - sin x) / x^3, by series where even 50 digits cancel."""
+    """(1 - cos x) / x^2 and (x - sin x) / x^3; series where even 50 digits cancel."""
     is_small = angle < Decimal("1e-8")
     x = np.where(is_small, ONE, angle)
     square = angle * angle
@@ -207,7 +207,7 @@ def from_twist(angular, linear):
 
 
 def to_twist(a):
-    """The logarithm, (angular, linear): what integrates to the translation."""
+    """The logarithm, (angular, linear): the linear part is the one that integrates to the translation."""
     angular = rotation_vector(a.q)
     angle = length(angular)
     is_small = angle < Decimal("1e-8")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Seeded cases for the oracle at 50 digits, edges among them, and what counts as equal."""
+"""Seeded cases for the oracle with 50 digits, including edge cases, and criteria of equality."""
 
 import functools
 from typing import NamedTuple
@@ -12,13 +12,13 @@ COUNT = 2000
 FLOATS = (np.float64, np.float32)
 LAYOUTS = {"affine": sinew.affine, "quat_vec": sinew.quat_vec, "dual_quat": sinew.dual_quat}
 
-# What a result may be off, in steps of its type at the size of what is added up: 1.4e-14 in float64, 7.6e-6
-# in float32. Checks that allow more say why.
+# The allowed error, in steps of the type at the size of what is summed: 1.4e-14 in float64, 7.6e-6 in
+# float32. Checks that allow more say why.
 STEPS = 64
 
 
 class Cases(NamedTuple):
-    """COUNT rigid motions: exact, and rounded to float64 in each layout; size: [n] of their translations."""
+    """COUNT rigid motions: exact, and rounded to float64 in each layout. size: [n] of their translations."""
 
     exact: Motion
     affine: np.ndarray
@@ -36,7 +36,7 @@ def cases_of(motion):
 
 
 def in_layout(motion, name):
-    """float64 [n, 4, 4], [n, 7] or [n, 8]."""
+    """The motions as float64 [n, 4, 4], [n, 7] or [n, 8]."""
     if name == "quat_vec":
         return rounded(np.concatenate([motion.q, motion.t]))
     if name == "dual_quat":
@@ -48,7 +48,7 @@ def in_layout(motion, name):
     return result
 
 
-# --- Families, so that each of rotations meets each of translations.
+# --- Families, arranged so that each family of rotations is combined with each of translations.
 
 
 def directions(rng, count=COUNT):
@@ -59,7 +59,7 @@ def directions(rng, count=COUNT):
 
 
 def angles(rng, count=COUNT):
-    """Any, near 0, 0, near half a turn, half a turn: the last bits of both edges, too."""
+    """Angles: any, near 0, 0, near 180 degrees, 180 degrees; also the last bits at both edges."""
     angle = rng.uniform(0.0, np.pi, count)
     tiny = 10.0 ** rng.uniform(-12, -1, count)
     family = np.arange(count) % 8
@@ -70,7 +70,7 @@ def angles(rng, count=COUNT):
 
 
 def translations(rng, count=COUNT):
-    """Any, none, tiny, huge."""
+    """Lengths: any, 0, tiny, huge."""
     t = rng.normal(size=(count, 3)) * 3.0
     family = (np.arange(count) // 8) % 5
     power = np.where(family == 1, rng.uniform(-25, -5, count), 0.0)
@@ -79,7 +79,7 @@ def translations(rng, count=COUNT):
 
 
 def quaternions(rng, angle):
-    """float64 [n, 4], of either sign; half a turn has w = 0."""
+    """Unit quaternions, float64 [n, 4], of either sign; w = 0 at 180 degrees."""
     half = np.where(angle == np.pi, 0.0, np.cos(angle / 2))
     q = np.column_stack([half, np.sin(angle / 2)[:, None] * directions(rng, len(angle))])
     return q / np.linalg.norm(q, axis=1)[:, None] * rng.choice([-1.0, 1.0], (len(angle), 1))
@@ -91,14 +91,14 @@ def motions(seed):
     rng = np.random.default_rng(seed)
     order = rng.permutation(COUNT)
     q, t = quaternions(rng, angles(rng)), translations(rng)
-    # Another order for another seed, so that families of two meet.
+    # Another seed gives another order, so that families of two are combined.
     return cases_of(Motion(unit(exact(q[order])), exact(t[order])))
 
 
 @functools.cache
 def pairs(seed):
-    """Two Cases, the second one rotated from the first by the families' angles, near half a turn among
-    them."""
+    """Two Cases, the second rotated from the first by the families' angles, some of them near 180
+    degrees."""
     first = motions(seed)
     rng = np.random.default_rng(seed + 1000)
     step = Motion(unit(exact(quaternions(rng, angles(rng)))), exact(translations(rng)))
@@ -112,7 +112,7 @@ def points(seed):
 
 
 def linear_maps(seed):
-    """float64 [n, 4, 4] that rotate, scale by 0.1 to 10 along axes, shear and mirror."""
+    """Matrices float64 [n, 4, 4] that rotate, scale by 0.1 to 10 along axes, shear and mirror."""
     rng = np.random.default_rng(seed + 3000)
     left, right = motions(seed).affine[:, :3, :3], motions(seed + 1).affine[:, :3, :3]
     scale = 10.0 ** rng.uniform(-1, 1, (COUNT, 3)) * rng.choice([-1.0, 1.0], (COUNT, 3))
@@ -127,7 +127,7 @@ def exact_matrix(linear):
     return exact(linear.reshape(*linear.shape[:-2], 9)).reshape(3, 3, *linear.shape[:-2])
 
 
-# --- What counts as equal
+# --- Criteria of equality
 
 
 def step_of(dtype):
@@ -140,8 +140,8 @@ def largest(array):
 
 
 def agree(got, want, size, steps=STEPS, where=None, count=COUNT):
-    """`got` [n, ..] is `want`, float64 [n, ..], to `steps` of its type at `size`, [n] or a number, where
-    `where`."""
+    """Asserts that `got` [n, ..] equals `want`, float64 [n, ..], within `steps` of its type at `size`,
+    [n] or a number, where `where` is true."""
     assert len(got) == len(want) == count, (len(got), len(want))
     assert np.isfinite(got).all(), f"case {np.argmin(np.isfinite(largest(got)))} is not finite"
     off = largest(got.astype(np.float64) - want)
@@ -155,11 +155,11 @@ def agree(got, want, size, steps=STEPS, where=None, count=COUNT):
 
 
 def agree_motions(got, name, want, size, *, rotation=1.0, steps=STEPS, where=None, signed=False):
-    """`got`, in the layout `name`, is `want`, float64 in that layout.
+    """Asserts that `got`, in the layout `name`, equals `want`, float64 in that layout.
 
-    size      [n] of the translations that are added up
-    rotation  what errors of rotations are measured by, [n] or a number
-    signed    whether the signs of quaternions count
+    size      [n] of the translations that are summed
+    rotation  what errors of rotations are relative to, [n] or a number
+    signed    whether the signs of quaternions matter
     """
     got = got.reshape(COUNT, *want.shape[1:])
     rotations = got[:, :3, :3] if name == "affine" else got[:, :4]

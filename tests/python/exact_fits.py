@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks at 50 digits: sinew.fit. A fit is held to what makes it the best one, with numbers that do not
-round."""
+"""Checks with 50 digits: sinew.fit. Verifies the conditions that make a fit the best one, in numbers that
+do not round."""
 
 import functools
 
@@ -32,8 +32,8 @@ def of_each(array, count):
 
 @functools.cache
 def point_cases():
-    """source, target [COUNT, POINTS, 3] and weights [COUNT, POINTS]: exact, noisy, far off the origin, tiny,
-    huge, of mirror images."""
+    """source, target [COUNT, POINTS, 3] and weights [COUNT, POINTS]: exact, noisy, far from the origin,
+    tiny, huge, and mirror images."""
     rng = np.random.default_rng(301)
     size = 10.0 ** np.where(np.arange(COUNT) % 5 == 1, rng.uniform(-12, 12, COUNT), 0.0)
     source = rng.normal(size=(COUNT, POINTS, 3)) + 10.0 * rng.normal(size=(COUNT, 1, 3))
@@ -50,7 +50,8 @@ def point_cases():
 
 @functools.cache
 def moments():
-    """Exact middles [3, COUNT] of both and the weighted sum of target source^T about them, of size 1."""
+    """The exact middles [3, COUNT] of both, and the weighted sum of target source^T about them, scaled to
+    size 1."""
     source, target, weights = point_cases()
     part = e.number(weights.T)
     part = part / part.sum(axis=0)
@@ -65,8 +66,9 @@ def moments():
 
 
 def rigid(method):
-    """The least squares of all rotations: R^T C is symmetric, and no two of its eigenvalues have a sum below
-    0 (so that it is the maximum, not another point of rest); the middle goes to the middle."""
+    """Asserts that the squares are the least for all rotations: R^T C is symmetric, no two of its
+    eigenvalues have a negative sum (so it is the maximum, not another stationary point), and the middle
+    maps to the middle."""
 
     def check(_name, function):
         source, target, weights = point_cases()
@@ -78,7 +80,7 @@ def rigid(method):
         name = LAYOUT_OF_FIT[method]
         for dtype in FLOATS:
             fit = function(*(a.astype(dtype) for a in (source, target, weights)), method=method)
-            # As a mirror image's gap is a difference, rounding may leave nothing of it.
+            # For a mirror image the gap is a difference, of which rounding may leave nothing.
             assert fit.is_defined[gap > 1e-3].all()
             motion = exact_motion(fit.transforms, name)
             rotation = e.matrix(motion.q)
@@ -86,7 +88,7 @@ def rigid(method):
             skew = np.array(
                 [aligned[2, 1] - aligned[1, 2], aligned[0, 2] - aligned[2, 0], aligned[1, 0] - aligned[0, 1]]
             )
-            # What coordinates far from the origin round counts by their size.
+            # Rounding of coordinates far from the origin is relative to their size.
             far = reach / size
             agree(rounded(skew).astype(dtype), np.zeros((COUNT, 3)), 1 + far)
             symmetric = np.moveaxis(((aligned + np.swapaxes(aligned, 0, 1)) / 2).astype(np.float64), -1, 0)
@@ -114,11 +116,11 @@ def agree_error(fit, motion, dtype, far):
 
 
 def exact_motion(array, name):
-    """The exact motion of a result, its rotation of unit length."""
+    """The exact motion of a result, with a rotation of unit length."""
     array = np.asarray(array, np.float64)
     if name == "affine":
         q = sinew.affine.to_quat_vec(array)[:, :4]
-        # As near as rounding: the matrix is held to it here.
+        # Allows rounding only: that the matrix is a rotation is checked here.
         np.testing.assert_allclose(
             np.moveaxis(e.matrix(e.unit(exact(q))).astype(np.float64), -1, 0),
             array[:, :3, :3],
@@ -137,8 +139,8 @@ def exact_motion(array, name):
 
 @functools.cache
 def hand_eye_cases():
-    """x, and motions a [COUNT, POSES] with b = x^-1 a x: the axes of the first two are 30 degrees or more
-    apart."""
+    """x, and motions a [COUNT, POSES] with b = x^-1 a x. The axes of the first two differ by at least 30
+    degrees."""
     rng = np.random.default_rng(302)
     x = motions(302).exact
     x = Motion(x.q, exact(rng.normal(size=(COUNT, 3))))
@@ -169,7 +171,7 @@ def hand_eye(_name, function):
             given = (of_each(cases.of(name, dtype), POSES) for cases in (a, b))
             found = function(*given, weights.astype(dtype))
             assert found.is_defined.all()
-            # Two axes 30 degrees apart and angles of 17 leave this much of the digits.
+            # Two axes 30 degrees apart and angles of 17 degrees leave this many digits.
             agree_motions(found.transforms, name, getattr(x, name), 1 + x.size, rotation=16.0, steps=512)
             zero = np.zeros(COUNT)
             agree(found.angle, zero, 16.0, 512)
@@ -181,7 +183,7 @@ def hand_eye(_name, function):
 
 @functools.cache
 def pose_cases():
-    """Motions [COUNT * POSES] about a middle, up to 0.7 radians from it, and weights."""
+    """Motions [COUNT * POSES] within 0.7 radians of a middle, and weights."""
     rng = np.random.default_rng(303)
     count = COUNT * POSES
     middle = motions(303).exact.take(np.repeat(np.arange(COUNT), POSES))
@@ -218,8 +220,8 @@ def average(_name, function):
 
 
 def robust_average(function):
-    """Five poses that are near and two that are not: these do not count, and the mean is where the others',
-    by Tukey's biweights, cancel."""
+    """Five poses near each other, and two outliers: these do not count, and the others' logarithms from
+    the mean, weighted by Tukey's biweight, sum to 0."""
     rng = np.random.default_rng(304)
     near, off = 5, 2
     count = COUNT * (near + off)
@@ -237,17 +239,17 @@ def robust_average(function):
     residual = weighted_logarithms(
         exact_motion(found.transforms, "dual_quat"), poses, part / part.sum(axis=0)
     )
-    # It ends where the next step is below 1e-13.
+    # The iteration ends when a step is below 1e-13.
     agree(residual[0], np.zeros((COUNT, 3)), 1.0, 1024)
     agree(residual[1], np.zeros((COUNT, 3)), 4.0, 1024)
     single = function(given.astype(np.float32), robust=True)
     assert single.is_defined.all()
-    # A median may be another pose's.
+    # The median may be that of another pose.
     agree(single.kept, found.kept, 1.0, 4096)
     agree_motions(single.transforms, "dual_quat", found.transforms, 4.0)
 
 
-# By module, function and method.
+# Checks by module, function and method.
 CHECKS = {
     **{f"fit.rigid.{method}": rigid(method) for method in LAYOUT_OF_FIT},
     "fit.hand_eye": hand_eye,

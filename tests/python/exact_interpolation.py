@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks at 50 digits: sinew.interpolate, sinew.spline, sinew.Skeleton."""
+"""Checks with 50 digits: sinew.interpolate, sinew.spline, sinew.Skeleton."""
 
 import functools
 import itertools
@@ -29,12 +29,12 @@ from motions import LAYOUT_OF
 
 BONES = 8
 GROUPS = COUNT // BONES
-# A result that hangs on the shorter of two ways, which are equal to about this, says that it is not defined.
+# If two ways are equally short to within about this, the result must be reported as not defined.
 TIE = 1e-6
 
 
 def sizes(array, name):
-    """[..]: of the translations."""
+    """The sizes [..] of the translations."""
     array = np.asarray(array, np.float64)
     if name == "affine":
         return np.linalg.norm(array[..., :3, 3], axis=-1)
@@ -43,7 +43,7 @@ def sizes(array, name):
 
 
 def numbers_of(array, name):
-    """float64 in the layout as numbers, components first: 16, 7 or 8."""
+    """Transforms in the layout, float64, as numbers with components first: 16, 7 or 8."""
     array = np.asarray(array, np.float64)
     return exact(array.reshape(*array.shape[:-2], 16) if name == "affine" else array)
 
@@ -54,7 +54,7 @@ def array_of(numbers, name):
 
 
 def nearest_rotations(arrays):
-    """float64 [n, 4, 4] with the nearest rotations, and how near others are."""
+    """float64 [n, 4, 4] with the nearest rotations, and the gap to the next nearest ones."""
     u, s, vt = np.linalg.svd(arrays[:, :3, :3])
     sign = np.linalg.det(u @ vt)
     u[:, :, 2] *= sign[:, None]
@@ -75,8 +75,8 @@ def motion_of(array, name):
 
 
 def linear_blend(arrays, weights, method):
-    """float64 [n, ..] of transforms [n, k, ..] with numbers [k, n] of sum 1 for weights, signs as they are;
-    and what errors of rotations are measured by."""
+    """float64 [n, ..] of transforms [n, k, ..] with weights [k, n] of sum 1 and unchanged signs; and what
+    errors of rotations are relative to."""
     name = LAYOUT_OF[method]
     numbers = numbers_of(arrays, name)
     total = (numbers * weights.T[None]).sum(axis=2)
@@ -107,7 +107,8 @@ def logarithms(arrays):
 
 
 def sinew_free_quaternions(rotations):
-    """Numbers [4, n] of float64 [n, 3, 3]: the longest column of 4 q q^T, which a rotation matrix gives."""
+    """Numbers [4, n] of float64 [n, 3, 3]: the longest column of 4 q q^T, which a rotation matrix
+    determines."""
     m = exact_matrix(rotations)
     (a, b, c), (d, f, g), (h, i, j) = m
     square = np.array(
@@ -125,15 +126,15 @@ def sinew_free_quaternions(rotations):
 
 
 def log_blend(arrays, weights):
-    """float64 [n, 4, 4], and how near to half a turn a matrix is."""
+    """float64 [n, 4, 4], and how near to 180 degrees from the identity a matrix is."""
     angular, linear, w = logarithms(arrays)
     motion = e.from_twist((angular * weights.T[None]).sum(axis=2), (linear * weights.T[None]).sum(axis=2))
     return in_layout(motion, "affine"), w.min(axis=1)
 
 
 def agree_blend(got, name, want, size, cancels, where):
-    """The blend of a method whose result is known."""
-    # What cancels makes the length uncertain by which the translation of a dual quaternion is divided.
+    """The blend by a method whose result is known."""
+    # Cancellation makes the length uncertain by which a dual quaternion's translation is divided.
     size = size * cancels * (cancels if name == "dual_quat" else 1.0)
     agree_motions(got, name, want, size, rotation=cancels, where=where)
 
@@ -143,7 +144,7 @@ def agree_blend(got, name, want, size, cancels, where):
 
 @functools.cache
 def between_cases():
-    """Two Cases and t, [COUNT], the same for each BONES of them."""
+    """Two Cases and t, [COUNT], with the same t for each group of BONES."""
     rng = np.random.default_rng(101)
     first = motions(101)
     step = Motion(e.unit(exact(quaternions(rng, angles(rng)))), exact(translations(rng)))
@@ -156,8 +157,8 @@ def between_cases():
 
 @functools.cache
 def between_wanted(method):
-    """float64 in the layout, sizes, what errors of rotations are measured by, and whether it is defined; NaN
-    near where that changes."""
+    """The result as float64 in the layout, sizes, what errors of rotations are relative to, and whether
+    it is defined; NaN near where that changes."""
     a, b, t = between_cases()
     name = LAYOUT_OF[method]
     size = (a.size + b.size) * (1 + np.abs(t))
@@ -185,7 +186,7 @@ def between_wanted(method):
 
 
 def _spherical(a, b, t, method):
-    """By logarithm and exponential, of rotations or of screws."""
+    """From logarithm and exponential, of rotations or of screws."""
     t = e.number(t)
     if method == "qv_slerp":
         step = e.product(e.conjugate(a.exact.q), b.exact.q)
@@ -206,7 +207,7 @@ def second_on_one_side(first, second, name):
 
 
 def agree_defined(got, want, dtype):
-    """Where float32 may see it otherwise, it may say so."""
+    """Where float32 may decide differently, either answer is allowed."""
     same = (got == want) | np.isnan(want)
     if dtype == np.float32:
         same |= ~np.asarray(got, bool)
@@ -234,7 +235,7 @@ MANY = 3
 @functools.cache
 def blend_cases(width):
     """Cases [COUNT * MANY] about a middle, rotated by up to `width` radians from it, and weights [COUNT,
-    MANY] of sum other than 1: none, some below 0, equal ones."""
+    MANY] whose sum is not 1; some are 0, negative or equal."""
     rng = np.random.default_rng(int(10 * width) + 200)
     middle = motions(102).exact.take(np.repeat(np.arange(COUNT), MANY))
     count = COUNT * MANY
@@ -258,7 +259,7 @@ def shares(weights):
 
 
 def signs_by_rule(quaternions, weights, rule):
-    """[n, k] signs, and how far from a tie the choice is, by float64."""
+    """Signs [n, k], and how far the choice is from a tie, in float64."""
     signs, margin = np.ones(weights.shape), np.ones(len(weights))
     if rule == "as_given":
         return signs, margin
@@ -282,14 +283,14 @@ RULES = ("heaviest", "running_sum", "as_given")
 
 
 def blend_of_sums(method):
-    """By each rule of signs."""
+    """Checks each rule of signs."""
 
     def check(_name, function):
         name = LAYOUT_OF[method]
         cases, weights = blend_cases(np.pi)
         arrays, part = of_each(getattr(cases, name)), shares(weights)
         size = largest(sizes(arrays, name)) * np.abs(part).sum(axis=0).astype(np.float64)
-        # A matrix has no sign.
+        # Matrices have no sign.
         for rule in RULES if name != "affine" else RULES[:1]:
             aligned, margin = arrays, np.ones(COUNT)
             if name != "affine":
@@ -298,7 +299,7 @@ def blend_of_sums(method):
             want, cancels = linear_blend(aligned, part, method)
             for dtype in FLOATS:
                 got = function(arrays.astype(dtype), weights.astype(dtype), method, rule)
-                # Equal weights leave the order to decide.
+                # With equal weights the order decides.
                 assert got.is_defined.mean() > 0.7
                 where = got.is_defined & (margin > 100 * step_of(dtype))
                 agree_blend(got.transforms, name, want, size, cancels, where)
@@ -323,8 +324,8 @@ def blend_of_logarithms(_name, function):
 
 
 def blend_of_screws(method):
-    """Of n: where the weighted logarithms towards the transforms cancel (of rotations, or of screws),
-    whatever the rule of signs, as the transforms are less than half a turn apart."""
+    """The blend of n, where the weighted logarithms to the transforms (of rotations, or of screws) sum to
+    0, for every rule of signs, since the transforms are less than 180 degrees apart."""
 
     def check(_name, function):
         name = LAYOUT_OF[method]
@@ -348,7 +349,7 @@ def blend_of_screws(method):
 
 
 def agree_mean(got, name, motions_exact, part, size):
-    """`got` [n, ..]: the weighted logarithms from it to the MANY motions of each cancel."""
+    """Asserts that the weighted logarithms from `got` [n, ..] to the MANY motions of each sum to 0."""
     dtype = got.dtype
     mean = motion_of(got.astype(np.float64), name)
     unit_error = np.abs(np.linalg.norm(got[:, :4].astype(np.float64), axis=1) - 1)
@@ -380,8 +381,8 @@ CURVES, TIMES, KEYS = 40, 50, 6
 @functools.cache
 def spline_cases():
     """Cases [CURVES * KEYS], each key within 60 degrees of the one before; times [CURVES, KEYS] and the
-    times wanted [CURVES, TIMES], numbers of float32, the same for each BONES curves; before, at and after
-    keys, and a cut."""
+    times to evaluate [CURVES, TIMES], float32 numbers, the same for each BONES curves; before, at and
+    after keys, and a cut."""
     rng = np.random.default_rng(103)
     count = CURVES * KEYS
     step = Motion(
@@ -401,8 +402,8 @@ def spline_cases():
 
 @functools.cache
 def spline_terms():
-    """Indices of four keys [COUNT, 4] and their weights, numbers [4, COUNT]: of the Hermite form's two keys
-    and of what their tangents are made of."""
+    """Indices of four keys [COUNT, 4] and their weights, numbers [4, COUNT]: of the Hermite form's two
+    keys and of those that determine their tangents."""
     _cases, times, at = spline_cases()
     indices = np.zeros((COUNT, 4), int)
     weights = e.number(np.zeros((4, COUNT)))
@@ -424,7 +425,7 @@ def curve_weights(times, at):
         return (last,) * 4, (none, one, none, none)
     before = key - 1 if key > 0 and times[key - 1] < times[key] else key
     beyond = key + 2 if key + 1 < last and times[key + 1] < times[key + 2] else key + 1
-    # Cardinal functions: the curve of a 1 at one key and 0 at the others.
+    # Cardinal functions: the curve with 1 at one key and 0 at the others.
     weights = []
     exact_times = [e.number(float(time)) for time in times]
     whole = exact_times[key + 1] - exact_times[key]
@@ -448,7 +449,7 @@ def curve_weights(times, at):
 
 
 def on_one_side(arrays, name):
-    """[n, 4, ..]: signs along the chain, from the second key."""
+    """Signs along the chain, [n, 4, ..], from the second key."""
     if name == "affine":
         return arrays
     q = arrays[..., :4].copy()
@@ -461,7 +462,7 @@ def on_one_side(arrays, name):
 
 @functools.cache
 def spline_wanted(method):
-    """float64 [COUNT, ..], sizes and what errors of rotations are measured by; of a mean no first."""
+    """float64 [COUNT, ..], sizes, and what errors of rotations are relative to."""
     name = LAYOUT_OF[method]
     cases, _times, _at = spline_cases()
     indices, weights = spline_terms()
@@ -512,7 +513,7 @@ def agree_spline_mean(got, name, keys, indices, weights, size):
 
 @functools.cache
 def of_curves(method, dtype):
-    """(transforms, is_defined) of every case, curve after curve."""
+    """(transforms, is_defined) for every case, curve after curve."""
     cases, times, at = spline_cases()
     keys = cases.of(LAYOUT_OF[method], dtype)
     keys = keys.reshape(CURVES, KEYS, *keys.shape[1:])
@@ -533,7 +534,7 @@ def catmull_rom(method):
 
 @functools.cache
 def vector_wanted(name):
-    """float64 [COUNT, ..]: components blended, of points, too."""
+    """float64 [COUNT, ..]: blended components, also of points."""
     cases, _times, _at = spline_cases()
     indices, weights = spline_terms()
     if name == "points":
@@ -564,7 +565,7 @@ def catmull_rom_vector(_name, function):
 
 
 def interval(times, at):
-    """Key, next and the part that is over, of each time wanted; the same key twice outside."""
+    """For each time: key, next key, and the elapsed part; the same key twice outside."""
     last = len(times) - 1
     found = []
     for moment in at:
@@ -677,8 +678,8 @@ def skeletons():
 
 @functools.cache
 def relative_wanted(has_changed):
-    """Exact motions relative to the root [COUNT], the root's as the last GROUPS; and sizes. Changed: bone
-    2's."""
+    """Exact motions relative to the root [COUNT], with the roots' own as the last GROUPS; and sizes. If
+    changed, bone 2's motion is another one."""
     cases, roots = motions(109), motions(110).exact.take(np.arange(GROUPS))
     own = motions(111).exact if has_changed else cases.exact
     at = np.arange(GROUPS) * BONES
@@ -759,8 +760,8 @@ def skeleton_interpolate(_name, _function):
 
 
 def _skeleton_curves(name, dtype, run):
-    """[COUNT, ..] in the order of spline_wanted(): run(skeleton, keyframes, times, at) of BONES curves at
-    once."""
+    """The results [COUNT, ..] in the order of spline_wanted(), from run(skeleton, keyframes, times, at)
+    for BONES curves at once."""
     cases, times, at = spline_cases()
     keys = getattr(cases, name)
     keys = keys.reshape(CURVES // BONES, BONES, KEYS, *keys.shape[1:]).swapaxes(1, 2)
@@ -784,7 +785,7 @@ def skeleton_spline(_name, _function):
                 dtype,
                 lambda skeleton, keys, times, at, method=method: skeleton.spline(keys, times, at, method),
             )
-            # Held to 50 digits above.
+            # Compared with 50 digits above.
             bones, is_defined = of_curves(method, dtype)
             np.testing.assert_array_equal(got, bones)
             of_bones = is_defined.reshape(CURVES // BONES, BONES, TIMES).all(axis=1)
@@ -808,7 +809,7 @@ BLENDS = {
     **{method: blend_of_screws(method) for method in ("qv_slerp", "sclerp", "dib")},
 }
 
-# By module, function and method.
+# Checks by module, function and method.
 CHECKS = {
     **{f"interpolate.between.{method}": between(method) for method in LAYOUT_OF},
     **{f"interpolate.blend.{method}": BLENDS[method] for method in LAYOUT_OF},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks at 50 digits: sinew.affine, sinew.quat_vec, sinew.dual_quat, sinew.quat, sinew.dual."""
+"""Checks with 50 digits: sinew.affine, sinew.quat_vec, sinew.dual_quat, sinew.quat, sinew.dual."""
 
 import functools
 
@@ -25,12 +25,13 @@ from exact_cases import (
     translations,
 )
 
-# What makes a motion of numbers has one oracle for the three layouts: the motion, by this function.
+# Functions that make a motion from numbers have one oracle for all three layouts: the motion, from this
+# function.
 
 
 def wanted(of):
-    """`of`() makes (arguments, motion, size of what is added up, what errors of rotations are measured
-    by)."""
+    """`of`() returns (arguments, motion, size of what is summed, what errors of rotations are relative
+    to)."""
     of = functools.cache(of)
 
     def check(name, function):
@@ -68,12 +69,12 @@ def from_screw():
     axis = directions(rng) * (10.0 ** rng.uniform(-3, 3, COUNT))[:, None]
     point, along = translations(rng), translations(rng)[::-1, 0] * rng.choice([0.0, 1.0], COUNT)
     angle = angles(rng) * rng.choice([-2.0, 1.0], COUNT)
-    # A part along the axis, which does not count.
+    # A component along the axis, which must be ignored.
     moment = np.cross(point, axis) + 0.5 * axis
     line = exact(axis) / e.length(exact(axis))
     foot = e.cross(line, exact(moment) / e.length(exact(axis)))
     motion = e.about(line, foot, e.number(angle), e.number(along))
-    # By the part along the axis, too, which is taken off.
+    # Includes the component along the axis, which is subtracted.
     size = lengths(moment) / lengths(axis) + np.abs(along)
     return (axis, moment, angle, along), motion, size * (1 + np.abs(angle)), 1.0 + np.abs(angle)
 
@@ -92,7 +93,7 @@ def from_screw_about():
 @functools.cache
 def twists_to_exp():
     rng = np.random.default_rng(24)
-    # Of any angle: every fifth of many turns.
+    # Angles of any size: every fifth is more than 360 degrees.
     angle = angles(rng) * np.where(np.arange(COUNT) % 5 == 0, 10.0 ** rng.uniform(0, 5, COUNT), 1.0)
     angular, linear = directions(rng) * angle[:, None], translations(rng)
     motion = e.from_twist(exact(angular), exact(linear))
@@ -103,7 +104,7 @@ def twists_to_exp():
 from_twist = wanted(twists_to_exp)
 
 
-# --- What one motion gives
+# --- Functions of one motion
 
 
 def identity(name, function):
@@ -126,27 +127,29 @@ def from_rotation_matrix(name, function):
 
 @functools.cache
 def twists(seed):
-    """float64 [n, 6] of both signs of the quaternions: at half a turn either is right; and scalar parts."""
+    """float64 [n, 6] for both signs of the quaternions, since either is right at 180 degrees; and scalar
+    parts."""
     motion = motions(seed).exact
     both = [np.concatenate(e.to_twist(m)) for m in (motion, _other_way(motion))]
     return *(rounded(twist) for twist in both), np.abs(motion.q[0].astype(np.float64))
 
 
 def _other_way(motion):
-    """The same where the quaternion's w is not 0; where it is, that about the opposite axis."""
+    """The same if the quaternion's w is not 0; otherwise the rotation vector about the opposite axis."""
     is_half = np.abs(motion.q[0]) < 1e-5
     return Motion(np.where(is_half, _through_zero(motion.q), motion.q), motion.t)
 
 
 def _through_zero(q):
-    """As near to `q` as rounding, with w of the other sign, so that the shorter way is the other one."""
+    """Equal to `q` up to rounding, but with the other sign of w, so that the shorter way is the other
+    one."""
     tiny = e.number("1e-40")
     w = np.where(q[0] < 0, tiny, -tiny)
     return np.concatenate([w[None], q[1:]])
 
 
 def agree_twists(got, seed, size):
-    """Rotation vectors to the last digits of their length; where half a turn is near, in either direction."""
+    """Compares rotation vectors to the last digits of their length; in either direction near 180 degrees."""
     one, other, w = twists(seed)
     dtype = got.dtype
     near = (w < 8 * step_of(dtype)) & (
@@ -173,7 +176,7 @@ def to_screw(name, function):
         twist = np.where(flips[:, None], other, one)
         size = np.where(angle > 0, angle, 1.0)
         axis = twist[:, :3] / size[:, None]
-        # Below this a rotation counts as none, and the axis is that of the translation.
+        # A rotation by less counts as none, and the axis is that of the translation.
         turns = angle > 4 * step_of(dtype)
         agree(screw.angle, angle, angle, where=turns)
         agree(screw.axis, axis, 1.0, where=turns)
@@ -191,8 +194,8 @@ def to_screw(name, function):
 
 
 def moments(twist):
-    """The line's point nearest to the origin, w x v / w^2, times the axis: v / |w| without what is along the
-    axis."""
+    """The cross product of the line's point nearest to the origin, w x v / w^2, and the axis: v / |w|
+    without its component along the axis."""
     angular, linear = exact(twist[:, :3]), exact(twist[:, 3:])
     size = e.length(angular)
     size = np.where(size > 0, size, e.number(1))
@@ -224,7 +227,7 @@ def inverse_of_any(function):
     inverted = e.inverse_matrix(linear)
     moved = rounded(-e.times(inverted, exact(maps[:, :3, 3])))
     inverted = np.moveaxis(inverted.astype(np.float64), -1, 0)
-    # Rounding of the matrix counts by its condition.
+    # Rounding of the matrix is multiplied by its condition number.
     norm = np.linalg.norm(inverted, axis=(1, 2))
     condition = norm * np.linalg.norm(maps[:, :3, :3], axis=(1, 2))
     for dtype in FLOATS:
@@ -245,7 +248,8 @@ def normalized(name, function):
             got = function((cases.quat_vec * np.where(np.arange(7) < 4, by[:, None], 1.0)).astype(dtype))
             agree_motions(got, name, cases.quat_vec, cases.size, signed=True)
         return
-    # Also what is no transform times a number: a part of `dual` along `real`.
+    # Includes dual quaternions that are not a multiple of a transform: with a component of `dual` along
+    # `real`.
     along = translations(rng)[:, :1]
     given = (cases.dual_quat + np.column_stack([np.zeros((COUNT, 4)), along * cases.dual_quat[:, :4]])) * by[
         :, None
@@ -258,7 +262,8 @@ def normalized(name, function):
 
 
 def nearest_rotations(function):
-    """By scipy's way, singular values in float64: as exact as they are apart, and the library's no less."""
+    """By scipy, with singular values in float64: as exact as their differences allow, and the library
+    must be as well."""
     maps = linear_maps(7)
     u, s, vt = np.linalg.svd(maps[:, :3, :3])
     sign = np.linalg.det(u @ vt)
@@ -353,7 +358,7 @@ def exact_distance(a, b):
     return angle.astype(np.float64), e.length(b.t - a.t).astype(np.float64)
 
 
-# --- Of matrices and of dual quaternions alone
+# --- Functions of matrices, and of dual quaternions
 
 
 def split_scale(_name, function):
@@ -387,7 +392,7 @@ def split_scale(_name, function):
         split = function(maps.astype(dtype), rest.of("affine", dtype))
         np.testing.assert_array_equal(split.has_scale, scaled)
         agree(split.rigid[:, :3, :3], rotation, condition, where=clear)
-        # Together they are what came, and the scale leaves the bone's head where it is.
+        # Together they are the input, and the scale does not move the bone's head.
         both = exact_matrix(split.rigid[:, :3, :3].astype(np.float64))
         whole = e.matmul(both, exact_matrix(split.scale[:, :3, :3].astype(np.float64)))
         agree(np.moveaxis(whole.astype(np.float64), -1, 0).astype(dtype), maps[:, :3, :3], norm * condition)
@@ -453,7 +458,7 @@ def power(_name, function):
 
 
 def quat(check):
-    """The same for sinew.quat as for pairs, where the translation is none."""
+    """The same checks for sinew.quat as for pairs, without translations."""
 
     def of_quaternions(_name, function):
         def as_pairs(*arguments):
@@ -544,7 +549,7 @@ def slerp(_name, function):
     for dtype in FLOATS:
         got = function(a.quat_vec[:, :4].astype(dtype), b.quat_vec[:, :4].astype(dtype), t.astype(dtype))
         sign = np.where(np.einsum("ni,ni->n", got, want) < 0, -1.0, 1.0)
-        # Half a turn apart, rounding decides between the two ways.
+        # 180 degrees apart, rounding decides between the two ways.
         agree(got, want * sign[:, None], 1.0, where=along > 8 * step_of(dtype))
 
 
@@ -554,7 +559,7 @@ def to_three_numbers(_name, function):
     for dtype in FLOATS:
         given = q.astype(dtype)
         got = function(given)
-        # -0 and 0 are one half turn's two signs.
+        # -0 and 0 are the two signs of a rotation by 180 degrees.
         same = np.where((given[:, :1] == 0), np.abs(want), want)
         np.testing.assert_array_equal(np.where(given[:, :1] == 0, np.abs(got), got), same.astype(dtype))
 
@@ -568,7 +573,7 @@ def from_three_numbers(_name, function):
     want = rounded(e.unit(np.concatenate([w[None], number])))
     for dtype in FLOATS:
         got = function(v.astype(dtype))
-        # The root of what is missing to 1: half of the digits go where nearly nothing is.
+        # w is the square root of a difference from 1: half of the digits are lost where that is nearly 0.
         agree(got, want, 1.0 / np.maximum(want[:, 0], np.sqrt(step_of(dtype))))
 
 
@@ -583,7 +588,7 @@ def dual_numbers(seed, low=-10.0, high=10.0):
 
 
 def dual(of, size, seed=30, signed=True):
-    """`of`(a) or (a, b) in pairs of numbers; size: what errors of both parts are measured by, float64."""
+    """`of`(a) or (a, b) in pairs of numbers. size: what errors of both parts are relative to, float64."""
 
     def check(_name, function):
         a, b = dual_numbers(seed).copy(), dual_numbers(seed + 1).copy()
@@ -601,7 +606,7 @@ def dual(of, size, seed=30, signed=True):
 
 
 def near(of, size, low, high):
-    """The same of reals where a function of angles or powers is known."""
+    """The same for real numbers, whose functions of angles or powers are known."""
 
     def check(_name, function):
         rng = np.random.default_rng(32)
@@ -619,7 +624,7 @@ def near(of, size, low, high):
 
 
 def of_angle(a):
-    """sin and cos: rounding of the angle, too."""
+    """sin and cos: includes rounding of the angle."""
     return 1 + np.abs(a[:, 0]), np.abs(a[:, 1]) * (1 + np.abs(a[:, 0]))
 
 
@@ -678,7 +683,7 @@ REPRESENTATIONS = {
     "transform_vector": transform_vector,
 }
 
-# By module and function: check(module's name, function).
+# Checks by module and function: check(module's name, function).
 CHECKS = {
     **{
         f"{layout}.{function}": check

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random transforms in the three layouts, from scipy: what sinew's mathematics is measured against."""
+"""Random transforms in the three layouts, from scipy, with which sinew's mathematics is compared."""
 
 import numpy as np
 import sinew
@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
-# One profile for every property: the same cases on every machine, on every run.
+# One profile for all properties: the same cases on every machine and in every run.
 settings.register_profile(
     "sinew",
     derandomize=True,
@@ -31,18 +31,18 @@ LAYOUT_OF = {
     "dib": "dual_quat",
 }
 
-# Rotations and translations where quotients of small numbers, or signs, go wrong first.
+# Rotations and translations for which quotients of small numbers, or signs, fail first.
 ANGLES = [0.0, 1e-30, 1e-12, 1e-7, 1e-4, 0.0199, 0.0201, 1.0, 3.0, np.pi - 1e-5, np.pi]
 
 
 def rigid(rng, count=None, extent=2.0):
-    """scipy's RigidTransform, one or `count`."""
+    """A RigidTransform of scipy, one or `count`."""
     translation = rng.uniform(-extent, extent, 3 if count is None else (count, 3))
     return RigidTransform.from_components(translation, Rotation.random(count, rng=rng))
 
 
 def layout(transform, name, dtype=np.float64):
-    """scipy's RigidTransform in a layout of sinew, without sinew."""
+    """scipy's RigidTransform in a layout of sinew, converted without sinew."""
     if name == "affine":
         array = transform.as_matrix()
     elif name == "quat_vec":
@@ -55,7 +55,7 @@ def layout(transform, name, dtype=np.float64):
 
 
 def matrix(array, name):
-    """float64 [.., 4, 4] of a layout of sinew, by scipy; what is not rigid in it is made so by scipy."""
+    """float64 [.., 4, 4] from a layout of sinew, by scipy, which also makes it rigid."""
     array = np.asarray(array, np.float64)
     if name == "affine":
         return array
@@ -69,7 +69,7 @@ def matrix(array, name):
 
 
 def hat(twist):
-    """The 4x4 matrix of se(3)."""
+    """The 4x4 matrix of an element of se(3)."""
     x, y, z, *linear = twist
     result = np.zeros((4, 4))
     result[:3, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
@@ -78,7 +78,7 @@ def hat(twist):
 
 
 def edge_motions():
-    """RigidTransform of every angle of ANGLES about five axes, each with two translations and without."""
+    """RigidTransforms by every angle in ANGLES about five axes, each with two translations and without."""
     rotations, translations = [], []
     for angle in ANGLES:
         for axis in ([1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, -0.8, 0], [0.48, 0.6, -0.64]):
@@ -94,7 +94,7 @@ def numbers(extent):
 
 @st.composite
 def rigid_motions(draw, angle=np.pi):
-    """RigidTransform of up to `angle`."""
+    """A RigidTransform by up to `angle`."""
     axis = np.array([draw(numbers(1.0)) for _ in range(3)])
     length = np.linalg.norm(axis)
     axis = axis / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Normals of polygon meshes in float64, by Blender's definition: the oracle of sinew.Normals.
+"""Normals of polygon meshes in float64, by Blender's definition: the oracle for sinew.Normals.
 
-A mesh is its points, its faces as lists of vertices, its edges as pairs, and what is sharp. Definitions are
-those of the header deform/normals.h, computed here one face, vertex and fan at a time.
+A mesh consists of its points, its faces as lists of vertices, its edges as pairs, and its sharp edges and
+faces. The definitions are those in the header deform/normals.h, computed here one face, vertex and fan at a
+time.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def face_normals(points, faces):
 
 
 def corner_angles(points, faces):
-    """Of all corners, face by face."""
+    """The angles of all corners, face by face."""
     angles = []
     for face in faces:
         ring = np.asarray(points, np.float64)[face]
@@ -52,7 +53,8 @@ def corner_angles(points, faces):
 
 
 def sums(points, faces, group_of_corner, count):
-    """Of `count` groups of corners: the unit vectors of their faces' normals weighted by their angles."""
+    """For each of `count` groups of corners, the unit vector of their faces' normals weighted by their
+    angles."""
     of_corner = np.repeat(face_normals(points, faces), [len(face) for face in faces], axis=0)
     weighted = of_corner * corner_angles(points, faces)[:, None]
     total = np.zeros((count, 3))
@@ -61,7 +63,8 @@ def sums(points, faces, group_of_corner, count):
 
 
 def vertex_normals(points, faces):
-    """Of all corners at a vertex; a vertex without faces has the direction of its point."""
+    """The vertex normals, from all corners at each vertex; without faces, the direction of the vertex's
+    point."""
     corners = np.array([vertex for face in faces for vertex in face], int)
     normals = sums(points, faces, corners, len(points))
     loose = np.setdiff1d(np.arange(len(points)), corners)
@@ -70,9 +73,8 @@ def vertex_normals(points, faces):
 
 
 def smooth_edges(faces, edges, sharp_edges=(), sharp_faces=()):
-    """{edge: the two corners that go along it} of smooth edges: those that are not sharp, nor of a sharp
-    face, and have two faces which go along them in opposite directions. A corner is (vertex, itself, the
-    next)."""
+    """{edge: the two corners along it} for smooth edges: those that are not sharp, not of a sharp face,
+    and have two faces that traverse them in opposite directions. A corner is (vertex, itself, the next)."""
     sharp = {frozenset(map(int, edges[i])) for i in np.flatnonzero(sharp_edges)}
     users = {}
     first = 0
@@ -92,7 +94,7 @@ def smooth_edges(faces, edges, sharp_edges=(), sharp_faces=()):
 
 
 def corner_fans(faces, edges, sharp_edges=(), sharp_faces=()):
-    """Which fan each corner is in: corners of a vertex whose faces meet at smooth edges there."""
+    """The fan of each corner. A fan is corners of a vertex whose faces meet at smooth edges there."""
     fan = list(range(sum(map(len, faces))))
 
     def root(corner):
@@ -109,7 +111,7 @@ def corner_fans(faces, edges, sharp_edges=(), sharp_faces=()):
 
 
 def corner_normals(points, faces, edges, sharp_edges=(), sharp_faces=()):
-    """Of fans; a corner that is a fan by itself has its face's normal."""
+    """Normals of fans. A corner that is a fan by itself has its face's normal."""
     fans = corner_fans(faces, edges, sharp_edges, sharp_faces)
     sizes = np.bincount(fans)
     of_face = np.repeat(face_normals(points, faces), [len(face) for face in faces], axis=0)
@@ -120,11 +122,11 @@ def corner_normals(points, faces, edges, sharp_edges=(), sharp_faces=()):
 def fan_edges(fan, faces, first_corners, smooth):
     """(vertex of the fan, the ends of its edges in the order of Blender's walk, the last of them).
 
-    The walk goes from a corner's following edge to its preceding one. It begins at the corner whose
-    following edge ends the fan, and at the first corner where none does. The edge where it began is not
-    listed twice.
+    The walk goes from a corner's following edge to its preceding one. It starts at the corner whose
+    following edge is the fan's boundary, or at the first corner if there is none. The edge where it started
+    is not listed twice.
 
-    fan: its corners, rising; first_corners: of each face; smooth: the edges that are
+    fan: its corners, ascending; first_corners: of each face; smooth: the smooth edges
     """
     before, starts = {}, []
     for corner in fan:
@@ -148,7 +150,7 @@ TOO_STEEP = 0.9999
 def fan_normal(normal, reference, other, edges, custom):
     """The custom normal `custom`, two int16, of a fan whose normal would be `normal`.
 
-    reference, other: directions of its first and last edge; edges: of all
+    reference, other: directions of its first and last edge; edges: directions of all
     """
     along = [normal @ reference, normal @ other]
     if max(map(abs, along)) >= TOO_STEEP:
@@ -172,7 +174,7 @@ def fan_normal(normal, reference, other, edges, custom):
 
 
 def custom_normals(points, faces, edges, custom, sharp_edges=(), sharp_faces=()):
-    """Of corners, with custom normals: int16 [corners, 2], relative to the space of each fan."""
+    """Custom normals of corners: int16 [corners, 2], relative to the space of each fan."""
     points = np.asarray(points, np.float64)
     first_corners = np.cumsum([0, *map(len, faces)])[:-1]
     sharp = edges, sharp_edges, sharp_faces

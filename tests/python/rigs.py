@@ -49,7 +49,7 @@ class Rig:
     weights: np.ndarray
     transforms: np.ndarray
     rest_bones: np.ndarray
-    centres: np.ndarray  # any point for each vertex, which cor and sdef rotate it about
+    centres: np.ndarray  # any point for each vertex, about which cor and sdef rotate it
 
     @property
     def mesh(self):
@@ -57,7 +57,7 @@ class Rig:
 
     @property
     def vertex_data(self):
-        # Of every tenth vertex sdef is not to use what it has.
+        # For every tenth vertex sdef must ignore its data.
         used = np.arange(len(self.centres))[:, None] % 10 != 9
         ends = (self.centres[::-1], np.roll(self.centres, 1, axis=0))
         spheres = np.hstack([self.centres, *ends, used]).astype(np.float32)
@@ -66,7 +66,8 @@ class Rig:
 
     @property
     def moments(self):
-        """What ddm keeps: each vertex's own weights, as if its neighbourhood were at its centre alone."""
+        """The vertex data for ddm: each vertex's own weights, as if all of its neighbourhood were at its
+        centre."""
         vertices = np.repeat(np.arange(len(self.centres)), np.diff(self.offsets))
         totals = np.bincount(vertices, self.weights.astype(np.float64), len(self.centres))
         counts = totals[vertices] > 0.0
@@ -100,8 +101,8 @@ class Rig:
 
 
 def random_rig(seed, vertices=200, bones=15, extent=1.0, most_influences=12, scaled=False):
-    """Bones with random rotations; 1 to `most_influences` bones a vertex. `scaled`: every second bone is
-    stretched along its axes, and of those every second one mirrored."""
+    """Bones with random rotations, and 1 to `most_influences` bones for each vertex. `scaled`: every
+    second bone is stretched along its axes, and every second one of those is mirrored."""
     rng = np.random.default_rng(seed)
     rest_bones = np.array([random_motion(rng, extent) for _ in range(bones)])
     transforms = np.array([random_motion(rng, extent) for _ in range(bones)])

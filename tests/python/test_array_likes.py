@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What numpy makes an array of is taken as that array is; pickles give the same bits; representations."""
+"""Anything that numpy converts to an array works like that array; pickles give the same bits;
+representations."""
 
 import copy
 import pickle
@@ -15,7 +16,7 @@ EXPECTED = RIG.deform("dq")
 
 
 class Arraylike:
-    """As tensors of other libraries are."""
+    """Like tensors of other libraries."""
 
     def __init__(self, array):
         self.array = array
@@ -25,7 +26,7 @@ class Arraylike:
 
 
 def strided(array):
-    """The same numbers, each axis the other way round and every second element of a larger array."""
+    """The same numbers, with every axis reversed and every second element of a larger array."""
     large = np.zeros([2 * length for length in array.shape], array.dtype)
     turned = large[tuple(slice(None, None, -2) for _ in array.shape)]
     turned[...] = array
@@ -137,7 +138,7 @@ def again(value):
 
 @every_method
 def test_pickles_give_the_same_bits(method):
-    # Of sets large and small, without influences, with weights of 0 and of any sum.
+    # Large and small sets, vertices without influences, weights of 0, and weights of any sum.
     rig = random_rig(71, vertices=500, most_influences=4, scaled=True)
     weights = rig.weights * np.float32(3.7)
     weights[::7] = 0
@@ -217,7 +218,7 @@ def test_states_of_other_things_are_refused(of, state, message):
         of.__new__(of).__setstate__(state)
 
 
-# --- How things look
+# --- Representations as text
 
 
 def test_what_things_look_like():

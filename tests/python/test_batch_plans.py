@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a batch reads, writes and remembers, without a Blender: inputs, job files, journals."""
+"""What a batch reads, writes and records, without Blender: inputs, job files, journals."""
 
 import glob
 import json
@@ -20,7 +20,7 @@ METHODS = ("lbs", "dq")
 
 @pytest.fixture
 def studio(tmp_path, monkeypatch):
-    """A folder with files in it, which is the current one."""
+    """A folder with files, which is the current folder."""
     folder = tmp_path / "studio"
     for name in ("a.blend", "chars/hero.blend", "chars/old/hero.blend", "chars/fox.glb", "notes.txt"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -58,7 +58,7 @@ def planned(inputs, out="out", listed=()):
 def test_inputs(studio, inputs, expected):
     found = planned(inputs)
     if expected is None:
-        # Named twice and in a folder, done once.
+        # Given twice and also by its folder; processed once.
         assert sorted(found) == ["a.blend", "chars/hero.blend", "chars/old/hero.blend"]
     else:
         assert found == expected
@@ -93,7 +93,7 @@ def test_a_folder_with_brackets_is_no_pattern(studio, monkeypatch):
 
 
 def link(path: Path, target: object) -> None:
-    """Skips the test where this user may make no links, as most on Windows."""
+    """Skips the test if this user may not create links, like most users on Windows."""
     try:
         path.symlink_to(target, target_is_directory=True)
     except OSError:
@@ -113,7 +113,7 @@ def test_bakes_beside_copies_are_not_inputs(studio):
     for name in ("hero.baked.blend", "half.baked.blend"):
         (studio / "chars" / name).touch()
     found = {"chars/half.baked.blend", "chars/hero.blend", "chars/old/hero.blend"}
-    # Somebody's own, as no batch has been at work there.
+    # A file of the user's: no batch has worked there.
     assert set(planned(["chars"])) == {*found, "chars/hero.baked.blend"}
     (studio / NAME).touch()
     assert set(planned(["chars"])) == set(planned(["chars/**/*.blend"])) == found
@@ -199,7 +199,7 @@ def test_settings_of_files(tmp_path):
         "method": "dq", "include": [], "exclude": [], "objects": [face, {"match": "Face*", "method": "lbs"}]
     }  # fmt: skip
     assert job.settings_of(Path("/x/old/a.blend"), Settings()).method == "dq"
-    # The command line speaks for all files, a rule for its own.
+    # The command line applies to all files, a rule to its own.
     given = Settings(method="dq", include=("Body",))
     assert job.settings_of(Path("/x/a.blend"), given).method == "dq"
     assert job.settings_of(Path("/x/hero.blend"), given).include == ("Body",)
@@ -210,7 +210,7 @@ def test_names_of_files_with_brackets(tmp_path):
     assert job.settings_of(Path("/x/b[1].blend"), Settings()).method == "dq"
     assert job.settings_of(Path("/x/b1.blend"), Settings()).method == "dq"
     assert job.settings_of(Path("/x/b[2].blend"), Settings()).method == "lbs"
-    # As a pattern has it, its first folder is "take 2".
+    # In the pattern, the first folder is "take 2".
     assert job.settings_of(Path("/x/take 2/a.blend"), Settings()).method == "dq"
 
 
@@ -275,9 +275,9 @@ def test_bakes_and_scale_of_files_and_objects(tmp_path):
         {"match": "Cape", "bake": []},
         {"match": "Face", "scale": "4.0", "bake": ["shape-keys"]},
     ]
-    # In any order, as they are sorted.
+    # Any order is allowed, as they are sorted.
     assert read(tmp_path, BAKES.replace('"1-48"', '"3,2,4,2"')).settings.bake_frames == "3,2,4,2"
-    # A rule's frames can be wrong for what the whole file bakes.
+    # A rule's frames can contradict what the whole file bakes.
     job = read(tmp_path, BAKES.replace('"2-5"', '"2,5"'))
     with pytest.raises(WrongUse, match="usd: Blender exports every frame of a range"):
         job.settings_of(Path("/x/hero.blend"), Settings()).check_bakes()
@@ -304,7 +304,7 @@ def test_errors_of_bakes_have_a_line(tmp_path, old, new, line, sentence):
 
 
 def test_parameters_of_files_and_objects(tmp_path):
-    """The command line's win over the file's, and a rule's over both."""
+    """Values on the command line override the file's, and a rule overrides both."""
     text = 'method = "lbs"\nset = ["mix=dq", "mix.group=Arms"]\n'
     text += '[[objects]]\nmatch = "Head"\nset = "mix=off"\n'
     job = read(tmp_path, text)
@@ -331,14 +331,14 @@ def test_every_key_of_a_job_file_is_documented():
 
 
 def test_the_schema_and_the_settings_have_the_same_keys():
-    """A key that is read and then dropped would be accepted and do nothing."""
+    """A key that is read and then ignored would be accepted without effect."""
     known = {name for name, *_others in rows(job_schema(METHODS))}
     assert known == {field.name for field in fields(Settings)} | {"inputs", "out", "files", "match"}
     assert {field.name for field in fields(ObjectRule)} == {"match", "method", "scale", "set", "bake"}
 
 
 def saved(folder, name="a.blend"):
-    """A copy saved but not named, and its record."""
+    """A copy that was saved but not renamed, and its record."""
     unfinished = folder / ".1.unfinished.blend"
     unfinished.write_bytes(b"a copy")
     return {"unfinished": unfinished.name, "written": stamp(unfinished), "source": name}
@@ -394,7 +394,7 @@ def test_a_journal_that_can_not_be_written(tmp_path):
     with pytest.raises(SinewError, match="can not be written"):
         Journal(tmp_path / "file" / "out")
     with Journal(tmp_path) as journal:
-        # A name of the byte 0xff on Linux, of half a character on Windows.
+        # A name with the byte 0xff on Linux, or with half a surrogate pair on Windows.
         journal.record(tmp_path / "\udcff.blend", {"error": "names need not be text"})
     with Journal(tmp_path) as journal:
         assert list(journal.latest) == ["\udcff.blend"]
@@ -417,7 +417,7 @@ def test_a_journal_that_can_not_be_written(tmp_path):
     ],
 )
 def test_a_journal_leads_nowhere_else(tmp_path, line):
-    """A folder can come from anybody, with a journal in it that moves files about."""
+    """A folder may come from anyone, and contain a journal that moves files."""
     out = tmp_path / "deep" / "out"
     out.mkdir(parents=True)
     for path in (out / ".1.unfinished.blend", tmp_path / "deep" / "x"):
@@ -448,7 +448,7 @@ def test_a_journal_leads_nowhere_else(tmp_path, line):
     ],
 )
 def test_patterns_end_where_links_lead_up_again(tmp_path, monkeypatch, pattern, expected):
-    """Two such links take glob 2 ** 40 steps."""
+    """With two such links, glob would need 2 ** 40 steps."""
     for name in ("a.blend", "sub/b.blend", "sub/deep/c.blend", ".hidden/d.blend"):
         (tmp_path / "tree" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "tree" / name).touch()

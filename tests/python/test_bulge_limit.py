@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limit Bulge against its formula in float64, and what it does to a bent tube."""
+"""Limit Bulge compared with its formula in float64, and its effect on a bent tube."""
 
 import pickle
 
@@ -15,7 +15,7 @@ every_form = pytest.mark.parametrize("form", FORMS)
 
 
 def bones_of(rig, seed=1):
-    """Heads and tails in the rig's size; the last bone is a point."""
+    """Heads and tails of the rig's size; the last bone is a point."""
     rng = np.random.default_rng(seed)
     heads = rng.uniform(-1.0, 1.0, (len(rig.transforms), 3)).astype(np.float32)
     tails = heads + rng.uniform(-0.5, 0.5, heads.shape).astype(np.float32)
@@ -87,7 +87,7 @@ def test_vertices_of_one_bone_and_scaled_bones_keep_their_place(form):
     limit = sinew.BulgeLimit(*single.mesh, *bones_of(single))
     points = single.deform("lbs")
     np.testing.assert_array_equal(limit.apply(points, single.transforms, form=form), points)
-    # All bones scaled alike: the limit grows with them.
+    # All bones have the same scale, with which the limit grows.
     rig = random_rig(8)
     larger = np.tile(np.diag([2.0, 2.0, 2.0, 1.0]).astype(np.float32), (len(rig.transforms), 1, 1))
     points = 2.0 * rig.rest_points
@@ -193,7 +193,7 @@ BENT = np.stack([np.eye(4), translation([0, 0, 2]) @ about([1, 0, 0], 90) @ tran
 
 
 def tube(offset):
-    """Its mesh and edges; the middle of the weights' ramp lies `offset` beside the joint."""
+    """Its mesh and edges. The middle of the weights' ramp is `offset` away from where the bones meet."""
     angles = 2 * np.pi * np.arange(SIDES) / SIDES
     points = np.float32(
         [[RADIUS * np.cos(a), RADIUS * np.sin(a), z] for z in np.linspace(0, 4, RINGS) for a in angles]
@@ -222,7 +222,7 @@ def bulge(points):
 
 
 def tear(mesh, edges, before, after):
-    """How far apart the stage takes the ends of an edge at most, in its lengths."""
+    """The largest factor by which the stage lengthens an edge."""
     moved = after.astype(np.float64) - before
     lengths = np.linalg.norm(mesh[0][edges[:, 0]] - mesh[0][edges[:, 1]], axis=1)
     return (np.linalg.norm(moved[edges[:, 0]] - moved[edges[:, 1]], axis=1) / lengths).max()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Optimised centres of rotation: against the definition in float64, and what they make of a tube."""
+"""Optimised centres of rotation: compared with the definition in float64, and their effect on a tube."""
 
 import sys
 import threading
@@ -43,9 +43,9 @@ def leaves(points, weights):
 
 
 def defined_centres(points, weights, triangles):
-    """Le and Hodgins' formula as it is printed; NaN where no triangle counts.
+    """Le and Hodgins' formula as printed; NaN if no triangle counts.
 
-    weights  [vertices, bones], of sum 1
+    weights  [vertices, bones], with sum 1
     """
     parts = [leaf for t in triangles for leaf in leaves(points[t], weights[t])]
     areas, centroids, means = (np.array(each) for each in zip(*parts, strict=True))
@@ -70,7 +70,7 @@ def test_centres_are_those_of_the_definition(tube):
     rigid = np.isnan(expected[:, 0])
     expected[rigid] = tube.points[rigid]
     assert (~rigid).sum() > 100
-    # Of the diameter, which is 1.
+    # Relative to the diameter, which is 1.
     assert np.linalg.norm(tube.centres(exact=True) - expected, axis=1).max() < 1e-5
     assert np.linalg.norm(tube.centres() - expected, axis=1).max() < 0.005
 
@@ -134,7 +134,7 @@ def test_false_cancels_and_what_is_raised_comes_through(at):
 
     with pytest.raises(KeyError, match="enough"):
         tube.centres(progress=stop)
-    # Nothing at all, 0 and None are no refusal.
+    # Returning nothing, 0 or None does not cancel.
     assert tube.centres(progress=lambda _done: 0) is not None
 
 

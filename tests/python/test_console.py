@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What commands print reaches any console."""
+"""Output of commands works on any console."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct delta mush: its moments against scipy's sparse solve, its points against singular values, and what
-it makes of a tube."""
+"""Direct delta mush: its moments compared with scipy's sparse solver, its points with singular values,
+and its effect on a tube."""
 
 import pickle
 import threading
@@ -56,7 +56,7 @@ def omega(points, triangles, weights, radius):
 
 
 def omega_of(rows, vertices, bones):
-    """The same of rows as Binding takes them."""
+    """The same from rows in the form of Binding's vertex data."""
     rows = rows.astype(np.float64)
     found = np.zeros((vertices, bones, 4, 4))
     for vertex in range(vertices):
@@ -68,13 +68,13 @@ def omega_of(rows, vertices, bones):
 
 
 def shares_of(tube):
-    """As the library takes them."""
+    """Rows in the library's form."""
     shares = tube.weights.astype(np.float32).astype(np.float64)
     return shares / shares.sum(axis=1, keepdims=True)
 
 
 def crumpled():
-    """Three bones on a mesh with obtuse triangles, of uneven density."""
+    """Three bones on a mesh with obtuse triangles and uneven density."""
     tube, rng = three_bones(), np.random.default_rng(3)
     tube.points = tube.points + rng.uniform(-0.06, 0.06, tube.points.shape)
     return tube
@@ -86,7 +86,7 @@ def test_moments_are_those_of_a_sparse_solve(tube, radius):
     points = tube.points.astype(np.float32).astype(np.float64)
     expected = omega(points, tube.triangles, shares_of(tube), radius)
     count, bones = expected.shape[:2]
-    # Of a length of 4, as often as an entry has it.
+    # Errors are relative to the tube's length of 4, to the power to which an entry contains lengths.
     lengths = np.array([4.0, 4.0, 4.0, 1.0])
     error = np.abs(omega_of(moments(tube, radius, exact=True), count, bones) - expected)
     assert (error / np.outer(lengths, lengths)).max() < 1e-6
@@ -97,7 +97,7 @@ def test_moments_are_those_of_a_sparse_solve(tube, radius):
 
 
 def svd_form(points, of_vertices, motions):
-    """Le and Lewis' variant 0, by the singular values."""
+    """Le and Lewis' variant 0, with singular values."""
     matrices = np.einsum("jab,ijbc->iac", motions, of_vertices)
     totals = of_vertices.sum(axis=1)
     centres, targets = totals[:, :3, 3], matrices[:, :3, 3]
@@ -126,7 +126,7 @@ def test_points_are_those_of_the_singular_values(axis, degrees, radius):
 
 
 def near_rig(seed, scaled=False, most_influences=6):
-    """Bones that differ by 120 degrees at most, and vertices with neighbourhoods of an extent."""
+    """Bones that differ by at most 120 degrees, and vertices whose neighbourhoods have an extent."""
     rig, rng = random_rig(seed, most_influences=most_influences, scaled=scaled), np.random.default_rng(seed)
     motions = rig.transforms.astype(np.float64)
     for bone, motion in enumerate(motions):
@@ -234,8 +234,8 @@ def bent(tube, radius, axis, degrees, variant="0"):
     return points.astype(np.float64), bones
 
 
-# Made apart from this code in numpy, by the radius: volume, bulge and longest edge of a bend by 90 degrees;
-# volume and least radius of a twist by 170.
+# Computed independently of this code in numpy, for each radius: volume, bulge and longest edge of a bend by
+# 90 degrees; volume and least radius of a twist by 170 degrees.
 TABLE = {0.26: (0.932, 1.012, 1.531, 0.833, 0.201), 0.91: (0.860, 1.318, 1.084, 0.878, 0.772)}
 
 
@@ -335,7 +335,7 @@ def test_a_binding_comes_back_from_its_pickle():
 
 
 def test_the_moments_say_which_bones_move_a_vertex():
-    """Weights that depend on where vertices are can name others in a frame."""
+    """Weights that depend on positions may name other bones in a frame."""
     tube = Tube(21, 12)
     data = {"ddm": moments(tube, 0.3)}
     points, offsets, bones, weights = tube.mesh

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deformer: its methods against float64 reference code, its threads, what it refuses."""
+"""The deformer: its methods compared with float64 reference code, its threads, its errors."""
 
 import os
 import subprocess
@@ -14,13 +14,13 @@ import sinew
 from rigs import Rig, about, random_motion, random_rig, transform, translation
 
 METHODS = [method.name for method in sinew.methods()]
-# What a build may be without.
+# Methods that a build may lack.
 WITHOUT = {"ddm"} - set(METHODS)
 RIGID = [name for name in METHODS if name != "lbs"]
 
-# Times the size of the scene: float32's 6e-8 after some tens of operations.
+# Relative to the size of the scene: float32's 6e-8 after some tens of operations.
 TOLERANCE = 4e-6
-# Nearer than this to a tie between q and -q, both signs are right, and their results far apart.
+# Nearer to a tie between q and -q than this, both signs are right, and their results far apart.
 NO_TIE = 1e-4
 
 every_method = pytest.mark.parametrize("method", METHODS)
@@ -120,7 +120,7 @@ def test_agrees_with_the_reference_with_sheared_bones(method):
 def test_agrees_with_the_reference_with_identity_rest_bones(method):
     rig = random_rig(22, scaled=True)
     expected, margins = reference.deform(method, *rig.mesh, rig.transforms)
-    # Nor with what methods keep of vertices: cor then rotates each vertex about itself.
+    # The same for vertex data: without it cor rotates each vertex about itself.
     points = sinew.Deformer(*rig.mesh, method).deform(rig.transforms)
     np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=TOLERANCE)
 
@@ -165,11 +165,11 @@ def test_rigid_motion_after_the_pose_commutes(method, scaled):
 
 
 def test_log_is_the_exponential_of_the_sum_of_logarithms():
-    """Of the 4x4 matrices as a whole, by scipy: nothing of the reference's splitting comes between."""
+    """Uses scipy on whole 4x4 matrices, without the reference's splitting."""
     rig = random_rig(60, vertices=100)
     motions = rig.transforms.astype(np.float64)
     logarithms = np.array([scipy.linalg.logm(motion).real for motion in motions])
-    # Near 180 degrees from rest the two directions are as good as each other.
+    # Near 180 degrees from rest both directions are equally good.
     sure = np.array([(np.trace(motion[:3, :3]) + 1.0) / 4.0 > 1e-6 for motion in motions])
     assert sure.all()
     points = rig.deform("log")
@@ -196,15 +196,15 @@ def test_log_spreads_a_twist_evenly():
         points = sinew.Deformer(*arrays, method).deform(twist)
         angles[method] = np.degrees(np.arctan2(points[:, 2], points[:, 1]))
     np.testing.assert_allclose(angles["log"], 170.0 * weights, atol=1e-4)
-    # Which is what sets it apart: the others are fast in the middle.
+    # This distinguishes it: the others are faster in the middle.
     assert np.abs(angles["dq"] - 170.0 * weights).max() > 5.0
 
 
 @every_method
 @pytest.mark.parametrize("size", [1e-30, 1.0, 1e6, 1e12])
 def test_finite_for_whatever_is_finite(method, size):
-    """Rotations by 180 degrees about all axes, bones without width, far bones, in every kernel that a mesh
-    can come to."""
+    """Rotations by 180 degrees about all axes, bones without width, and far bones, in every kernel that a
+    mesh can use."""
     rng = np.random.default_rng(61)
     axes = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (-1, -2, 3)]
     motions = [np.eye(4), np.diag([0.0, 0.0, 0.0, 1.0]), np.diag([-1.0, -1.0, -1.0, 1.0])]
@@ -222,8 +222,8 @@ def test_finite_for_whatever_is_finite(method, size):
 
 
 def change_by_space(method, rig, other_from_space):
-    """The largest distance by which points differ when rest points, rest bones and motions are given in
-    another space and the result is taken back."""
+    """The largest distance by which points change if rest points, rest bones and motions are given in
+    another space and the result is mapped back."""
     _, margins = rig.reference(method)
     back = np.linalg.inv(other_from_space)
     other = rig.with_motions(
@@ -406,7 +406,8 @@ def test_bones_from_model_takes_three_rows_and_identity(method):
 
 @every_method
 def test_rest_inverses_equal_multiplying_by_hand(method):
-    """Also of bones by columns, and far away, where the product of two float matrices would lose digits."""
+    """Also for bones stored by columns, and far away, where the product of two float matrices would lose
+    digits."""
     rig, rng = random_rig(42), np.random.default_rng(43)
     far = np.array([random_motion(rng, 1000.0) for _bone in rig.transforms])
     posed = (rig.transforms.astype(np.float64) @ far).astype(np.float32)
@@ -475,7 +476,7 @@ def test_layout_of_the_input_means_nothing(method):
     rig = random_rig(47, scaled=True)
     expected = rig.deform(method)
 
-    # Blender's foreach_get gives matrices column by column.
+    # Blender's foreach_get returns matrices column by column.
     def as_blender_gives(matrices):
         flat = np.ascontiguousarray(matrices.transpose(0, 2, 1)).ravel()
         return flat.reshape(-1, 4, 4).transpose(0, 2, 1)
@@ -549,7 +550,7 @@ def test_gil_is_released(method):
     interval = sys.getswitchinterval()
     thread.start()
     ready.wait()
-    # Python takes the GIL from nobody for this long: the thread moves only when someone lets it go.
+    # Python never switches threads within this time: the other thread only runs if someone releases the GIL.
     sys.setswitchinterval(1000.0)
     try:
         gate.release()
@@ -655,7 +656,7 @@ def test_a_method_that_is_no_name_is_refused_in_one_sentence(method, got):
 
 
 def unaligned(array):
-    """The same numbers one byte off."""
+    """The same numbers, misaligned by one byte."""
     memory = np.zeros(array.nbytes + 1, np.uint8)
     result = memory[1:].view(array.dtype).reshape(array.shape)
     result[...] = array
@@ -702,7 +703,7 @@ def test_bones_beyond_the_limit_are_refused(bone):
         sinew.Deformer(point, offsets, np.int32([bone]), weights)
 
 
-# Repeated without memory of their own: refused before any is taken.
+# Repeated without memory of their own: must be refused before memory is allocated.
 @pytest.mark.parametrize("length", [2**31, 2**40, 2**58])
 def test_more_than_can_be_numbered_is_refused(length):
     rig = random_rig(54, vertices=3)
@@ -767,7 +768,7 @@ def test_set_rest_points_beside_deform_tears_nothing(method):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 def test_a_child_forked_while_others_deform_goes_on(tmp_path):
-    """Of the threads that deform here it has none, and must not wait for them."""
+    """The child has none of the threads that deform here, and must not wait for them."""
     program = tmp_path / "fork.py"
     program.write_text(FORKING)
     done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=120)
@@ -802,7 +803,7 @@ print("children:", ended)
 """
 
 
-# What waits for Python's lock when Python ends is unwound before 3.14, and must not take the process along.
+# Before 3.14, threads that wait for the GIL when Python ends are unwound; this must not end the process.
 ENDING = """
 import threading, time
 import numpy as np, sinew

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.DeltaMush beside float64 numpy, as numpy people use it."""
+"""sinew.DeltaMush compared with float64 numpy."""
 
 import pickle
 
@@ -21,7 +21,7 @@ def mesh_of(seed, size=12):
     faces = []
     for number, (a, b, c, d) in enumerate(quads):
         faces += [[a, b, c], [a, c, d]] if number % 3 == 0 else [[a, b, c, d]]
-    # A face of three edges, one of which has two faces already, and a hexagon of others.
+    # A face with three edges, one of which already has two faces, and a hexagon with edges of its own.
     faces += [[30, 31, size * size], list(range(3 * size, 3 * size + 6))]
     points = np.concatenate([points, points[30:34] + rng.normal(0, 0.05, (4, 3))])
     edges = {frozenset((face[i - 1], face[i])) for face in faces for i in range(len(face))}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Diagnostics find planted faults and no others; what they say of dual quaternions is what those do."""
+"""Diagnostics find planted faults and no others; what they report about dual quaternions is true."""
 
 from itertools import permutations
 
@@ -85,7 +85,7 @@ def pose_check(motions_of_frames, influences):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_dependence_on_the_order_of_groups_is_what_dual_quaternions_do(seed):
-    """All orders of each vertex's influences, by the float64 reference."""
+    """All orders of each vertex's influences, with the float64 reference."""
     rig = random_rig(seed, vertices=60, bones=8, most_influences=5)
     influences = Influences(rig.offsets, rig.bones, rig.weights)
     found = pose_check([rig.transforms], influences).get("order_of_groups")
@@ -112,7 +112,7 @@ def test_dependence_on_the_order_of_groups_is_what_dual_quaternions_do(seed):
 
 
 def two_bones(weights):
-    """Vertices between two bones: the second one's weights."""
+    """Vertices between two bones, with these weights of the second one."""
     weights = np.asarray(weights, np.float32)
     offsets = 2 * np.arange(len(weights) + 1, dtype=np.int32)
     bones = np.tile(np.array([0, 1], np.int32), len(weights))

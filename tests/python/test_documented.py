@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every command that the documents name exists and is run by a test, most of them here, as written."""
+"""Every command in the documents exists and is run by a test, most of them here, as written."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ DOCUMENTS = [
 ]
 PROGRAMS = Path(sys.executable).parent
 
-# Where a command is run that this file can not run: in another test, which names it. A command that is none
-# of a block, of these, or of what ./dev test runs, is one that no test knows.
+# For commands that this file can not run: the test that runs them, which must contain the command. Every
+# other command must be in a block, or be run by ./dev test.
 ELSEWHERE = {
     "sinew reskin --scheduler": "tests/blender/test_cluster.py",
     "sinew check --blender": "tests/blender/test_check.py",
@@ -43,8 +43,8 @@ ELSEWHERE = {
 
 
 class Command(NamedTuple):
-    """words: without a prompt, a pipe in front, and what is said of it behind; whole: with arguments, as it
-    can be run."""
+    """words: the command without prompt, preceding pipe and description; whole: with arguments, so that
+    it can be run."""
 
     document: str
     line: str
@@ -58,12 +58,12 @@ class Command(NamedTuple):
 
 def commands_in(path: Path) -> list[Command]:
     found = []
-    # A line that ends with a backslash goes on.
+    # A line that ends with a backslash continues.
     text = re.sub(r" *\\\n *", " ", path.read_text(encoding="utf-8"))
     for line in text.splitlines():
         block = re.match(r" {4,}(?:find .*\| )?((?:sinew|\./dev|dask) .*)", line)
         if block:
-            # What is said of it stands behind two spaces.
+            # A description follows after two spaces.
             text = re.split(r"\s{2,}", block[1])[0]
             found.append(Command(path.name, line.strip(), tuple(shlex.split(text)), whole=True))
             continue
@@ -161,11 +161,11 @@ def test_what_is_run_elsewhere_is():
         assert last in text or "./dev" in command, (command, place)
 
 
-# --- Each line for real
+# --- Runs each line
 
 
 def key_of(command: Command) -> str | None:
-    """Where it stands in ELSEWHERE."""
+    """Its entry in ELSEWHERE."""
     for known in ELSEWHERE:
         program, *rest = known.split()
         if command.words[0] == program and all(word in command.words for word in rest):
@@ -178,7 +178,7 @@ def test_every_command_is_known():
     for command in COMMANDS:
         is_run = command in RUN_HERE or key_of(command) is not None
         is_run = is_run or (command.words[0] == "./dev" and command.words[1] in runs)
-        # Named in a sentence: one of its subcommand that is run is enough.
+        # A command in a sentence: it is enough that one of its subcommands is run.
         named = not command.whole and any(command.name == other.name for other in RUN_HERE)
         assert is_run or named, f"no test runs {' '.join(command.words)} of {command.document}"
 
@@ -188,7 +188,7 @@ RUN_HERE = [command for command in WHOLE if command.words[0] == "sinew" and key_
 
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory):
-    """A folder with the files that the documents speak of."""
+    """A folder with the files that the documents mention."""
     pytest.importorskip("bpy", reason="the commands need Blender")
     folder = tmp_path_factory.mktemp("studio")
     rig = ROOT / "blend_files" / "wrist.blend"
@@ -203,7 +203,7 @@ def studio(tmp_path_factory):
         (folder / name).write_text(swing(count), encoding="utf-8")
     batch = (ROOT / "docs" / "batch.md").read_text(encoding="utf-8")
     job = re.search(r"```toml\n(.*?)```", batch, re.DOTALL)[1]
-    # The rig has one mesh, which the example's lists of names do not know.
+    # The rig has one mesh, which the example's lists of names do not contain.
     (folder / "film.toml").write_text(
         re.sub(r"^include = .*\n", "", job, flags=re.MULTILINE), encoding="utf-8"
     )
@@ -211,7 +211,7 @@ def studio(tmp_path_factory):
 
 
 def swing(count: int) -> str:
-    """A motion capture file of a bone on another that goes ahead, which swings once."""
+    """A motion capture file with one bone on another that moves forwards; the first one swings once."""
     site = "End Site { OFFSET 0 1 0 }"
     leg = f"JOINT leg {{ OFFSET 0 1 0 CHANNELS 3 Zrotation Xrotation Yrotation {site} }}"
     places = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
@@ -224,7 +224,7 @@ def swing(count: int) -> str:
 
 
 def run(line: str, folder: Path) -> str:
-    """A line as it stands, with this environment's programs."""
+    """Runs a line as written, with this environment's programs."""
     line = re.split(r"\s{2,}", line)[0].replace("/library", "library")
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {line}"],

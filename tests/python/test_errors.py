@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every refusal names the argument, what was wanted and what came."""
+"""Every error names the argument, what was expected and what was given."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ NAN, INF = np.float32("nan"), np.float32("inf")
 
 
 def good():
-    """Two vertices on two bones: what each case below spoils in one place."""
+    """Valid arguments, two vertices on two bones, of which each case below spoils one."""
     return {
         "rest_points": np.float32([[0, 0, 0], [1, 1, 1]]),
         "influence_offsets": np.int32([0, 1, 3]),

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every public function of the mathematics, 2,000 seeded cases each with edges among them, against 50 digits
-(mpmath): float64 to 1e-14 and float32 to 1e-5 of what is added up, but where a check says why it allows more.
+"""Every public function of the mathematics, with 2,000 seeded cases each including edge cases, compared with
+50 digits (mpmath): float64 to 1e-14 and float32 to 1e-5 of what is summed, unless a check says why it allows
+more.
 
-Rounding of the input counts as the function's: results are compared with those of the input before it was
-rounded. Edges are rotations by nothing, by next to nothing, by half a turn and next to it, both signs of
-quaternions, and translations of nothing, 1e-25 and 1e12.
+Rounding of the input counts as the function's error: results are compared with those for the input before it
+was rounded. Edge cases are rotations by 0, nearly 0, 180 degrees and nearly 180 degrees, both signs of
+quaternions, and translations of 0, 1e-25 and 1e12.
 """
 
 import inspect
@@ -27,7 +28,7 @@ CHECKS = {**exact_transforms.CHECKS, **exact_interpolation.CHECKS, **exact_fits.
 
 
 def public_functions():
-    """By "module.function": what these modules and Skeleton offer."""
+    """The functions of these modules and of Skeleton, by "module.function"."""
     found = {
         f"{module}.{name}": getattr(getattr(sinew, module), name)
         for module in MODULES
@@ -41,7 +42,7 @@ FUNCTIONS = public_functions()
 
 
 def names():
-    """With the method, of functions that have several."""
+    """Includes the method for functions that have several."""
     return [
         f"{name}.{method}" if method else name for name in FUNCTIONS for method in METHODS.get(name, ("",))
     ]

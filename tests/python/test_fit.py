@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.fit against scipy and against float64 written from the papers."""
+"""sinew.fit compared with scipy and with float64 code written from the papers."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ CASES = 2000
 
 
 def random_pairs(rng, count, points=12, noise=0.05):
-    """[count, points, 3] twice, and [count, points]: points, where rigid motions take them, weights."""
+    """Points [count, points, 3], their images under rigid motions, and weights [count, points]."""
     # Thick, flat and thin sets, near the origin and away from it.
     extents = 10.0 ** rng.uniform(-2, 0, (count, 1, 3))
     source = rng.normal(size=(count, points, 3)) * extents + rng.uniform(-5, 5, (count, 1, 3))
@@ -106,7 +106,7 @@ def flat(rng):
     return rng.normal(size=(9, 3)) * [1, 2, 0]
 
 
-# What is there, whether the fit is the only one as good, whether a mirror image would be better.
+# The input, whether the fit is unique, whether a mirror image would be better.
 DEGENERATE = {
     "one point": (lambda rng: np.ones((1, 3)), 1, False, False),
     "one place": (lambda rng: np.full((5, 3), 0.1), 1, False, False),
@@ -114,7 +114,7 @@ DEGENERATE = {
     "a plane": (flat, 1, True, False),
     "a plane, mirrored": (flat, [1, -1, 1], True, False),
     "a body, mirrored": (lambda rng: rng.normal(size=(9, 3)) * [1, 2, 3], [1, -1, 1], True, True),
-    # As far along y as along z: half a turn about either of many axes.
+    # Equal extents along y and z: a rotation by 180 degrees about any of many axes is equally good.
     "a cross, mirrored": (lambda rng: np.vstack([np.eye(3), -np.eye(3)]), [1, -1, 1], False, True),
 }
 
@@ -137,7 +137,7 @@ def test_degenerate_points_are_flagged(case, dtype, method):
     off = source @ got[:3, :3].T + got[:3, 3] - target
     np.testing.assert_allclose(result.error, np.sqrt((off**2).sum(axis=1).mean()), atol=1e-5)
     if not is_mirrored:
-        # One of the best: nothing is left.
+        # One of the best fits: no error remains.
         assert np.abs(off).max() < (1e-5 if dtype == np.float32 else 1e-13)
 
 
@@ -168,7 +168,7 @@ def test_sizes_near_the_ends_of_a_type(method, size, dtype):
 
 
 def hand_eye_reference(a, b):
-    """[8]: Daniilidis 1999, eqs. 31 to 36, from dual quaternions [n, 8]."""
+    """Daniilidis 1999, eqs. 31 to 36: x as [8] from dual quaternions [n, 8]."""
 
     def cross(v):
         return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
@@ -186,7 +186,7 @@ def hand_eye_reference(a, b):
 
 
 def motions_of_two(rng, count, motions, noise=0.0):
-    """Motions of one body, those of the other, and where this is: a x = x b but for noise."""
+    """Motions of one body, those of the other, and x: a x = x b up to noise."""
     x = rigid(rng, count)
     a = [rigid(rng, count) for _ in range(motions)]
     b = [x.inv() * each * x for each in a]
@@ -204,7 +204,7 @@ def test_hand_eye_finds_what_was_there():
     assert result.is_defined.all()
     error = np.abs(matrix(result.transforms, "dual_quat") - x.as_matrix()).max(axis=(1, 2))
     assert np.median(error) < 2e-15
-    # Some of random motions have almost parallel axes.
+    # Some random motions have nearly parallel axes.
     assert error.max() < 1e-10
     assert result.angle.max() < 1e-12
     assert result.translation.max() < 1e-12
@@ -213,17 +213,17 @@ def test_hand_eye_finds_what_was_there():
 def test_hand_eye_of_noisy_motions_is_that_of_the_paper():
     a, b, _ = motions_of_two(np.random.default_rng(9), 200, 8, noise=0.01)
     for i in range(200):
-        # Half turns have signs that noise decides, which the formulas leave open.
+        # Rotations by 180 degrees have signs that noise decides, which the formulas do not determine.
         clear = (np.abs(a[i, :, 0]) > 0.05) & (np.abs(b[i, :, 0]) > 0.05)
         p, q = a[i, clear], b[i, clear]
-        # The paper's rows have the unit of length that comes; Sinew's none.
+        # The paper's rows depend on the unit of length; Sinew's do not.
         longest = max(np.linalg.norm(sinew.dual_quat.to_quat_vec(e)[:, 4:], axis=1).max() for e in (p, q))
         scale = np.repeat([1, 1 / longest], 4)
         want = hand_eye_reference(p * scale, q * scale) / scale
         got = matrix(fit.hand_eye(p, q).transforms, "dual_quat")
         rotation = matrix(want, "dual_quat")[:3, :3]
         np.testing.assert_allclose(got[:3, :3], rotation, atol=1e-11)
-        # Of the translation the paper's is not the least squares of what is left; ours is.
+        # The paper's translation does not minimise the remaining squares; Sinew's does.
         a_motions, b_motions = matrix(p, "dual_quat"), matrix(q, "dual_quat")
         rows = np.vstack(a_motions[:, :3, :3] - np.eye(3))
         right = np.concatenate(b_motions[:, :3, 3] @ rotation.T - a_motions[:, :3, 3])
@@ -232,7 +232,7 @@ def test_hand_eye_of_noisy_motions_is_that_of_the_paper():
 
 def test_hand_eye_of_every_layout_and_with_weights():
     a, b, x = motions_of_two(np.random.default_rng(10), 5, 6)
-    b[:, 3:] = a[:, 3:]  # wrong, and without weight
+    b[:, 3:] = a[:, 3:]  # wrong, but without weight
     weights = np.array([1.0, 2, 3, 0, 0, 0])
     for name in ("affine", "quat_vec", "dual_quat"):
         convert = getattr(sinew.dual_quat, f"to_{name}", lambda same: same)
@@ -285,7 +285,7 @@ def test_average_is_where_the_screws_cancel_and_scipys_rotation():
     )
     screws = np.einsum("cp,cpi->ci", weights, sides.as_exp_coords().reshape(CASES, 7, 6))
     assert np.abs(screws).max() < 1e-12
-    # As sinew's own blend of many, which begins elsewhere; and other signs or order give the same.
+    # Equals sinew's own blend of many, which starts elsewhere; other signs or orders give the same.
     blends = sinew.interpolate.blend(array, weights, "dib").transforms
     np.testing.assert_allclose(matrix(blends, "dual_quat"), mean.as_matrix(), atol=1e-12)
     order = rng.permutation(7)
@@ -324,7 +324,7 @@ def test_robust_average_of_poses_of_which_almost_half_are_wrong(dtype):
         away.append([apart.angle, apart.translation])
         plain = sinew.quat_vec.rigid_distance(fit.average(array).transforms, of_right)
         plain_away.append([plain.angle, plain.translation])
-    # The mean of 60 is itself known to 0.02 / sqrt(60) in each of three directions.
+    # The mean of 60 has an error of 0.02 / sqrt(60) in each of three directions.
     assert np.sqrt(np.mean(np.square(away), axis=0)).max() < 0.02 * np.sqrt(3 / 60)
     assert np.median(plain_away, axis=0).min() > 0.1
 
@@ -337,7 +337,7 @@ def test_robust_average_of_equal_poses_is_that_pose():
     assert result.is_defined
     np.testing.assert_allclose(result.transforms, right, atol=1e-14)
     np.testing.assert_array_equal(result.kept > 0.99, [False] * 4 + [True] * 5)
-    # Weights decide whose half it is.
+    # Weights decide which half counts.
     weights = np.array([1.0] * 4 + [0.1] * 5)
     assert not np.allclose(fit.average(poses, weights, robust=True).transforms, right)
 

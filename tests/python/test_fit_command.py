@@ -12,7 +12,7 @@ from sinew_addon.commands import console
 
 
 class Output(console.Console):
-    """Keeps what is said."""
+    """Collects the output."""
 
     def __init__(self):
         self.said, self.complaints = [], []
@@ -25,7 +25,7 @@ class Output(console.Console):
 
 
 def fit(*words):
-    """(exit status, what it says, complaints)."""
+    """(exit status, output, errors)."""
     parser, modules = cli.make_parser()
     args = parser.parse_args(["fit", *map(str, words)])
     output = Output()

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Any arguments for everything that the library exports: a result, or an error that names an argument.
+"""Arbitrary arguments for everything that the library exports: the outcome is a result, or an error that
+names an argument.
 
-What is accepted gives what plain contiguous arrays of the same numbers give.
-SINEW_FUZZ_EXAMPLES (default 8000, within a minute) is for all cases together.
+Accepted arguments must give the same result as plain contiguous arrays of the same numbers.
+SINEW_FUZZ_EXAMPLES (default 8000, which takes under a minute) is the number for all cases together.
 """
 
 import os
@@ -20,14 +21,14 @@ EXAMPLES = int(os.environ.get("SINEW_FUZZ_EXAMPLES", "8000"))
 
 
 class Raises:
-    """Says that it is an array, and then is none."""
+    """Claims to be an array, but is none."""
 
     def __array__(self, dtype=None, copy=None):
         raise RuntimeError("no array of mine")
 
 
 class Lies:
-    """An array of something else than it says."""
+    """Claims to be an array of another type."""
 
     __array_interface__ = {"shape": (2, 3), "typestr": "<f4", "version": 3, "data": None}
 
@@ -59,7 +60,7 @@ LAYOUTS = ["plain", "negative", "strided", "fortran", "read-only", "unaligned", 
 
 
 def laid_out(array, how):
-    """The same numbers lying differently."""
+    """The same numbers in another memory layout."""
     if how == "list":
         return array.tolist()
     if how == "fortran":
@@ -84,7 +85,7 @@ def laid_out(array, how):
 
 @st.composite
 def arrays(draw, shape, wild=True):
-    """(what is given, plain numbers): of this shape and of moderate numbers; if wild at times of others."""
+    """(the argument, plain numbers): of this shape and with moderate numbers; if wild, sometimes others."""
     shape = list(shape)
     if wild and draw(st.booleans()):
         change = draw(st.integers(0, 3))
@@ -106,7 +107,7 @@ def arrays(draw, shape, wild=True):
     with np.errstate(all="ignore"):
         array = numbers.astype(dtype)
     given = laid_out(array, draw(st.sampled_from(LAYOUTS)))
-    # A list has no type but that which numpy gives it; without axes it is a number, which has none.
+    # A list has only the type that numpy gives it; without axes it is a number, which has none.
     if isinstance(given, list):
         return given, np.asarray(given)
     return given, array if isinstance(given, np.ndarray) else given
@@ -114,7 +115,7 @@ def arrays(draw, shape, wild=True):
 
 @st.composite
 def integers(draw, values, wild=True):
-    """(what is given, plain numbers): these, here and there another."""
+    """(the argument, plain numbers): these, sometimes replaced."""
     values = list(values)
     if wild and values and draw(st.booleans()):
         wrong = st.sampled_from([-1, 0, 1, 5, 2**20 - 1, 2**20, 2**31 - 1, 2**31, 2**32, 2**62, -(2**31)])
@@ -147,7 +148,8 @@ def of(kind, wild):
 
 
 def wild_one(draw, count):
-    """Whether each of so many arguments may be anything: none, or one, so that the others do not hide it."""
+    """Whether each of these arguments may be anything: none or one of them, so that errors do not hide
+    each other."""
     chosen = draw(st.integers(-1, count - 1))
     return [index == chosen for index in range(count)]
 
@@ -166,13 +168,13 @@ def names_of_arguments(function):
 
 
 def attempt(call, arguments, known):
-    """The result, or None where it was refused as it ought to be."""
+    """The result, or None if it was refused correctly."""
     try:
         return call(*arguments)
     except REFUSALS as error:
         if not isinstance(error, MemoryError):
             text = str(error)
-            # Pybind's own sentence has the signature, with every name.
+            # Pybind's own message contains the signature, with every name.
             assert any(name in text for name in known), (known, text)
             assert "\n" not in text or "incompatible" in text
         return None
@@ -190,7 +192,7 @@ def same(result, plain):
 
 
 def plain_of(values):
-    """The same arguments as contiguous arrays, of float64 where the call's arrays are not all of less."""
+    """The same arguments as contiguous arrays; float64 if not all of the call's arrays are smaller."""
     numbers = [array for _, array in values if isinstance(array, np.ndarray)]
     wide = any(a.dtype.itemsize > (4 if a.dtype.kind == "f" else 2) for a in numbers)
     dtype = np.float64 if wide else np.float32
@@ -307,7 +309,7 @@ def run(function, arguments):
 
 
 def many(part):
-    """Settings for this part of all examples."""
+    """Settings for this case's share of the examples."""
     return settings(
         max_examples=max(10, int(EXAMPLES * part)),
         deadline=None,

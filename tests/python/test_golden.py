@@ -75,7 +75,7 @@ def test_every_method_and_stage_is_there(reader, path):
 
 
 def test_no_two_results_of_a_case_are_the_same(reader):
-    """So that a reader that takes one method for another is found."""
+    """Detects readers that confuse methods."""
     case, about = reader.read(FOLDER / "weights.npz")
     names = [result["array"] for result in about["results"]]
     for a, b in itertools.combinations(names, 2):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones: the properties of the solution, and motions that were made by known helper bones."""
+"""Helper bones: properties of the solution, and motions that were made by known helper bones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TUBE = Tube(29, 12)
 POSES = [((1, 0, 0), angle) for angle in range(0, 131, 13)]
 POSES += [((0, 0, 1), angle) for angle in range(17, 171, 17)]
 SEGMENTS = np.array([[[0, 0, 0], [0, 0, 2]], [[0, 0, 2], [0, 0, 4]]], dtype=np.float64)
-# Of the limb.
+# Relative to the limb.
 DIAMETER = 1.0
 
 
@@ -50,7 +50,7 @@ def motion_by(method):
 
 
 def played(motion, solution):
-    """float64 [frames, vertices, 3]: linear blend skinning, apart from the solver's code."""
+    """float64 [frames, vertices, 3]: linear blend skinning, independent of the solver's code."""
     motions = np.concatenate([motion.bones, solution.motions], axis=1)
     rest = np.broadcast_to(motion.rest, motion.targets.shape).astype(np.float64)
     points = np.zeros(motion.targets.shape)
@@ -79,7 +79,7 @@ def test_two_helper_bones_a_joint_play_the_method(method):
 
 @pytest.mark.parametrize("method", ["dq", "cor"])
 def test_helper_bones_that_scale_are_nearer(method):
-    """Two of them have .7 % of the limb's diameter at most, which is out of the reach of rigid ones."""
+    """With two of them the error is at most .7 % of the limb's diameter, which rigid ones can not reach."""
     motion = motion_by(method)
     solution = solved(motion, Wanted(2), helper_bones.ScalingSolver)
     rms, worst = errors_of(played(motion, solution), motion.targets)
@@ -89,7 +89,7 @@ def test_helper_bones_that_scale_are_nearer(method):
     linear = solution.motions[..., :3]
     squares = linear @ linear.swapaxes(-1, -2)
     sizes = np.sqrt(squares[..., 0, 0])
-    # The same along all axes, which any engine's bones can have.
+    # Scaled equally along all axes, which any engine supports.
     assert np.allclose(squares, np.square(sizes)[..., None, None] * np.identity(3), atol=1e-9)
     assert sizes.max() > 1.1
     assert sizes.min() > 0.5
@@ -122,7 +122,7 @@ def test_weights_are_few_and_sum_to_one(most):
     assert np.allclose(solution.weights.sum(axis=1), 1.0)
     assert ((solution.bones >= 0) == (solution.weights > 0.0)).all()
     assert set(solution.parents) <= {0, 1}
-    # Rest stays as it is: helper bones only rotate and move.
+    # Rest is not changed: helper bones only rotate and move.
     linear = solution.motions[..., :3]
     assert np.allclose(linear @ linear.swapaxes(-1, -2), np.identity(3), atol=1e-9)
 
@@ -169,7 +169,7 @@ def test_a_vertex_without_weights_and_a_mesh_without_vertices():
     solution = solved(Motion(motion.rest, motion.targets, motion.bones, bare, SEGMENTS), Wanted(1))
     assert (solution.bones[0] == -1).all()
     assert (solution.weights[0] == 0.0).all()
-    # It stays at rest, also where a stage behind the method moves it: that is an error, too.
+    # It stays at rest, even where a stage after the method moves it; that is an error, too.
     distances = np.linalg.norm(motion.targets[:, 0].astype(np.float64) - motion.rest[0, 0], axis=1)
     assert np.isclose(solution.errors[0], np.sqrt(np.square(distances).mean()), atol=1e-6)
     targets = motion.targets.copy()
@@ -187,7 +187,7 @@ def test_a_vertex_without_weights_and_a_mesh_without_vertices():
 
 
 def best_of_all_subsets(gram, allowed, most):
-    """The least w G w over all sets of at most `most` candidates."""
+    """The smallest w G w over all sets of at most `most` candidates."""
     best = np.inf
     for count in range(1, most + 1):
         for chosen in itertools.combinations(np.flatnonzero(allowed), count):
@@ -211,6 +211,6 @@ def test_sparse_weights_against_all_subsets():
         assert ((weights > 0.0).sum(axis=1) <= most).all()
         found = simplex.objective(grams, weights)
         best = np.array([best_of_all_subsets(g, a, most) for g, a in zip(grams, allowed, strict=True)])
-        # With a limit the search is none of all sets.
+        # With a limit the search does not try all sets.
         assert (found <= best * (1.0 + slack)).mean() > 0.95
         assert (found >= best * (1.0 - 1e-6)).all()

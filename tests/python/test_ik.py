@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.ik against scipy's least squares, the law of cosines, and plain matrices for the poses."""
+"""sinew.ik compared with scipy's least squares, the law of cosines, and plain matrices for the poses."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ CHAINS = 220
 
 
 def rest_of(lengths):
-    """Bones along y, one behind the other, [bones, 7]."""
+    """Bones along y, each at the end of the one before, [bones, 7]."""
     rest = np.zeros((len(lengths), 7))
     rest[:, 0] = 1.0
     rest[1:, 5] = lengths[:-1]
@@ -24,7 +24,7 @@ def matrices(quaternions):
 
 
 def poses_of(rest, rotations):
-    """The oracle of poses, in matrices: rotation and head of each bone of a chain."""
+    """The oracle for poses, with matrices: rotation and head of each bone of a chain."""
     rotation, head, poses = np.eye(3), np.zeros(3), []
     for own, at_rest, q in zip(rest, matrices(rest[:, :4]), matrices(rotations), strict=True):
         head = head + rotation @ own[4:]
@@ -98,12 +98,12 @@ def test_chains_without_limits_reach_where_scipy_does(method):
         )
         distance = np.linalg.norm(tip_of(rest, found.rotations, lengths[-1]) - goal)
         assert distance == pytest.approx(found.distance, abs=1e-9 * total)
-        # Folded to the end of its reach a chain is at a minimum of the fourth order.
+        # Folded to the end of its reach, a chain is at a minimum of the fourth order.
         assert distance <= theirs + (1.1e-6 if method == "dls" else 1e-4) * total
 
 
 def angles_to_quaternions(angles):
-    """What swing_twist_angles() undoes: by scipy, the swing from its quaternion."""
+    """The inverse of swing_twist_angles(), by scipy, with the swing from its quaternion."""
     x, z = np.sin(angles[:, 0] / 2), np.sin(angles[:, 2] / 2)
     w = np.sqrt(np.maximum(1 - x * x - z * z, 0.0))
     swing = Rotation.from_quat(np.column_stack([x, np.zeros_like(x), z, w]))
@@ -119,14 +119,16 @@ def test_angles_of_swing_and_twist():
 
 
 def test_chains_with_limits_come_as_near_as_scipy():
-    """Both from one start, both within the same bounds; a local minimum is no fault, more of them are."""
+    """Both start from the same pose within the same bounds. A local minimum is no fault, but there must
+    not be more."""
     rng = np.random.default_rng(4)
     nearer, as_near, farther = 0, 0, 0
     for _ in range(CHAINS):
         count = int(rng.integers(2, 6))
         lengths = rng.uniform(0.5, 1.5, count)
         rest, total = rest_of(lengths), lengths.sum()
-        # x is free within its limits, z locked or the other way round: bounds of scipy's have no ellipse.
+        # x is free within its limits and z locked, or the other way round: scipy's bounds can not be an
+        # ellipse.
         locked = np.zeros((count, 3), bool)
         locked[np.arange(count), np.where(rng.random(count) < 0.5, 0, 2)] = True
         limits = np.stack([-rng.uniform(0.2, 2.5, (count, 3)), rng.uniform(0.2, 2.5, (count, 3))], axis=-1)
@@ -165,7 +167,7 @@ def test_wanted_rotations_against_scipy():
         count = int(rng.integers(3, 7))
         lengths = rng.uniform(0.5, 1.5, count)
         rest, total = rest_of(lengths), lengths.sum()
-        # Half of them are nowhere: the sum of squares is to be the least.
+        # Half of the goals are unreachable: the sum of squares must be minimal.
         goal = rng.normal(size=3) * 0.5 * total
         wanted = Rotation.random(random_state=rng)
         start = rng.uniform(-0.4, 0.4, (count, 3))

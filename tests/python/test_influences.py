@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From vertex groups to influences."""
+"""Influences from vertex groups."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sinew_addon.core.influences import GroupWeights, Influences, entries_of_bon
 
 
 def random_groups(seed: int, zeros: bool, vertices: int = 200) -> GroupWeights:
-    """Of groups 0 to 4, none to four entries a vertex."""
+    """Groups 0 to 4, with none to four entries for each vertex."""
     random = np.random.default_rng(seed)
     counts = random.integers(0, 5, vertices, dtype=np.int32)
     weights = random.uniform(0.1, 1.0, counts.sum()).astype(np.float32)

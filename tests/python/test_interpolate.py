@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.interpolate against scipy and against float64 written from the papers."""
+"""sinew.interpolate compared with scipy and with float64 code written from the papers."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def one_side(quaternions, weights):
 
 
 def mean_rotation(rotations, weights):
-    """The point that the weighted logarithms towards the rotations leave where it is."""
+    """The fixed point: the weighted logarithms from it to the rotations sum to 0."""
     quaternions = one_side(rotations.as_quat(), weights)
     mean = Rotation.from_quat(weights @ quaternions)
     for _ in range(60):
@@ -87,7 +87,7 @@ def test_between_agrees_with_the_papers(method, dtype):
         assert result.transforms.dtype == dtype
         assert result.is_defined.all()
         for t, transform in zip(TIMES, result.transforms, strict=True):
-            # Almost 180 degrees apart, the rounding of float32 moves the result.
+            # Almost 180 degrees apart, the rounding of float32 changes the result.
             far = (
                 ends[0].inv() * ends[1]
             ).rotation.magnitude() > 3.1 or ends.rotation.magnitude().max() > 3.1
@@ -102,7 +102,7 @@ def test_blend_of_many_agrees_with_the_papers(method):
     name = LAYOUT_OF[method]
     for count in (1, 2, 3, 5, 8):
         for _ in range(8):
-            # Within 115 degrees of one another: the mean on the sphere is then the only one near.
+            # Within 115 degrees of each other, the mean on the sphere is unique nearby.
             middle = rigid(rng)
             spread = RigidTransform.from_exp_coords(
                 np.column_stack([rng.uniform(-1, 1, (count, 3)) / 1.8, rng.uniform(-2, 2, (count, 3))])
@@ -240,7 +240,7 @@ def test_pairs_fail_where_dual_quaternions_hold():
         name = LAYOUT_OF[method]
         plain = matrix(between(*layout(ends, name), 0.5, method).transforms, name)
         error[method] = np.abs(in_space(method, ends, 0.5, nothing, right) - plain).max()
-    # Half way of a chord against half way of its arc.
+    # The midpoint of a chord compared with the midpoint of its arc.
     assert error["qv_nlerp"] > 0.2
     assert error["qv_slerp"] > 0.2
     assert error["matrix_polar"] > 0.2
@@ -303,7 +303,7 @@ def test_the_largest_translations_are_finite_and_never_falsely_defined(method, d
     where = {"affine": (slice(0, 3), 3), "quat_vec": slice(4, 7), "dual_quat": None}[name]
     for end, sign in ((a, 1.0), (b, -1.0)):
         if where is None:
-            # real * (0, t) / 2 with t along x, which may be as large as any.
+            # real * (0, t) / 2 with t along x, which may be as large as any number.
             w, x, y, z = end[:4]
             end[4:] = sign * (large / 2) * np.array([-x, w, z, -y], dtype)
         else:
@@ -341,7 +341,7 @@ def blends_in_two_orders(method, motions, weights):
 
 
 def wide_motions(rng, count):
-    """[3 count], up to 143 degrees from the identity."""
+    """Motions [3 count], up to 143 degrees from the identity."""
     axes = rng.normal(size=(3 * count, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     angles = rng.uniform(0, 2.5, (3 * count, 1))
@@ -354,12 +354,13 @@ def test_what_the_order_decides_is_not_defined(method):
     rng = np.random.default_rng(20)
     even = np.ones((2000, 3))
     plain, changes = blends_in_two_orders(method, wide_motions(rng, 2000), even)
-    # Never silently; and hardly ever where nothing changes (the means of two choices of signs can be one).
+    # Never without being reported; and hardly ever reported where nothing changes (two choices of signs can
+    # have the same mean).
     assert not (plain.is_defined & changes).any()
     assert 0.1 < changes.mean() < 0.3
     if method in ("qv_nlerp", "dlb"):
         np.testing.assert_array_equal(plain.is_defined, ~changes)
-    # With one that is the heaviest nothing is left to the order.
+    # With a single heaviest transform, the order does not matter.
     uneven = np.tile([1.0, 1.001, 0.999], (2000, 1))
     plain, changes = blends_in_two_orders(method, wide_motions(rng, 2000), uneven)
     assert not (plain.is_defined & changes).any()
@@ -373,7 +374,7 @@ def test_turns_by_thirds_are_a_tie():
         assert not blend(turns, np.full(3, np.float32(1 / 3)), method).is_defined
         assert blend(turns, [1.0, 1.1, 1.0], method).is_defined
     assert not blend(sinew.dual_quat.to_quat_vec(turns), np.ones(3), "qv_nlerp").is_defined
-    # Near one another, equal weights are as good as any.
+    # Near each other, equal weights do not matter.
     near = sinew.dual_quat.from_axis_angle([0, 0, 1], np.radians([0.0, 40, 80]))
     assert blend(near, np.ones(3), "dlb").is_defined
 
@@ -387,7 +388,7 @@ def test_what_is_no_rotation_is_not_defined(method):
         long[:, :3, :3] *= 2
     else:
         long[:, : 4 if name == "quat_vec" else 8] *= 2
-    # A matrix that scales is one that matrices blend.
+    # Methods that blend matrices accept a matrix that scales.
     is_any = method in ("matrix_linear", "matrix_polar")
     assert between(*ends, 0.3, method).is_defined
     assert between(*long, 0.3, method).is_defined == is_any
@@ -431,7 +432,7 @@ def test_signs_by_the_running_sum_are_those_of_skinning():
         close(sinew.dual_quat.transform_point(running.transforms, point), skinned, 2e-4)
         heaviest = blend(poses, shares, "dlb").transforms
         differ += np.abs(sinew.dual_quat.transform_point(heaviest, point) - skinned).max() > 1e-2
-    # The rules are not the same.
+    # The rules give different results.
     assert differ > 5
 
 

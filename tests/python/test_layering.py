@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who may include and import whom, read from the sources as text."""
+"""Which files may include and import which, read from the sources as text."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "native" / "sinew"
 
-# Folder of native/sinew: those whose headers it may include.
+# Folder of native/sinew: the folders whose headers it may include.
 MAY_INCLUDE = {
     "transform": {"transform"},
     "interpolate": {"transform", "interpolate"},
@@ -22,13 +22,13 @@ MAY_INCLUDE = {
     "ik": {"transform", "interpolate", "skeleton", "ik"},
 }
 
-# The rooms of addon/, lowest first: a file imports from its own and from those in front of it. What lies in
-# addon/ itself and starts a process is for all.
+# The rooms of addon/, lowest first: a file may import from its own room and from those before it. Files
+# directly in addon/ that start a process may be imported by all.
 ROOMS = ("core", "io", "attach", "deform", "ui", "features", "jobs", "commands")
 FOR_ALL = {"native", "blender_process", "other_blender"}
 FOR_COMMANDS = {"prepare", "worker"}
 
-# What nothing in addon/core may import: Blender and what is built on it.
+# Modules that nothing in addon/core may import: Blender and what is built on it.
 OF_BLENDER = {"aud", "bgl", "blf", "bl_math", "bmesh", "bpy", "bpy_extras", "gpu", "imbuf", "mathutils"}
 
 
@@ -50,7 +50,7 @@ def wrong_includes(folder, text):
             if parts[0] != "sinew" or inside not in MAY_INCLUDE[folder]:
                 wrong.append(header)
         elif header.startswith(".") or (LIBRARY / folder / header).exists():
-            wrong.append(header)  # by a path from native/, so that this test can read the folder
+            wrong.append(header)  # with a path from native/, so that this test can see the folder
     return wrong
 
 
@@ -63,7 +63,7 @@ def python_headers(text):
 
 
 def imports(text):
-    """Dotted names that `text` imports anywhere, functions included; a leading dot for each level up."""
+    """Dotted names that `text` imports anywhere, also in functions; with a leading dot for each level up."""
     names = []
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
@@ -81,7 +81,8 @@ def of_blender(text):
 
 
 def rooms_used(text, path):
-    """The rooms and files of addon/ that `text` imports from, as the file `path`, relative to addon/."""
+    """The rooms and files of addon/ that `text` imports from, if it is the file `path`, relative to
+    addon/."""
     used = set()
     for name in imports(text):
         level = len(name) - len(name.lstrip("."))
@@ -96,7 +97,7 @@ def rooms_used(text, path):
 
 
 def wrong_rooms(text, path):
-    """The rooms that `text` imports from and may not."""
+    """The rooms that `text` imports from although it must not."""
     below = set(ROOMS[: ROOMS.index(path.parts[0]) + 1])
     processes = FOR_ALL | FOR_COMMANDS if path.parts[0] == "commands" else FOR_ALL
     return rooms_used(text, path) - below - processes
@@ -175,7 +176,7 @@ def test_jobs_hand_tasks_out_without_importing_them():
     assert rooms <= {"core", "jobs"} | FOR_ALL
 
 
-# The tests above only ever see good sources: these show that they would see bad ones.
+# The tests above only see good sources: these show that they would detect bad ones.
 @pytest.mark.parametrize(
     ("folder", "line"),
     [
@@ -243,7 +244,7 @@ def test_a_right_room_is_let_through(path, text):
 
 
 def test_what_the_extension_uses_of_the_library_is_looked_for_when_it_starts():
-    """addon/native.py says so in a sentence where an older library lacks it."""
+    """addon/native.py reports in a sentence if an older library lacks it."""
     addon = ROOT / "addon"
     tree = ast.parse((addon / "native.py").read_text(encoding="utf-8"))
     names = next(n.value for n in tree.body if isinstance(n, ast.Assign) and n.targets[0].id == "NAMES")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What ./dev installs is locked by hashes, holds what is asked for, and names no address of a registry."""
+"""What ./dev installs is locked by hashes, contains what is required, and names no address of a registry."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def wanted(name: str) -> list[str]:
 
 
 def locked(text: str) -> dict[str, list[str]]:
-    """Versions by name; several where they differ by a marker. Anything else in the text is an error."""
+    """Versions by name; several if they differ by a marker. Anything else in the text is an error."""
     found: dict[str, list[str]] = {}
     end = 0
     for match in PINNED.finditer(text):
@@ -52,7 +52,7 @@ def numbers(version: str) -> tuple[int, ...]:
 
 
 def fits(version: str, specifier: str) -> bool:
-    """For the forms that are used: ==1.2, ==1.2.*, >=1.2."""
+    """Supports the forms that are used: ==1.2, ==1.2.*, >=1.2."""
     if specifier.endswith(".*"):
         return f"{version}.".startswith(specifier.removeprefix("==")[:-1])
     if specifier.startswith(">="):
@@ -96,7 +96,7 @@ def test_ranges_of_users_are_those_that_are_locked():
 def test_environments_are_made_of_locks():
     made = re.findall(r"^ +make_environment (.*)$", DEV, re.MULTILINE)
     assert len(made) >= 6
-    # What is measured beside Sinew is in no release.
+    # Packages that are only compared in benchmarks are not locked.
     assert [line for line in made if "--locked" not in line] == [
         '.venvs/bench "$everyday_python" "${bench_requirements[@]}"'
     ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mended weights against plain matrices in float64."""
+"""Mended weights compared with plain matrices in float64."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Metrics on shapes whose measures are known in closed form, and against trimesh."""
+"""Metrics on shapes whose measures are known in closed form, and compared with trimesh."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def surface_of(mesh):
 
 
 def influences_of(weights):
-    """weights [vertices, bones]; zero for none."""
+    """weights [vertices, bones]; None: 0."""
     weighted = weights > 0.0
     offsets = np.concatenate([[0], np.cumsum(weighted.sum(axis=1))]).astype(np.int32)
     vertices, bones = np.nonzero(weighted)
@@ -27,8 +27,8 @@ def influences_of(weights):
 
 
 class Tube:
-    """A closed tube along X from -LENGTH / 2 to LENGTH / 2 with its joint in the middle: the second bone's
-    weight goes from 0 to 1, linearly, from one end to the other."""
+    """A closed tube along X from -LENGTH / 2 to LENGTH / 2. Two bones meet in its middle; the second
+    bone's weight increases linearly from 0 to 1 from one end to the other."""
 
     def __init__(self):
         x = np.repeat(np.linspace(-LENGTH / 2, LENGTH / 2, RINGS), SIDES)
@@ -46,7 +46,7 @@ class Tube:
         for side in range(SIDES):
             beside, top = (side + 1) % SIDES, (RINGS - 1) * SIDES
             triangles += [(first, beside, side), (last, top + side, top + beside)]
-        # Along the tube only: their stretch is known.
+        # Only edges along the tube: their stretch is known.
         self.surface = Surface(len(self.rest), np.array(triangles, np.int32), np.array(edges, np.int32))
         second = self.rest[:, 0] / LENGTH + 0.5
         self.second = second
@@ -78,7 +78,7 @@ def tube():
 
 
 def test_linear_blend_of_a_half_twist_leaves_two_cones(tube):
-    """At weight w the cross-section is scaled by |1 - 2 w|: a third of the volume is left."""
+    """At weight w the cross-section is scaled by |1 - 2 w|: a third of the volume remains."""
     measured = tube.measure("lbs", about([1, 0, 0], 180)).summary()
     assert measured.volume_change == pytest.approx(-2 / 3, abs=1e-5)
     assert measured.bulge_min == pytest.approx(-RADIUS, rel=1e-5)
@@ -92,8 +92,8 @@ def test_linear_blend_of_a_twist_shrinks_cross_sections(tube, degrees):
     w = tube.second[: SIDES * RINGS]
     shrunk = RADIUS * np.sqrt(1 - 4 * w * (1 - w) * np.sin(np.radians(degrees) / 2) ** 2)
     np.testing.assert_allclose(measured.field("bulge")[: SIDES * RINGS], shrunk - RADIUS, atol=1e-6)
-    # The mean of the squared radius over the length; rings are flat polygons that rotate against each other,
-    # so the triangles between them lie a little inside.
+    # The mean squared radius over the length. Rings are flat polygons that rotate against each other, so the
+    # triangles between them are slightly inside.
     expected = 1 - 2 / 3 * np.sin(np.radians(degrees) / 2) ** 2
     assert measured.summary().volume_change == pytest.approx(expected - 1, abs=1e-3)
 
@@ -102,7 +102,8 @@ def test_dual_quaternions_keep_a_twisted_tube_round(tube):
     measured = tube.measure("dq", about([1, 0, 0], 180))
     assert abs(measured.summary().volume_change) < 0.01
     np.testing.assert_allclose(measured.field("bulge"), 0.0, atol=1e-6)
-    # A blend of no rotation and one by 180 degrees rotates by 2 atan(w / (1 - w)) (Kavan et al. 2008, DLB).
+    # A blend of no rotation and a rotation by 180 degrees rotates by 2 atan(w / (1 - w)) (Kavan et al. 2008,
+    # DLB).
     angles = 2 * np.arctan2(tube.second, 1 - tube.second)[: SIDES * RINGS].reshape(RINGS, SIDES)[:, 0]
     step, chords = LENGTH / (RINGS - 1), 2 * RADIUS * np.sin(np.diff(angles) / 2)
     longest = np.hypot(step, chords.max()) / step
@@ -112,7 +113,7 @@ def test_dual_quaternions_keep_a_twisted_tube_round(tube):
 
 @pytest.mark.parametrize("degrees", [60, 120])
 def test_dual_quaternions_bulge_where_a_tube_bends(tube, degrees):
-    """Each vertex rotates about the joint: outside the bend it keeps sqrt(x^2 + r^2) from it."""
+    """Each vertex rotates about the joint: on the outer side of the bend its distance is sqrt(x^2 + r^2)."""
     measured = tube.measure("dq", about([0, 0, 1], -degrees))
     bend, w = np.radians(degrees), tube.second
     rotation = 2 * np.arctan2(w * np.sin(bend / 2), 1 - w + w * np.cos(bend / 2))
@@ -187,7 +188,7 @@ def test_holes_are_closed_by_fans_to_their_middle(name):
     surface = Surface(len(points), open_faces.astype(np.int32), np.empty((0, 2), np.int32))
     assert surface.caps.count == 2
     assert len(surface.caps.starts) == sum(len(mesh.vertex_neighbors[seed]) for seed in seeds)
-    # The same by trimesh: the vertex that was taken out, put back at the middle of its neighbours.
+    # The same with trimesh: the vertex that was moved, put back to the middle of its neighbours.
     closed = points.copy()
     for seed in seeds:
         closed[seed] = points[mesh.vertex_neighbors[seed]].mean(axis=0)
@@ -196,7 +197,7 @@ def test_holes_are_closed_by_fans_to_their_middle(name):
 
 
 def test_seams_are_no_holes():
-    """Every triangle with vertices of its own, as files for games have them at hard edges."""
+    """Gives every triangle its own vertices, as game files have at hard edges."""
     mesh = MESHES["torus"]
     points = mesh.vertices[mesh.faces.ravel()]
     triangles = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
@@ -231,7 +232,7 @@ def test_flipped_faces_are_those_turned_against_their_bone():
     gauge = Gauge(surface_of(mesh), influences_of(weights))
     axes = np.array([[[0, 0, 0], [0, 0, 1]]], np.float64)
     gauge.set_frame(FrameOfRig(mesh.vertices, axes, transform(motion, axes), motion[None, :3, :3]))
-    # A cap pushed through to the other side, and noise that leaves triangles any way round.
+    # A cap pushed through to the other side, and noise that flips triangles.
     pushed = mesh.vertices[:, 2] > 0.5
     local = mesh.vertices.copy()
     local[pushed, 2] = 1.0 - local[pushed, 2]
@@ -271,7 +272,7 @@ def test_fields_of_edges_and_areas_are_those_of_a_plain_loop():
             area[row, triangle] += np.linalg.norm(np.cross(b - a, c - a)) / 2
     np.testing.assert_allclose(measured.field("stretch"), stretch, rtol=1e-9)
     np.testing.assert_allclose(measured.field("area"), area[0] / area[1], rtol=1e-9)
-    # No bone holds these: none swells.
+    # No bone influences these, so none swells.
     assert not measured.field("bulge").any()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips blended: against formulas in numpy and scipy, and against walks whose contacts are known."""
+"""Blended clips: compared with formulas in numpy and scipy, and with walks whose contacts are known."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def matrices(rigid):
 
 
 def apart(a, b):
-    """The largest difference of two arrays of rigid transforms, whatever the signs of quaternions."""
+    """The largest difference of two arrays of rigid transforms, independent of the signs of quaternions."""
     return np.abs(matrices(a) - matrices(b)).max()
 
 
 def plain(method, **more):
-    """Every clip from its first frame, its root as any bone: what the formulas say alone."""
+    """Every clip from its first frame, with its root like any bone: only what the formulas give."""
     return Settings(method=method, align=False, root_motion=KEYED, **more)
 
 
@@ -48,7 +48,7 @@ def test_methods_are_the_librarys():
     assert len({method.number for method in METHODS.values()}) == len(METHODS)
 
 
-# --- What every blend has
+# --- Properties of all blends
 
 
 @pytest.mark.parametrize("root_motion", [TRAVEL, KEYED])
@@ -99,7 +99,7 @@ def test_signs_of_quaternions_and_the_sum_of_weights_do_not_matter():
 
 @pytest.mark.parametrize("method", sorted(set(METHODS) - {"matrix_log"}))
 def test_a_rigid_motion_of_all_clips_goes_through(method):
-    """From the left, which is what moving the whole motion is; matrix_log lets nothing through."""
+    """Composing from the left moves the whole motion; matrix_log does not allow it."""
     clips = pair(5)
     moved, x = [], quat_vec.from_twist(np.array([0.4, -0.8, 0.3, 1.0, 2.0, -0.5]))
     for clip in clips:
@@ -117,8 +117,8 @@ def test_a_rigid_motion_of_all_clips_goes_through(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_where_on_the_ground_clips_are_does_not_matter(method):
-    """With root motion a clip may stand elsewhere and face elsewhere: the blend begins where the heaviest
-    does."""
+    """With root motion, clips may have other positions and directions: the blend starts where the
+    heaviest clip starts."""
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2)
     rigid = run.poses.rigid.copy()
     ground = quat_vec.from_screw_about(UP, np.array([3.0, 1.0, 0.0]), 1.2, 0.0)
@@ -144,13 +144,13 @@ def test_dlb_is_the_normalised_sum():
     real, dual = total[..., :4], total[..., 4:]
     norm = np.linalg.norm(real, axis=-1, keepdims=True)
     slope = (real * dual).sum(-1, keepdims=True) / norm
-    # |q| of a dual quaternion is a dual number: its inverse is 1 / n - e s / n^2.
+    # q| of a dual quaternion is a dual number, with the inverse 1 / n - e s / n^2.
     unit = np.concatenate([real / norm, dual / norm - real * slope / norm**2], axis=-1)
     assert np.abs(dual_quat.to_affine(unit) - matrices(made.poses.rigid)).max() < 1e-12
 
 
 def dual_quat_of(clip):
-    """By the definition: real, and half the translation times it."""
+    """By the definition: the real part, and half the translation times it."""
     q, t = clip.poses.rigid[..., :4], clip.poses.rigid[..., 4:]
     w, v = q[..., :1], q[..., 1:]
     return np.concatenate([q, -0.5 * (t * v).sum(-1, keepdims=True), 0.5 * (t * w + np.cross(t, v))], axis=-1)
@@ -201,7 +201,7 @@ def test_linear_matrices_shrink_and_no_other_method_does():
         if method == "matrix_linear":
             assert np.abs(made.volume - wanted).max() < 1e-12
             assert made.volume.min() < 0.8
-            # What Blender gets of it: the lengths of the axes.
+            # What Blender receives of it: the lengths of the axes.
             axes = np.linalg.norm(0.5 * (left + right)[..., :3, :3], axis=-2)
             assert np.abs(made.poses.scale - scale * axes).max() < 1e-12
             shrunk = measure.shrinking(made)
@@ -214,7 +214,8 @@ def test_linear_matrices_shrink_and_no_other_method_does():
 
 
 def test_a_half_turn_apart_a_matrix_is_flat_and_the_blend_is_not_defined():
-    """Smith 2013, section 3.5.2: half way to a half turn about z a matrix is that of a line."""
+    """Smith 2013, section 3.5.2: halfway to a rotation by 180 degrees about z, a matrix collapses to a
+    line."""
     a = walks.walk()
     rest = Poses(np.broadcast_to(quat_vec.identity(), a.poses.rigid.shape).copy(), a.poses.scale)
     still = replace(a, poses=rest)
@@ -242,16 +243,16 @@ def test_armature_space_is_the_blend_of_what_algorithm_1_gives():
             np.stack([quat_vec.to_dual_quat(end) for end in ends], axis=1), np.full((8, 2), 0.5), "dlb"
         ).transforms
         posed = rig.to_armature(made.poses.rigid)[frame]
-        # Rotations are those, whatever holds the heads.
+        # Rotations do not depend on how heads are constrained.
         assert np.abs(matrices(posed)[:, :3, :3] - dual_quat.to_affine(wanted)[:, :3, :3]).max() < 1e-9
-    # Connected bones stay on their parents' tails; what they would have left them by is told.
+    # Connected bones stay on their parents' tails; the distance by which they would leave them is reported.
     assert np.abs(made.poses.rigid[:, rig.connected, 4:]).max() == 0.0
     assert made.apart[:, rig.connected].max() > 0.05
     assert blend([a, b], (0.5, 0.5), plain("dlb")).apart.max() == 0.0
 
 
 def test_relative_blends_keep_bones_of_a_chain_together_and_armature_space_does_not():
-    """Smith 2013, figure 3.3, for blends of motions: two legs at other phases."""
+    """Smith 2013, figure 3.3, for blends of motions: two legs with different phases."""
     walk, run = walks.walk(), walks.walk("late", 20, 1.1, 0.3, start=0.4)
     for method in ("dlb", "qv_nlerp", "matrix_linear"):
         relative = blend([walk, run], (0.5, 0.5), plain(method))
@@ -260,18 +261,19 @@ def test_relative_blends_keep_bones_of_a_chain_together_and_armature_space_does_
         assert torn.apart.max() > 0.01
 
 
-# --- Times
+# --- Timing
 
 
 def test_a_blend_of_periods_20_and_30_has_period_25_and_keeps_the_contacts():
-    """Whatever frame a clip begins at, the left foot of the blend is on the ground when that of both is."""
+    """Whatever frames the clips start at, the left foot of the blend is on the ground when it is in both
+    clips."""
     walk = walks.walk(period=20, start=0.1)
     run = walks.walk("run", 30, 1.1, 0.2, start=0.65)
     made = blend([walk, run], (0.5, 0.5))
     assert made.is_cyclic
     clip = made.clip("blend")
     assert clip.length == 25.0
-    # Of the reference, which is the first: it begins at phase 0.1, its left foot lifts at 0.6.
+    # For the reference, which is the first clip: it starts at phase 0.1, and its left foot lifts at 0.6.
     phases = 0.1 + np.arange(26) / 25.0
     sides = [walks.foot(phases + ahead, 1.0, 0.1)[1] == 0.0 for ahead in (0.0, 0.5)]
     feet = measure.bones_named(clip, ["foot.L", "foot.R"])
@@ -282,7 +284,7 @@ def test_a_blend_of_periods_20_and_30_has_period_25_and_keeps_the_contacts():
         lifted = height > walks.ANKLE + 0.05
         assert lifted.any()
         assert not (lifted & on_ground).any()
-    # It closes, but for its travel.
+    # It is closed except for its travel.
     assert apart(clip.poses.rigid[0, 1:], clip.poses.rigid[-1, 1:]) < 1e-9
 
 
@@ -303,7 +305,7 @@ def test_without_alignment_feet_meet_the_ground_at_other_times_and_slide():
 def test_the_offset_of_a_cycle_is_found(offset):
     reference, late = (grounded(walks.walk(start=start), 0, UP).clip for start in (0.0, offset))
     warp = align(reference, late, np.ones(8, dtype=bool))
-    # What the reference has at phase 0 the other has at -offset, which is 1 - offset.
+    # Where the reference has phase 0, the other clip has -offset, which equals 1 - offset.
     off = np.mod(warp.own - np.arange(PHASES + 1) / PHASES + offset + 0.5, 1.0) - 0.5
     assert np.abs(off).max() < 1.0 / PHASES
     assert warp.own[-1] - warp.own[0] == pytest.approx(1.0)
@@ -328,7 +330,7 @@ def test_another_pace_within_the_cycle_is_found():
     reference = grounded(walks.walk(period=40), 0, UP).clip
     other = grounded(walks.walk("bent", 40, phases=bent), 0, UP).clip
     warp = align(reference, other, np.ones(8, dtype=bool))
-    # The other clip is at `bent` when it is at `even`: so the inverse.
+    # The other clip is at `bent` when this one is at `even`, so it is the inverse.
     phases = np.arange(PHASES + 1) / PHASES
     wanted = np.interp(phases, bent, even)
     assert np.abs(warp.own - wanted).max() < 1.2 / PHASES
@@ -364,7 +366,7 @@ def test_clips_that_do_not_move_and_single_poses_blend():
 
 
 def test_weights_change_over_the_blend():
-    """A change from a walk to a run begins as the one and ends as the other, at its pace there."""
+    """A transition from a walk to a run starts as the one and ends as the other, with their speeds."""
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
     made = blend([walk, run], ((1, 0), (0, 1)), Settings(cycles=3))
     timing = made.timing
@@ -376,7 +378,7 @@ def test_weights_change_over_the_blend():
     assert apart(made.poses.rigid[0], walk.poses.rigid[0]) < 1e-9
     last = grounded(run, 0, UP).clip.at(timing.times[-1:, 1]).rigid
     assert apart(made.poses.rigid[-1:, 1:], last[:, 1:]) < 1e-9
-    # One frame of the blend is one of the clip that it is alone.
+    # Where a clip is alone, one frame of the blend is one frame of the clip.
     assert timing.times[1, 0] - timing.times[0, 0] == pytest.approx(1.0, abs=0.03)
     assert timing.times[-1, 1] - timing.times[-2, 1] == pytest.approx(1.0, abs=0.03)
     assert not made.is_cyclic
@@ -397,7 +399,7 @@ def test_between_samples_and_beyond_the_ends():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_two_straight_walks_move_at_the_blended_speed(method):
-    """Of equal periods the mean of the speeds; of others the mean stride in the mean period."""
+    """For equal periods the mean of the speeds; for others the mean stride in the mean period."""
     for period, share in ((20, 0.25), (30, 0.25), (30, 0.6)):
         slow, fast = walks.walk(stride=0.6), walks.walk("fast", period, 1.1, start=0.2)
         made = blend([slow, fast], (1 - share, share), Settings(method=method, cycles=2))
@@ -426,7 +428,7 @@ def test_three_walks_move_at_the_mean_of_their_speeds(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_change_of_weights_has_no_jumps(method):
-    """No bone moves faster in the blend than in the clips, but for what the blend itself changes."""
+    """No bone moves faster in the blend than in the clips, except for changes by the blend itself."""
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
     made = blend([walk, run], ((1, 0), (0, 1)), Settings(method=method, cycles=4))
     steps = {}
@@ -438,7 +440,7 @@ def test_a_change_of_weights_has_no_jumps(method):
 
 @pytest.mark.parametrize("smooth", [False, True])
 def test_weights_have_keys_over_the_motion(smooth):
-    """A run in the middle of a walk, which is alone before and behind."""
+    """A run in the middle of a walk, which is alone before and after it."""
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
     weights = Weights.of(((1, 0), (0, 2), (3, 0)), 2, (0.25, 0.5, 0.75), smooth)
     made = blend([walk, run], weights, Settings(cycles=8))
@@ -449,7 +451,7 @@ def test_weights_have_keys_over_the_motion(smooth):
     assert np.abs(weights.over(shares).sum(axis=1) - 1.0).max() < 1e-12
     ran = made.timing.weights[:, 1]
     assert ran.max() > 0.95
-    # Two of eight cycles at each end are the walk's own, in its time.
+    # Two of eight cycles at each end are the walk's own, with its timing.
     assert (ran[:40] == 0.0).all()
     assert (ran[-40:] == 0.0).all()
     paces = np.diff(made.timing.times[:, 0])
@@ -479,7 +481,7 @@ def test_turns_add_up_to_the_blended_turn(method):
     made = blend([left, right], (0.5, 0.5), Settings(method=method, cycles=4))
     root = made.rig.to_armature(made.poses.rigid)[:, 0]
     whole = quat_vec.to_screw(quat_vec.compose(root[-1], quat_vec.inverse(root[0])))
-    # An even walk on a circle: its turn is the mean, and it goes on along the vertical's circle.
+    # A regular walk on a circle: its rotation is the mean, and it continues on the circle about the vertical.
     assert whole.angle * np.sign(whole.axis @ UP) == pytest.approx(-4 * 0.3, abs=2e-3)
     assert np.abs(root[:, 6] - root[0, 6]).max() < 1e-9
     same = blend([left, left], (0.5, 0.5), Settings(method=method, cycles=2))
@@ -495,7 +497,7 @@ def test_in_place_keeps_the_pose_and_goes_nowhere():
     place = still.rig.to_armature(still.poses.rigid)[:, 0, 4:]
     assert np.abs(place - place[0]).max() < 1e-9
     assert moving.rig.to_armature(moving.poses.rigid)[-1, 0, 5] == pytest.approx(-1.9)
-    # As keyed they do not close, so that they are blended once, each from end to end.
+    # As keyed they are not cyclic, so each is blended once from end to end.
     keyed = blend([walk, run], (0.5, 0.5), Settings(root_motion=KEYED))
     assert not keyed.is_cyclic
     assert keyed.root is None
@@ -510,7 +512,7 @@ def test_the_root_is_the_uppermost_bone_that_moves():
         "thigh.L",
         "thigh.R",
     )
-    # A bone above that stands still does not carry.
+    # A bone above the root that does not move does not carry it.
     rig = walk.rig
     names, parents = (
         ("master", *rig.names),
@@ -535,7 +537,7 @@ def test_the_root_is_the_uppermost_bone_that_moves():
 
 
 def test_a_root_that_tilts_on_a_turned_armature_travels_on_its_own_ground():
-    """Up may be any direction of armature space, as of files with Y up; a tilt is none of the travel."""
+    """Up may be any direction in armature space, as in files with Y up; a tilt is not part of the travel."""
     walk = walks.walk(sway=0.0)
     x = quat_vec.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
     rig = replace(walk.rig, rest=walk.rig.rest.copy())
@@ -553,7 +555,7 @@ def test_a_root_that_tilts_on_a_turned_armature_travels_on_its_own_ground():
     assert np.abs(place[-1] - place[0] - quat_vec.transform_vector(x, [0.0, -2.4, 0.0])).max() < 1e-9
 
 
-# --- Numbers
+# --- Measures
 
 
 def test_sliding_is_what_a_dragged_foot_slides():
@@ -567,7 +569,7 @@ def test_sliding_is_what_a_dragged_foot_slides():
     assert found.sliding == pytest.approx(0.03)
     assert found.travel == pytest.approx(0.03)
     assert found.angular_acceleration == found.worst_acceleration == 0.0
-    # A foot that stands slides nowhere.
+    # A planted foot does not slide.
     standing = np.arange(21) / 20 < 0.55
     steps, on_ground = measure.sliding(walk, feet, UP)
     assert steps[standing[1:], 0].max() < 1e-9
@@ -579,7 +581,7 @@ def test_angular_acceleration_is_that_of_a_growing_spin():
     rig = walks.rig()
     frames = np.arange(25)
     rigid = np.broadcast_to(quat_vec.identity(), (25, 8, 7)).copy()
-    # angle = a t^2 / 2: at 24 frames a second every second difference is a / 24^2.
+    # angle = a t^2 / 2: at 24 frames per second every second difference is a / 24^2.
     rigid[:, 4] = quat_vec.from_axis_angle([1.0, 2.0, 2.0], 0.5 * 3.0 * (frames / 24.0) ** 2)
     clip = Clip("spin", rig, Poses(rigid, np.ones((25, 8, 3))), 24.0)
     found = measure.measure(clip, [], 0, UP, 24.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.Normals beside float64 numpy, as numpy people use it."""
+"""sinew.Normals compared with float64 numpy."""
 
 import pickle
 
@@ -19,7 +19,7 @@ def sharp_of(mesh, edges=0.2, faces=0.1, seed=3):
 
 
 def custom_of(mesh, seed=4):
-    """int16 [corners, 2], of which some are 0."""
+    """int16 [corners, 2], some of them 0."""
     rng = np.random.default_rng(seed)
     numbers = rng.integers(-32768, 32768, (sum(map(len, mesh[1])), 2))
     return (numbers * (rng.random(numbers.shape) < 0.8)).astype(np.int16)
@@ -62,7 +62,7 @@ def test_custom_normals_agree_with_the_reference(share, is_bent):
     normals = normals_of(mesh, **sharp, custom_normals=custom)
     assert normals.domain == "corner"
     expected = reference.custom_normals(points, mesh[1], mesh[2], custom, **sharp)
-    # Of edges almost along the normal the angle about it is known less well.
+    # For edges almost along the normal, the angle about it is less precise.
     np.testing.assert_allclose(normals.compute(points), expected, rtol=0, atol=5e-5)
     plain = normals_of(mesh, **sharp)
     for domain in ("vertex", "face"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours, plots and the comparison of pictures."""
+"""Colours, plots and picture comparison."""
 
 import json
 import re
@@ -27,7 +27,7 @@ def lightness(colours):
 
 
 def test_colours_grow_evenly_lighter():
-    """Perceptually uniform: lightness is a straight line over the values."""
+    """Perceptually uniform: lightness is linear in the value."""
     shares = np.linspace(0, 1, 101)
     light = lightness(viridis(shares))
     straight = np.polyval(np.polyfit(shares, light, 1), shares)
@@ -36,7 +36,7 @@ def test_colours_grow_evenly_lighter():
     np.testing.assert_array_equal(viridis([-1.0, 2.0]), viridis([0.0, 1.0]))
 
 
-# What dichromats see of linear sRGB (G. Machado, M. Oliveira, L. Fernandes, 2009, severity 1).
+# How dichromats perceive linear sRGB (G. Machado, M. Oliveira, L. Fernandes, 2009, severity 1).
 SIGHT = {
     "usual": np.eye(3),
     "protanopia": np.array(
@@ -64,7 +64,7 @@ SIGHT = {
 
 
 def cielab(colours, sight):
-    """[n, 3] of sRGB colours under D65, as they look to this sight."""
+    """sRGB colours [n, 3] under D65, as perceived with this kind of vision."""
     seen = np.clip(linear(np.asarray(colours)) @ SIGHT[sight].T, 0.0, 1.0)
     to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
     ratios = seen @ to_xyz.T / to_xyz.sum(axis=1)
@@ -76,12 +76,12 @@ def cielab(colours, sight):
 def test_both_sides_of_neutral_look_different_to_all(sight):
     shares = np.linspace(0.0, 1.0, 101)
     lab = cielab(diverging(shares), sight)
-    # Darker away from the middle, evenly, so that how far a value is off is seen without any hue.
+    # Evenly darker away from the middle, so that the size of a value is visible without hue.
     steps = np.diff(lab[:, 0])
     assert (steps[:50] > 0.2).all()
     assert (steps[50:] < -0.2).all()
     assert abs(lab[0, 0] - lab[-1, 0]) < 12.0, "the ends look unequally far"
-    # A difference of 2.3 is just noticed.
+    # A difference of 2.3 is just noticeable.
     apart = np.linalg.norm(lab - lab[::-1], axis=1)
     assert apart[:40].min() > 10.0
     assert apart[:25].min() > 25.0
@@ -154,7 +154,8 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def paths_of(svg, start):
-    """[[(x, y), ...], ...]: the paths of lines whose id begins so, one for each piece without gaps."""
+    """[[(x, y), ...], ...]: the paths of lines whose id starts with this, one for each piece without
+    gaps."""
     found = []
     for group in ElementTree.fromstring(svg).iter(f"{SVG}g"):
         if group.get("id", "").startswith(start):
@@ -167,7 +168,7 @@ def paths_of(svg, start):
 
 
 def marks_of(svg):
-    """The positions of the points that are drawn alone."""
+    """The positions of points that are drawn separately."""
     groups = [
         g
         for g in ElementTree.fromstring(svg).iter(f"{SVG}g")
@@ -232,7 +233,7 @@ def test_only_what_differs_visibly_counts():
     picture = np.zeros((10, 20, 4))
     picture[2:8, 5:15] = [0.5, 0.5, 0.5, 1.0]
     other = picture.copy()
-    # The colour behind no alpha is not seen; a little is along every edge.
+    # The colour behind alpha 0 is invisible; a little alpha is along every edge.
     other[0, 0] = [1.0, 1.0, 1.0, 0.0]
     other[2, 5] = [0.6, 0.6, 0.6, 1.0]
     assert golden.differing_share(golden.difference(picture, other)) == 0.0
@@ -283,7 +284,7 @@ def test_settings_of_golden_pictures_are_read_as_written(tmp_path):
 
 
 def test_titles_of_a_sheet_stay_in_their_columns(tmp_path):
-    """Where pictures are small, what stands over one does not run into the next."""
+    """With small pictures, the text above one does not overlap the next."""
     image = pytest.importorskip("PIL.Image")
     image.new("RGBA", (64, 64)).save(tmp_path / "picture.png")
     columns = [Column("dq", "", [tmp_path / "picture.png"]), Column("", "", [tmp_path / "picture.png"])]

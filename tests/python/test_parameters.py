@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""NAME=VALUE, as --set and job files have it."""
+"""NAME=VALUE, as in --set and in job files."""
 
 from __future__ import annotations
 

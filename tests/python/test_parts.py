@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.quat and sinew.dual: what transforms are made of, against scipy and derivatives."""
+"""sinew.quat and sinew.dual, the parts of transforms, compared with scipy and derivatives."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def of(rotation):
 
 
 def same_rotation(got, wanted, tolerance):
-    """Of either sign."""
+    """Quaternions of either sign."""
     close(np.abs((np.asarray(got, float) * wanted).sum(axis=-1)), 1, tolerance)
     close(np.linalg.norm(got, axis=-1), 1, tolerance)
 
@@ -74,7 +74,7 @@ def test_three_numbers_store_a_rotation():
     q = of(Rotation.random(2000, rng=np.random.default_rng(3)))
     stored = quat.to_three_numbers(q)
     assert stored.shape == (2000, 3)
-    # w is lost by what 1 - |v|^2 loses: the less of w there is, the more.
+    # w loses the digits that 1 - |v|^2 loses: the smaller w is, the more.
     error = np.abs(quat.from_three_numbers(stored) - np.where(q[:, :1] < 0, -q, q)).max(axis=1)
     assert (error <= 1e-15 / np.maximum(np.abs(q[:, 0]), 1e-8)).all()
     half_turn = quat.from_three_numbers(np.array([1, 1e-3, 0], np.float32))
@@ -86,9 +86,9 @@ def test_exponentials_of_any_angle_are_finite(dtype, angle):
     twist = np.array([0, angle, 0, 1, 2, 3], dtype)
     for layout in (sinew.affine, sinew.quat_vec, sinew.dual_quat):
         assert np.isfinite(layout.from_twist(twist)).all()
-    # As far along the axis, and next to nothing across it.
+    # Equal along the axis, and nearly equal across it.
     close(sinew.quat_vec.from_twist(twist)[4:], [0, 2, 0], 1e-6)
-    # The formula for large angles goes on where the other one ends.
+    # The formula for large angles continues where the other one ends.
     below, above = (sinew.quat_vec.from_twist([0, a, 0, 1, 2, 3.0]) for a in (1e4, np.nextafter(1e4, 2e4)))
     close(below, above, 1e-11)
 
@@ -106,7 +106,7 @@ def test_matrices_that_are_not_rigid_are_refused():
         for module in (sinew.quat, sinew.quat_vec, sinew.dual_quat):
             with pytest.raises(ValueError, match=r"^rotation: expected rigid"):
                 module.from_rotation_matrix(a[:3, :3])
-    # What float32 and some products round is let through.
+    # Rounding by float32 and by some products is accepted.
     turned = sinew.affine.from_axis_angle([1, 2, 3], 1.0).astype(np.float32)
     turned[0] *= np.float32(1.0002)
     sinew.affine.to_quat_vec(turned)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who deforms an object, as a table: without Blender."""
+"""Who deforms an object, as a table, without Blender."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-# The package around it imports bpy; this file does not.
+# The package around this file imports bpy; the file itself does not.
 _PATH = Path(__file__).resolve().parents[2] / "addon" / "deform" / "plan.py"
 _SPEC = importlib.util.spec_from_file_location("sinew_plan", _PATH)
 plan_module = importlib.util.module_from_spec(_SPEC)
@@ -69,7 +69,7 @@ def test_what_is_written_after_the_update_is_in_a_buffer(facts):
 
 @pytest.mark.parametrize("route", [{}, {"safe_mode": True}, {"has_upstream": True}, {"mesh_is_shared": True}])
 def test_who_waits_keeps_its_route(route):
-    """So nothing but the method changes when it ends."""
+    """So only the method changes when it ends."""
     waiting, after = plan(ObjectFacts(**route, waits_for="until found")), plan(ObjectFacts(**route))
     assert (waiting.in_buffer, waiting.after_update) == (after.in_buffer, after.after_update)
     assert waiting.is_in_depsgraph == after.is_in_depsgraph == (after.state is State.IN_DEPSGRAPH)
@@ -107,6 +107,6 @@ def test_who_computes_normals(facts, domain, reason):
 
 
 def test_every_fact_matters():
-    """One that no row changes would not have to be gathered."""
+    """A fact that no row changes would not need to be collected."""
     named = {name for facts, *_ in (*TABLE, *NORMALS) for name in facts}
     assert named == {field.name for field in fields(ObjectFacts)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The platforms that tools/cross_build.py builds for have one name each. Nothing is built here."""
+"""The platforms that tools/cross_build.py builds for have consistent names. Nothing is built here."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_what_is_said_of_the_system_is_what_python_was_built_with():
     said = {name: int(value) for name, value in re.findall(r"^#define (\w+) (\d+)$", unix, re.MULTILINE)}
     assert said["SIZEOF_LONG"] == 8
     assert len(said) > 20
-    # Python no longer asks for some of them.
+    # Newer versions of Python no longer call some of them.
     assert {name: own[name] for name in said if name in own} == {n: v for n, v in said.items() if n in own}
     assert len(said.keys() - own.keys()) <= 3
 
@@ -110,7 +110,7 @@ def test_a_wheel_is_whole_and_always_the_same(tmp_path):
 
 
 def test_what_is_left_out_elsewhere_is_there():
-    """A test that was renamed would run there unnoticed, or not at all."""
+    """A renamed test would otherwise run there unnoticed, or not at all."""
     for name in platform_tests.CHECKOUT_TESTS:
         assert (ROOT / f"tests/python/{name}.py").is_file()
     for name in platform_tests.BLENDER_TESTS:

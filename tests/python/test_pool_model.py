@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A model of the thread pool (native/sinew/deform/thread_pool.cpp): every order in which its threads can
-take their steps is tried, for a caller that runs a few jobs and ends the threads in between.
+"""A model of the thread pool (native/sinew/deform/thread_pool.cpp): tries every order in which its threads
+can take their steps, for a caller that runs a few jobs and ends the threads in between.
 
-What it answers: can a wake-up be lost, so that somebody sleeps for ever? Not with a wait that compares and
-falls asleep in one step, as C++ defines std::atomic::wait. With that of libstdc++ 12 where there is no futex,
-such as under mingw, it can: it compares, and only then takes the mutex of the condition variable that it
-sleeps on (docs/install.md has what else is at fault there).
+It answers whether a wake-up can be lost, so that a thread sleeps forever. It can not with a wait that
+compares and falls asleep in one step, as C++ defines std::atomic::wait. It can with libstdc++ 12 where there
+is no futex, such as under mingw: this compares first, and then locks the mutex of the condition variable
+that it sleeps on (docs/install.md describes the other faults there).
 
-One step is one access to what threads share. That each sees what others wrote before (memory orders) is not
-in the model: the thread sanitizer looks at that, in ./dev test.
+One step is one access to shared memory. Memory orders, which make writes visible to other threads, are not
+in the model: the thread sanitizer checks them, in ./dev test.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ CHUNKS = 2  # of every job
 
 
 class Worker(NamedTuple):
-    """at: the step it takes next. seen: of the bell; last_job: as in serve()."""
+    """at: the next step. seen: value of the bell; last_job: as in serve()."""
 
     at: str = "none"
     seen: int = 0
@@ -28,7 +28,7 @@ class Worker(NamedTuple):
 
 
 class State(NamedTuple):
-    """caller: the step it takes next; phase: which entry of the plan; came, done_seen: locals of run()."""
+    """caller: its next step; phase: index into the plan; came, done_seen: locals of run()."""
 
     workers: tuple[Worker, ...]
     caller: str = "begin"
@@ -50,11 +50,11 @@ class BrokenError(Exception):
 END = 0
 
 
-# A case for each step, as in the pool.
+# One case for each step of the pool.
 def caller_steps(  # noqa: C901, PLR0912
     state: State, plan: tuple[int, ...], is_one_step: bool
 ) -> Iterator[State]:
-    """plan: for each call its helpers, or END for end_threads()."""
+    """plan: for each call the number of helpers, or END for end_threads()."""
     if state.phase == len(plan):
         return
     helpers = plan[state.phase]
@@ -135,7 +135,8 @@ def worker_steps(state: State, index: int, is_one_step: bool) -> Iterator[State]
 
 
 def explore(plan: tuple[int, ...], *, is_one_step: bool) -> tuple[int, list[State]]:
-    """The number of states that can be, and those in which nobody can go on though the plan is not done."""
+    """The number of reachable states, and those in which no thread can continue although the plan is not
+    done."""
     start = State(tuple(Worker() for _ in range(max(plan))))
     seen, unvisited, stuck = {start}, [start], []
     while unvisited:
@@ -152,7 +153,7 @@ def explore(plan: tuple[int, ...], *, is_one_step: bool) -> tuple[int, list[Stat
     return len(seen), stuck
 
 
-# Jobs one after another, with as many helpers and with fewer; the threads ended between jobs, and twice.
+# Several jobs, with the same number of helpers and with fewer; threads ended between jobs, and twice.
 PLANS = ((1, 1, 1, END, 1, END, END), (2, 2, END), (2, 1), (1, 2, END, 1))
 
 
@@ -167,6 +168,6 @@ def test_a_wait_of_two_steps_sleeps_for_ever():
     for plan in PLANS:
         _count, stuck = explore(plan, is_one_step=False)
         callers = {state.caller for state in stuck}
-        # The caller sleeps though all are done, or waits for a worker that slept through the end.
+        # The caller sleeps although all are done, or waits for a worker that slept through the end.
         assert "asleep" in callers, plan
         assert ("join" in callers) == (END in plan)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones that follow the pose, in poses that they were not made from; and the random poses."""
+"""Helper bones that follow the pose, in poses other than those they were made from; and the random poses."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from sinew_addon.core.helper_bones import Motion, Wanted
 from sinew_addon.core.pose_samples import Joints
 from test_helper_bones import POSES, SEGMENTS, TUBE, errors_of, influences_of_tube, motion_by, played
 
-# Y along the bones, which lie along z.
+# Bones are along z, with Y along each bone.
 REST = np.tile(np.identity(4), (2, 1, 1))
 REST[:, :3, :3] = about((1, 0, 0), 90.0)[:3, :3]
 REST[1, 2, 3] = 2.0
-# Of a joint between two bones, in degrees about x, y, z.
+# Rotations of a joint between two bones, in degrees about x, y, z.
 REACH = (130.0, 60.0, 165.0)
 
 
@@ -47,7 +47,7 @@ def solved(motion, wanted):
             return stop.value
 
 
-# What of linear blending's error they leave, bent and twisted as they were not made for.
+# The share of linear blending's error that remains, bent and twisted in ways that they were not made for.
 @pytest.mark.parametrize(
     ("method", "count", "share"),
     [("dq", 2, 0.16), ("dq", 4, 0.06), ("sbs", 4, 0.06), ("cor", 2, 0.16), ("cor", 4, 0.06)],
@@ -65,7 +65,7 @@ def test_bend_and_twist_that_they_were_not_made_from(method, count, share):
 @pytest.mark.parametrize("size", [1.0, 1.4])
 @pytest.mark.parametrize(("method", "head_method"), [("dq", "dq"), ("cor", "lbs")])
 def test_a_helper_bone_moves_as_the_method_blends(method, head_method, size):
-    """Its head as the library deforms a point that hangs on the same bones by the same weights. Centres of
+    """The helper bone's head, as the library deforms a point with the same influences. Centres of
     rotation are moved linearly."""
     motion = random_motion(method, 24, seed=4, size=size)
     solution = solved(motion, Wanted(3))
@@ -74,7 +74,7 @@ def test_a_helper_bone_moves_as_the_method_blends(method, head_method, size):
     for blend, moved in zip(solution.blends, solution.motions.swapaxes(0, 1), strict=True):
         assert np.isclose(blend.weights.sum(), 1.0)
         assert (blend.weights >= 0.0).all()
-        # Its head: scale of bones is about the point itself there, as in the constraint.
+        # The helper bone's head: scale applies about the point itself there, as in the constraint.
         point = blend.head.astype(np.float32)[None]
         bones, weights = blend.bones.astype(np.int32), blend.weights.astype(np.float32)
         offsets = np.array([0, len(bones)], np.int32)
@@ -95,7 +95,7 @@ def test_the_stated_error_is_what_is_played():
 
 
 def relative(poses, joints):
-    """Each jointed bone's rotation vector against its parent, apart from the code's."""
+    """Each jointed bone's rotation vector relative to its parent, independently of the code."""
     vectors = {}
     for bone, parent in enumerate(joints.parents):
         if parent < 0:
@@ -118,7 +118,7 @@ def test_random_poses_keep_to_limits_and_joints():
     rest = np.concatenate([REST, REST[1:]])
     rest[2, 2, 3] = 3.0
     joints = Joints(rest, np.array([-1, 0, 1]), limits)
-    # The last bone is seen to rotate by 0 to 0.8 about its x, and stands 0.5 off its parent.
+    # The last bone rotates by 0 to 0.8 about its x, and is 0.5 away from its parent.
     poses = np.tile(rest, (3, 1, 1, 1))
     poses[:, 0] = np.array([about((0, 0, 1), a) for a in (0.0, 10.0, 20.0)]) @ rest[0]
     for frame, angle in enumerate((0.0, 0.4, 0.8)):
@@ -127,7 +127,7 @@ def test_random_poses_keep_to_limits_and_joints():
         moved[:3, 3] = (0.0, 0.0, 0.5)
         poses[frame, 2] = poses[frame, 1] @ np.linalg.inv(rest[1]) @ rest[2] @ moved
     sampled = pose_samples.sampled(poses, joints, 200, seed=6)
-    # A bone without a parent stays.
+    # A bone without a parent is not changed.
     assert np.array_equal(sampled[:, 0], poses[np.arange(200) % 3, 0])
     moved = relative(sampled, joints)
     limited = np.array([vector_of(m) for m in moved[1]])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Precomputations on threads, and the folder that keeps their results."""
+"""Precomputations on threads, and the folder that caches their results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-# The package around it imports bpy; these files do not.
+# The package around these files imports bpy; the files do not.
 _CORE = Path(__file__).resolve().parents[2] / "addon" / "core"
 _PACKAGE = types.ModuleType("sinew_precompute_core")
 _PACKAGE.__path__ = [str(_CORE)]
@@ -191,7 +191,7 @@ for number in range(300):
 
 
 def test_several_processes_share_it(tmp_path):
-    """None of them ever reads what another has half written."""
+    """No process ever reads a file that another has half written."""
     running = [
         subprocess.Popen([sys.executable, "-c", WRITER, _CORE, tmp_path], stderr=subprocess.PIPE, text=True)
         for _ in range(3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The README's Python program runs, and its table of methods is the library's."""
+"""The README's Python program runs, and its table of methods agrees with the library."""
 
 import re
 from pathlib import Path
@@ -23,7 +23,7 @@ def test_the_python_program_deforms(capsys):
 def test_the_table_names_every_method_and_no_other():
     rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \| (.*) \|$", README, re.MULTILINE)
     methods = {method.name for method in sinew.methods()}
-    # A build may be without it.
+    # A build may lack it.
     rows = [row for row in rows if row[0] in methods or row[0] != "ddm"]
     assert [(name, group) for name, group, _text in rows] == [(m.name, m.group) for m in sinew.methods()]
     for (_name, _group, text), method in zip(rows, sinew.methods(), strict=True):

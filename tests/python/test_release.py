@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The version is the same everywhere, and tools/release.py sets it everywhere or nowhere."""
+"""The version is the same in all files, and tools/release.py sets it in all of them or in none."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def texts() -> dict[str, str]:
 
 
 def parsed(texts: dict[str, str]) -> dict[str, object]:
-    """Each file as its own reader has it."""
+    """Each file parsed by its own kind of reader."""
     project = re.search(r"project\(sinew\s+VERSION\s+(\S+)", texts["CMakeLists.txt"])
     return {
         "CMakeLists.txt": project[1],
@@ -79,7 +79,7 @@ def test_all_files_have_the_same_version(texts):
 
 
 def test_nothing_else_names_the_version(texts):
-    """What a release would have to change, too."""
+    """Other files that a release would have to change."""
     version = release.version_in(texts)
     looked_at = [
         path
@@ -94,7 +94,7 @@ def test_nothing_else_names_the_version(texts):
         for path in [*looked_at, *ROOT.glob("*.md")]
         if named.search(path.read_text(encoding="utf-8"))
     }
-    # Measurements stay those of the version that was measured.
+    # Benchmark results keep the version that was measured.
     assert found <= {place.file for place in release.PLACES} | {"CHANGELOG.md", "docs/results.md"}
 
 
@@ -106,7 +106,7 @@ def test_a_new_version_is_set_everywhere_and_changes_nothing_else(texts):
         assert len(changed) == {"addon/pyproject.toml": 2, "CITATION.cff": 2, "CHANGELOG.md": 0}.get(name, 1)
         assert all("9.8.7" in line or line == f"date-released: {DATE}" for line in changed)
     assert str(parsed(after)["CITATION.cff"]["date-released"]) == DATE
-    # The next one replaces the date.
+    # The next release replaces the date.
     assert after | {"CITATION.cff": ""} == release.with_version(after, "9.8.7", "2032-01-01") | {
         "CITATION.cff": ""
     }
@@ -144,9 +144,9 @@ def test_the_next_versions():
 
 def test_what_is_compiled_in_has_a_notice():
     declared = re.findall(r"FetchContent_Declare\((\w+)", (ROOT / "cmake/dependencies.cmake").read_text())
-    # Of tests and measurements alone, which nobody is given.
+    # Only for tests and benchmarks, which are not distributed.
     compiled_in = {*declared, "pybind11"} - {"googletest", "benchmark"}
-    # By zig, whose C and C++ libraries they are: tools/cross_build.py links them in.
+    # From zig, whose C and C++ libraries tools/cross_build.py links.
     compiled_in |= {"llvm", "mingw-w64"}
     assert len(compiled_in) >= 4
     notices = (ROOT / "NOTICES.md").read_text(encoding="utf-8")
@@ -200,9 +200,9 @@ def test_a_first_release_may_have_the_version_that_is_there(texts):
     assert release.obstacles_in_texts(texts | {"CHANGELOG.md": changes}, release.version_in(texts)) == []
 
 
-# --- The whole, in a repository of its own
+# --- A complete release, in its own repository
 
-# Stands for the build alone: a zip with a wheel in it, named as ./dev package names its own.
+# Stands in for the build: a zip with a wheel in it, with the name that ./dev package would give it.
 PACKAGES = """#!/usr/bin/env python3
 import re, sys, zipfile
 assert sys.argv[1:] == ["package"]
@@ -287,10 +287,10 @@ def test_a_release(checkout):
     assert len(git(checkout, "log", "--oneline").splitlines()) == 1
     assert git(checkout, "tag") == ""
     assert "git tag --sign v7.0.0" in done.stdout
-    # Once committed, its notes are there for who publishes them.
+    # After the commit, its notes can be printed for publishing.
     assert run(checkout, "--notes", "7.0.0").stdout == "### Added\n\n- A thing.\n"
     assert "this is 7.0.0, not 7.0.1" in run(checkout, "--notes", "7.0.1").stderr
-    # The same again is none.
+    # The same release again is refused.
     commit(checkout)
     again = run(checkout, "7.0.0")
     assert again.returncode == 1

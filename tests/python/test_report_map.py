@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/report.md has every part of Smith 2013, and what it names in Sinew exists. Reads sources alone."""
+"""docs/report.md has every part of Smith 2013, and what it names in Sinew exists. Only reads sources."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ NUMBERED = re.compile(
 
 
 def numbered(text: str) -> set[tuple[str, str]]:
-    """The parts that `text` names, ("table", "3.1") and so on; of a range its two ends."""
+    """The parts that `text` names, ("table", "3.1") and so on; the two ends of a range."""
     return {
         (kind.lower(), number)
         for kind, numbers in NUMBERED.findall(text)
@@ -73,7 +73,7 @@ def numbered(text: str) -> set[tuple[str, str]]:
 
 
 def rows() -> list[list[str]]:
-    """The cells of the tables that say where each part is."""
+    """The cells of the tables that list where each part is."""
     chapters = TEXT[TEXT.index("## Where each part is") : TEXT.index("## Misprints")]
     lines = [line for line in chapters.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
@@ -91,7 +91,7 @@ def test_a_list_of_numbers_is_read_whole():
 @pytest.mark.parametrize("kind", PARTS)
 def test_every_part_has_its_row(kind):
     found = {number for row in rows() for what, number in numbered(row[0]) if what == kind}
-    # Of a chapter with sections these say what it has.
+    # For a chapter with sections, the sections say what it has.
     missing = set(PARTS[kind]) - found - ({"2"} if kind == "chapter" else set())
     assert not missing
 
@@ -123,7 +123,7 @@ def test_citations_in_the_sources_name_parts_of_the_report():
     assert len(cited) > 30
 
 
-# --- What it names
+# --- Names in Sinew
 
 
 def links() -> set[str]:
@@ -137,7 +137,7 @@ def paths() -> set[str]:
 
 
 def test_links_lead_somewhere():
-    # Made by the site, of the Python package.
+    # The site generates these from the Python package.
     made = {"python.md"}
     found = links() - made
     assert len(found) > 25
@@ -152,7 +152,7 @@ def test_paths_are_there():
 
 
 def assigned(body: list[ast.stmt]) -> dict[str, ast.stmt]:
-    """What statements define, by name; of an import its names."""
+    """The names that statements define; for an import, its names."""
     found: dict[str, ast.stmt] = {}
     for node in body:
         match node:
@@ -168,7 +168,7 @@ def assigned(body: list[ast.stmt]) -> dict[str, ast.stmt]:
 
 
 def public(file: str) -> set[str]:
-    """What a file of the package defines and lists."""
+    """The names that a file of the package defines and lists."""
     tree = make_reference.parsed(file)
     return set(make_reference.exported(tree)) & assigned(tree.body).keys()
 

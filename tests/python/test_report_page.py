@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of `sinew report`, made in quick mode: it needs nothing beside itself, and says what report.json
-says.
+"""The page of `sinew report`, made in quick mode: it needs no other files, and agrees with report.json.
 
 SINEW_EXPERIMENTS is the folder of the built programs of experiments/; without it the page has no times.
 """
@@ -24,7 +23,7 @@ DRAWN = {"3.6", "3.7", "3.8", "3.9", "3.10", "3.11"}
 
 
 class Reader(HTMLParser):
-    """What a page refers to, its tags, and under each heading the rows of its tables and its text."""
+    """What a page refers to, its tags, and for each heading the rows of its tables and its text."""
 
     def __init__(self, page):
         super().__init__()
@@ -70,7 +69,7 @@ def run_report(folder, *options, status=0):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """Text of report.html, content of report.json, and what was said on the way."""
+    """Text of report.html, content of report.json, and the progress messages."""
     folder = tmp_path_factory.mktemp("report")
     programs = ["--programs", PROGRAMS] if PROGRAMS else []
     done = run_report(folder, "--quick", *programs)
@@ -86,7 +85,7 @@ def test_it_needs_nothing_beside_itself(made):
     assert reader.tags.count("svg") == 6
     assert not {"script", "link", "iframe", "object", "embed"} & set(reader.tags)
     assert [reference for reference in reader.references if not reference.startswith(("#", "data:"))] == []
-    # Names of namespaces are not fetched.
+    # Names of XML namespaces are not fetched.
     addresses = set(re.findall(r"\w+://[^\s\"'<)]+", html))
     assert addresses <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
     assert "@import" not in html
@@ -249,7 +248,7 @@ def test_orders_are_those_of_the_times(measurements, number):
     for row, names in rows.items():
         times = [measurements.optimised[f"{number}/{name}"].median for name in names]
         assert second.values[row] == pytest.approx(min(times) / measure.OPERATIONS[number] * 1e9)
-    # All that is measured of a matrix is a candidate for the best: none is left out.
+    # Every measured matrix is a candidate for the best: none is left out.
     known = {name for names in rows.values() for name in names}
     measured = {name.split("/")[1] for name in measurements.optimised if name.startswith(f"{number}/")}
     other = {name for name in measured - known if not name.startswith(("kernel_", "sinew_"))}

@@ -3,7 +3,7 @@
 columns differ. All numbers are those of `sinew report`.
 
 The axes in the report are rounded and not of unit length (|(0.707, -0.707, 0)| = 0.99985). Its matrix path
-normalises the axis (as glm::rotate does), its quaternion path the quaternion (cos, sin axis).
+normalises the axis (as glm::rotate does), its quaternion path normalises the quaternion (cos, sin axis).
 """
 
 import numpy as np
@@ -19,7 +19,8 @@ def test_table_3_1_memory():
 
 
 def test_table_3_6_translation_of_one_transform():
-    # Printed: matrix and pair exact, dual quaternion (1.00000012, -0.00000003, 0.5): rounding of float32.
+    # Printed: matrix and pair exact, dual quaternion (1.00000012, -0.00000003, 0.5), which is rounding of
+    # float32.
     for normalise in ("axis", "quaternion"):
         for dtype in (np.float32, np.float64):
             motion = pair(80, (0, 1, 1), (1, 0, 0.5), dtype, normalise)
@@ -50,7 +51,8 @@ def test_table_3_6_takes_no_error_for_rounding_that_is_none(monkeypatch, name, w
 
 @pytest.mark.parametrize(
     ("name", "tolerance"),
-    # Printed digits are float32's: the pair's are good to a digit or two, the dual quaternion's drift.
+    # Printed digits are those of float32: the pair's are right to a digit or two, the dual quaternion's
+    # drift.
     [("affine", 3e-6), ("quat_vec", 2e-6), ("dual_quat", 6e-6)],
 )
 def test_tables_3_7_and_3_8_are_the_report_s_construction_in_float64(name, tolerance):
@@ -68,7 +70,7 @@ def test_float64_digits_of_the_pair():
 
 
 def test_columns_differ_by_the_axes_and_not_by_the_representation():
-    # As printed, matrix and pair are 4e-4 apart in Table 3.7; by one construction, rounding.
+    # As printed, matrix and pair are 4e-4 apart in Table 3.7; built in the same way, they differ by rounding.
     apart = error(printed.ONE_BY_ONE["affine"], printed.ONE_BY_ONE["quat_vec"])
     assert apart > 4e-4
     mixed = error(
@@ -100,7 +102,8 @@ def test_rows_show_both_readings(table):
         unit = [float(number) for number in row.more["with unit axes"].split(",")]
         is_matrix = "matri" in row.name
         first = row.name.startswith("A")
-        # With unit axes only the matrices stay: theirs are unit already. A alone moves by its translation.
+        # With unit axes only the matrices are unchanged: theirs have unit length already. A only moves by its
+        # translation.
         assert (error(unit, row.printed) < 3e-6) == (is_matrix or first)
 
 
@@ -112,7 +115,7 @@ def test_a_wrong_digit_is_seen(monkeypatch):
 
 
 def brute_force(method, t, point):
-    """Figures 3.4 and 3.5 by scipy alone."""
+    """Figures 3.4 and 3.5 computed with scipy only."""
     from scipy.spatial.transform import Rotation, Slerp
 
     (angle_a, axis_a, translation_a), (angle_b, axis_b, translation_b) = printed.ENDS
@@ -155,7 +158,7 @@ def test_figures_3_4_and_3_5_show_what_the_report_says():
         assert len(figure.pictures) == 2
         assert all(fact.agrees for fact in figure.facts)
     shrinking = paths.figure_3_5().facts[0].values
-    # Half way, the mean matrix keeps only the axis of the rotation between the two: by hand, from the sum.
+    # Halfway, the mean matrix keeps only the axis of the rotation between the two: by hand, from the sum.
     assert shrinking["matrix_linear"] == pytest.approx(0.1347, abs=1e-4)
 
 
@@ -165,9 +168,9 @@ def test_figure_3_3_tears_the_elbow_where_bones_are_combined_first():
     assert len(figure.pictures) == 2
     assert figure.facts[0].agrees
     gaps = figure.facts[0].values
-    # The upper arm's end goes on the circle, the lower arm's head straight: apart by its height.
+    # The upper arm's end moves on the circle, the lower arm's head straight: they are apart by its height.
     assert gaps["gap, root, qv_nlerp"] == pytest.approx(1 - np.cos(np.radians(joints.DEGREES / 2)), abs=1e-6)
-    # Matrices shrink the upper arm, too: their elbow holds, and nothing is rigid.
+    # Matrices shrink the upper arm, too: their elbow stays connected, but nothing is rigid.
     assert gaps["gap, root, matrix_linear"] < 1e-12
     assert gaps["gap, root, dlb"] > 0.05
     assert max(gap for name, gap in gaps.items() if name.startswith("gap, parent")) < 1e-12
@@ -191,7 +194,7 @@ def test_dlb_and_sclerp_differ_by_as_much_as_the_report_says():
 def test_a_joint_drifts_at_most_as_far_as_nlerp_from_slerp():
     times, half = np.array(studies.TIMES), np.pi / 4
     nlerp = np.arctan2(times * np.sin(half), 1 - times + times * np.cos(half))
-    # Of a chain of two links, the first joint alone moves the tip; two keys are at most 90 degrees apart.
+    # For a chain of two links only the first joint moves the tip; two keys are at most 90 degrees apart.
     at_most = np.sin(np.abs(nlerp - times * half).max())
     assert 0.1 * at_most < studies.drift(2).high < at_most
 
@@ -224,7 +227,7 @@ def test_tables_3_7_and_3_8_have_float32_beside_float64():
 
 def test_what_is_said_of_the_chain_is_held_to_ours():
     (apart,) = tables.one_by_one().facts
-    # Of one axis for all, what is left is rounding: no 1e-5, and it does not grow with each.
+    # With the same axis for all, only rounding remains: not 1e-5, and it does not grow with each link.
     assert max(apart.values.values()) < 2e-6
     assert not apart.agrees
     (combined,) = tables.combined().facts

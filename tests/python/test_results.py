@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/results.md: what its numbers, docs/results.json, make of it, and what other numbers would."""
+"""docs/results.md: what is generated from its numbers, docs/results.json, and from other numbers."""
 
 import copy
 import json
@@ -36,7 +36,7 @@ def test_its_plots_are_there():
     assert named == plots.keys()
     for name, text in plots.items():
         kept = (DOCS / name).read_text(encoding="utf-8")
-        # matplotlib's releases place things a little otherwise; the words are the same.
+        # Releases of matplotlib differ slightly in positions; the words are the same.
         assert re.findall(r"<text[^>]*>([^<]*)<", kept) == re.findall(r"<text[^>]*>([^<]*)<", text)
         assert len(kept) < 100_000
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bill of materials says what a zip holds: against the module itself, and by CycloneDX's own schema."""
+"""The bill of materials agrees with a zip's content: compared with the module itself, and with
+CycloneDX's schema."""
 
 from __future__ import annotations
 
@@ -43,7 +44,7 @@ def make_zip(path: Path, wheels: list[Path]) -> Path:
 
 @pytest.fixture
 def zip_of_two(tmp_path):
-    """With this Python's module for one Python, and one with other things within for another."""
+    """A zip with this Python's module for one Python, and a module with other contents for another."""
     other = b"\0sinew-compiled-in{GLM=GLM: version 1.0.1;LLVM=220108;mingw-w64=13.0.0}\0"
     wheels = [make_wheel(tmp_path, MODULE.read_bytes()), make_wheel(tmp_path, other, "3.13")]
     return make_zip(tmp_path / "sinew-1.2.3.zip", wheels)
@@ -62,7 +63,7 @@ def test_it_says_what_the_zip_holds(zip_of_two):
         }
     assert {part["bom-ref"]: part["hashes"][0]["content"] for part in bill["components"]} == held
     first, second = bill["components"]
-    # The module here was compiled with the headers that it names.
+    # This module was compiled with the headers that it names.
     said = dict(part.split("=") for part in re.findall(r"\w+=[^;}]+", sinew._native.__compiled_in__))
     assert {part["name"]: part["version"] for part in first["components"]} == {
         name: version.removeprefix("GLM: version ") for name, version in said.items()

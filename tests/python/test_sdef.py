@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spherical deform against its formula in float64, and parameters of methods, of which it has one."""
+"""Spherical deform compared with its formula in float64, and parameters of methods, since it has one."""
 
 import re
 
@@ -104,5 +104,5 @@ def test_half_turns_and_opposite_quaternions_are_finite_and_near(parameters):
     motions[4, :3, :3] = rig.transforms[3, :3, :3] @ motions[1, :3, :3]
     points = rig.with_(transforms=motions).deform("sdef", parameters=parameters)
     assert np.isfinite(points).all()
-    # Rotations about points of the cube of size 2, which rotate about its middle.
+    # Rotations about points in the cube of size 2, which itself rotates about its middle.
     assert np.linalg.norm(points, axis=1).max() < 4 * np.sqrt(3)

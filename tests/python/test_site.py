@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The site: what is broken fails its build, nothing is missing, and what is made from code is all there."""
+"""The site: broken links fail its build, nothing is missing, and generated pages are complete."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from sinew import _types
 from sinew_addon import cli
 
 ROOT = Path(__file__).resolve().parents[2]
-# Made by ./dev site and ./dev test.
+# Installed by ./dev site and ./dev test.
 PYTHON = ROOT / ".venvs" / "site" / "bin" / "python"
-# What the site is made from.
+# The sources of the site.
 DOCUMENTS = sorted(path.name for path in ROOT.glob("*.md"))
 FOLDERS = ["docs", "addon", "native", "bench", "experiments", "shaders", "tests/golden"]
 
@@ -34,7 +34,7 @@ sys.path.remove(str(ROOT / "docs"))
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory) -> Path:
-    """What the site is made from, as a copy that a test may break."""
+    """A copy of the site's sources that a test may break."""
     folder = tmp_path_factory.mktemp("checkout")
     for name in FOLDERS:
         shutil.copytree(
@@ -46,7 +46,7 @@ def checkout(tmp_path_factory) -> Path:
 
 
 def build(checkout: Path, out: Path) -> subprocess.CompletedProcess:
-    """The line of ./dev, as it stands there."""
+    """The line as it is in ./dev."""
     assert PYTHON.exists(), "./dev site makes what builds the site"
     dev = (ROOT / "dev").read_text(encoding="utf-8")
     line = re.search(r"\.venvs/site/bin/python (-m mkdocs .*)", dev)[1]
@@ -92,7 +92,7 @@ def test_what_is_broken_fails_the_build(document, text, complaint, site, checkou
     assert "1 warnings in strict mode" in done.stderr + done.stdout
 
 
-# --- What is built
+# --- The result
 
 
 class Page(HTMLParser):
@@ -130,7 +130,7 @@ def test_every_document_is_a_page(site):
     names = {path.stem for path in (ROOT / "docs").glob("*.md")}
     names |= {path.stem.lower() for path in ROOT.glob("*.md")} | set(make_reference.PAGES)
     assert names <= {path.stem for path in site.glob("*.html")}
-    # What engines copy is there; what makes the pages is not.
+    # Files for engines are included; programs that generate pages are not.
     assert {path.parent.name for path in site.rglob("*.py")} == {"shaders"}
 
 
@@ -140,7 +140,7 @@ def test_all_that_pages_refer_to_is_there(pages):
         for tag, address in page.refers:
             parts = urlsplit(address)
             if parts.scheme or parts.netloc:
-                # A reader may go elsewhere; a page loads nothing from there.
+                # Links may lead elsewhere; a page loads nothing from elsewhere.
                 assert tag == "a", (path.name, address)
                 continue
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path

@@ -131,7 +131,7 @@ def test_root_and_branches(name):
         other[changed] = layout(rigid(rng), name)
         want = skeleton.root_relative(other, root)
         np.testing.assert_array_equal(skeleton.update_branch(placed, other, changed, root), want)
-    # Others are left as they are, right or wrong.
+    # Other bones are not changed, whether right or wrong.
     wrong = np.repeat(root[None], 8, axis=0)
     result = skeleton.update_branch(wrong, bones, 3, root)
     np.testing.assert_array_equal(result[[0, 1, 2, 6, 7]], wrong[[0, 1, 2, 6, 7]])

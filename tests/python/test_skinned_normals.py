@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.SkinnedNormals: the methods in float64, differentiated, are its oracle."""
+"""sinew.SkinnedNormals: its oracle is the derivative of the methods in float64."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,8 @@ def frames_of(rig, seed=3):
 
 
 def jacobians(rig, method, step=1e-3):
-    """float64 [vertices, 3, 3]: of the method's map of each vertex, its weights kept; by differences."""
+    """float64 [vertices, 3, 3]: derivatives of the method's map of each vertex with fixed weights, by
+    differences."""
     columns = []
     for axis in np.eye(3):
         ends = [
@@ -35,7 +36,7 @@ def unit(vectors):
 
 
 def expected_of(rig, method, normals, tangents):
-    """And how well each is determined: 1 where the blend is a rotation, 0 where it flattens."""
+    """Also returns how well each is determined: 1 where the blend is a rotation, 0 where it flattens."""
     maps = jacobians(rig, method)
     values = np.linalg.svd(maps, compute_uv=False)
     inverse = np.linalg.inv(maps)
@@ -73,7 +74,7 @@ def test_of_corners_are_those_of_their_vertices():
     np.testing.assert_array_equal(got[0], sinew.Deformer(binding, "lbs", mix).deform(rig.transforms))
     np.testing.assert_array_equal(got[1], each[1][vertices])
     np.testing.assert_array_equal(got[2], each[2][vertices])
-    # And alone, where the points are known.
+    # Also without the points, if these are known.
     out = np.empty_like(got[1])
     assert corners.deform_normals(rig.transforms, got[0], out=out) is out
     np.testing.assert_array_equal(out, got[1])
@@ -90,7 +91,7 @@ def test_in_the_space_of_the_bones():
     np.testing.assert_array_equal(
         points, sinew.Deformer(binding, "dq").deform(rig.transforms, bones_from_model=space)
     )
-    # Bones that do not move leave normals alone, whatever the space.
+    # Bones that do not move do not change normals, in any space.
     still = np.broadcast_to(np.eye(4, dtype=np.float32), rig.transforms.shape)
     np.testing.assert_allclose(skinned.deform(still, bones_from_model=space)[1], normals, rtol=0, atol=2e-6)
     assert np.abs(got - normals).max() > 0.1

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each fenced block of the documents is run or read by a test, and each picture is made by a program: a new
-one has its line here."""
+"""Each fenced block of the documents is run or read by a test, and each picture is made by a program: new
+ones must be listed here."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# (document, language of the block) -> how many, and the test that runs them as they stand. Commands in blocks
-# that are indented are test_documented.py's.
+# (document, language of the block) -> their number, and the test that runs them as written.
+# test_documented.py covers commands in indented blocks.
 SNIPPETS = {
     ("README.md", "python"): (1, "tests/python/test_readme.py"),
     ("README.md", "cpp"): (1, "tests/native/consumer/test.cmake"),
@@ -30,7 +30,7 @@ SNIPPETS = {
 }
 NOT_RUN = {("CONTRIBUTING.md", ""): "a drawing of a frame"}
 
-# Pictures of docs/ -> the program that makes them, which names them or what stands in front of theirs.
+# Pictures of docs/ -> the program that makes them, which contains their names or a prefix of them.
 PICTURES = {
     r"(batch-report|heat|human|page|wrist|methods-\w+)\.png": ("docs/draw_sheets.py", None),
     r"comparison\.png": ("docs/photograph_comparison.py", None),
@@ -60,7 +60,7 @@ def tracked(*patterns: str) -> list[str]:
 
 
 def blocks(document: str) -> list[tuple[str, str]]:
-    """(language, text) of each."""
+    """(language, text) of each block."""
     text = (ROOT / document).read_text(encoding="utf-8")
     return re.findall(r"^ *```(\S*)\n(.*?)^ *```$", text, re.MULTILINE | re.DOTALL)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.spline and Skeleton's keyframes against float64 written from the report."""
+"""sinew.spline and Skeleton's keyframes compared with float64 code written from the report."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def close(got, wanted, tolerance=1e-13):
 
 
 def reference(keys, times, at):
-    """Smith 2013, section 2.3.2, with scipy's Hermite spline; the ends' tangents one-sided, constant
+    """Smith 2013, section 2.3.2, with scipy's Hermite spline; one-sided tangents at the ends, constant
     outside."""
     flat = keys.reshape(len(keys), -1)
     after = np.minimum(np.arange(len(keys)) + 1, len(keys) - 1)
@@ -33,7 +33,7 @@ def reference(keys, times, at):
 
 
 def on_one_side(keys, size):
-    """Signs that bring each quaternion into the hemisphere of the one before."""
+    """Signs that put each quaternion into the hemisphere of the one before."""
     keys = keys.copy()
     for i in range(1, len(keys)):
         if keys[i, :4] @ keys[i - 1, :4] < 0:
@@ -54,7 +54,7 @@ def test_vector_form_is_the_hermite_spline_of_the_components(name, dtype):
         else:
             size = 4 if name == "quat_vec" else 8
             wanted = reference(on_one_side(keys.astype(np.float64), size), TIMES, AT)
-            # The sign is that of the key before, as it came.
+            # The sign is that of the given key before.
             flip = np.where((result.transforms[:, :4] * wanted[:, :4]).sum(axis=1) < 0, -1.0, 1.0)[:, None]
             got = result.transforms * np.where(np.arange(keys.shape[1]) < size, flip, 1.0)
         close(got, wanted, 64 * np.finfo(dtype).eps)
@@ -62,7 +62,7 @@ def test_vector_form_is_the_hermite_spline_of_the_components(name, dtype):
 
 @ALL
 def test_blend_form_is_the_blend_with_the_weights_of_the_spline(method):
-    # Within 57 degrees of one another: all in one hemisphere, whichever key is the heaviest.
+    # Within 57 degrees of each other, all are in one hemisphere, whichever key is the heaviest.
     name, rng = LAYOUT_OF[method], np.random.default_rng(1)
     twists = np.column_stack([rng.uniform(-0.29, 0.29, (5, 3)), rng.uniform(-2, 2, (5, 3))])
     keys = layout(rigid(rng) * RigidTransform.from_exp_coords(twists), name)
@@ -105,7 +105,7 @@ def test_one_key_and_two(method):
     keys = layout(rigid(np.random.default_rng(4), 2), name)
     single = catmull_rom(keys[:1], TIMES[:1], AT, method)
     close(matrix(single.transforms, name), np.tile(matrix(keys[0], name), (len(AT), 1, 1)))
-    # Between two keys the tangents are the straight way itself.
+    # Between two keys the tangents have the direction of the straight line.
     t = np.array([0.25, 0.5, 0.75])
     double = catmull_rom(keys, TIMES[:2], t, method)
     straight = between(keys[0], keys[1], t, method)
@@ -253,7 +253,7 @@ def test_hermite_of_points_is_scipys(dtype):
     wanted = CubicHermiteSpline(TIMES, points, tangents)(np.clip(AT, TIMES[0], TIMES[-1]))
     close(result.transforms, wanted, 64 * np.finfo(dtype).eps)
     assert result.is_defined.all()
-    # With Catmull-Rom's tangents it is that spline, of points too.
+    # With Catmull-Rom's tangents it equals that spline, for points, too.
     plain = catmull_rom_vector(points.astype(float), TIMES, AT).transforms
     close(plain, reference(points.astype(float), TIMES, AT), 1e-13)
 

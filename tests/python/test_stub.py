@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stub, which editors read, and the module, which help() reads, say the same."""
+"""The stub, which editors read, and the module, which help() reads, have the same descriptions."""
 
 import ast
 import re
@@ -13,7 +13,7 @@ STUB = ast.parse((Path(__file__).parents[2] / "native/python/sinew/_native.pyi")
 
 
 def described():
-    """(name, docstring, what it is of) for everything of the stub that has a docstring or ought to."""
+    """(name, docstring, object) for everything in the stub that has or should have a docstring."""
     for node in STUB.body:
         if isinstance(node, ast.FunctionDef):
             yield pytest.param(ast.get_docstring(node), getattr(_native, node.name), id=node.name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which method is best at what."""
+"""Which method is best by which criterion."""
 
 import math
 
@@ -10,7 +10,7 @@ BY_NAME = {criterion.name: criterion for criterion in CRITERIA}
 
 
 def suggestion(**values):
-    """Of methods a, b and c over frames 1, 2, ...; values by criterion: those of each method."""
+    """Results for methods a, b and c over frames 1, 2, ...; values by criterion: those of each method."""
     made = Suggestion({"a": "Method A", "b": "Method B", "c": "Method C"}, [1.0, 2.0], diagonal=2.0)
     for criterion, of_methods in values.items():
         for method, of_frames in zip("abc", of_methods, strict=False):
@@ -28,7 +28,7 @@ def test_the_worst_frame_counts_and_its_sign_does_not():
 def test_equals_share_and_where_all_are_equal_nobody_is_best():
     assert suggestion(stretch=[[0.100], [0.101], [0.2]]).best(BY_NAME["stretch"]) == ["a", "b"]
     assert suggestion(stretch=[[0.1], [0.1], [0.1]]).best(BY_NAME["stretch"]) == []
-    # One that is far off makes no others equal.
+    # A method that is far off does not make the others count as equal.
     assert suggestion(stretch=[[0.1], [0.15], [50.0]]).best(BY_NAME["stretch"]) == ["a"]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Threads that Python did not start, as Blender's are."""
+"""Threads that Python did not start, such as Blender's."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ THREADS = 50
 
 
 def thread_states() -> int:
-    """How many Python has."""
+    """The number of thread states that Python has."""
     api = ctypes.pythonapi
     for name in ("PyInterpreterState_Get", "PyInterpreterState_ThreadHead", "PyThreadState_Next"):
         getattr(api, name).restype = ctypes.c_void_p
@@ -28,7 +28,7 @@ def thread_states() -> int:
 
 @pytest.fixture
 def in_foreign_threads():
-    """in_foreign_threads(work, count): runs it in so many threads of the system, one after the other."""
+    """in_foreign_threads(work, count): runs work in this many threads of the system, one after the other."""
     if sys.platform == "win32":
         pytest.skip("no POSIX threads here")
     library = ctypes.CDLL(None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.affine, .quat_vec and .dual_quat against scipy."""
+"""sinew.affine, .quat_vec and .dual_quat compared with scipy."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""On Windows, a Blender does not outlive its batch. tests/blender/test_batch.py looks on Linux."""
+"""On Windows, Blender processes do not outlive their batch. tests/blender/test_batch.py tests this on
+Linux."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ import pytest
 
 pytestmark = pytest.mark.skipif(sys.platform != "win32", reason="Windows alone has job objects")
 
-# Counts in a file until it is ended.
+# Counts in a file until the process is ended.
 CHILD = """
 import sys, time
 for count in range(300):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the hosted workflows call is there, and they take no more than they need. Nobody runs them here."""
+"""What the hosted workflows call exists, and they have no more permissions than they need. They are not
+run here."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ every_workflow = pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: pat
 
 
 def load(path: Path) -> dict:
-    """As parsed; YAML 1.1 reads the key `on` as true."""
+    """The parsed workflow; YAML 1.1 reads the key `on` as true."""
     workflow = yaml.safe_load(path.read_text(encoding="utf-8"))
     workflow["on"] = workflow.pop(True)
     return workflow
@@ -34,7 +35,7 @@ def steps_of(workflow: dict) -> list[dict]:
 
 
 def lines_of(workflow: dict) -> list[list[str]]:
-    """Words of every line that a step runs."""
+    """The words of every line that a step runs."""
     return [
         shlex.split(line, comments=True)
         for step in steps_of(workflow)
@@ -102,7 +103,7 @@ WORKFLOW = {
 }
 SECOND = ("jobs", "second")
 FIRST_STEP = (*SECOND, "steps", 0)
-# What is put where, and a part of what is then said.
+# A mistake that is inserted at a position, and a part of the message that must follow.
 WRONG = [
     (("job",), {}, "a workflow has no key 'job'"),
     (("on", "pushes"), None, "no event 'pushes'"),
@@ -221,7 +222,7 @@ def test_an_action_has_one_version():
 
 @every_workflow
 def test_it_may_read_and_ends(path):
-    """A job that writes says so itself, and none runs for hours."""
+    """A job that writes declares so itself, and no job runs for hours."""
     workflow = load(path)
     assert workflow["permissions"] == {"contents": "read"}
     for name, job in workflow["jobs"].items():
@@ -240,7 +241,7 @@ def test_what_is_installed_is_locked():
         if "pip install" in step.get("run", "")
         for words in [shlex.split(step["run"])]
     ]
-    # The library itself, and the Blender of the day, which nobody has seen before.
+    # Sinew's own library, and the current Blender, which are not locked.
     others = [words for words in installed if "--require-hashes" not in words]
     assert len(installed) > len(others) == 2
     assert sorted(words[-1] for words in others) == ["./addon", "bpy"]

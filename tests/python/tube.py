@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A tube that bends and twists between two bones, and what methods do to it."""
+"""A tube that bends and twists between two bones, and the effect of methods on it."""
 
 import numpy as np
 import sinew
 from rigs import about, transform, translation
 
-# How far ddm smooths.
+# The radius of ddm's smoothing.
 RADIUS = 0.26
 
 
 class Tube:
-    """Length 4, radius 0.5, along z; two bones meet in its middle, and weights change over 1 unit."""
+    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over 1 unit."""
 
     def __init__(self, rings=81, around=32):
         self.rings, self.around = rings, around
@@ -42,7 +42,7 @@ class Tube:
         return np.array([np.eye(4), joint @ about(axis, degrees) @ np.linalg.inv(joint)])
 
     def vertex_data(self, method):
-        """What the method keeps of the tube, as sinew.Binding takes it."""
+        """The method's vertex data for the tube, as sinew.Binding takes it."""
         if method == "cor":
             return {method: self.centres()}
         if method == "ddm":
@@ -65,14 +65,14 @@ class Tube:
         return np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
 
     def longest_edge(self, points):
-        """Over its length at rest."""
+        """Relative to its length at rest."""
         edges = np.concatenate([self.quads[:, [k, (k + 1) % 4]] for k in range(4)]).T
         posed, rest = (np.linalg.norm(p[edges[0]] - p[edges[1]], axis=1) for p in (points, self.points))
         return (posed / rest).max()
 
 
 def three_bones():
-    """A tube whose weights of three bones change along it and around it."""
+    """A tube with three bones whose weights change along it and around it."""
     tube = Tube(21, 12)
     x, _y, z = tube.points.T
     raw = np.column_stack([np.exp(-((z - c - 0.6 * x) ** 2)) for c in (0.7, 2.1, 3.3)])
@@ -82,7 +82,7 @@ def three_bones():
 
 
 def bulge(points, bones):
-    """The largest distance from the nearer bone, over the radius."""
+    """The largest distance from the nearer bone, relative to the radius."""
     joint = np.array([0.0, 0.0, 2.0])
     ends = np.zeros(3), transform(bones[1], np.array([0.0, 0.0, 4.0]))
     distances = []
@@ -93,8 +93,8 @@ def bulge(points, bones):
 
 
 def numbers(tube, deformed):
-    """Volume and bulge bent by 90 degrees, bulge bent by 130, the longest edge bent by 90, volume and least
-    radius twisted by 170; of 1 at rest.
+    """Volume and bulge bent by 90 degrees, bulge bent by 130, the longest edge bent by 90, volume and
+    smallest radius twisted by 170; each is 1 at rest.
 
     deformed  takes an axis and an angle in degrees; returns points and bones, as Tube.deformed
     """
@@ -112,7 +112,7 @@ def numbers(tube, deformed):
     )
 
 
-# Computed apart from this code, in numpy.
+# Computed independently of this code, in numpy.
 TABLE = {
     "lbs": (0.967, 1.010, 1.003, 1.77, 0.872, 0.09),
     "dq": (1.000, 1.088, 1.105, 2.24, 0.998, 1.0),

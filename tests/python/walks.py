@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walking pair of legs in closed form: a foot on the ground stays where it is, to rounding.
+"""A walking pair of legs in closed form: a foot on the ground does not move, to within rounding.
 
-It faces -Y and Z is up, as Blender's characters. Two links of each leg are solved for the ankle.
+It faces -Y and Z is up, as for Blender's characters. Two links of each leg are solved for the ankle.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from sinew_addon.core.motion.clip import Clip, Rig
 THIGH = SHIN = 0.45
 ANKLE, WIDE = 0.08, 0.1
 LEG = ANKLE + SHIN + THIGH
-# Of a cycle, how long a foot is on the ground; how high the hips are carried.
+# The share of a cycle in which a foot is on the ground, and the height of the hips.
 DUTY = 0.6
 HIP = 0.88
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def rig() -> Rig:
-    """Hips, a spine, and thigh, shin and foot of each side."""
+    """Hips, a spine, and thigh, shin and foot on each side."""
     heads = {
         "hips": ((0, 0, LEG), (0, 0, LEG + 0.2), None),
         "spine": ((0, 0, LEG + 0.2), (0, 0, 1.5), "hips"),
@@ -52,13 +52,13 @@ def rig() -> Rig:
 
 
 def foot(phase: np.ndarray, stride: float, lift: float) -> tuple[np.ndarray, np.ndarray]:
-    """How far a foot is ahead of the hips and above the ground: on it for DUTY of a cycle, which it begins
-    in front."""
+    """How far a foot is in front of the hips and above the ground. It is on the ground for DUTY of a
+    cycle, which starts with the foot in front."""
     phase = np.mod(phase, 1.0)
     reach = 0.5 * DUTY * stride
     on_ground = reach - stride * phase
     u = np.clip((phase - DUTY) / (1.0 - DUTY), 0.0, 1.0)
-    # Hermite: it leaves the ground and meets it at the ground's pace.
+    # Hermite: it leaves and meets the ground at the ground's speed.
     pace = -stride * (1.0 - DUTY)
     swing = (
         -reach * (2 * u**3 - 3 * u**2 + 1)
@@ -84,8 +84,8 @@ def walk(
     turn: float = 0.0,
     phases: np.ndarray | None = None,
 ) -> Clip:
-    """One cycle of `period` frames from phase `start`, whose root goes `stride` along -Y, or along an arc of
-    `turn` radians. phases [samples]: of another pace."""
+    """One cycle of `period` frames from phase `start`. Its root moves by `stride` along -Y, or along an
+    arc of `turn` radians. phases [samples]: for an uneven pace."""
     own = rig()
     phases = phases_of(period, start) if phases is None else phases
     rigid = np.broadcast_to(quat_vec.identity(), (len(phases), len(own.names), 7)).copy()
@@ -104,7 +104,7 @@ def walk(
         rotate(f"thigh.{side}", thigh)
         rotate(f"shin.{side}", knee)
         rotate(f"foot.{side}", -(thigh + knee))
-    # The hips stand lower than with straight legs, and go ahead; turning, about a centre beside them.
+    # The hips are lower than with straight legs, and move ahead; on an arc, about a centre beside them.
     hips = own.rest[0]
     done = phases - phases[0]
     lower = quat_vec.from_translation(np.array([0.0, 0.0, HIP - LEG]))
@@ -119,7 +119,7 @@ def walk(
 
 
 def random_clip(rng: np.random.Generator, name: str, frames: int = 12, most: float = 1.2) -> Clip:
-    """Every bone rotated and moved about smoothly; no cycle."""
+    """Every bone rotated and moved smoothly; not cyclic."""
     own = rig()
     time = np.linspace(0.0, 1.0, frames + 1)[:, None, None]
     bones = len(own.names)

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What GitHub asks of a workflow, as far as Sinew's use it: keys, needs, matrices, expressions and what these
-may name in each place. A part of what actionlint checks, which the Python registry does not have."""
+"""GitHub's rules for workflows, as far as Sinew uses them: keys, needs, matrices, expressions, and what
+these may refer to in each position. A part of what actionlint checks, which the Python registry does not
+have."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 
-# Of a workflow, of its jobs, of jobs that call another workflow, and of steps.
+# Keys of a workflow, of its jobs, of jobs that call another workflow, and of steps.
 WORKFLOW = {"name", "run-name", "on", "permissions", "env", "defaults", "concurrency", "jobs"}
 CALL = {"name", "needs", "if", "permissions", "uses", "with", "secrets", "strategy", "concurrency"}
 JOB = CALL - {"uses", "with", "secrets"} | {
@@ -28,14 +29,14 @@ PERMISSIONS = {
     *("pages", "pull-requests", "security-events", "statuses"),
 }
 
-# Contexts that an expression has, by its place.
+# The contexts that an expression may use, by its position.
 ALWAYS = {"github", "inputs", "vars"}
 OF_JOB = ALWAYS | {"needs"}
 OF_RUN = OF_JOB | {"strategy", "matrix"}
 OF_STEP = OF_RUN | {"job", "runner", "env", "secrets", "steps"}
 CONTEXTS = {"if": OF_JOB, "strategy": OF_JOB, "env": OF_RUN | {"secrets"}, "secrets": OF_RUN | {"secrets"}}
 STATUS = {"always", "cancelled", "failure", "success"}
-# Name -> fewest and most arguments.
+# Name -> minimum and maximum number of arguments.
 FUNCTIONS = {
     **dict.fromkeys(("contains", "startsWith", "endsWith"), (2, 2)),
     **dict.fromkeys(("toJSON", "fromJSON"), (1, 1)),
@@ -50,7 +51,8 @@ TOKEN = re.compile(
 
 
 class Expression:
-    """One between ${{ and }}, read as GitHub does; what it names and calls is in `paths` and `called`."""
+    """An expression between ${{ and }}, parsed like GitHub does; `paths` and `called` list what it refers
+    to and calls."""
 
     def __init__(self, text: str) -> None:
         self.paths: list[tuple[str, ...]] = []
@@ -68,7 +70,7 @@ class Expression:
             raise ValueError(f"{self._tokens[0][1]!r} is not expected")
 
     def _next(self, *signs: str) -> str:
-        """Takes a sign where it is one of these."""
+        """Consumes a token if it is one of these."""
         if self._tokens and self._tokens[0][0] == "sign" and self._tokens[0][1] in signs:
             return self._tokens.pop(0)[1]
         return ""
@@ -117,7 +119,7 @@ class Expression:
             self.paths.append((name, *self._rest()))
 
     def _rest(self) -> list[str]:
-        """What follows a name or a call: .key, .* or [index], which counts as *."""
+        """Parses what follows a name or a call: .key, .* or [index], which counts as *."""
         path = []
         while sign := self._next(".", "["):
             if sign == ".":
@@ -143,7 +145,7 @@ def texts(value: object) -> Iterator[str]:
 def faults_in_expressions(
     value: object, contexts: set[str], known: dict[str, set[str]], is_condition: bool = False
 ) -> Iterator[str]:
-    """known: of some contexts, what they have"""
+    """known: for some contexts, the keys that they have"""
     for text in texts(value):
         found = re.findall(r"\$\{\{(.*?)\}\}", text, re.DOTALL)
         if text.count("${{") != len(found):
@@ -234,7 +236,7 @@ def faults_in_events(on: dict) -> Iterator[str]:
 
 
 def faults(workflow: dict) -> list[str]:
-    """Each in a sentence. workflow: as parsed, with `on` by its name"""
+    """The mistakes in a workflow, each as a sentence. workflow: as parsed, with `on` by its name"""
     on, jobs = workflow["on"], workflow["jobs"]
     inputs: set[str] = set()
     for event in ("workflow_call", "workflow_dispatch"):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skinning in native code: bind a mesh to bones once, deform it at any pose. Numpy in, numpy out.
+"""Skinning in native code: bind a mesh to bones once, then deform it for any pose. Numpy in, numpy out.
 
-Rigid transforms, and what lies between them: sinew.affine, sinew.quat_vec, sinew.dual_quat,
-sinew.interpolate, sinew.spline; their parts: sinew.quat, sinew.dual; and what fits them to measurements:
-sinew.fit. Rotations that bring bones to where they are wanted: sinew.ik.
+sinew.affine, sinew.quat_vec and sinew.dual_quat have rigid transforms; sinew.quat and sinew.dual have their
+parts; sinew.interpolate and sinew.spline interpolate them; sinew.fit fits them to measurements; sinew.ik has
+inverse kinematics.
 """
 
 from . import affine, dual, dual_quat, fit, ik, interpolate, quat, quat_vec, spline

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the typed modules share."""
+"""Types that the typed modules share."""
 
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -27,7 +27,8 @@ class Distance(NamedTuple, Generic[Float]):
 
 
 class ScaleSplit(NamedTuple, Generic[Float]):
-    """rigid and scale [.., 4, 4]; has_scale bool [..]: whether `scale` is more than rounding."""
+    """rigid and scale [.., 4, 4]; has_scale bool [..]: whether `scale` differs from the identity by more
+    than rounding."""
 
     rigid: NDArray[Float]
     scale: NDArray[Float]
@@ -35,15 +36,15 @@ class ScaleSplit(NamedTuple, Generic[Float]):
 
 
 class Blended(NamedTuple, Generic[Float]):
-    """The transforms, and whether each is what the method defines; where not, the method says what it is."""
+    """The transforms, and whether each is defined; the methods specify the result where it is not."""
 
     transforms: NDArray[Float]
     is_defined: NDArray[np.bool_] | Any
 
 
 class RigidFit(NamedTuple, Generic[Float]):
-    """transforms: target_from_source, in the layout of the method; error [..]: the root of the weighted mean
-    of the squared distances that are left; is_defined, is_mirrored: bool [..]."""
+    """transforms: target_from_source, in the layout of the method; error [..]: the root of the weighted
+    mean of the remaining squared distances; is_defined, is_mirrored: bool [..]."""
 
     transforms: NDArray[Float]
     error: NDArray[Float]
@@ -62,8 +63,8 @@ class HandEye(NamedTuple, Generic[Float]):
 
 
 class Averaged(NamedTuple, Generic[Float]):
-    """transforms: the means; is_defined: bool [..]; kept [.., n]: how much each pose counts beside its
-    weight, 0 to 1; 1 where the mean is not robust."""
+    """transforms: the means; is_defined: bool [..]; kept [.., n]: how much each pose counts besides its
+    weight, 0 to 1; always 1 if the mean is not robust."""
 
     transforms: NDArray[Float]
     is_defined: NDArray[np.bool_] | Any

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Transforms as 3x4 matrices, x -> linear x + translation.
 
-Layout: [.., 4, 4] or [.., 3, 4], row-major, column vectors; a fourth row is not read, and results have it.
-The linear part may scale and shear where a function does not say otherwise.
+Layout: [.., 4, 4] or [.., 3, 4], row-major, column vectors. A fourth row is not read; results have one. The
+linear part may scale and shear unless a function says otherwise.
 
-Every function takes one or many: leading axes broadcast as numpy's do, and numbers may stand for arrays of
-numbers. Arrays are anything that numpy makes one of. The result is float32 where all arrays of a call are of
-float32 or less, float64 otherwise, as numpy promotes; numbers do not count. ValueError names the argument,
-what was wanted and what came; NaN and infinity are refused.
+All functions accept one transform or many: leading axes broadcast as in numpy, and numbers may be used
+instead of arrays of numbers. Arrays may be anything that numpy converts to one. The result is float32 if all
+arrays in a call are float32 or smaller, float64 otherwise, as numpy promotes; plain numbers do not count.
+ValueError names the argument, what was expected and what was given; NaN and infinity are refused.
 """
 
 from typing import Any
@@ -64,13 +64,14 @@ transform_vector = _layout.transform_vector
 
 
 def split_scale(posed_from_rest: ArrayLike, rest_bone: ArrayLike) -> ScaleSplit[Any]:
-    """A bone's motion in two, posed_from_rest = rigid * scale: what methods that blend rigid motions need.
+    """Splits a bone's motion into posed_from_rest = rigid * scale, as methods that blend rigid motions need
+    it.
 
-    posed_from_rest  where the motion takes points of the rest shape; may scale, shear and mirror
-    rest_bone        the bone's rest axes, Y along the bone, and head in the same space; orthonormal
+    posed_from_rest  maps points of the rest shape to the pose; may scale, shear and mirror
+    rest_bone        the bone's rest axes (Y along the bone) and head in the same space; orthonormal
 
-    Axes are made square keeping Y, as Blender's Armature modifier does for Preserve Volume; a mirror is in
-    `scale`. A motion within 1e-5 of orthonormal and 1e-4 of unit size has the identity for `scale`. `rigid`
-    is a rotation and a translation also where axes vanish.
+    Axes are made perpendicular while keeping Y, as Blender's Armature modifier does for Preserve Volume;
+    mirroring becomes part of `scale`. For a motion within 1e-5 of orthonormal and 1e-4 of unit size, `scale`
+    is the identity. `rigid` is a rotation and a translation even if axes vanish.
     """
     return ScaleSplit(*_native.split_scale(posed_from_rest, rest_bone))

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Dual numbers real + e dual, e^2 = 0 (Clifford 1873; Smith 2013, section 2.2.3).
 
-Layout: [.., 2] as (real, dual). Sums and differences are those of the arrays. A function of one is f(real) +
-e dual f'(real): with dual = 1 the dual part is the derivative.
+Layout: [.., 2] as (real, dual). Sums and differences are those of the arrays. A function of a dual number is
+f(real) + e dual f'(real), so with dual = 1 the dual part is the derivative.
 
-Every function takes one or many: leading axes broadcast as numpy's do. The result is float32 where all arrays
-of a call are of float32 or less, float64 otherwise. ValueError names the argument, what was wanted and what
-came; NaN and infinity are refused.
+All functions accept one number or many: leading axes broadcast as in numpy. The result is float32 if all
+arrays in a call are float32 or smaller, float64 otherwise. ValueError names the argument, what was expected
+and what was given; NaN and infinity are refused.
 """
 
 from typing import Any
@@ -24,22 +24,22 @@ def multiply(a: ArrayLike, b: ArrayLike) -> NDArray[Any]:
 
 
 def divide(a: ArrayLike, b: ArrayLike) -> NDArray[Any]:
-    """a / b. ValueError where a real part of `b` is 0: it has no inverse."""
+    """a / b. ValueError if a real part of `b` is 0: such a number has no inverse."""
     return _native.divide(a, b)
 
 
 def conjugate(a: ArrayLike) -> NDArray[Any]:
-    """real - e dual."""
+    """The conjugate: real - e dual."""
     return _native.conjugate(a)
 
 
 def sqrt(a: ArrayLike) -> NDArray[Any]:
-    """The square root with a real part above 0. ValueError where the real part of `a` is not above 0."""
+    """The square root with a positive real part. ValueError if the real part of `a` is not positive."""
     return _native.sqrt(a)
 
 
 def sin(a: ArrayLike) -> NDArray[Any]:
-    """The sine, radians: of an angle and a length, as of a screw."""
+    """The sine, radians: for example of a screw's angle and length."""
     return _native.sin(a)
 
 
@@ -54,5 +54,5 @@ def exp(a: ArrayLike) -> NDArray[Any]:
 
 
 def log(a: ArrayLike) -> NDArray[Any]:
-    """The natural logarithm. ValueError where the real part of `a` is not above 0."""
+    """The natural logarithm. ValueError if the real part of `a` is not positive."""
     return _native.log(a)

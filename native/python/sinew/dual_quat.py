@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rigid transforms as unit dual quaternions real + e dual (DQ; Smith 2013, section 2.2.3).
 
-Layout: [.., 8] as (w, x, y, z) of the real part, then of the dual. Unit: |real| = 1 and dot(real, dual) = 0.
-a and -a are one transform.
+Layout: [.., 8] as (w, x, y, z) of the real part, then of the dual part. Unit means |real| = 1 and dot(real,
+dual) = 0. a and -a are the same transform.
 
-Every function takes one or many: leading axes broadcast as numpy's do, and numbers may stand for arrays of
-numbers. Arrays are anything that numpy makes one of. The result is float32 where all arrays of a call are of
-float32 or less, float64 otherwise, as numpy promotes; numbers do not count. ValueError names the argument,
-what was wanted and what came; NaN and infinity are refused.
+All functions accept one transform or many: leading axes broadcast as in numpy, and numbers may be used
+instead of arrays of numbers. Arrays may be anything that numpy converts to one. The result is float32 if all
+arrays in a call are float32 or smaller, float64 otherwise, as numpy promotes; plain numbers do not count.
+ValueError names the argument, what was expected and what was given; NaN and infinity are refused.
 """
 
 from typing import Any
@@ -69,27 +69,29 @@ transform_vector = _layout.transform_vector
 
 
 def conjugate(a: ArrayLike) -> NDArray[Any]:
-    """real* + e dual*, the quaternion conjugate: conjugate(a b) = conjugate(b) conjugate(a)."""
+    """The quaternion conjugate, real* + e dual*: conjugate(a b) = conjugate(b) conjugate(a)."""
     return _native.conjugate(a)
 
 
 def dual_conjugate(a: ArrayLike) -> NDArray[Any]:
-    """real - e dual, the dual conjugate."""
+    """The dual conjugate, real - e dual."""
     return _native.dual_conjugate(a)
 
 
 def combined_conjugate(a: ArrayLike) -> NDArray[Any]:
-    """real* - e dual*, both: a (1 + e p) combined_conjugate(a) is 1 + e p', p' where `a` takes p."""
+    """Both conjugates, real* - e dual*: a (1 + e p) combined_conjugate(a) = 1 + e p', with p' the image
+    of p."""
     return _native.combined_conjugate(a)
 
 
 def norm(a: ArrayLike) -> NDArray[Any]:
-    """sqrt(a conjugate(a)), a dual number, [.., 2]: 1, 0 of a unit one; 0, 0 where the real part is 0."""
+    """sqrt(a conjugate(a)), a dual number, [.., 2]: (1, 0) for a unit `a`; (0, 0) if the real part is 0."""
     return _native.norm(a)
 
 
 def log(a: ArrayLike) -> NDArray[Any]:
-    """The logarithm of unit `a`, without scalar parts: half the twist. Of a and -a that with w >= 0 is taken.
+    """The logarithm of unit `a`: half the twist, with scalar parts of 0. Of a and -a, the one with w >= 0 is
+    used.
 
     Source: Kavan et al. 2008, section 3.4.
     """
@@ -97,13 +99,13 @@ def log(a: ArrayLike) -> NDArray[Any]:
 
 
 def exp(a: ArrayLike) -> NDArray[Any]:
-    """The unit dual quaternion whose logarithm is `a`, of any angle. Scalar parts are not read."""
+    """The unit dual quaternion whose logarithm is `a`, of any angle. Scalar parts are ignored."""
     return _native.exp(a)
 
 
 def power(a: ArrayLike, exponent: ArrayLike) -> NDArray[Any]:
-    """Unit `a` done `exponent` times, [..]: its screw with angle and translation times `exponent`.
+    """The power of unit `a`: its screw with angle and translation multiplied by `exponent`, [..].
 
-    The shorter way: of a and -a that with w >= 0 is taken. Source: Kavan et al. 2008, section 3.4.
+    Takes the shorter way: of a and -a, the one with w >= 0 is used. Source: Kavan et al. 2008, section 3.4.
     """
     return _native.power(a, exponent)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inverse kinematics: rotations of bones, within limits, that bring tips to where they are wanted.
+"""Inverse kinematics: rotations of bones, within limits, that bring tips to their goals.
 
-Poses are dual quaternions inside, and each axis that a bone may rotate about is a screw. One problem is
-solved or many: axes before the last ones of each argument broadcast as numpy's do, frames of an animation,
-say. Every problem starts from its own `rotations` and depends on no other. All is float64, whatever comes.
-Arrays are anything that numpy makes one of. ValueError names the argument, what was wanted and what came.
+Poses are dual quaternions internally, and each axis that a bone may rotate about is a screw. One problem or
+many are solved: the axes before the last ones of each argument broadcast as in numpy, for example for the
+frames of an animation. Each problem starts from its own `rotations` and does not depend on the others. All
+results are float64. Arrays may be anything that numpy converts to one. ValueError names the argument, what
+was expected and what was given.
 """
 
 from collections.abc import Sequence
@@ -24,14 +25,14 @@ METHODS: Final[tuple[Method, ...]] = _native.METHODS
 
 
 class Effector(NamedTuple):
-    """What is to be where: the tip of a bone.
+    """The goal for the tip of one bone.
 
-    bone: its index. It and all bones above it rotate.
-    position_weight, rotation_weight: 0: the one or the other does not count. An error of 1 radian counts as
-        one of the chain's length.
-    has_pole: first rotate the chain about its root, as Blender's constraint does, until its tip lies to its
-        goal and the axis cos(pole_angle) x + sin(pole_angle) z of the root bone to the side of the pole: what
-        then bends stays in that plane. With several effectors no pole counts.
+    bone: its index. The bone and all of its ancestors rotate.
+    position_weight, rotation_weight: 0 means that the position or rotation does not count. An error of 1
+        radian counts like one of the chain's length.
+    has_pole: first rotate the chain about its root, as Blender's constraint does, so that its tip points at
+        the goal and the axis cos(pole_angle) x + sin(pole_angle) z of the root bone points to the side of
+        the pole. Bends then stay in that plane. With several effectors, poles are ignored.
     """
 
     bone: int
@@ -42,9 +43,9 @@ class Effector(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """rotations [.., bones, 4]: relative to rest, w >= 0; distance and angle (radians) [..]: the largest that
-    is left of a tip's position and rotation; iterations [..], int32; is_reached [..]: whether both are within
-    the tolerance."""
+    """rotations [.., bones, 4]: relative to rest, w >= 0; distance and angle (radians) [..]: the largest
+    remaining errors of a tip's position and rotation; iterations [..], int32; is_reached [..]: whether
+    both are within the tolerance."""
 
     rotations: NDArray[np.float64]
     distance: NDArray[np.float64] | Any
@@ -54,7 +55,7 @@ class Solution(NamedTuple):
 
 
 class Solver:
-    """Of one tree of bones, its limits and effectors; solve() allocates nothing but its result."""
+    """A solver for one tree of bones with its limits and effectors. solve() allocates only its result."""
 
     def __init__(
         self,
@@ -65,14 +66,15 @@ class Solver:
         limits: ArrayLike | None = None,
         stiffness: ArrayLike | None = None,
     ) -> None:
-        """parents: int32 [bones], the index of each bone's parent, -1 for a root; parents come first.
+        """parents: int32 [bones], the index of each bone's parent, -1 for a root; parents precede their
+            children.
         effectors: at least one.
-        locked: bool [bones, 3], axes x, y (along the bone) and z that a bone does not rotate about.
-        limits: [bones, 3, 2], the least and the largest angle about x, y and z, radians, -pi <= least <= 0 <=
-            largest <= pi; (-inf, inf) where there is none. The angles are those of swing_twist_angles(), as
-            of Blender's IK limits. With limits of x and z a bone's swing stays within an ellipse through the
-            four. Of bones with limits or locks it ends at 177.7 degrees.
-        stiffness: [bones, 3], 0 to below 1: how much less than others the bone rotates about an axis.
+        locked: bool [bones, 3], axes x, y (along the bone) and z about which a bone does not rotate.
+        limits: [bones, 3, 2], the smallest and the largest angle about x, y and z, radians, with -pi <=
+            smallest <= 0 <= largest <= pi; (-inf, inf) for no limit. The angles are those of
+            swing_twist_angles(), as for Blender's IK limits. With limits of x and z a bone's swing stays
+            within an ellipse through the four. Bones with limits or locks swing by at most 177.7 degrees.
+        stiffness: [bones, 3], 0 to below 1: how much less the bone rotates about an axis than about others.
         """
         self._solver = _native.Solver(
             parents,
@@ -97,32 +99,33 @@ class Solver:
         tolerance: float = 1e-6,
         iterations: int = 100,
     ) -> Solution:
-        """Rotations that bring the tips to the goals.
+        """Finds rotations that bring the tips to the goals.
 
         rest: [.., bones, 4, 4], [.., bones, 3, 4], [.., bones, 7] or [.., bones, 8]: each bone relative to
-            its parent where it does not rotate. A matrix's linear part becomes the nearest rotation.
+            its parent, not rotated. A matrix's linear part is replaced by the nearest rotation.
         tips: [.., effectors, 3], each in the space of its bone.
-        goals: [.., effectors, ..], in any of these layouts: where each tip is to be, and how its bone is to
-            be rotated.
-        poles: [.., effectors, 3], points; None where no effector has a pole.
-        rotations: [.., bones, 4], where to start; what is beyond limits is brought within. None: no rotation.
-        root: [.., 4, 4], [.., 3, 4], [.., 7] or [.., 8], before bones without a parent; None: nothing. Goals
-            and poles are in the space that it leads to.
+        goals: [.., effectors, ..], in any of these layouts: the goals of each tip's position and of its
+            bone's rotation.
+        poles: [.., effectors, 3], points; None if no effector has a pole.
+        rotations: [.., bones, 4], the start; rotations beyond the limits are brought within. None: no
+            rotation.
+        root: [.., 4, 4], [.., 3, 4], [.., 7] or [.., 8], applied after the transform of every bone without a
+            parent; None: the identity. Goals and poles are in the space that it maps to.
         method: one of METHODS.
 
-            dls  damped least squares on screws; a step for all axes (Wampler 1986; Sugihara 2011)
-            ccd  cyclic descent, one bone after the other from the tip (Wang, Chen 1991): cheap steps, and
-                 many of them where a chain is nearly straight, or limited
+            dls  damped least squares on screws; each step moves all axes (Wampler 1986; Sugihara 2011)
+            ccd  cyclic descent, one bone after the other from the tip (Wang, Chen 1991): cheap steps, but
+                 many of them where a chain is nearly straight or limited
 
-        tolerance: in lengths of the longest chain, and in radians: what counts as reached.
-        iterations: at most; steps of all axes, or sweeps over all bones.
+        tolerance: errors that count as reached, in lengths of the longest chain and in radians.
+        iterations: maximum number of steps of all axes, or of sweeps over all bones.
 
-        A goal out of reach of a chain of one effector whose rotation does not count is moved to the nearest
-        end of the reach: a chain without limits stretches straight to it. A chain that is straight to a
-        nearer goal is bent a little about its first free axis. A pole on the line from root to goal does not
-        count; limits are kept where a pole wants otherwise. With limits the result can be a local minimum:
-        within them, and such that no step improves it; a chain of one effector is tried once more from its
-        start rotated to the goal, and the better result stays.
+        If a chain with one effector whose rotation does not count can not reach its goal, the goal is moved
+        to the nearest point of its range; a chain without limits stretches straight towards it. A straight
+        chain that points at a nearer goal is bent a little about its first free axis. A pole on the line
+        from root to goal is ignored. Limits can cause local minima: the result is within limits, and no step
+        improves it. A chain with one effector is solved a second time, starting with a rotation to the goal,
+        and the better result is used.
         """
         return Solution(
             *self._solver.solve(rest, tips, goals, poles, rotations, root, method, tolerance, iterations)
@@ -130,11 +133,11 @@ class Solver:
 
 
 def swing_twist_angles(rotations: NDArray[Float] | ArrayLike) -> NDArray[Any]:
-    """[.., 3], radians: what limits bound. A rotation is a twist about y, of the angle y, and then a swing
-    without twist: x and z are twice the arcsines of its quaternion's x and z, so that of a swing about x
-    alone x is its angle.
+    """The angles that limits bound, [.., 3], radians. A rotation is decomposed into a twist about y, by the
+    angle y, followed by a swing without twist; x and z are twice the arcsines of the x and z of its
+    quaternion, so that for a swing about x alone x is its angle.
 
-    rotations: [.., 4]; signs and lengths do not matter. Of a swing by 180 degrees the twist is 0.
+    rotations: [.., 4]; signs and lengths do not matter. For a swing by 180 degrees the twist is 0.
     """
     angles: NDArray[Any] = _native.swing_twist_angles(rotations)
     return angles

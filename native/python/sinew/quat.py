@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rotations as unit quaternions w + xi + yj + zk (Smith 2013, section 2.1).
 
-Layout: [.., 4] as (w, x, y, z). q and -q are one rotation. With a translation: sinew.quat_vec.
+Layout: [.., 4] as (w, x, y, z). q and -q are the same rotation. With a translation: sinew.quat_vec.
 
-Every function takes one or many: leading axes broadcast as numpy's do, and numbers may stand for arrays of
-numbers. The result is float32 where all arrays of a call are of float32 or less, float64 otherwise.
-ValueError names the argument, what was wanted and what came; NaN and infinity are refused.
+All functions accept one quaternion or many: leading axes broadcast as in numpy, and numbers may be used
+instead of arrays of numbers. The result is float32 if all arrays in a call are float32 or smaller, float64
+otherwise. ValueError names the argument, what was expected and what was given; NaN and infinity are refused.
 """
 
 from typing import Any
@@ -33,7 +33,7 @@ __all__ = [
 
 
 def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> NDArray[Any]:
-    """The rotation by `angle` radians, [..], about `axis`, [.., 3], of any length; of length 0 none."""
+    """The rotation by `angle` radians, [..], about `axis`, [.., 3]. Any length; 0 gives the identity."""
     return _native.from_axis_angle(axis, angle)
 
 
@@ -43,27 +43,28 @@ def from_rotation_vector(vector: ArrayLike) -> NDArray[Any]:
 
 
 def to_rotation_vector(q: ArrayLike) -> NDArray[Any]:
-    """Axis times angle of unit `q`, [.., 3], 0 to pi long; at pi the signs of `q` decide its direction."""
+    """Axis times angle of unit `q`, [.., 3], with a length of 0 to pi; at pi the signs of `q` decide its
+    direction."""
     return _native.to_rotation_vector(q)
 
 
 def from_rotation_matrix(rotation: ArrayLike) -> NDArray[Any]:
-    """The quaternion of `rotation`, [.., 3, 3], with w >= 0. ValueError where it is no rotation."""
+    """The quaternion of `rotation`, [.., 3, 3], with w >= 0. ValueError if it is no rotation."""
     return _native.from_rotation_matrix(rotation)
 
 
 def to_rotation_matrix(q: ArrayLike) -> NDArray[Any]:
-    """The matrix of unit `q`, [.., 3, 3]."""
+    """The rotation matrix of unit `q`, [.., 3, 3]."""
     return _native.to_rotation_matrix(q)
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> NDArray[Any]:
-    """a b, Hamilton's product: first the rotation `b`, then `a`."""
+    """The product a b (Hamilton), which applies the rotation `b` first."""
     return _native.compose(a, b)
 
 
 def conjugate(q: ArrayLike) -> NDArray[Any]:
-    """w - xi - yj - zk: the rotation back, of a unit quaternion."""
+    """The conjugate w - xi - yj - zk: the inverse of a unit quaternion."""
     return _native.conjugate(q)
 
 
@@ -73,12 +74,12 @@ def norm(q: ArrayLike) -> NDArray[Any]:
 
 
 def normalized(q: ArrayLike) -> NDArray[Any]:
-    """`q` at length 1; one of length 0 gives the identity."""
+    """`q` normalised; length 0 gives the identity."""
     return _native.normalized(q)
 
 
 def rotate(q: ArrayLike, vectors: ArrayLike) -> NDArray[Any]:
-    """q v q*: `vectors`, [.., 3], after the rotation by unit `q`."""
+    """q v q*: the images of `vectors`, [.., 3], under the rotation by unit `q`."""
     return _native.rotate(q, vectors)
 
 
@@ -88,22 +89,24 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> NDArray[Any]:
 
 
 def slerp(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> NDArray[Any]:
-    """From `a` at t = 0 to `b` at t = 1 at constant pace, the shorter way (Shoemake 1985).
+    """Interpolates from `a` at t = 0 to `b` at t = 1 at constant speed, along the shorter way (Shoemake
+    1985).
 
-    At half a turn the signs as given decide; sinew.interpolate.between by "qv_slerp" says where.
+    At 180 degrees the signs as given decide; sinew.interpolate.between with "qv_slerp" reports where that
+    happens.
     """
     return _native.slerp(a, b, t)
 
 
 def to_three_numbers(q: ArrayLike) -> NDArray[Any]:
-    """x, y and z of `q` or -q, whichever has w >= 0, [.., 3]: to store it (Smith 2013, section 3.3)."""
+    """x, y and z of `q` or -q, whichever has w >= 0, [.., 3], for storage (Smith 2013, section 3.3)."""
     return _native.to_three_numbers(q)
 
 
 def from_three_numbers(numbers: ArrayLike) -> NDArray[Any]:
-    """Undoes to_three_numbers(): w is the root of what is missing to length 1.
+    """The inverse of to_three_numbers(): w is computed from the unit length.
 
-    Near half a turn, where w is small, it is lost: off by up to the root of the type's rounding, 3e-4 in
-    float32.
+    Near 180 degrees w is small and imprecise: its error is up to the square root of the type's rounding
+    error, 3e-4 for float32.
     """
     return _native.from_three_numbers(numbers)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rigid transforms as quaternion-vector pairs (QV; Smith 2013, section 2.2.1).
 
-Layout: [.., 7] as (w, x, y, z, tx, ty, tz), the quaternion of unit length: rotation, then translation.
+Layout: [.., 7] as (w, x, y, z, tx, ty, tz), with a quaternion of unit length: rotation, then translation.
 
-Every function takes one or many: leading axes broadcast as numpy's do, and numbers may stand for arrays of
-numbers. Arrays are anything that numpy makes one of. The result is float32 where all arrays of a call are of
-float32 or less, float64 otherwise, as numpy promotes; numbers do not count. ValueError names the argument,
-what was wanted and what came; NaN and infinity are refused.
+All functions accept one transform or many: leading axes broadcast as in numpy, and numbers may be used
+instead of arrays of numbers. Arrays may be anything that numpy converts to one. The result is float32 if all
+arrays in a call are float32 or smaller, float64 otherwise, as numpy promotes; plain numbers do not count.
+ValueError names the argument, what was expected and what was given; NaN and infinity are refused.
 """
 
 import numpy as np

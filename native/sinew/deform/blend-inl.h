@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The rigid methods on lanes, agreeing with skinning/: compiled once for each instruction set, see
+// Blending for the rigid methods on lanes; agrees with skinning/. Compiled once for each instruction set, see
 // kernels/.
 //
-// Rows of bones are summed as Palette says; `finish` makes points of the sums. There is no case for blends that
-// cancel: a term never points against the sum before it, so |sum|^2 >= the sum of squared weights
-// >= 1 / influences, and kDegenerateBlend takes 1e12 influences.
+// Rows of bones are summed as described at Palette; `finish` computes points from the sums. Blends can not cancel
+// here: every term is added in the hemisphere of the sum before it, so |sum|^2 >= the sum of squared weights >= 1
+// / influences, which reaches kDegenerateBlend only with 1e12 influences.
 #if defined(SINEW_DEFORM_BLEND_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_BLEND_INL_H_
 #undef SINEW_DEFORM_BLEND_INL_H_
@@ -18,13 +18,13 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// Numbers of a bone's row, unless its method has more: two Float4.
+/// Numbers in a bone's row, unless its method has more: two Float4.
 inline constexpr std::size_t kRow = 8;
 
-/// The most that a method has.
+/// The largest number of them in any method.
 inline constexpr std::size_t kMaxRow = 16;
 
-/// The weighted sum of rows.
+/// A weighted sum of rows.
 template <class D, std::size_t kNumbers = kRow>
 struct Sum {
     Vec<D> value[kNumbers];
@@ -38,16 +38,19 @@ HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin,
     }
 }
 
-/// A weighted sum, and that of the quaternions alone so far: the next is added in its hemisphere.
+/// A weighted sum of rows, and the weighted sum of only their quaternions, which decides the hemisphere of the
+/// next term.
 template <class D, std::size_t kNumbers>
 struct Blend {
     Sum<D, kNumbers> sum;
     Vec<D> quaternion[4];
 };
 
-/// The base that rows are added without where they are added plainly.
+/// The base of rows that are added plainly.
 inline constexpr float kNoBase[kMaxRow] = {};
 
+/// Starts a blend with the first row.
+///
 /// plain  whether the first row is added by its weight
 template <std::size_t kNumbers, class D>
 HWY_INLINE Blend<D, kNumbers> begin_blend(D d, const float* row, Vec<D> weight, bool plain) {
@@ -60,11 +63,11 @@ HWY_INLINE Blend<D, kNumbers> begin_blend(D d, const float* row, Vec<D> weight, 
     return blend;
 }
 
-/// Adds what `row`, in the hemisphere of the blend, differs from the `base`: the first row, or kNoBase; the
-/// weight, negative where it was negated.
+/// Adds the weighted difference of `row` from `base`, with `row` in the hemisphere of the blend. `base` is the
+/// first row, or kNoBase. Returns the weight, negative where the row was negated.
 ///
-/// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
-/// must decide a tie alike.
+/// The products and sums of the dot product are rounded one by one, in the order of the mixed kernel, because
+/// both must decide ties alike.
 template <class Rigid, class D>
 HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight,
                                Blend<D, Rigid::kNumbers>& blend) {
@@ -91,7 +94,7 @@ HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
     return palette.bones[kNumbers / 4 * static_cast<std::size_t>(bone)].value.data();
 }
 
-/// What the scale of `bone` adds to `rest`, or false where it has none.
+/// Computes the displacement of `rest` by the scale of `bone`. Returns false if the bone has no scale.
 template <class D>
 HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest, Points<D>& by) {
     const auto index = static_cast<std::size_t>(bone);

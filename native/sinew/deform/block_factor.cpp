@@ -8,11 +8,11 @@
 namespace sinew {
 namespace {
 
-// Rows of one block fit the first cache beside those that it changes.
-constexpr std::size_t kMostColumns = 32;
+// The rows of one block then fit into the first-level cache together with the right sides that they change.
+constexpr std::size_t kMaxColumns = 32;
 
-// Zeros that a block may keep, as a part of its numbers: they cost less than a block more.
-constexpr double kMostZeros = 0.3;
+// Share of zeros that a block may store: up to this share they cost less than one more block.
+constexpr double kMaxZeros = 0.3;
 
 class BlockMaker {
 public:
@@ -45,23 +45,24 @@ private:
         return rows_.subspan(begin, static_cast<std::size_t>(starts_[column + 1]) - begin);
     }
 
-    /// Adds `column` to the columns from begin_ on, if few zeros are added with it.
+    /// Adds `column` to the block of columns from begin_ on, if that stores few enough zeros. Returns whether it
+    /// did.
     bool add(std::size_t column) {
         const std::size_t width = column + 1 - begin_;
-        if (width > kMostColumns) return false;
+        if (width > kMaxColumns) return false;
         if (below_.empty() || below_.front() != static_cast<std::int32_t>(column)) return false;
         const auto of = rows_of(column);
         merged_.clear();
         std::set_union(below_.begin() + 1, below_.end(), of.begin(), of.end(), std::back_inserter(merged_));
         const std::size_t all = width * merged_.size() + BlockFactor::triangle(width);
         const std::size_t numbers = numbers_ + of.size();
-        if (static_cast<double>(all - numbers) > kMostZeros * static_cast<double>(all)) return false;
+        if (static_cast<double>(all - numbers) > kMaxZeros * static_cast<double>(all)) return false;
         below_.swap(merged_);
         numbers_ = numbers;
         return true;
     }
 
-    /// Writes columns [begin_, end).
+    /// Writes the block of columns [begin_, end).
     void close(std::size_t end) {
         const std::size_t width = end - begin_;
         const std::size_t first_value = factor_.values.size();
@@ -89,7 +90,7 @@ private:
     std::span<const std::int32_t> rows_;
     std::span<const double> values_;
     BlockFactor factor_;
-    // Of the columns from begin_ on.
+    // The block of columns from begin_ on.
     std::size_t begin_ = 0;
     std::vector<std::int32_t> below_;
     std::size_t numbers_ = 0;

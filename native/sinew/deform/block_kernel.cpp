@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Solves by a BlockFactor on lanes.
+// Solves with a BlockFactor on lanes.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <algorithm>
 #include <array>
@@ -21,7 +21,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Vectors that a right side's row is taken in, as many as are added to at once.
+// A row of right sides is processed in groups of this many vectors, so that as many sums are in progress at once.
 constexpr std::size_t kVectors = 5;
 using Doubles = hn::CappedTag<double, kSolvedColumns / kVectors>;
 using DoubleVec = hn::Vec<Doubles>;
@@ -51,34 +51,34 @@ HWY_INLINE void subtract(double by, const Row& from, Row& row) {
     }
 }
 
-/// Whether a group is left once those of less than `least` are 0.
-HWY_INLINE bool clear_little(double least, double* x) {
-    bool is_left = false;
+/// Clears each group whose first number is less than `least`. Returns whether any group is not 0.
+HWY_INLINE bool clear_small(double least, double* x) {
+    bool any_nonzero = false;
     for (std::size_t group = 0; group < kGroups; ++group) {
         double* const own = x + kGroupColumns * group;
         if (own[0] >= least) {
-            is_left = true;
+            any_nonzero = true;
         } else {
             std::fill_n(own, kGroupColumns, 0.0);
         }
     }
-    return is_left;
+    return any_nonzero;
 }
 
-/// A block with its right sides.
+/// A block and its right sides.
 struct Part {
     const FactorBlock& block;
     const double* triangle;
     const double* below;
     const std::int32_t* rows;
     double* all;
-    double* own;  // those of its columns
-    std::uint8_t* is_there;
-    std::uint8_t* own_is_there;
+    double* own;  // of its own columns
+    std::uint8_t* is_nonzero;
+    std::uint8_t* own_is_nonzero;
 };
 
 HWY_INLINE Part part_of(const BlockFactor& factor, const FactorBlock& block, double* x,
-                        std::uint8_t* is_there) {
+                        std::uint8_t* is_nonzero) {
     const double* const triangle = factor.values.data() + block.first_value;
     return {block,
             triangle,
@@ -86,17 +86,17 @@ HWY_INLINE Part part_of(const BlockFactor& factor, const FactorBlock& block, dou
             factor.rows.data() + block.first_row,
             x,
             x + kSolvedColumns * block.first,
-            is_there,
-            is_there + block.first};
+            is_nonzero,
+            is_nonzero + block.first};
 }
 
-HWY_INLINE bool is_any(const std::uint8_t* is_there, std::size_t count) {
-    return std::find(is_there, is_there + count, std::uint8_t{1}) != is_there + count;
+HWY_INLINE bool is_any(const std::uint8_t* is_nonzero, std::size_t count) {
+    return std::find(is_nonzero, is_nonzero + count, std::uint8_t{1}) != is_nonzero + count;
 }
 
-/// By the triangle. Whether anything is left.
+/// Solves with the triangle. Returns whether any right side is not 0.
 HWY_INLINE bool solve_forward(const Part& part, const double* diagonal, double nothing) {
-    bool is_left = false;
+    bool any_nonzero = false;
     for (std::size_t k = 0; k < part.block.width; ++k) {
         double* const x = part.own + kSolvedColumns * k;
         const double* const values = part.triangle + BlockFactor::triangle(k);
@@ -107,13 +107,13 @@ HWY_INLINE bool solve_forward(const Part& part, const double* diagonal, double n
             }
             store(row, x + at);
         }
-        part.own_is_there[k] = clear_little(nothing * diagonal[k], x) ? 1 : 0;
-        is_left = is_left || part.own_is_there[k] != 0;
+        part.own_is_nonzero[k] = clear_small(nothing * diagonal[k], x) ? 1 : 0;
+        any_nonzero = any_nonzero || part.own_is_nonzero[k] != 0;
     }
-    return is_left;
+    return any_nonzero;
 }
 
-/// What the columns take from the rows below them.
+/// Subtracts the contribution of the block's columns from the rows below.
 HWY_INLINE void spread(const Part& part) {
     const std::size_t width = part.block.width;
     const std::size_t count = part.block.row_count;
@@ -144,10 +144,10 @@ HWY_INLINE void spread(const Part& part) {
             store(row, a + at);
         }
     }
-    for (i = 0; i < count; ++i) part.is_there[part.rows[i]] = 1;
+    for (i = 0; i < count; ++i) part.is_nonzero[part.rows[i]] = 1;
 }
 
-/// What the rows below take from columns [k, k + kColumns).
+/// Subtracts the contribution of the rows below from columns [k, k + kColumns).
 template <std::size_t kColumns>
 HWY_INLINE void collect(const Part& part, std::size_t k) {
     const std::size_t width = part.block.width;
@@ -163,7 +163,7 @@ HWY_INLINE void collect(const Part& part, std::size_t k) {
     }
 }
 
-/// By the triangle, transposed.
+/// Solves with the transposed triangle.
 HWY_INLINE void solve_backward(const Part& part, double nothing) {
     const std::size_t width = part.block.width;
     for (std::size_t k = width; k-- > 0;) {
@@ -176,7 +176,7 @@ HWY_INLINE void solve_backward(const Part& part, double nothing) {
             }
             store(row, x + at);
         }
-        part.own_is_there[k] = clear_little(nothing, x) ? 1 : 0;
+        part.own_is_nonzero[k] = clear_small(nothing, x) ? 1 : 0;
     }
 }
 
@@ -189,18 +189,18 @@ void divide(const double* diagonal, std::size_t width, double* x) {
 
 }  // namespace
 
-void solve(const BlockFactor& factor, double nothing, double* x, std::uint8_t* is_there) {
+void solve(const BlockFactor& factor, double nothing, double* x, std::uint8_t* is_nonzero) {
     for (const FactorBlock& block : factor.blocks) {
-        const Part part = part_of(factor, block, x, is_there);
-        if (!is_any(part.own_is_there, block.width)) continue;
+        const Part part = part_of(factor, block, x, is_nonzero);
+        if (!is_any(part.own_is_nonzero, block.width)) continue;
         if (solve_forward(part, factor.diagonal.data() + block.first, nothing)) spread(part);
     }
     for (std::size_t b = factor.blocks.size(); b-- > 0;) {
         const FactorBlock& block = factor.blocks[b];
-        const Part part = part_of(factor, block, x, is_there);
-        bool is_needed = is_any(part.own_is_there, block.width);
+        const Part part = part_of(factor, block, x, is_nonzero);
+        bool is_needed = is_any(part.own_is_nonzero, block.width);
         for (std::size_t i = 0; i < block.row_count && !is_needed; ++i) {
-            is_needed = is_there[part.rows[i]] != 0;
+            is_needed = is_nonzero[part.rows[i]] != 0;
         }
         if (!is_needed) continue;
         divide(factor.diagonal.data() + block.first, block.width, part.own);

@@ -7,22 +7,22 @@
 namespace sinew {
 namespace {
 
-// A block of one list of bones computes all of them for each vertex. Where that is more than this many times what its
-// vertices have, each has a list of its own.
-constexpr std::size_t kMostShared = 2;
+// A block with one common list of bones computes all of them for each vertex. If the list is more than this many
+// times as long as those of its vertices, each lane gets its own list.
+constexpr std::size_t kMaxShared = 2;
 
 using Row = std::array<float, kMomentNumbers>;
 
-/// Of one vertex.
+/// The moments of one bone at one vertex.
 struct BoneRow {
     std::int32_t bone;
     Row numbers;
 };
 
-/// row  [kMomentFloats]
+/// The bone of a row [kMomentFloats].
 std::int32_t bone_of(const float* row) { return static_cast<std::int32_t>(row[1]); }
 
-/// Whether the row says nothing of its bone.
+/// Whether all numbers of the row are 0.
 bool is_empty(const float* row) {
     return std::all_of(row + 2, row + kMomentFloats, [](float number) { return number == 0.0f; });
 }
@@ -32,7 +32,7 @@ class RowsByVertex {
 public:
     RowsByVertex(const PackedMesh& mesh, std::span<const float> rows) : mesh_(mesh), rows_(rows) {}
 
-    /// Those of lane `lane` of block `b`.
+    /// The rows of the vertex in lane `lane` of block `b`.
     void find(std::size_t b, std::size_t lane, std::vector<BoneRow>& found) const {
         found.clear();
         const auto vertex = static_cast<std::size_t>(mesh_.vertices[b].lane[lane]);
@@ -62,7 +62,7 @@ private:
         return begin;
     }
 
-    /// The vertex alone, by its weights.
+    /// The vertex's rest point as its neighbourhood, with the weights of its influences.
     void add_point(std::size_t b, std::size_t lane, std::vector<BoneRow>& found) const {
         found.clear();
         const Block& block = mesh_.blocks[b];
@@ -115,7 +115,7 @@ private:
         }
         std::ranges::sort(bones);
         bones.erase(std::unique(bones.begin(), bones.end()), bones.end());
-        MomentBlock block{{}, 0, static_cast<std::uint32_t>(bones.size()), bones.size() > kMostShared * most};
+        MomentBlock block{{}, 0, static_cast<std::uint32_t>(bones.size()), bones.size() > kMaxShared * most};
         if (block.mixed) {
             block.bones = static_cast<std::uint32_t>(most);
             bones = own_bones(most);
@@ -131,7 +131,7 @@ private:
         moments_.blocks.push_back(block);
     }
 
-    /// [kLanes][most] the last is repeated.
+    /// [kLanes][most] bones; shorter lists repeat their last bone.
     [[nodiscard]] std::vector<std::int32_t> own_bones(std::size_t most) const {
         std::vector<std::int32_t> bones;
         for (const std::vector<BoneRow>& of_lane : lanes_) {
@@ -151,13 +151,14 @@ private:
                 return before.first_bone;
             }
         }
-        const auto place = static_cast<std::uint32_t>(moments_.bones.size());
+        const auto position = static_cast<std::uint32_t>(moments_.bones.size());
         moments_.bones.insert(moments_.bones.end(), bones.begin(), bones.end());
-        return place;
+        return position;
     }
 
-    [[nodiscard]] float& number_at(const MomentBlock& block, const MomentPlace& place, std::size_t lane) {
-        return moments_.parts[static_cast<std::size_t>(place.part)][row_of(block, place)].lane[lane];
+    [[nodiscard]] float& number_at(const MomentBlock& block, const MomentPosition& position,
+                                   std::size_t lane) {
+        return moments_.parts[static_cast<std::size_t>(position.part)][row_of(block, position)].lane[lane];
     }
 
     void fill(const MomentBlock& block, std::span<const std::int32_t> bones, std::size_t lane) {
@@ -169,13 +170,13 @@ private:
                     ? i
                     : static_cast<std::size_t>(std::ranges::lower_bound(bones, row.bone) - bones.begin());
             for (std::size_t n = 0; n < kMomentNumbers; ++n) {
-                number_at(block, moment_place(k, n), lane) = row.numbers[n];
+                number_at(block, moment_position(k, n), lane) = row.numbers[n];
                 sums[n] += static_cast<double>(row.numbers[n]);
             }
         }
         for (std::size_t n = 1; n < kMomentNumbers; ++n) {
-            const MomentPlace of_all =
-                n < 4 ? MomentPlace{MomentPart::weight, n - 1} : MomentPlace{MomentPart::second, n - 4};
+            const MomentPosition of_all =
+                n < 4 ? MomentPosition{MomentPart::weight, n - 1} : MomentPosition{MomentPart::second, n - 4};
             number_at(block, of_all, lane) = static_cast<float>(sums[n]);
         }
     }
@@ -211,9 +212,9 @@ std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& mom
                 Full row{static_cast<float>(mesh.vertices[b].lane[lane]),
                          static_cast<float>(mesh.used_bones[static_cast<std::size_t>(moments.bones[bone])])};
                 for (std::size_t n = 0; n < kMomentNumbers; ++n) {
-                    const MomentPlace place = moment_place(k, n);
-                    const auto part = static_cast<std::size_t>(place.part);
-                    row[2 + n] = moments.parts[part][row_of(block, place)].lane[lane];
+                    const MomentPosition position = moment_position(k, n);
+                    const auto part = static_cast<std::size_t>(position.part);
+                    row[2 + n] = moments.parts[part][row_of(block, position)].lane[lane];
                 }
                 if (!is_empty(row.data())) found.push_back(row);
             }

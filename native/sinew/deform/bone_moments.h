@@ -12,63 +12,66 @@
 
 namespace sinew {
 
-/// The parts that rows of moments are kept in, each of all blocks one after the other: a variant that needs less reads
-/// less memory. They are
+/// Rows of moments are stored in three parts, each with the rows of all blocks one after the other, so that a
+/// variant reads only the parts that it needs:
 ///
-///     weight  the centroid of each neighbourhood (x, y, z), then of each bone its weight
-///     first   of each bone its first moments
-///     second  the sum of all bones' second moments, then those of each
+///     weight  the centroid of each neighbourhood (x, y, z), then the weight of each bone
+///     first   the first moments of each bone
+///     second  the sum of the second moments over all bones, then those of each bone
 enum class MomentPart : std::size_t { weight, first, second };
 inline constexpr std::size_t kMomentParts = 3;
 
-/// Rows of a block whose vertices have moments of `bones`, of each part.
+/// The number of rows of each part, for a block whose vertices have moments of `bones` bones.
 [[nodiscard]] constexpr std::array<std::size_t, kMomentParts> moment_rows(std::size_t bones) {
     return {3 + bones, 3 * bones, 6 + 6 * bones};
 }
 
-/// Where number `n` of Moments is of the block's rows.
-struct MomentPlace {
+/// The row of a block in which number `n` of a bone's Moments is stored.
+struct MomentPosition {
     MomentPart part;
     std::size_t row;
 };
-[[nodiscard]] constexpr MomentPlace moment_place(std::size_t bone, std::size_t n) {
+[[nodiscard]] constexpr MomentPosition moment_position(std::size_t bone, std::size_t n) {
     if (n == 0) return {MomentPart::weight, 3 + bone};
     if (n < 4) return {MomentPart::first, 3 * bone + n - 1};
     return {MomentPart::second, 6 + 6 * bone + n - 4};
 }
 
-/// Numbers of each bone: weight, first moment, second moment.
+/// Numbers for each bone: weight, first moments, second moments.
 inline constexpr std::size_t kMomentNumbers = kMomentFloats - 2;
 
-/// The moments of a block of a packed mesh.
+/// The moments of one block of a packed mesh.
 struct MomentBlock {
-    std::array<std::uint32_t, kMomentParts> first_rows;  // of BoneMoments::parts
-    std::uint32_t first_bone;  // of BoneMoments::bones: [bones], or if mixed [kLanes][bones]
-    std::uint32_t bones;       // rising; a vertex that lacks one has 0 of it
-    bool mixed;                // every lane has bones of its own
+    std::array<std::uint32_t, kMomentParts> first_rows;  // into BoneMoments::parts
+    std::uint32_t first_bone;  // into BoneMoments::bones: [bones], or if mixed [kLanes][bones]
+    std::uint32_t bones;       // ascending; a vertex without one of them has moments of 0
+    bool mixed;                // every lane has its own bones
 };
 
-/// What a mesh's vertices have of moments, in the order of its blocks. Blocks that follow each other and have the same
-/// bones name them once.
+/// The moments of a mesh's vertices, in the order of its blocks. Consecutive blocks with the same bones share one
+/// list of them.
 struct BoneMoments {
-    std::vector<MomentBlock> blocks;  // [blocks]; empty: the method has none
+    std::vector<MomentBlock> blocks;  // [blocks]; empty if the method has none
     std::array<std::vector<Lanes<float>>, kMomentParts> parts;
     std::vector<std::int32_t> bones;  // indices into PackedMesh::used_bones
 };
 
-/// The row of a block.
-[[nodiscard]] inline std::size_t row_of(const MomentBlock& block, const MomentPlace& place) {
-    return block.first_rows[static_cast<std::size_t>(place.part)] + place.row;
+/// The index into BoneMoments::parts of a row of a block.
+[[nodiscard]] inline std::size_t row_of(const MomentBlock& block, const MomentPosition& position) {
+    return block.first_rows[static_cast<std::size_t>(position.part)] + position.row;
 }
 
-/// The bones of the rows, in any order, any number of times. Those of rows of 0 alone are left out.
+/// The bones of the rows [any number][kMomentFloats], in any order and possibly repeated. Rows that are all 0 are
+/// left out.
 [[nodiscard]] std::vector<std::int32_t> bones_of_moments(std::span<const float> rows);
 
-/// rows  [any number][kMomentFloats] by rising vertices and bones, each once; these bones are used ones of `mesh`. A
-///       vertex without rows has its rest point as its neighbourhood.
+/// Packs the moments in the order of the mesh's blocks.
+///
+/// rows  [any number][kMomentFloats] in ascending order of vertices and bones, each pair once; their bones are
+///       among mesh.used_bones. The neighbourhood of a vertex without rows is its own rest point.
 [[nodiscard]] BoneMoments pack_moments(const PackedMesh& mesh, std::span<const float> rows);
 
-/// Undoes pack_moments(), but for rows of 0 alone.
+/// The inverse of pack_moments(), without rows that are all 0.
 [[nodiscard]] std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& moments);
 
 }  // namespace sinew

@@ -25,7 +25,7 @@ public:
             const Lanes<float>* const weights = &rows_[block.first_row] + 3;
             for (std::size_t lane = 0; lane < kLanes; ++lane) {
                 std::size_t count = block.influences;
-                // Fewer influences are filled up with weight 0.
+                // Vertices with fewer influences are padded with weight 0.
                 while (count > 1 && weights[count - 1].lane[lane] == 0.0f) --count;
                 add(block.first_bone + block.influences * lane, count, block.influences);
             }
@@ -35,7 +35,8 @@ public:
     }
 
 private:
-    /// length  of what is at `first`, of which `count` bones are the set
+    /// Adds the set of the `count` bones from `first` on, and its entries, which are `length` in all with
+    /// padding.
     void add(std::size_t first, std::size_t count, std::size_t length) {
         const std::span of(mesh_.bones.data() + first, count);
         const std::uint32_t begin = sets_.offsets[find(of)];

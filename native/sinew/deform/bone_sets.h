@@ -9,16 +9,18 @@
 
 namespace sinew {
 
-/// The sets of bones of a mesh, each once, for methods that work something out of each set.
+/// The sets of bones that a mesh's vertices have, each once. For methods that compute something for each set
+/// (Sbs).
 struct BoneSets {
     std::vector<std::uint32_t> offsets{0};  // [sets + 1] into `bones`
     std::vector<std::uint32_t> bones;       // [entries] indices into PackedMesh::used_bones
-    std::vector<std::int32_t> entries;  // [PackedMesh::bones] the entry of each; of weight 0 any of its set
+    // [PackedMesh::bones] an index into `bones` for each; where the weight is 0, any of its set
+    std::vector<std::int32_t> entries;
 };
 
-/// In the order of the mesh's blocks. Bones in another order are another set.
+/// Finds the sets, in the order of the mesh's blocks. The same bones in another order are another set.
 ///
-/// rows  those of `mesh` or a copy of them
+/// rows  mesh.rows, or a copy of them
 [[nodiscard]] BoneSets find_bone_sets(const PackedMesh& mesh, std::span<const Lanes<float>> rows);
 
 }  // namespace sinew

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bones in lanes: compiled once for each instruction set, see kernels/.
+// Motions of bones, with one bone in each lane. Compiled once for each instruction set, see kernels/.
 #if defined(SINEW_DEFORM_BONES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_BONES_INL_H_
 #undef SINEW_DEFORM_BONES_INL_H_
@@ -16,12 +16,12 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-// In double, as the digits that a bone loses are lost to each of its vertices.
+// In double, because digits that a bone loses are lost for each of its vertices.
 using BoneTag = hn::CappedTag<double, 8>;
 using BoneVec = Vec<BoneTag>;
 using BonePoints = Points<BoneTag>;
 
-/// Affine transforms by their columns.
+/// Affine transforms, by columns.
 struct Motions {
     BonePoints x;
     BonePoints y;
@@ -33,7 +33,7 @@ HWY_INLINE BoneVec dot(const BonePoints& a, const BonePoints& b) {
     return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
-/// The motions of the bones `used`: at most as many as there are lanes; the last is repeated.
+/// The motions of the bones `used`, at most as many as there are lanes. Further lanes repeat the last bone.
 HWY_INLINE Motions load_motions(std::span<const Affine<float>> posed_from_rest,
                                 std::span<const std::int32_t> used) {
     const BoneTag d;
@@ -69,8 +69,8 @@ struct Quats {
     BonePoints v;
 };
 
-/// to_quat() without branches: of the four multiples of the quaternion, each by a component of its own, the
-/// one by the largest.
+/// to_quat() without branches. The matrix gives four multiples of the quaternion, each by one of its components;
+/// the multiple by the largest component is the most accurate.
 HWY_INLINE Quats rotations(const Motions& m) {
     const BoneTag d;
     const BoneVec one = hn::Set(d, 1.0);
@@ -100,7 +100,7 @@ HWY_INLINE Quats rotations(const Motions& m) {
     return {hn::Mul(scale, q.w), {hn::Mul(scale, q.v.x), hn::Mul(scale, q.v.y), hn::Mul(scale, q.v.z)}};
 }
 
-/// TargetKernel::prepare of a rigid method.
+/// TargetKernel::prepare for a rigid method.
 template <class Rigid>
 void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
                    Palette& palette) {

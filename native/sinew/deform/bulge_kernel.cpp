@@ -20,7 +20,8 @@ namespace HWY_NAMESPACE {
 
 #if HWY_TARGET == HWY_AVX2
 
-/// The points of vertices anywhere, each by a masked load: a gather takes several times as long on some processors.
+/// Loads points of arbitrary vertices, each with a masked load. A gather takes several times as long on some
+/// processors.
 HWY_INLINE Points<Full> load_each(Full d, const std::int32_t* vertices, const Vec3<float>* points) {
     const hn::CappedTag<float, 4> four;
     const auto three = hn::FirstN(four, 3);
@@ -65,7 +66,7 @@ HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b,
     }
 }
 
-/// The point of the bone's segment that is nearest to `p`.
+/// The point of the bone's segment nearest to `p`.
 template <class D>
 HWY_INLINE Points<D> nearest_of_segment(D d, const BulgeBone& bone, const Points<D>& p) {
     const float* const head = bone.head.value.data();
@@ -90,8 +91,10 @@ HWY_INLINE Vec<D> squared_length(const Points<D>& v) {
     return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::Mul(v.z, v.z)));
 }
 
-/// The bones and weights of the lanes: bone_of(k), and weight_of(k) of one.
+/// Limits the points of some lanes.
 ///
+/// bone_of     bone_of(k) returns the k-th bone
+/// weight_of   weight_of(k) returns its weight in each lane
 /// kStretched  whether a bone may stretch
 template <BulgeForm kForm, bool kStretched, class D, class BoneOf, class WeightOf>
 HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::size_t lane, std::size_t count,
@@ -132,7 +135,7 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
     const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
     if (frame.model_from_bones == nullptr) return add_scaled<D>(point, share, to_bones);
     const float* const rows = frame.model_from_bones->value.data();
-    // A vector, which has no translation.
+    // A vector: the translation does not apply.
     const auto rotated = [&](const float* row, Vec<D> of) HWY_ATTR {
         return hn::MulAdd(
             hn::Set(d, row[0]), to_bones.x,
@@ -143,7 +146,7 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
         {rotated(rows, to_bones.x), rotated(rows + 4, to_bones.y), rotated(rows + 8, to_bones.z)});
 }
 
-/// Blocks [begin, end), which have the same bones: two or more.
+/// Limits blocks [begin, end) with the same bones, two or more.
 ///
 /// kCount  their influences, or 0 for any number
 template <BulgeForm kForm, bool kStretched, std::size_t kCount>
@@ -172,7 +175,7 @@ void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_
     }
 }
 
-/// A block whose vertices have bones of their own, one by one.
+/// Limits a mixed block, vertex by vertex.
 template <BulgeForm kForm, bool kStretched>
 void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t b) {
     const One d;
@@ -273,7 +276,8 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
                 if (weight > most) of_heaviest = distance;
                 most = weight > most ? weight : most;
             }
-            // As limited() rounds it, so that it stays where the mean is as short: of bones that lie in one line.
+            // Also with limited()'s rounding of the mean vector, so that rest points are not moved where that
+            // vector is as long as the mean distance: for bones in one line.
             frame.distances[0][b].lane[lane] =
                 kAllowance * HWY_MAX(mean, length_of(subtract<One>(nearest, p)));
             frame.distances[1][b].lane[lane] = kAllowance * of_heaviest;

@@ -17,7 +17,7 @@
 namespace sinew {
 namespace {
 
-// As of Deformer.
+// As in Deformer.
 constexpr std::size_t kVerticesWorthAThread = 32768;
 constexpr std::size_t kBlocksOfAChunk = 256;
 
@@ -60,7 +60,7 @@ void check_space(const Affine<float>& bones_from_model) {
     }
 }
 
-/// Whether a motion keeps lengths.
+/// Whether a motion preserves lengths.
 bool is_orthonormal(const Mat3<double>& m) {
     const Mat3<double> products = glm::transpose(m) * m - Mat3<double>(1.0);
     double largest = 0.0;
@@ -81,14 +81,14 @@ struct BulgeLimit::State {
     PackedMesh mesh;
     std::size_t vertex_count = 0;
     std::size_t bone_count = 0;
-    std::vector<BoneSegment<float>> segments;  // of mesh.used_bones
-    std::vector<Lanes<float>> weights;         // [blocks], or none
-    std::vector<Lanes<float>> distances[2];    // as of BulgeFrame
+    std::vector<BoneSegment<float>> segments;  // for each of mesh.used_bones
+    std::vector<Lanes<float>> weights;         // [blocks], or empty
+    std::vector<Lanes<float>> distances[2];    // as in BulgeFrame
     Affine<float> bones_from_model;
     bool same_space = true;
     Float4 to_bones[kDisplacementRows];
     Float4 to_model[kDisplacementRows];
-    mutable std::vector<BulgeBone> bones;  // of one call
+    mutable std::vector<BulgeBone> bones;  // scratch for one call
     mutable std::mutex mutex;
 };
 
@@ -118,7 +118,7 @@ BulgeLimit::State::State(const BulgeLimitData& data) {
 }
 
 BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
-    // Distances are only written by measure(), which no other call runs beside.
+    // measure() alone writes the distances, and no other call runs at the same time.
     return {&mesh,
             bones.data(),
             {const_cast<Lanes<float>*>(distances[0].data()), const_cast<Lanes<float>*>(distances[1].data())},

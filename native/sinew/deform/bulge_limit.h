@@ -12,55 +12,55 @@
 
 namespace sinew {
 
-/// What a BulgeLimit is made of. Nothing is kept by reference.
+/// The data that a BulgeLimit is constructed from. No reference is kept.
 struct BulgeLimitData {
     BindData mesh;                                 // rest bones and vertex data are not read
     std::span<const BoneSegment<float>> segments;  // [bones] at rest, in the space of posed_from_rest
-    Affine<float> bones_from_model{};              // takes rest points to that space; invertible
+    Affine<float> bones_from_model{};              // maps rest points to that space; invertible
     std::span<const float> weights{};  // [vertices] of the vertex group, clamped to 0 to 1; empty: all 1
 };
 
-/// How one frame is limited.
+/// How to limit one frame.
 struct BulgeLimitOptions {
     BulgeForm form = BulgeForm::continuous;
     float strength = 1.0f;    // clamped to 0 to 1; NaN: 1
-    std::size_t threads = 0;  // 0: as many as help
+    std::size_t threads = 0;  // 0: as many as useful
 };
 
-/// The stage `bulge_limit` (skinning/bulge_limit.h) of one mesh, after Deformer::deform(). Once constructed it is valid,
-/// and applying it can not fail and allocates nothing. Calls of one object wait for each other. One that was moved from
-/// can only be assigned to or destroyed.
+/// The stage `bulge_limit` (skinning/bulge_limit.h) for one mesh, applied after Deformer::deform(). A constructed
+/// object is valid; apply() can not fail and does not allocate. Concurrent calls on one object wait for each
+/// other. A moved-from object can only be assigned to or destroyed.
 class SINEW_EXPORT BulgeLimit {
 public:
-    /// Throws std::invalid_argument that names the field, what was wanted and what came: as Binding does, and for fewer
-    /// segments than bones, values that are not finite, a transform of determinant 0 and weights that are NaN or not one
-    /// for each vertex.
+    /// Throws std::invalid_argument that names the field, what was expected and what was given: as Binding does,
+    /// and for fewer segments than bones, values that are not finite, a singular transform, weights that are NaN,
+    /// and a number of weights other than that of vertices.
     explicit BulgeLimit(const BulgeLimitData& data);
 
     BulgeLimit(BulgeLimit&&) noexcept;
     BulgeLimit& operator=(BulgeLimit&&) noexcept;
     ~BulgeLimit();
 
-    /// Other rest points [vertices], or the same in another space: it takes about as long as to apply it. Throws as the
-    /// constructor does, and is then as it was.
+    /// Sets other rest points [vertices], or the same points with another bones_from_model. Takes about as long
+    /// as apply(). Throws as the constructor does; the object is then unchanged.
     void set_rest_points(std::span<const Vec3<float>> rest_points,
                          const Affine<float>& bones_from_model = {});
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
-    /// One more than the highest bone that an influence names.
+    /// One more than the highest bone index in the influences.
     [[nodiscard]] std::size_t bone_count() const noexcept;
 
-    /// Limits in place.
+    /// Limits the points in place.
     ///
-    /// points           [vertices] deformed, model space; of another size nothing is written
-    /// posed_from_rest  [bones, at least bone_count()] finite; bones that it lacks stay at rest
+    /// points           [vertices] deformed, model space; if the size is wrong, nothing is written
+    /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
     ///
-    /// A vertex of fewer than two bones stays, as do all in the rest pose, to the bit. The result does not depend on the
-    /// number of threads.
+    /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. The
+    /// result does not depend on the number of threads.
     void apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                const BulgeLimitOptions& options = {}) const noexcept;
 
-    /// What it was made of, to make it anew with the same bits.
+    /// The data that the object was constructed from. An object made of it gives the same bits.
     struct Parts {
         BoundMesh mesh;
         std::vector<BoneSegment<float>> segments;

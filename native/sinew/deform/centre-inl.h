@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rows of bones for methods that rotate about a point which the bones move: compiled once for each instruction set, see
-// kernels/.
+// Rows of bones for methods that rotate a vertex about a point that the bones move. Compiled once for each
+// instruction set, see kernels/.
 #if defined(SINEW_DEFORM_CENTRE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_CENTRE_INL_H_
 #undef SINEW_DEFORM_CENTRE_INL_H_
@@ -14,12 +14,12 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// What kernels of such rows have alike. A row is the rotation (w, x, y, z), then the rows of what the motion adds to
-/// a point.
+/// The common part of these kernels. A row is the rotation (w, x, y, z), then the displacement rows of the
+/// motion.
 struct CentreRows {
     static constexpr std::size_t kNumbers = 16;
 
-    /// The translation that also moves by the rotated scale.
+    /// Adds the displacement by the bone's scale, rotated, to the translation.
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D, kNumbers>& sum) {
@@ -35,7 +35,7 @@ struct CentreRows {
         const BoneTag d;
         const BoneVec two = hn::Set(d, 2.0);
         const BonePoints v{hn::Mul(two, q.v.x), hn::Mul(two, q.v.y), hn::Mul(two, q.v.z)};
-        // 2 v v^T - 2 |v|^2 + 2 w [v]x: the rotation without the identity.
+        // The rotation minus the identity: 2 v v^T - 2 |v|^2 + 2 w [v]x.
         const BoneVec xx = hn::Mul(v.x, q.v.x);
         const BoneVec yy = hn::Mul(v.y, q.v.y);
         const BoneVec zz = hn::Mul(v.z, q.v.z);
@@ -58,7 +58,7 @@ struct CentreRows {
     }
 };
 
-/// Linear blending, where a method has nothing else for a vertex.
+/// Linear blending, for vertices without data of the method.
 struct LinearRows : CentreRows {
     static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 0;

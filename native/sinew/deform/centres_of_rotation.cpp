@@ -17,17 +17,17 @@ namespace sinew {
 namespace {
 
 constexpr double kSigma = 0.1;
-// Edges along which weights change by this are halved.
+// Edges along which weights change by this much are halved.
 constexpr double kSplit = 0.1;
 constexpr double kCellsOfOne = 64.0;
 
-// Cells are summed up this many at a time, by as many sums: what a compiler makes vectors of.
+// Cells are summed in strips of this size, with a sum for each position, which compilers vectorise.
 constexpr std::size_t kStrip = 8;
 
 constexpr std::size_t kTrianglesBetweenReports = 4096;
 constexpr std::size_t kVerticesOfAChunk = 256;
 
-/// The influences of a vertex, each bone once.
+/// Merges the influences of a vertex, so that each bone occurs once.
 void merge(std::span<const Influence<float>> influences, std::vector<Influence<double>>& merged) {
     merged.clear();
     for (const Influence<float>& influence : influences) {
@@ -41,13 +41,13 @@ void merge(std::span<const Influence<float>> influences, std::vector<Influence<d
     }
 }
 
-/// Numbers of pairs of bones, from 0 on in the order in which they come.
+/// Numbers pairs of bones from 0 on, in the order in which they are added.
 class PairNumbers {
 public:
     std::uint32_t find_or_add(std::int32_t a, std::int32_t b) {
         return numbers_.try_emplace(key(a, b), static_cast<std::uint32_t>(numbers_.size())).first->second;
     }
-    /// Null where no triangle has both.
+    /// Null if no triangle has both bones.
     [[nodiscard]] const std::uint32_t* find(std::int32_t a, std::int32_t b) const {
         const auto found = numbers_.find(key(a, b));
         return found == numbers_.end() ? nullptr : &found->second;
@@ -61,16 +61,16 @@ private:
     std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
 };
 
-/// Triangles that count as one for a pair of bones. All sums are weighted by area times the pair's weights.
+/// Triangles that are treated as one for a pair of bones. All sums are weighted by area times the pair's weights.
 struct Cell {
     std::uint32_t pair = 0;
     double mass = 0.0;
     Vec3<double> centroids{0.0};
-    double first = 0.0;  // weights of the pair's bones
+    double first = 0.0;  // sums of the weights of the pair's bones
     double second = 0.0;
 };
 
-/// Cells by their pair and rounded weights.
+/// Finds cells by their pair and rounded weights.
 class CellTable {
 public:
     std::uint32_t find_or_add(std::uint64_t key, std::uint32_t next) {
@@ -109,7 +109,7 @@ private:
     std::size_t used_ = 0;
 };
 
-/// Splits triangles and adds up what is left of them in cells.
+/// Splits triangles and adds the parts to cells.
 class Collector {
 public:
     explicit Collector(bool exact) : exact_(exact) {}
@@ -123,7 +123,7 @@ public:
                     bones_.push_back(influence.bone);
             }
         }
-        // Where all are of one bone there is no pair.
+        // A triangle of a single bone has no pairs.
         if (bones_.size() < 2) return;
         std::ranges::sort(bones_);
         pairs_.assign(bones_.size() * bones_.size(), kNone);
@@ -145,7 +145,7 @@ private:
     static constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
     using Points = std::array<Vec3<double>, 3>;
-    using Corners = std::array<std::size_t, 3>;  // where the weights of each begin in weights_
+    using Corners = std::array<std::size_t, 3>;  // index into weights_ where each corner's weights start
 
     void split(const Points& points, const Corners& corners) {
         std::size_t widest = 0;
@@ -226,13 +226,14 @@ private:
     PairNumbers numbers_;
     std::vector<Cell> cells_;
     CellTable table_;
-    // Of the triangle at work.
-    std::vector<std::int32_t> bones_;   // rising
+    // Scratch for the current triangle.
+    std::vector<std::int32_t> bones_;   // ascending
     std::vector<std::uint32_t> pairs_;  // [bones][bones] their numbers
-    std::vector<double> weights_;       // [corners][bones], and those of edges that were halved
+    // [corners][bones], followed by those of the midpoints of halved edges
+    std::vector<double> weights_;
 };
 
-/// exp(-y) of y >= 0, to 2e-7; 0 from 2^-126 on. Without a branch, so that a compiler makes vectors of it.
+/// exp(-y) for y >= 0, to 2e-7; 0 from 2^-126 on. Without a branch, so that compilers vectorise it.
 inline float exponential(float y) {
     const float t = std::min(y * 1.44269504f, 127.0f);
     const auto whole = static_cast<std::int32_t>(t);
@@ -247,7 +248,7 @@ inline float exponential(float y) {
 
 inline double exponential(double y) { return std::exp(-y); }
 
-/// The cells of all pairs, pair by pair, in strips of kStrip of which the last is filled up with cells of no mass.
+/// The cells of all pairs, pair by pair, in strips of kStrip. A pair's last strip is padded with cells of mass 0.
 template <class T>
 class PairSums {
 public:
@@ -268,7 +269,7 @@ public:
             const std::size_t i = next[cell.pair]++;
             Strip& strip = strips_[starts_[cell.pair] + i / kStrip];
             const std::size_t lane = i % kStrip;
-            // By the sum of all, as areas may have any size.
+            // Relative to the total, as areas may have any magnitude.
             const double mass = cell.mass / total;
             const Vec3<double> moment = mass * (cell.centroids / cell.mass - origin);
             strip.first[lane] = static_cast<T>(cell.first / (cell.mass * kSigma));
@@ -280,7 +281,8 @@ public:
         }
     }
 
-    /// Adds what a vertex of these weights has of `pair` to the mass and the moment about the origin.
+    /// Adds the contribution of `pair` at a vertex with these weights to the mass and to the moment about the
+    /// origin.
     void add(std::size_t pair, double first, double second, double& mass, Vec3<double>& moment) const {
         const auto a = static_cast<T>(first);
         const auto b = static_cast<T>(second);

@@ -12,22 +12,24 @@
 
 namespace sinew {
 
-/// The optimised centre of rotation of each vertex [vertices], model space: what Cor keeps of it (Le, Hodgins 2016).
+/// The optimised centre of rotation of each vertex [vertices], model space: the vertex data of Cor (Le, Hodgins
+/// 2016).
 ///
 ///     c_i = sum over triangles t of s(w_i, w_t) A_t g_t / sum of s(w_i, w_t) A_t
 ///     s(a, b) = sum over pairs of bones j, k of a_j a_k b_j b_k exp(-((a_j b_k - a_k b_j) / 0.1)^2)
 ///
-/// A is the area of a triangle, g its centroid and w the mean of its corners' weights. Edges along which weights change
-/// by 0.1 and more are halved before, so that weights within a triangle are alike. A vertex of one bone, or one whose
-/// bones no triangle shares, is its own centre.
+/// A_t is the area of triangle t, g_t its centroid and w_t the mean of its corners' weights. Edges along which
+/// weights change by 0.1 or more are halved first, so that weights within a triangle are similar. A vertex of one
+/// bone, or one whose bones no triangle shares, is its own centre.
 ///
-/// The sum of a pair of bones depends on two weights alone. So triangles whose two weights round to the same 1/64 are
-/// added up, for each pair, and count by their mean: centres are off by a few thousandths of a limb's diameter.
+/// The term of a pair of bones depends on two weights only. Triangles whose two weights round to the same 1/64
+/// are therefore summed for each pair, and represented by their mean. Centres deviate by a few thousandths of a
+/// limb's diameter.
 ///
 /// data       rest points and influences; the rest is not read
-/// triangles  [3 x triangles] vertices of the corners; may be of no area
+/// triangles  [3 x triangles] vertices of the corners; triangles may have area 0
 ///
-/// Nothing where `progress` cancelled it. The result does not depend on the number of threads. Throws
+/// Returns nullopt if `progress` cancelled. The result does not depend on the number of threads. Throws
 /// std::invalid_argument as Binding does, and for a corner that is no vertex.
 [[nodiscard]] SINEW_EXPORT std::optional<std::vector<Vec3<float>>> centres_of_rotation(
     const BindData& data, std::span<const std::int32_t> triangles, const PrecomputeOptions& options = {});

@@ -7,7 +7,7 @@
 namespace sinew {
 namespace {
 
-// How far from 1 the sum of normalised weights may be, each of which was rounded.
+// How far the sum of normalised weights may be from 1, since each was rounded.
 constexpr double kNormalised = 1e-5;
 
 template <class T>
@@ -115,7 +115,8 @@ BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rows,
     const std::size_t named =
         mesh.used_bones.empty() ? 0 : static_cast<std::size_t>(mesh.used_bones.back()) + 1;
     if (named < bone_count) {
-        // Named without weight, and dropped: of the last vertex, which takes it without weight.
+        // The highest bone was named by an influence without weight, which was dropped: give it back to the last
+        // vertex.
         bound.influence_bones.push_back(static_cast<std::int32_t>(bone_count) - 1);
         bound.influence_weights.push_back(0.0f);
         ++bound.influence_offsets.back();

@@ -14,28 +14,32 @@ namespace sinew {
 /// Throws std::invalid_argument "`argument`: expected `wanted`, got `got`".
 [[noreturn]] void fail(const std::string& argument, const std::string& wanted, const std::string& got);
 
-/// Throws where a point is not finite.
+/// Throws if a point is not finite.
 void check_points(std::span<const Vec3<float>> points);
 
-/// bone_count  one more than the highest bone that an influence names
+/// Throws if there are some but fewer than `bone_count` rest bones, or if one is not finite.
+///
+/// bone_count  one more than the highest bone index in the influences
+/// bone_count  one more than the highest bone index in the influences
 void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
 
-/// Throws as Binding says, but for rest bones and vertex data.
+/// Throws as Binding does, except for rest bones and vertex data, which are not checked.
 void check(const BindData& data);
 
-/// Influences of positive weight, of sum 1 for each vertex that has any.
+/// Influences of positive weight. The weights of each vertex that has any have sum 1.
 struct NormalisedInfluences {
     std::vector<std::uint32_t> offsets{0};  // [vertices + 1]
     std::vector<Influence<float>> influences;
 };
 
-/// Throws where `triangles` [3 x any number] has a corner that is no vertex.
+/// Throws if `triangles` [3 x any number] has a corner that is no vertex.
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);
 
-/// What `mesh` was packed of, as far as points, weights and the highest bone are concerned.
+/// The points and influences that `mesh` was packed from.
 ///
-/// rows        of `mesh`, or with other rest points
-/// bone_count  one more than the highest bone that was named; a bone named without weight is named so again
+/// rows        mesh.rows, or a copy with other rest points
+/// bone_count  one more than the highest bone index; if only an influence without weight named that bone, the
+///             result has such an influence too
 [[nodiscard]] BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rows,
                                    std::size_t vertex_count, std::size_t bone_count);
 

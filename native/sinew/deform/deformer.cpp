@@ -25,11 +25,10 @@ namespace {
 // Below this, waking a second thread costs more than it saves.
 constexpr std::size_t kVerticesWorthAThread = 32768;
 
-// 4096 vertices: small enough to even out threads of unequal speed, large enough that taking one costs
-// nothing.
+// 4096 vertices: few enough to balance threads of unequal speed, many enough that fetching a chunk costs nothing.
 constexpr std::size_t kBlocksOfAChunk = 256;
 
-/// The kernel of each method, in the order of the list.
+/// The kernel of each method, in the order of Methods.
 const Kernel& kernel_at(std::size_t method) noexcept {
     static const auto kernels =
         std::apply([](const auto&... methods) { return std::array{&methods.kernel()...}; }, Methods{});
@@ -72,7 +71,7 @@ void check_moments(const std::string& name, std::span<const float> rows, std::si
     }
 }
 
-/// The index of the method.
+/// Checks vertex data and returns the index of its method.
 std::size_t checked_vertex_data(const VertexData& data, std::size_t vertex_count) {
     const std::size_t index = checked_method("vertex_data", data.method);
     const std::string name(kMethods[index].name);
@@ -95,7 +94,7 @@ std::size_t checked_vertex_data(const VertexData& data, std::size_t vertex_count
     return index;
 }
 
-/// Of one method in one frame; one more than needed, as there may be none.
+/// The parameters of one method for one frame. One more than the maximum, which may be 0.
 using ParameterValues = std::array<double, kMaxMethodParameters + 1>;
 
 ParameterValues valid_values(const MethodInfo& method, std::span<const double> given) noexcept {
@@ -125,14 +124,15 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
 struct Binding::Packed {
     explicit Packed(const BindData& data);
 
-    /// With the rest points of `rows`.
+    /// The mesh with the rest points in `rows`.
     [[nodiscard]] BoundMesh unpack(std::span<const Lanes<float>> rows) const;
 
     PackedMesh mesh;
-    std::vector<Affine<float>> rest_bones;      // of mesh.used_bones; or empty: all identity
-    std::vector<std::int32_t> stretched_bones;  // of mesh.used_bones, those whose axes are not of unit length
-    std::array<std::vector<Lanes<float>>, kMethodCount> vertex_rows;  // of each method; empty: none
-    std::array<BoneMoments, kMethodCount> moments;                    // of methods that keep these
+    std::vector<Affine<float>> rest_bones;  // for each of mesh.used_bones; empty: all identity
+    // indices into mesh.used_bones of bones whose axes are not of unit length
+    std::vector<std::int32_t> stretched_bones;
+    std::array<std::vector<Lanes<float>>, kMethodCount> vertex_rows;  // for each method; empty: none
+    std::array<BoneMoments, kMethodCount> moments;                    // for methods that keep moments
     std::size_t vertex_count;
     std::size_t influence_count;
     std::size_t bone_count = 0;
@@ -144,7 +144,8 @@ Binding::Packed::Packed(const BindData& data) {
     for (const std::int32_t bone : data.influence_bones) {
         bone_count = std::max(bone_count, static_cast<std::size_t>(bone) + 1);
     }
-    // They may be others than those of the influences, whose weights may depend on where the vertices are.
+    // Vertex data may name bones that no influence names, since its weights may depend on the vertices'
+    // positions.
     std::vector<std::int32_t> bones_of_vertex_data;
     for (const VertexData& of_method : data.vertex_data) {
         if (!kMethods[checked_vertex_data(of_method, vertex_count)].keeps_moments) continue;
@@ -205,7 +206,7 @@ struct Deformer::State {
     State(std::shared_ptr<const Binding::Packed> packed, std::vector<Lanes<float>> own_rows,
           const MethodInfo& method, const std::optional<MixData>& mix);
 
-    /// With the rows of `packed`, which nothing else reads.
+    /// With its own binding, whose rows it moves out of `packed`, since nothing else reads them.
     static std::unique_ptr<State> alone(const BindData& data, const MethodInfo& method,
                                         const std::optional<MixData>& mix) {
         const auto packed = std::make_shared<Binding::Packed>(data);
@@ -222,11 +223,11 @@ struct Deformer::State {
     }
 
     std::shared_ptr<const Binding::Packed> packed;
-    std::vector<Lanes<float>> own_rows;  // empty: those of the binding
-    std::array<std::size_t, 2> methods;  // indices in the list; the second is that of the mix
+    std::vector<Lanes<float>> own_rows;  // empty: use those of the binding
+    std::array<std::size_t, 2> methods;  // indices into Methods; the second is that of the mix
     std::array<const Kernel*, 2> kernels;
     std::optional<MixWeights> mix;
-    BoneSets sets;  // none unless a kernel wants them
+    BoneSets sets;  // empty unless a kernel needs sets
     PaletteStore palettes;
 
 private:
@@ -315,7 +316,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         Palette& palette = reading.palette(k);
         prepare(kernel, bones, palette);
         if (kernel.set_bone_size > 0) {
-            // The pairs are those of bones, not of rows: each set is tested.
+            // mesh.pairs are pairs of bones, but these rows belong to sets, so each set has to be tested.
             std::fill_n(palette.may_be_plain, state_->sets.bones.size(), std::uint8_t{1});
         } else {
             find_plain(packed.mesh.pairs, packed.mesh.used_bones.size(), palette);
@@ -337,7 +338,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     const std::size_t threads = options.threads > 0
                                     ? options.threads
                                     : std::min(hardware_threads(), 1 + points.size() / kVerticesWorthAThread);
-    // By one reference: a larger capture makes std::function allocate.
+    // A single reference: with a larger capture std::function would allocate.
     parallel_for(
         packed.mesh.blocks.size(), threads,
         [&work](std::size_t begin, std::size_t end) {

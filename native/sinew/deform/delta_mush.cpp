@@ -19,7 +19,8 @@ namespace {
 // Below this, waking a second thread at each iteration costs more than it saves.
 constexpr std::size_t kVerticesWorthAThread = 16384;
 
-// So many iterations go over the mesh one close behind the other, while what they read is in the cache.
+// This many iterations run over the mesh closely one behind the other, so that what they read is still in the
+// cache.
 constexpr std::size_t kIterationsTogether = 8;
 
 // With a radius, the share of vertices whose edges may be too short for the number of iterations.
@@ -55,13 +56,14 @@ void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& se
 
 Float4 float4_of(const Vec3<float>& point) { return {{point.x, point.y, point.z, 0.0f}}; }
 
-/// How often a mesh is smoothed, and by how much each of its vertices in its order: the factor of its own alone.
+/// How often a mesh is smoothed, and the factor of each vertex in the order of the mesh, not yet divided by its
+/// number of neighbours.
 struct Amount {
     std::size_t iterations;
     std::vector<float> factors;
 };
 
-/// The mean square of the lengths of each vertex's edges at rest, in the order of the mesh; 0 without edges.
+/// The mean squared length of each vertex's edges at rest, in the order of the mesh; 0 without edges.
 std::vector<double> squared_lengths(const MushMesh& mesh, std::span<const Vec3<float>> rest_points) {
     std::vector<double> squared(mesh.vertices.size());
     const auto point = [&](std::size_t i) { return Vec3<double>(rest_points[mesh.vertices[i]]); };
@@ -94,7 +96,7 @@ Amount amount_of(const MushMesh& mesh, std::span<const Vec3<float>> rest_points,
         sorted.begin() + static_cast<std::ptrdiff_t>(kShareOfShortest * static_cast<double>(sorted.size()));
     std::ranges::nth_element(sorted, shortest);
     const auto radius = static_cast<double>(settings.radius);
-    // What the factors of all iterations have to add up to, times the square of the length of edges.
+    // What the factors of all iterations must sum to, times the squared length of edges.
     const double wanted = (settings.type == SmoothType::length_weighted ? 4.0 : 2.0) * radius * radius;
     const double iterations = std::ceil(wanted / (static_cast<double>(settings.factor) * *shortest));
     amount.iterations = static_cast<std::size_t>(std::clamp(iterations, 1.0, DeltaMushStage::kMaxIterations));
@@ -118,7 +120,7 @@ struct DeltaMush::State {
 
     void bind(std::span<const Vec3<float>> points, const DeltaMushSettings& with);
 
-    /// Smooths smoothed[0]; the index of the result.
+    /// Smooths smoothed[0]. Returns the index of the result in `smoothed`.
     std::size_t smooth(const MushKernel& kernel, std::size_t threads) const noexcept;
 
     [[nodiscard]] std::size_t threads_for(std::size_t threads) const noexcept {
@@ -126,7 +128,7 @@ struct DeltaMush::State {
         return std::min(hardware_threads(), 1 + mesh.vertices.size() / kVerticesWorthAThread);
     }
 
-    // As they came.
+    // The data given to the constructor.
     std::vector<std::int32_t> face_offsets;
     std::vector<std::int32_t> corner_vertices;
     std::vector<std::int32_t> edges;
@@ -136,11 +138,11 @@ struct DeltaMush::State {
 
     MushMesh mesh;
     std::size_t iterations = 0;
-    std::vector<float> factors;        // as MushFrame has them, and room for a vector
-    bool is_uniform = true;            // as of MushFrame
-    std::vector<MushDetails> details;  // as MushBlock::first_detail
+    std::vector<float> factors;        // as in MushFrame, with room for one more vector
+    bool is_uniform = true;            // as in MushFrame
+    std::vector<MushDetails> details;  // indexed by MushBlock::first_detail
 
-    // Of one call at a time. Those beyond the vertices stay 0.
+    // Scratch for one call at a time. Elements beyond the vertices stay 0.
     mutable std::mutex mutex;
     std::vector<Float4> kept;
     mutable std::vector<Float4> smoothed[2];
@@ -176,15 +178,16 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
         kept[i] = smoothed[0][i] = float4_of(rest_points[mesh.vertices[i]]);
     }
-    // By the kernels that smooth each frame, so that the rest pose comes out as it was.
+    // Uses the kernels that smooth each frame, so that the rest pose is reproduced.
     const MushKernel kernel = mush_kernel();
     const std::size_t result = smooth(kernel, threads_for(0));
     const MushFrame frame{&mesh, smoothed[result].data(), nullptr, nullptr, false, nullptr, 0.0f, nullptr};
     kernel.take_details(frame, kept.data(), details.data(), 0, mesh.chunk_count());
 }
 
-/// Iterations that go over the mesh together. Each chunk reads what the iteration before made of those at most
-/// mesh.reach beside it, and then writes over what the one before that made of itself.
+/// Runs several iterations over the mesh together. An iteration on a chunk reads what the previous iteration
+/// wrote to chunks at most mesh.reach away, and then overwrites what the iteration before that wrote to the same
+/// chunk.
 class Iterations {
 public:
     Iterations(const MushMesh& mesh, std::size_t threads) noexcept
@@ -194,10 +197,10 @@ public:
           most_(std::min(kIterationsTogether,
                          1 + (parts_ > 1 ? chunks_ / parts_ / (2 * reach_) : kIterationsTogether))) {}
 
-    /// At most so many can be run together.
+    /// The largest number of iterations that can run together.
     [[nodiscard]] std::size_t most() const noexcept { return most_; }
 
-    /// Calls run(iteration, chunk) for each of `count`.
+    /// Calls run(iteration, chunk) for every chunk and each of `count` iterations.
     template <class Run>
     void run(std::size_t count, const Run& run) const {
         struct Work {
@@ -225,7 +228,7 @@ public:
 private:
     [[nodiscard]] std::size_t begin(std::size_t part) const noexcept { return chunks_ * part / parts_; }
 
-    /// What needs no chunk of another part: with each iteration fewer.
+    /// Runs what needs no chunk of another part, which is less with each iteration.
     template <class Run>
     void run_part(std::size_t part, std::size_t count, const Run& run) const {
         const std::size_t first = begin(part);
@@ -240,7 +243,7 @@ private:
         }
     }
 
-    /// What is missing then between a part and the next.
+    /// Runs what is then missing between a part and the next.
     template <class Run>
     void run_between(std::size_t part, std::size_t count, const Run& run) const {
         const std::size_t middle = begin(part + 1);
@@ -316,13 +319,13 @@ void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
         mesh.chunk_count(), threads,
         [&work](std::size_t begin, std::size_t end) {
             const std::vector<std::uint32_t>& vertices = work.state.mesh.vertices;
-            // Read once: the compiler takes any number that is stored for one of these.
+            // Read once, because the compiler assumes that any stored number may change it.
             const std::uint32_t* const of = vertices.data();
             const Vec3<float>* const from = work.frame.points;
             Float4* const to = work.state.smoothed[0].data();
             end = std::min(end * MushMesh::kChunk, vertices.size());
             for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
-                // The fourth number is 0 always.
+                // The fourth number is always 0.
                 std::memcpy(&to[i], &from[of[i]], sizeof(Vec3<float>));
             }
         },

@@ -12,45 +12,48 @@
 
 namespace sinew {
 
-/// What DeltaMush takes at most; more is refused.
+/// Limit of DeltaMush. More is refused.
 inline constexpr std::size_t kMaxMushVertices = 0x1FFFFFFF;  // 2^29 - 1
 
-/// How neighbours count. In the order of DeltaMushStage::kSmoothTypes.
+/// How neighbours are weighted. In the order of DeltaMushStage::kSmoothTypes.
 enum class SmoothType { simple, length_weighted };
 
-/// What the stage `delta_mush` smooths by.
+/// How the stage `delta_mush` smooths.
 struct DeltaMushSettings {
-    /// How often; at most DeltaMushStage::kMaxIterations. Not used with a radius.
+    /// Number of smoothing iterations, at most DeltaMushStage::kMaxIterations. Not used with a radius.
     std::size_t iterations = 5;
-    /// How far the smoothing reaches, in units of the points; 0: so many iterations.
+    /// How far the smoothing reaches, in units of the points; 0: use `iterations`.
     ///
-    /// n iterations on edges of length h spread a detail as a Gaussian of the width h sqrt(n factor / 2), half of that
-    /// squared where neighbours count by length. The width is the radius at every vertex: its h is the root mean square
-    /// of its edges at rest, the number of iterations is that which the vertices with the shortest edges need (but for
-    /// the shortest tenth of them), and where edges are longer the factor is smaller. Limits: the shortest tenth, and
-    /// all where that would be more than DeltaMushStage::kMaxIterations, reach less far; edges of unlike lengths at a
-    /// vertex reach as far as they are long; what is narrower than the radius, such as a finger, is smoothed as a whole.
+    /// n iterations over edges of length h spread a detail as a Gaussian of width h sqrt(n factor / 2); with
+    /// SmoothType::length_weighted the square of the width is halved. The factor of each vertex is chosen so that
+    /// this width is the radius: h is the root mean square of the vertex's edges at rest, n is the number of
+    /// iterations that the vertices with the shortest edges need, without the shortest tenth of them, and longer
+    /// edges get a smaller factor.
+    ///
+    /// Limits: the shortest tenth reaches less far, and so do all vertices if n would exceed
+    /// DeltaMushStage::kMaxIterations. Where a vertex has edges of different lengths, the smoothing reaches
+    /// farther along the longer ones. Parts narrower than the radius, such as fingers, are smoothed as a whole.
     float radius = 0.0f;
     /// 0 to 1.
     float factor = 0.5f;
     SmoothType type = SmoothType::simple;
-    /// The ends of edges that have one face are not smoothed.
+    /// Whether vertices on edges with a single face are left as they are.
     bool pin_boundary = false;
     /// [vertices] how much each vertex is smoothed, clamped to 0 to 1; empty: fully.
     std::span<const float> weights{};
 };
 
 /// The stage `delta_mush` (Mancewicz et al. 2014), as Blender's Corrective Smooth with the rest source Original
-/// Coordinates: see skinning/delta_mush.h. Any polygons, edges without faces, edges of many faces. Once constructed it is
-/// valid, and applying it can not fail and allocates nothing. Calls of one object wait for each other. One that was
-/// moved from can only be assigned to or destroyed.
+/// Coordinates: see skinning/delta_mush.h. Takes any polygons, edges without faces, and edges of many faces. A
+/// constructed object is valid; apply() can not fail and does not allocate. Concurrent calls on one object wait
+/// for each other. A moved-from object can only be assigned to or destroyed.
 class SINEW_EXPORT DeltaMush {
 public:
-    /// rest_points  [vertices] the mesh without shape keys
+    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: sizes that
+    /// do not match or exceed the limits; indices of vertices that do not exist; an edge of a face that is not
+    /// among the edges; values that are not finite or out of range. No reference is kept.
     ///
-    /// Throws std::invalid_argument that names the field, what was wanted and what came: sizes that do not fit or
-    /// are beyond the limits, vertices that there are not, an edge of a face that is not among the edges, values that
-    /// are not finite or out of their range. Nothing is kept by reference.
+    /// rest_points  [vertices] the mesh without shape keys
     DeltaMush(const MeshTopology& topology, std::span<const Vec3<float>> rest_points,
               const DeltaMushSettings& settings);
 
@@ -58,24 +61,26 @@ public:
     DeltaMush& operator=(DeltaMush&&) noexcept;
     ~DeltaMush();
 
-    /// Other rest points or settings on the same faces and edges: it takes about as long as to apply it. Throws as the
-    /// constructor does, and is then as it was.
+    /// Sets other rest points or settings for the same faces and edges. Takes about as long as apply(). Throws as
+    /// the constructor does; the object is then unchanged.
     void bind(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& settings);
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
-    /// How often it smooths, also with a radius.
+    /// The number of smoothing iterations, also if a radius determines it.
     [[nodiscard]] std::size_t iterations() const noexcept;
 
-    /// Smooths in place.
+    /// Smooths the points in place and adds their details back.
     ///
-    /// points   [vertices] in the space of the rest points; of another size nothing is written
-    /// scale    how much of the details comes back; 1 all
-    /// threads  0: as many as help
+    /// points   [vertices] in the space of the rest points; if the size is wrong, nothing is written
+    /// scale    how much of the details is added back; 1: all
+    /// threads  0: as many as useful
     ///
-    /// A vertex without faces is smoothed without details. The result does not depend on the number of threads.
+    /// A vertex without faces is smoothed and has no details. The result does not depend on the number of
+    /// threads.
     void apply(std::span<Vec3<float>> points, float scale = 1.0f, std::size_t threads = 0) const noexcept;
 
-    /// What it was made of. Spans are valid until bind() or the end of this.
+    /// The data that the object was constructed from. Spans are valid until bind() or until the object is
+    /// destroyed.
     struct Parts {
         MeshTopology topology;
         std::span<const Vec3<float>> rest_points;

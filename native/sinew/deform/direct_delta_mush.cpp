@@ -17,29 +17,29 @@
 namespace sinew {
 namespace {
 
-// How often the neighbourhood's weights are smoothed: four times, they are near a bell's.
+// Number of smoothing steps. After four, the neighbourhood's weights are close to a Gaussian.
 constexpr int kSteps = 4;
 
 // The share of the work before the first bone.
 constexpr double kShareOfFactor = 0.1;
 
-// Weights below this are 0: far below any that is kept, and far above numbers that are slow to compute with.
+// Smaller weights are set to 0: far below any weight that is kept, and far above denormals, which are slow.
 constexpr double kNothing = 1e-13;
 
-// Of exact results.
+// The smallest weight of exact results.
 constexpr double kLeastExact = 1e-10;
 
-// A neighbourhood whose squared extents are below this, as a part of those of the mesh, is a point: what is found of
-// them is rounding, from which no rotation comes.
+// A neighbourhood whose sum of squared extents is below this share of the mesh's is a point: its computed extents
+// are rounding errors, from which no rotation can be found.
 constexpr double kLeastExtentOfMesh = 1e-12;
 
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
 
-// 1, x, y, z, xx, yy, zz, yz, xz, xy: what is smoothed of a bone.
+// 1, x, y, z, xx, yy, zz, yz, xz, xy: the columns that are smoothed for each bone.
 constexpr std::size_t kColumns = kGroupColumns;
 using Columns = std::array<double, kColumns>;
 
-/// Half the cotangent of the angle at `corner`; 0 of a triangle without area.
+/// Half the cotangent of the angle at `corner`; 0 for a triangle without area.
 double half_cotangent(const Vec3<double>& corner, const Vec3<double>& a, const Vec3<double>& b) {
     const Vec3<double> to_a = a - corner;
     const Vec3<double> to_b = b - corner;
@@ -48,7 +48,7 @@ double half_cotangent(const Vec3<double>& corner, const Vec3<double>& a, const V
     return twice_area > 1e-9 * longest ? 0.5 * glm::dot(to_a, to_b) / twice_area : 0.0;
 }
 
-/// The matrix of one step, and the mass of each vertex; both over the mean mass.
+/// The matrix of one step, and the mass of each vertex; both divided by the mean mass.
 struct Smoothing {
     SparseMatrix step;
     std::vector<double> mass;
@@ -59,7 +59,7 @@ Smoothing smoothing_of(std::span<const Vec3<float>> points, std::span<const std:
     const std::size_t count = points.size();
     Smoothing smoothing{SparseMatrix(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(count)),
                         std::vector<double>(count)};
-    // Below the diagonal: an entry of each edge's two triangles, to be added up.
+    // Entries below the diagonal: one for each of an edge's triangles, to be summed.
     using Entry = Eigen::Triplet<double, std::int32_t>;
     std::vector<Entry> entries;
     entries.reserve(triangles.size());
@@ -104,7 +104,7 @@ Smoothing smoothing_of(std::span<const Vec3<float>> points, std::span<const std:
     return smoothing;
 }
 
-/// The step, to be solved for kGroups bones at once, and only where they are not 0.
+/// Solves a step for kGroups bones at once, and only for rows where they are not 0.
 class Solver {
 public:
     explicit Solver(const SparseMatrix& matrix) {
@@ -121,26 +121,26 @@ public:
                                     {lower.valuePtr(), numbers},
                                     std::vector<double>(diagonal.data(), diagonal.data() + diagonal.size()));
         for (std::size_t i = 0; i < count; ++i) {
-            place_.push_back(
+            row_numbers_.push_back(
                 static_cast<std::size_t>(factor.permutationP().indices()(static_cast<Eigen::Index>(i))));
         }
     }
 
-    /// Where the solver has row `i`.
-    [[nodiscard]] std::size_t place(std::size_t i) const { return place_[i]; }
+    /// The solver's number of row `i`.
+    [[nodiscard]] std::size_t row(std::size_t i) const { return row_numbers_[i]; }
 
-    /// x, is_there  as of SolveBlocks
-    void solve(std::span<Columns> x, std::span<std::uint8_t> is_there) const {
-        solve_(factor_, kNothing, x.front().data(), is_there.data());
+    /// Arguments as for SolveBlocks.
+    void solve(std::span<Columns> x, std::span<std::uint8_t> is_nonzero) const {
+        solve_(factor_, kNothing, x.front().data(), is_nonzero.data());
     }
 
 private:
     BlockFactor factor_;
     SolveBlocks* solve_ = solve_blocks();
-    std::vector<std::size_t> place_;
+    std::vector<std::size_t> row_numbers_;
 };
 
-/// What a bone has about a vertex, from the vertex as the origin.
+/// The moments of a bone at a vertex, with the vertex as the origin.
 struct Found {
     std::uint32_t vertex;
     std::array<float, kColumns> moments;
@@ -152,11 +152,11 @@ Columns columns_of(const Vec3<double>& p, double weight) {
     return columns;
 }
 
-/// From `origin` instead.
+/// The moments relative to `o`.
 std::array<float, kColumns> moved_to(const Vec3<double>& o, const Columns& m) {
     const double weight = m[0];
     const Vec3<double> first = Vec3<double>(m[1], m[2], m[3]) - weight * o;
-    // Of (p - o) (p - o)^T, by the moments from there: p p^T less first o^T, o first^T and weight o o^T.
+    // Moments of (p - o) (p - o)^T: those of p p^T minus first o^T, minus o first^T, minus weight o o^T.
     const auto second = [&](std::size_t column, int a, int b) {
         return static_cast<float>(m[column] - first[a] * o[b] - o[a] * first[b] - weight * o[a] * o[b]);
     };
@@ -172,7 +172,7 @@ std::array<float, kColumns> moved_to(const Vec3<double>& o, const Columns& m) {
             second(9, 0, 1)};
 }
 
-/// The influences of each bone.
+/// An influence of a bone.
 struct Weight {
     std::uint32_t vertex;
     float weight;
@@ -190,7 +190,7 @@ WeightsByBone weights_by_bone(const NormalisedInfluences& influences) {
     return found;
 }
 
-/// The moments of kGroups bones about all vertices that they have any.
+/// Computes the moments of kGroups bones at all vertices where they are not 0.
 class BoneSmoother {
 public:
     BoneSmoother(const Solver& solver, std::span<const double> mass, std::span<const Vec3<double>> points)
@@ -198,42 +198,42 @@ public:
           points_(points),
           mass_(points.size()),
           x_(kGroups * points.size()),
-          is_there_(points.size()) {
+          is_nonzero_(points.size()) {
         for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-            mass_[solver.place(vertex)] = mass[vertex];
+            mass_[solver.row(vertex)] = mass[vertex];
         }
     }
 
-    /// Nothing where `goes_on()` is false.
+    /// Stops early if `goes_on()` returns false.
     ///
-    /// weights  [at most kGroups] of each bone
+    /// weights  [at most kGroups] the influences of each bone
     template <class GoesOn>
     void find(std::span<const std::vector<Weight>* const> weights, double least, const GoesOn& goes_on,
               std::span<std::vector<Found>> found) {
         clear();
         for (std::size_t bone = 0; bone < weights.size(); ++bone) {
             for (const auto& [vertex, weight] : *weights[bone]) {
-                const std::size_t place = solver_.place(vertex);
-                Columns& x = x_[kGroups * place + bone];
+                const std::size_t row = solver_.row(vertex);
+                Columns& x = x_[kGroups * row + bone];
                 const Columns columns = columns_of(points_[vertex], static_cast<double>(weight));
                 for (std::size_t c = 0; c < kColumns; ++c) x[c] += columns[c];
-                is_there_[place] = 1;
+                is_nonzero_[row] = 1;
             }
         }
         for (int step = 0; step < kSteps; ++step) {
             if (!goes_on()) return;
-            for (std::size_t place = 0; place < points_.size(); ++place) {
-                if (is_there_[place] == 0) continue;
+            for (std::size_t row = 0; row < points_.size(); ++row) {
+                if (is_nonzero_[row] == 0) continue;
                 for (std::size_t bone = 0; bone < kGroups; ++bone) {
-                    for (double& number : x_[kGroups * place + bone]) number *= mass_[place];
+                    for (double& number : x_[kGroups * row + bone]) number *= mass_[row];
                 }
             }
-            solver_.solve(x_, is_there_);
+            solver_.solve(x_, is_nonzero_);
         }
         for (std::size_t vertex = 0; vertex < points_.size(); ++vertex) {
-            const std::size_t place = solver_.place(vertex);
-            if (is_there_[place] == 0) continue;
-            const Columns* const x = &x_[kGroups * place];
+            const std::size_t row = solver_.row(vertex);
+            if (is_nonzero_[row] == 0) continue;
+            const Columns* const x = &x_[kGroups * row];
             for (std::size_t bone = 0; bone < weights.size(); ++bone) {
                 if (x[bone][0] < least) continue;
                 found[bone].push_back(
@@ -244,29 +244,30 @@ public:
 
 private:
     void clear() {
-        for (std::size_t place = 0; place < points_.size(); ++place) {
-            if (is_there_[place] == 0) continue;
-            std::fill_n(&x_[kGroups * place], kGroups, Columns{});
-            is_there_[place] = 0;
+        for (std::size_t row = 0; row < points_.size(); ++row) {
+            if (is_nonzero_[row] == 0) continue;
+            std::fill_n(&x_[kGroups * row], kGroups, Columns{});
+            is_nonzero_[row] = 0;
         }
     }
 
     const Solver& solver_;
     std::span<const Vec3<double>> points_;
-    // As the solver has them.
+    // In the solver's order.
     std::vector<double> mass_;
-    std::vector<Columns> x_;  // [points][kGroups], 0 where nothing is there
-    std::vector<std::uint8_t> is_there_;
+    std::vector<Columns> x_;  // [points][kGroups], 0 between calls
+    std::vector<std::uint8_t> is_nonzero_;
 };
 
-/// Writes the rows of one vertex, from what its bones have about it.
+/// Writes the rows of one vertex from the moments of its bones.
 ///
-/// least_extent  of the sum of squared extents; a neighbourhood of less is a point, and has second moments of 0
+/// least_extent  threshold for the sum of squared extents; below it a neighbourhood is a point, with second
+///               moments of 0
 void add_rows(std::uint32_t vertex, const Vec3<double>& point,
               std::span<const std::pair<std::int32_t, const Found*>> of_bones, double least_extent,
               std::vector<float>& rows) {
     double total = 0.0;
-    Vec3<double> centre(0.0);  // from the vertex
+    Vec3<double> centre(0.0);  // relative to the vertex
     const auto at = [](const Found& found, std::size_t i) { return static_cast<double>(found.moments[i]); };
     for (const auto& [bone, found] : of_bones) {
         total += at(*found, 0);
@@ -318,7 +319,7 @@ std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
     const Solver solver(smoothing.step);
     if (!reporter.go_on(kShareOfFactor)) return std::nullopt;
 
-    // About the mesh's middle, so that no digits are lost to where it is.
+    // Relative to the mesh's middle, so that a mesh far from the origin loses no digits.
     std::vector<Vec3<double>> points(data.rest_points.begin(), data.rest_points.end());
     Vec3<double> origin(0.0);
     for (const Vec3<double>& point : points) origin += point / static_cast<double>(vertex_count);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dual quaternions on lanes: compiled once for each instruction set, see kernels/. A row is the real part and the dual
-// part, each (w, x, y, z).
+// Dual quaternions on lanes. Compiled once for each instruction set, see kernels/. A row is the real part and the
+// dual part, each (w, x, y, z).
 #if defined(SINEW_DEFORM_DUAL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_DUAL_INL_H_
 #undef SINEW_DEFORM_DUAL_INL_H_
@@ -19,7 +19,7 @@ struct DqKernel {
     static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 2;
 
-    /// The dual part that also moves by the scale: + 1/2 real * displacement.
+    /// Adds the displacement by the bone's scale to the dual part: + 1/2 real * displacement.
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D>,
                                      Vec<D> signed_weight, const Points<D>& rest, Sum<D>& sum) {
@@ -36,7 +36,7 @@ struct DqKernel {
         sum.value[7] = hn::MulAdd(half, rotated.z, sum.value[7]);
     }
 
-    /// Division by the squared norm replaces the square root, as in skinning/dq.h.
+    /// Divides once by the squared norm instead of taking a square root, as in skinning/dq.h.
     template <class D>
     static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
         const Vec<D>* const real = sum.value;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What exponentials of rigid motions are made of, on lanes: compiled once for each instruction set, see kernels/.
+// The functions that exponentials of rigid motions need, on lanes. Compiled once for each instruction set, see
+// kernels/.
 #if defined(SINEW_DEFORM_EXPONENTIAL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_EXPONENTIAL_INL_H_
 #undef SINEW_DEFORM_EXPONENTIAL_INL_H_
@@ -21,8 +22,8 @@ HWY_INLINE Vec<D> polynomial(D d, Vec<D> x, const Number (&c)[kCount]) {
     return sum;
 }
 
-/// Functions of the square y of half an angle of 180 degrees at most: three polynomials, exact to 6e-8 in absolute terms,
-/// without a branch and a division by the angle.
+/// Functions of y, the square of half an angle of at most 180 degrees. Three polynomials with an absolute error
+/// of at most 6e-8, which need no branch and no division by the angle.
 template <class D>
 struct ExponentialFactors {
     Vec<D> sinc;    // of half the angle

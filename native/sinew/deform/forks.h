@@ -5,8 +5,8 @@
 
 namespace sinew {
 
-/// How often the process was forked on the way to this one since the library was loaded. A child has none of its
-/// parent's threads, so what they were doing stays undone in it.
+/// How many forks lie between the process that loaded the library and this one. A forked child has none of its
+/// parent's threads, so their unfinished work stays unfinished in the child.
 [[nodiscard]] std::uint32_t forks() noexcept;
 
 }  // namespace sinew

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points of any vertices into lanes: compiled once for each instruction set, see kernels/.
+// Gathers points of arbitrary vertices into lanes. Compiled once for each instruction set, see kernels/.
 #if defined(SINEW_DEFORM_GATHER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_GATHER_INL_H_
 #undef SINEW_DEFORM_GATHER_INL_H_
@@ -17,9 +17,9 @@ namespace HWY_NAMESPACE {
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// A point in the first three lanes.
+/// Loads a point into the first three lanes.
 ///
-/// kIsLast  nothing may be read behind it
+/// kIsLast  nothing may be read behind the point
 template <bool kIsLast, class D4>
 HWY_INLINE Vec<D4> row(D4 d, const Vec3<float>* points, std::int32_t i) {
     const float* const from = &points[i].x;
@@ -36,7 +36,7 @@ HWY_INLINE Vec<D4> row(D4 d, const Float4* normals, std::int32_t i) {
     return hn::Load(d, normals[i].value.data());
 }
 
-/// Row r of four: lane 4 b + c is coordinate c of the point of the lane 4 b + r.
+/// Row r of four: its lane 4 b + c is coordinate c of the point for lane 4 b + r.
 template <bool kIsLast, class D, class Point>
 HWY_INLINE Vec<D> rows(D d, const Point* points, const std::int32_t* vertices) {
     if constexpr (hn::MaxLanes(D()) == 4) {
@@ -50,7 +50,7 @@ HWY_INLINE Vec<D> rows(D d, const Point* points, const std::int32_t* vertices) {
 
 #endif
 
-/// One point of each lane: whole points are read and transposed, as to gather each number takes longer.
+/// One point for each lane. Whole points are read and then transposed, as gathering each number takes longer.
 template <bool kIsLast, class D, class Point>
 HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* vertices) {
 #if HWY_TARGET != HWY_SCALAR

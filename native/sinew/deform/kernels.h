@@ -13,52 +13,53 @@ namespace sinew {
 
 struct BoneMoments;
 
-/// What every block of one frame reads.
+/// The input and output of one frame, common to all blocks.
 struct Frame {
     const PackedMesh* mesh;
-    const Lanes<float>* rows;         // of the mesh, or with other rest points
-    const Lanes<float>* vertex_rows;  // [blocks][MethodInfo::vertex_floats]; null: the method has none
-    const BoneMoments* moments;       // null: the method has none
-    const std::int32_t* bones;        // as PackedMesh::bones, or BoneSets::entries
+    const Lanes<float>* rows;         // mesh->rows, or a copy with other rest points
+    const Lanes<float>* vertex_rows;  // [blocks][MethodInfo::vertex_floats]; null if the method has none
+    const BoneMoments* moments;       // null if the method has none
+    const std::int32_t* bones;        // PackedMesh::bones, or BoneSets::entries
     const Palette* palette;
-    const Float4* bones_from_model;  // displacements of points to the space of the bones and back;
-    const Float4* model_from_bones;  // null: the same space
+    const Float4* bones_from_model;  // displacement rows that map points to the space of the bones, and
+    const Float4* model_from_bones;  // back to model space; null if the spaces are the same
     const double* parameters;        // [MethodInfo::parameters] valid_value() of each
     Vec3<float>* points;
 };
 
-/// The functions of a kernel that are compiled once for each instruction set.
+/// The functions of a kernel for one instruction set.
 struct TargetKernel {
-    /// Deforms the blocks [begin, end). The meaning of each method is in skinning/; its kernel agrees with it.
+    /// Deforms the blocks [begin, end). The method is defined in skinning/; the kernel agrees with that
+    /// definition.
     ///
-    /// A vertex's result depends on its own rest point and influences and on the pose alone, not on its lane, its block or
-    /// other vertices; of a method that keeps moments, but for rounding. On other instruction sets it may differ by
-    /// rounding, as only some of them multiply and add in one step.
+    /// A vertex's result depends only on its own rest point and influences and on the pose, not on its lane, its
+    /// block or other vertices (for a method that keeps moments, up to rounding). Instruction sets may differ by
+    /// rounding, since only some of them have a fused multiply-add.
     void (*deform)(const Frame& frame, std::size_t begin, std::size_t end);
 
-    /// Writes the rows of the bones `used` to `palette.bones`, and their sizes. Under a rigid method as if each
-    /// were rigid; the indices of those that are not are added to `palette.scaled`.
+    /// Writes the rows of the bones `used` to palette.bones, and their sizes to palette.sizes. A rigid method
+    /// treats every bone as rigid, and adds the indices of those that are not to palette.scaled.
     void (*prepare)(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
                     Palette& palette);
 };
 
-/// Instruction sets, see targets.h.
+/// Number of instruction sets, see targets.h.
 inline constexpr std::size_t kTargetCount = 4;
 
-/// How the library deforms whole meshes by one method. The file of this name in kernels/ defines it.
+/// How the library deforms whole meshes with one method. Defined in kernels/NAME.cpp.
 struct Kernel {
-    /// A bone that does not move, in Palette::bones: its size is that of each bone there.
+    /// The rows in Palette::bones of a bone that does not move. Every bone there has as many.
     std::span<const Float4> rest_row;
 
-    /// Whether rotations are blended: the scale of bones is then kept apart, and points are taken to the space of
-    /// the bones and back. A method that is not rigid has that space in its bones.
+    /// Whether the method blends rotations. Then the scale of bones is stored apart, and points are mapped to the
+    /// space of the bones and back. Otherwise that space is part of the bones' matrices.
     bool is_rigid;
 
-    /// Bytes of a prepared bone, where the palette has a row for each bone of each set of bones (BoneSets); 0 where
-    /// it has one for each bone.
+    /// Bytes of a prepared bone, if the palette has a row for each bone of each set of bones (BoneSets); 0 if it
+    /// has one for each bone.
     std::size_t set_bone_size;
 
-    /// Fills `palette` for `bones`, all of which are posed unless rows are those of sets.
+    /// Fills `palette`. Every one of bones.used is posed, unless the palette has rows for sets.
     void (*prepare)(const Kernel& kernel, const Bones& bones, Palette& palette);
 
     std::array<TargetKernel, kTargetCount> targets;
@@ -72,11 +73,11 @@ struct Kernel {
 
 inline const TargetKernel& Kernel::target() const noexcept { return targets[target_in_use()]; }
 
-/// Fills Palette::may_be_plain from the sizes: once in a frame for each pair of bones, so that few vertices are tested
-/// one by one.
+/// Fills Palette::may_be_plain from the sizes, once per frame for each pair of bones, so that the test runs for
+/// few vertices.
 void find_plain(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept;
 
-/// Fills `palette` for `bones`. A bone that the pose lacks stays at rest.
+/// Fills `palette`. Bones that the pose lacks stay at rest.
 void prepare(const Kernel& kernel, const Bones& bones, Palette& palette) noexcept;
 
 }  // namespace sinew

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points in lanes: compiled once for each instruction set, see kernels/.
+// Points in lanes. Compiled once for each instruction set, see kernels/.
 #if defined(SINEW_DEFORM_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_LANES_INL_H_
 #undef SINEW_DEFORM_LANES_INL_H_
@@ -26,8 +26,8 @@ using One = hn::CappedTag<float, 1>;
 template <class D>
 using Vec = hn::Vec<D>;
 
-/// Where a frame's blocks are and where their points go. A copy on the stack: the compiler would read what the frame
-/// refers to again after every vector that it stores.
+/// Pointers to a frame's blocks and points. Kept as a copy on the stack, because the compiler would reload the
+/// frame's own members after every stored vector.
 struct MeshPointers {
     const Block* blocks;
     const Lanes<float>* rows;
@@ -43,12 +43,12 @@ HWY_INLINE MeshPointers pointers_of(const Frame& frame) {
             mesh.vertices.data(), mesh.runs.data(), frame.points};
 }
 
-/// The weights of the first influence of block `b`, which is not mixed.
+/// The weights of the first influence in block `b`, which must not be mixed.
 HWY_INLINE const float* first_weights_of(const Frame& frame, std::size_t b) {
     return frame.mesh->first_weights[b].lane.data();
 }
 
-/// One coordinate of several vertices in each vector.
+/// Several points: each vector has one coordinate of all of them.
 template <class D>
 struct Points {
     Vec<D> x;
@@ -67,7 +67,7 @@ HWY_INLINE Points<D> add(const Points<D>& a, const Points<D>& b) {
     return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
 
-/// rows  [3] of `displacement`, each (x, y, z, translation)
+/// The displacement of `p` by the rows [3], each (x, y, z, translation).
 template <class D>
 HWY_INLINE Points<D> displacement(D d, const float* rows, const Points<D>& p) {
     const auto row = [d, &p](const float* r) HWY_ATTR {
@@ -103,7 +103,7 @@ HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D
     return {hn::MulAdd(scale, b.x, a.x), hn::MulAdd(scale, b.y, a.y), hn::MulAdd(scale, b.z, a.z)};
 }
 
-/// `v` rotated by the unit quaternion `q` (w, x, y, z).
+/// Rotates `v` by the unit quaternion `q` (w, x, y, z).
 template <class D>
 HWY_INLINE Points<D> rotated_by(D d, const float* q, const Points<D>& v) {
     const Points<D> axis{hn::Set(d, q[1]), hn::Set(d, q[2]), hn::Set(d, q[3])};
@@ -111,7 +111,7 @@ HWY_INLINE Points<D> rotated_by(D d, const float* q, const Points<D>& v) {
     return add_scaled<D>(v, hn::Set(d, 2.0f), cross<D>(axis, inner));
 }
 
-/// `start`, and what the rotation by the quaternion `q` [4] of any length adds to `v`.
+/// `start` plus the displacement of `v` under the rotation by the quaternion `q` [4], which may have any length.
 template <class D>
 HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, const Points<D>& v) {
     const Vec<D> squared_norm =
@@ -122,12 +122,12 @@ HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, 
     return add_scaled<D>(start, scale, cross<D>(axis, inner));
 }
 
-/// 1 / sqrt(x), x positive and finite. A root and a division of 16 lanes take as long as some twenty
-/// other operations.
+/// 1 / sqrt(x) for positive finite x. A square root and a division of 16 lanes take as long as about twenty other
+/// operations.
 template <class D>
 HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
-    // At least 12 digits, by one of Newton's steps but the last two or three of 24.
+    // The estimate has at least 12 bits; one Newton step makes these all but the last two or three of 24.
     const auto root = hn::ApproximateReciprocalSqrt(x);
     const auto product = hn::Mul(x, root);
     const auto half = hn::Mul(root, hn::Set(d, 0.5f));
@@ -145,9 +145,10 @@ struct Interleaved {
 };
 
 HWY_INLINE Interleaved interleave(const Points<Full>& p) {
-    // Lane j of coordinate c is float 3 j + c, and 3 j + c mod 16 is another lane for each j: one permute brings all of
-    // a coordinate to their lanes, whichever part takes them. A blend can go where no multiply-add does; six permutes
-    // of two sources took an eleventh more of a whole linear blend on Zen 4.
+    // Lane j of coordinate c is float 3 j + c of the result, and 3 j + c mod 16 is different for each j. So one
+    // permute brings all values of a coordinate to their lanes, in whichever part they are. Blends run on ports
+    // that do no multiply-add; with six two-source permutes instead, a whole linear blend took 9 % longer on Zen
+    // 4.
     alignas(64) static constexpr std::int32_t kFrom[3][16] = {
         {0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15, 10, 5},
         {5, 0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15, 10},
@@ -155,7 +156,7 @@ HWY_INLINE Interleaved interleave(const Points<Full>& p) {
     const __m512 x = _mm512_permutexvar_ps(_mm512_load_si512(kFrom[0]), p.x.raw);
     const __m512 y = _mm512_permutexvar_ps(_mm512_load_si512(kFrom[1]), p.y.raw);
     const __m512 z = _mm512_permutexvar_ps(_mm512_load_si512(kFrom[2]), p.z.raw);
-    // Lane l of part i is float 16 i + l, of coordinate (i + l) mod 3.
+    // Lane l of part i is float 16 i + l, which is coordinate (i + l) mod 3.
     constexpr __mmask16 kEveryThirdFrom[3] = {0x9249, 0x2492, 0x4924};
     Interleaved result;
     for (int i = 0; i < 3; ++i) {
@@ -165,7 +166,7 @@ HWY_INLINE Interleaved interleave(const Points<Full>& p) {
     return result;
 }
 
-/// Undoes interleave(), in the same way.
+/// The inverse of interleave(), in the same way.
 HWY_INLINE Points<Full> deinterleave(const Interleaved& from) {
     alignas(64) static constexpr std::int32_t kFrom[3][16] = {
         {0, 3, 6, 9, 12, 15, 2, 5, 8, 11, 14, 1, 4, 7, 10, 13},
@@ -184,7 +185,7 @@ HWY_INLINE Points<Full> load_consecutive(Full d, const float* from) {
     return deinterleave({{hn::LoadU(d, from), hn::LoadU(d, from + kLanes), hn::LoadU(d, from + 2 * kLanes)}});
 }
 
-/// Whole vectors with all but the run's own floats masked out. Lanes that repeat the last vertex are 0.
+/// Loads whole vectors with all floats outside the run masked out. Lanes that repeat the last vertex become 0.
 HWY_INLINE Points<Full> load_runs(Full d, const Run* runs, std::size_t count, const float* points) {
     Interleaved interleaved{{hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
     for (std::size_t r = 0; r < count; ++r) {
@@ -202,7 +203,7 @@ HWY_INLINE void store_consecutive(Full d, const Points<Full>& p, float* to) {
     for (std::size_t i = 0; i < 3; ++i) hn::StoreU(points.part[i], d, to + kLanes * i);
 }
 
-/// Whole vectors with all but the run's own floats masked out.
+/// Stores whole vectors with all floats outside the run masked out.
 HWY_INLINE void store_runs(Full, const Run* runs, std::size_t count, const Points<Full>& p, float* points) {
     const Interleaved interleaved = interleave(p);
     for (std::size_t r = 0; r < count; ++r) {
@@ -213,9 +214,9 @@ HWY_INLINE void store_runs(Full, const Run* runs, std::size_t count, const Point
     }
 }
 
-/// Lanes are transposed to points, then each by one masked store.
+/// Transposes lanes to points and stores each point with a masked store.
 ///
-/// Apart from store_points, so that its stack is not that of every block.
+/// Not inlined into store_points, whose stack frame would grow for every block.
 inline HWY_NOINLINE void scatter_points(Full d, const std::int32_t* vertices, Vec3<float>* points,
                                         Vec<Full> x, Vec<Full> y, Vec<Full> z) {
     alignas(64) float float4s[4 * kLanes];
@@ -241,12 +242,12 @@ HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// Apart from store_points, so that its stack is not that of every block.
+/// Not inlined into store_points, whose stack frame would grow for every block.
 template <class D>
 HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>* points, Vec<D> x, Vec<D> y,
                                  Vec<D> z) {
-    // x and y go together, so that a point takes two moves, and these are of integers: a processor stores two of them
-    // at once, but one vector.
+    // x and y are stored together, so a point takes two stores. These are integer stores, because a processor can
+    // store two integers at once, but only one vector.
     constexpr std::size_t kMax = hn::MaxLanes(D());
     alignas(64) float pairs[2][kMax];
     alignas(64) float zs[kMax];
@@ -268,7 +269,7 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>*
 
 #endif
 
-/// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it once more.
+/// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it again.
 template <class D>
 HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::size_t lane,
                              const Points<D>& p) {
@@ -285,13 +286,13 @@ HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::si
     }
 }
 
-/// Where the lanes to be deformed of a block end: known before where one vector holds them all.
+/// The end of the lanes of a block to deform. A constant where one vector holds all lanes.
 template <class D>
 HWY_INLINE std::size_t lanes_end(D d, const Block& block) {
     return hn::MaxLanes(D()) == kLanes ? hn::Lanes(d) : block.vertices;
 }
 
-/// Whether these bones of a vertex are added plainly.
+/// Whether these bones of a vertex are added plainly, see Palette.
 HWY_INLINE bool is_plain(const Palette& palette, const std::int32_t* bones, std::size_t count) {
     if (HWY_LIKELY(palette.may_be_plain[bones[0]] == 0)) return false;
     const float first = palette.sizes[bones[0]];
@@ -300,7 +301,7 @@ HWY_INLINE bool is_plain(const Palette& palette, const std::int32_t* bones, std:
     return sinew::is_plain(first, least);
 }
 
-/// Blocks [begin, end), which have no bones.
+/// Writes the rest points of blocks [begin, end), which have no bones.
 inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
     const MeshPointers pointers = pointers_of(frame);
@@ -313,11 +314,11 @@ inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) 
     }
 }
 
-/// The first block after `b` that has other bones, or `end`.
+/// The first block after `b` with other bones, or `end`.
 inline std::size_t end_of_set(const Frame& frame, std::size_t b, std::size_t end) {
     const Block* const blocks = frame.mesh->blocks.data();
     std::size_t after = b + 1;
-    // A set without bones has no entry of its own in PackedMesh::bones.
+    // A set without bones has no entry in PackedMesh::bones, so the numbers of influences are compared, too.
     while (after < end && !blocks[after].mixed && blocks[after].first_bone == blocks[b].first_bone &&
            blocks[after].influences == blocks[b].influences) {
         ++after;

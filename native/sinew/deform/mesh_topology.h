@@ -6,11 +6,11 @@
 
 namespace sinew {
 
-/// Faces and edges of a mesh, as vertices.
+/// The faces and edges of a mesh, as indices of vertices.
 struct MeshTopology {
     std::span<const std::int32_t> face_offsets;     // [faces + 1] first corner of each face, then the end
     std::span<const std::int32_t> corner_vertices;  // [corners]
-    std::span<const std::int32_t> edges;            // [edges][2] every edge of a face, and those without one
+    std::span<const std::int32_t> edges;            // [edges][2] all edges of faces, and edges without faces
 };
 
 }  // namespace sinew

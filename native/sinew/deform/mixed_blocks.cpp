@@ -8,11 +8,11 @@
 namespace sinew {
 namespace {
 
-// Few enough that what the first kernel wrote is still in the first cache, enough that a set of bones is prepared
-// once for many vertices.
+// Few enough that what the first kernel wrote is still in the first-level cache, and enough that a set of bones
+// is prepared once for many vertices.
 constexpr std::size_t kBlocksAtOnce = 16;
 
-/// Blocks [begin, end), at most kBlocksAtOnce.
+/// Mixes blocks [begin, end), at most kBlocksAtOnce.
 void mix_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
                 const MixWeights& mix, std::size_t begin, std::size_t end) {
     const PackedMesh& mesh = *frames[0].mesh;
@@ -25,7 +25,7 @@ void mix_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Fr
             }
         }
     };
-    // By way of the points themselves: a kernel writes nowhere else.
+    // Both kernels write to the points themselves, since a kernel has no other output.
     std::array<Vec3<float>, kBlocksAtOnce * kLanes> by_first;
     kernels[0]->target().deform(frames[0], begin, end);
     for_each_vertex([&](const Vec3<float>& point, std::size_t i, float) { by_first[i] = point; });

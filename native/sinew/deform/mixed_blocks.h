@@ -10,7 +10,7 @@
 
 namespace sinew {
 
-/// How much of a block the second method deforms.
+/// Which vertices of a block the second method deforms.
 enum class Share : std::uint8_t { none, some, all };
 
 /// The weights of the stage `mix` in the order of a packed mesh.
@@ -19,13 +19,15 @@ struct MixWeights {
     std::vector<Share> shares;          // [blocks]
 };
 
+/// Packs the weights of a mix.
+///
 /// weights  [vertices] not NaN; clamped to 0 to 1
 [[nodiscard]] MixWeights pack_mix(const PackedMesh& mesh, std::span<const float> weights);
 
-/// Deforms the blocks [begin, end) as Mix says, by two kernels. One that no vertex of a block takes does not run there,
-/// so such blocks have the bits that the other kernel alone gives.
+/// Deforms the blocks [begin, end) with two kernels and mixes the results (skinning/mix.h). A kernel that has no
+/// share in a block does not run for it, so the other kernel's bits are unchanged there.
 ///
-/// frames  for each kernel; of one mesh, and with the same points to write
+/// frames  one for each kernel, with the same mesh and the same points to write
 void deform_mixed_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
                          const MixWeights& mix, std::size_t begin, std::size_t end) noexcept;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The stage `delta_mush` on whole chunks: see skinning/delta_mush.h for what it computes.
+// The stage `delta_mush` on whole chunks: see skinning/delta_mush.h for the definition.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <algorithm>
 #include <array>
@@ -25,15 +25,15 @@ namespace HWY_NAMESPACE {
 
 constexpr float kRootOfTwo = 1.41421356237f;
 
-// The four numbers of a point at once, or one after the other where vectors have one lane.
+// Processes the four numbers of a point at once, or one after the other where vectors have one lane.
 using Four = hn::CappedTag<float, 4>;
 
 HWY_INLINE const float* numbers_of(const Float4* points) { return reinterpret_cast<const float*>(points); }
 HWY_INLINE float* numbers_of(Float4* points) { return reinterpret_cast<float*>(points); }
 
-/// One iteration of the numbers from `at` on.
+/// One iteration for the numbers of one vector.
 ///
-/// neighbour(k)  the numbers of the k-th neighbour
+/// neighbour(k)  pointer to the numbers of the k-th neighbour
 template <std::size_t kValence, class D, class Neighbour>
 HWY_INLINE void smooth_numbers(D d, const float* point, float* to, std::size_t valence, Vec<D> factor,
                                const Neighbour& neighbour) {
@@ -45,7 +45,7 @@ HWY_INLINE void smooth_numbers(D d, const float* point, float* to, std::size_t v
     hn::StoreU(hn::MulAdd(factor, hn::NegMulAdd(count, old, sum), old), d, to);
 }
 
-/// A run that is consecutive, several vertices at once, where all have the same factor.
+/// Smooths a consecutive run, several vertices at once. All must have the same factor.
 ///
 /// kValence  neighbours of each vertex
 template <std::size_t kValence>
@@ -62,7 +62,8 @@ HWY_INLINE void smooth_consecutive(const MushFrame& frame, const MushRun& run) {
         smooth_numbers<kValence>(d, point + at, to + at, kValence, factor,
                                  [&](std::size_t k) HWY_ATTR { return neighbours[k] + at; });
     };
-    // The first and the last vector overlap others, so that those between are stored to whole cache lines.
+    // The first and the last vector overlap their neighbours, so that all stores between them are aligned to
+    // cache lines.
     const std::size_t lanes = hn::Lanes(d);
     const std::size_t last = 4 * static_cast<std::size_t>(run.end - run.begin) - lanes;
     smooth_at(0);
@@ -71,7 +72,9 @@ HWY_INLINE void smooth_consecutive(const MushFrame& frame, const MushRun& run) {
     smooth_at(last);
 }
 
-/// kValence  neighbours of each vertex; 0: those of the run
+/// Smooths a run.
+///
+/// kValence  neighbours of each vertex; 0: that of the run
 template <std::size_t kValence>
 HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run) {
     if constexpr (kValence > 0) {
@@ -92,7 +95,7 @@ HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run) {
     }
 }
 
-/// Vertices without neighbours stay.
+/// Vertices without neighbours are not moved.
 HWY_INLINE void copy_run(const MushFrame& frame, const MushRun& run) {
     for (std::size_t i = run.begin; i < run.end; ++i) frame.to[i] = frame.from[i];
 }
@@ -113,21 +116,21 @@ void smooth(const MushFrame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// The vertex in a lane, of up to kLanes that follow each other. A vector of each coordinate is made of four vectors of
-/// points by exchanging numbers within quarters of a vector of 16, which is cheaper than across. Vectors of all lengths
-/// have this order, as details are kept in it.
+/// The offset of the vertex in a lane, for a batch of kLanes consecutive vertices. Four vectors of points become
+/// vectors of x, y and z by exchanging numbers only within quarters of a 16-lane vector, which is cheaper than
+/// across quarters. Shorter vectors use the same order, since the details are stored in it.
 HWY_INLINE std::size_t vertex_of(std::size_t lane) { return 4 * (lane % 4) + lane / 4; }
 
 #if HWY_TARGET == HWY_SCALAR
 
-/// Points of vertices in lanes from `lane` on, of kLanes that follow each other.
+/// Points for the lanes from `lane` on, for a batch of kLanes consecutive vertices.
 template <class D>
 HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
     const float* const numbers = numbers_of(points + vertex_of(lane));
     return {hn::Set(d, numbers[0]), hn::Set(d, numbers[1]), hn::Set(d, numbers[2])};
 }
 
-/// index_of(vertex)  of the point
+/// The same for arbitrary points: index_of(vertex) returns the index of the point.
 template <class D, class Index>
 HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
     return consecutive_points(d, points + static_cast<std::size_t>(index_of(vertex_of(lane))), 0);
@@ -140,7 +143,7 @@ HWY_INLINE void store_lanes(D, const Points<D>& p, Float4* to, std::size_t lane)
 
 #else
 
-/// The first or second halves of quarters, those of `a` and `b` alternating.
+/// The first halves of all quarters, alternating between `a` and `b`.
 template <class D>
 HWY_INLINE Vec<D> first_halves(D d, Vec<D> a, Vec<D> b) {
     const hn::RepartitionToWide<D> wide;
@@ -152,7 +155,9 @@ HWY_INLINE Vec<D> second_halves(D d, Vec<D> a, Vec<D> b) {
     return hn::BitCast(d, hn::InterleaveUpper(wide, hn::BitCast(wide, a), hn::BitCast(wide, b)));
 }
 
-/// points(i)  the i-th of four vectors
+/// Transposes points into lanes.
+///
+/// points(i)  the i-th of four vectors of points
 template <class D, class OfPoints>
 HWY_INLINE Points<D> to_lanes(D d, const OfPoints& points) {
     const Vec<D> a = points(0), b = points(1), e = points(2), f = points(3);
@@ -161,14 +166,14 @@ HWY_INLINE Points<D> to_lanes(D d, const OfPoints& points) {
     return {first_halves(d, xy_ab, xy_ef), second_halves(d, xy_ab, xy_ef), first_halves(d, z_ab, z_ef)};
 }
 
-/// Points of vertices in lanes from `lane` on, of kLanes that follow each other.
+/// Points for the lanes from `lane` on, for a batch of kLanes consecutive vertices.
 template <class D>
 HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
     return to_lanes(d, [&](std::size_t i)
                            HWY_ATTR { return hn::LoadU(d, numbers_of(points + 4 * i + vertex_of(lane))); });
 }
 
-/// The point of `vertex` and of those behind it.
+/// A vector of the points for `vertex` and the next vertices.
 template <class D, class Index>
 HWY_INLINE Vec<D> collected(D d, const Float4* points, const Index& index_of, std::size_t vertex) {
     if constexpr (hn::MaxLanes(D()) <= 4) {
@@ -180,7 +185,7 @@ HWY_INLINE Vec<D> collected(D d, const Float4* points, const Index& index_of, st
     }
 }
 
-/// index_of(vertex)  of the point
+/// The same for arbitrary points: index_of(vertex) returns the index of the point.
 template <class D, class Index>
 HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
     return to_lanes(
@@ -211,7 +216,7 @@ HWY_INLINE Vec<D> dot_of(const Points<D>& a, const Points<D>& b) {
     return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
-/// 1 / length of a vector by its square; 0 of one without a direction.
+/// 1 / length of a vector, from its square; 0 if the vector has no direction.
 template <class D>
 HWY_INLINE Vec<D> inverse_length(D d, Vec<D> squared) {
     const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushStage::kShortest)));
@@ -226,7 +231,7 @@ HWY_INLINE Points<D> unit(D d, const Points<D>& v) {
     return {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
 }
 
-/// The frame of a corner: axes of any length, and what makes them unit vectors; and how much it counts.
+/// The frame of a corner: axes of any length, the factors that normalise them, and the corner's weight.
 template <class D>
 struct CornerLanes {
     Points<D> x, y, z;
@@ -234,12 +239,13 @@ struct CornerLanes {
     Vec<D> weight;
 };
 
-/// Of the corner between the spokes to the next vertex of the face and to the one before, which are unit vectors, or 0.
+/// The frame of the corner between the spokes to the next and to the previous vertex of the face, which are unit
+/// vectors or 0.
 template <class D>
 HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>& previous) {
-    // The definition's a is `previous`, its b is -next. Its y, along (a x b) x (a + b), goes along b - a: here it is a - b,
-    // which adds the same, as details are taken along it, too. Of unit vectors |a + b| |a - b| is 2 |a x b|, and
-    // (a + b)^2 + (a - b)^2 is 4: these two lengths say all.
+    // The definition's a is `previous` and its b is -next. Its y axis, along (a x b) x (a + b), has the direction
+    // of b - a; here it is a - b, which cancels out, since details are stored in the same axes. For unit vectors,
+    // |a + b| |a - b| = 2 |a x b| and (a + b)^2 + (a - b)^2 = 4, so these two lengths determine everything.
     CornerLanes<D> corner;
     corner.x = subtract<D>(previous, next);
     corner.y = add<D>(previous, next);
@@ -255,8 +261,9 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>&
     corner.unit_z = hn::Add(half_unit_z, half_unit_z);
     corner.unit_y = hn::Mul(half_unit_z, length_x);
 
-    // DeltaMushStage::angle() of the cosine c = a b. (a + b)^2 is 2 + 2 c, (a - b)^2 is 2 - 2 c: the smaller is
-    // 2 (1 - |c|), and the polynomial's factor is the root of half of it. Where an edge has no direction, c is 0.
+    // DeltaMushStage::angle() of the cosine c = a b. (a + b)^2 = 2 + 2 c and (a - b)^2 = 2 - 2 c, so the smaller
+    // is 2 (1 - |c|), and the polynomial's factor is the square root of half of it. If an edge has no direction,
+    // c is 0.
     const auto least = hn::IfThenElse(are_two, hn::Min(squared_x, squared_y), hn::Set(d, 2.0f));
     const auto least_length = hn::IfThenElse(are_two, hn::Min(length_x, length_y), hn::Set(d, kRootOfTwo));
     const auto m = hn::NegMulAdd(least, hn::Set(d, 0.5f), hn::Set(d, 1.0f));
@@ -272,7 +279,7 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>&
     return corner;
 }
 
-/// The direction of the k-th spoke of the vertices of a block from `lane` on.
+/// The unit direction of the k-th spoke, for the vertices of a block from `lane` on.
 template <bool kIsConsecutive, class D>
 HWY_INLINE Points<D> spoke(D d, const MushFrame& frame, const MushBlock& block, std::size_t lane,
                            const Points<D>& point, std::size_t k) {
@@ -339,7 +346,7 @@ void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
                 hn::IfThenElseZero(hn::Gt(weights, hn::Zero(d)), hn::Div(hn::Set(d, frame.scale), weights));
             store_lanes(d, add_scaled<D>(point, share, sum), finished, lane);
         }
-        // Read once: the compiler takes any number that is stored for one of the frame's.
+        // Read once, because the compiler assumes that any stored number may change it.
         const std::uint32_t* const vertices = mesh.vertices.data() + block.first_vertex;
         Vec3<float>* const points = frame.points;
         const std::size_t count = block.vertices;
@@ -372,11 +379,11 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
     }
 }
 
-/// sqrt(x), x not negative; of less than any length that counts, something as small.
+/// sqrt(x) for x >= 0. For x below any relevant squared length, some similarly small number.
 template <class D>
 HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
-    // As inverse_root().
+    // As in inverse_root().
     x = hn::Max(x, hn::Set(d, 1e-37f));
     const auto inverse = hn::ApproximateReciprocalSqrt(x);
     const auto result = hn::Mul(x, inverse);
@@ -387,7 +394,7 @@ HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
 #endif
 }
 
-/// 1 / x, x positive. A division takes as long as the root.
+/// 1 / x for positive x. A division takes as long as the root.
 template <class D>
 HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
@@ -398,10 +405,10 @@ HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
 #endif
 }
 
-/// Vertices [begin, begin + count) of a run, at most kLanes.
+/// Smooths vertices [begin, begin + count) of a run, at most kLanes.
 ///
 /// kValence             neighbours of each vertex; 0: `valence`
-/// index_of(vertex, k)  the k-th neighbour of a vertex from `begin` on; kIsConsecutive: of the first alone
+/// index_of(vertex, k)  the k-th neighbour of a vertex counted from `begin`; if kIsConsecutive, only of the first
 template <std::size_t kValence, bool kIsConsecutive, class Index>
 HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valence, std::size_t begin,
                                        std::size_t count, const Index& index_of) {
@@ -409,7 +416,7 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
     const Full d;
     using D = Full;
     const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
-    // Beyond the last vertex there is room.
+    // There is room beyond the last vertex.
     alignas(64) float factors[kLanes];
     for (std::size_t lane = 0; lane < kLanes && !frame.is_uniform; ++lane) {
         factors[lane] = frame.factors[begin + vertex_of(lane)];
@@ -444,7 +451,8 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
     if (result == rest) std::copy_n(rest, count, frame.to + begin);
 }
 
-/// Calls call(begin, count) for the vertices of a run. The last kLanes overlap those before: to write fewer takes longer.
+/// Calls call(begin, count) for the vertices of a run. The last kLanes may overlap those before, since writing
+/// fewer takes longer.
 template <class Call>
 HWY_INLINE void for_each_lanes(const MushRun& run, const Call& call) {
     const std::size_t count = HWY_MIN(kLanes, static_cast<std::size_t>(run.end - run.begin));
@@ -453,7 +461,7 @@ HWY_INLINE void for_each_lanes(const MushRun& run, const Call& call) {
     call(last, count);
 }
 
-/// A run that is consecutive.
+/// Smooths a consecutive run.
 template <std::size_t kValence>
 HWY_INLINE void smooth_consecutive_by_length(const MushFrame& frame, const MushRun& run) {
     const std::int32_t* const neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
@@ -476,7 +484,7 @@ HWY_INLINE void smooth_others_by_length(const MushFrame& frame, const MushRun& r
     });
 }
 
-/// An iteration by length.
+/// One iteration of SmoothType::length_weighted.
 void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end) {
     const MushMesh& mesh = *frame.mesh;
     for (std::size_t r = mesh.first_runs[begin]; r < mesh.first_runs[end]; ++r) {

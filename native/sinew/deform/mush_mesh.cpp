@@ -10,10 +10,10 @@
 namespace sinew {
 namespace {
 
-// A run costs about as much as some vertices.
-constexpr std::size_t kFewestConsecutive = 8;
+// Shorter sequences are not worth a run of their own, which costs about as much as several vertices.
+constexpr std::size_t kMinConsecutive = 8;
 
-/// How many faces each edge has. Throws where an edge of a face is not among the edges.
+/// The number of faces at each edge. Throws if an edge of a face is not among the edges.
 std::vector<std::uint32_t> faces_of_edges(const MeshTopology& topology, const CornerNeighbours& around,
                                           const ByVertex& edge_ends) {
     std::vector<std::uint32_t> faces(topology.edges.size() / 2);
@@ -21,7 +21,7 @@ std::vector<std::uint32_t> faces_of_edges(const MeshTopology& topology, const Co
     return faces;
 }
 
-/// The vertices that the spokes of each vertex lead to, as MushBlock has them.
+/// The ends of each vertex's spokes, in the order described at MushBlock.
 class Fans {
 public:
     Fans(const MeshTopology& topology, const CornerNeighbours& around, const ByVertex& corners) {
@@ -41,7 +41,8 @@ public:
     [[nodiscard]] std::span<const std::int32_t> of(std::size_t vertex) const { return spokes_.of(vertex); }
 
 private:
-    /// A corner of a vertex, by the two others. In the face beside it `previous` is the next.
+    /// A corner of a vertex, by the two other vertices. The next face around the vertex has `previous` as its
+    /// `next`.
     struct Corner {
         std::int32_t next;
         std::int32_t previous;
@@ -54,7 +55,7 @@ private:
         }
     }
 
-    /// Whether the faces of the corners lie side by side, in one row or all around; if so it adds their spokes.
+    /// If the faces of the corners are adjacent, in a row or all around, adds their spokes and returns true.
     bool add_chain() {
         std::ranges::sort(corners_, {}, &Corner::next);
         previous_.clear();
@@ -81,14 +82,15 @@ private:
     }
 
     ByVertex spokes_;
-    // Of one vertex.
+    // Scratch for one vertex.
     std::vector<Corner> corners_;
     std::vector<std::int32_t> previous_;
     std::vector<std::int32_t> chain_;
 };
 
-/// Vertices breadth-first, so that neighbours are near each other. Those of a vertex come in the order of its faces
-/// around it, from where it was reached: then a grid is passed in rows, whatever the order of its vertices.
+/// Orders vertices breadth-first, so that neighbours are close. The neighbours of a vertex are visited in the
+/// order of its faces, starting where the vertex was reached from. A grid is thus visited row by row, whatever
+/// the order of its vertices.
 class BreadthFirst {
 public:
     BreadthFirst(const ByVertex& neighbours, const Fans& fans, std::size_t count)
@@ -101,8 +103,8 @@ public:
             if (parents_[vertex] >= 0) continue;
             const std::size_t begin = order_.size();
             visit_from(vertex);
-            // Once more from the vertex that was reached last, at an end of this part of the mesh: fewer lie between
-            // neighbours.
+            // Visit this part of the mesh again, starting at the vertex reached last, which is at one of its
+            // ends: neighbours are then closer in the order.
             const std::size_t last = order_.back();
             for (std::size_t i = begin; i < order_.size(); ++i) parents_[order_[i]] = -1;
             order_.resize(begin);
@@ -133,7 +135,7 @@ private:
 
     const ByVertex& neighbours_;
     const Fans& fans_;
-    std::vector<std::int32_t> parents_;  // where each vertex was reached from; -1: not yet
+    std::vector<std::int32_t> parents_;  // the vertex that each vertex was reached from; -1: not reached yet
     std::vector<std::uint32_t> order_;
 };
 
@@ -159,9 +161,9 @@ public:
                 first, first + static_cast<std::ptrdiff_t>(std::min(MushMesh::kChunk, vertex_count - begin)),
                 {}, kind);
         }
-        place_.resize(vertex_count);
+        number_in_order_.resize(vertex_count);
         for (std::size_t i = 0; i < vertex_count; ++i) {
-            place_[mesh_.vertices[i]] = static_cast<std::int32_t>(i);
+            number_in_order_[mesh_.vertices[i]] = static_cast<std::int32_t>(i);
         }
     }
 
@@ -184,7 +186,7 @@ private:
     [[nodiscard]] std::size_t valence(std::size_t i) const {
         return neighbours_.of(mesh_.vertices[i]).size();
     }
-    /// How many corners and spokes.
+    /// The numbers of corners and spokes.
     [[nodiscard]] std::pair<std::size_t, std::size_t> fan_size(std::size_t i) const {
         const std::size_t vertex = mesh_.vertices[i];
         return {corners_.of(vertex).size(), fans_.of(vertex).size()};
@@ -194,11 +196,12 @@ private:
         mesh_.on_boundary.resize(mesh_.vertices.size());
         const auto faces = faces_of_edges(topology_, around_, edge_ends_);
         for (std::size_t end = 0; end < topology_.edges.size(); ++end) {
-            if (faces[end / 2] == 1) mesh_.on_boundary[index(place_[index(topology_.edges[end])])] = 1;
+            if (faces[end / 2] == 1)
+                mesh_.on_boundary[index(number_in_order_[index(topology_.edges[end])])] = 1;
         }
     }
 
-    /// Those of a vertex, in the order of the mesh.
+    /// The neighbours of a vertex, in the order of the mesh.
     [[nodiscard]] std::span<const std::int32_t> neighbours(std::size_t i) const {
         return std::span(sorted_).subspan(first_sorted_[i], valence(i));
     }
@@ -208,7 +211,7 @@ private:
             const std::size_t chunk = first_sorted_.size() / MushMesh::kChunk;
             first_sorted_.push_back(sorted_.size());
             for (const std::int32_t neighbour : neighbours_.of(vertex)) {
-                sorted_.push_back(place_[index(neighbour)]);
+                sorted_.push_back(number_in_order_[index(neighbour)]);
                 const std::size_t of_neighbour = index(sorted_.back()) / MushMesh::kChunk;
                 mesh_.reach =
                     std::max(mesh_.reach, std::max(chunk, of_neighbour) - std::min(chunk, of_neighbour));
@@ -217,7 +220,7 @@ private:
         }
     }
 
-    /// How many vertices from `i` on have their neighbours one place behind those of the one before.
+    /// How many vertices from `i` on have neighbours that follow those of the vertex before by one index.
     [[nodiscard]] std::size_t count_consecutive(std::size_t i, std::size_t end) const {
         std::size_t after = i + 1;
         while (after < end && std::ranges::equal(neighbours(after - 1), neighbours(after),
@@ -230,7 +233,7 @@ private:
     void add_runs(std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end;) {
             const std::size_t count = count_consecutive(i, end);
-            const bool is_consecutive = count >= kFewestConsecutive;
+            const bool is_consecutive = count >= kMinConsecutive;
             if (i == begin || is_consecutive || mesh_.runs.back().is_consecutive ||
                 valence(i) != mesh_.runs.back().valence) {
                 mesh_.runs.push_back({static_cast<std::uint32_t>(i), 0,
@@ -246,12 +249,12 @@ private:
         }
     }
 
-    /// Where the spokes of a vertex lead, beginning alike for vertices side by side.
+    /// The ends of a vertex's spokes. Adjacent vertices start with corresponding ones.
     std::span<const std::int32_t> spokes(std::size_t i) {
         const auto [corners, count] = fan_size(i);
         spokes_.clear();
         for (const std::int32_t vertex : fans_.of(mesh_.vertices[i])) {
-            spokes_.push_back(place_[index(vertex)]);
+            spokes_.push_back(number_in_order_[index(vertex)]);
         }
         if (count == corners) {
             std::rotate(spokes_.begin(), std::ranges::min_element(spokes_), spokes_.end());
@@ -279,7 +282,7 @@ private:
             const std::size_t lane = v - begin;
             const auto of_vertex = spokes(v);
             for (std::size_t k = 0; k < spoke_count; ++k) {
-                // Lanes without a vertex repeat the last.
+                // Lanes without a vertex repeat the last one.
                 std::fill(added[k].lane.begin() + static_cast<std::ptrdiff_t>(lane), added[k].lane.end(),
                           of_vertex[k]);
                 is_consecutive &= added[k].lane[0] + static_cast<std::int32_t>(lane) == of_vertex[k];
@@ -301,9 +304,10 @@ private:
     ByVertex neighbours_;
     ByVertex corners_;
     Fans fans_;
-    std::vector<std::int32_t> spokes_;  // of one vertex
-    std::vector<std::int32_t> place_;   // of each vertex in the order of the mesh
-    std::vector<std::int32_t> sorted_;  // the places of each vertex's neighbours, rising
+    std::vector<std::int32_t> spokes_;           // scratch for one vertex
+    std::vector<std::int32_t> number_in_order_;  // the number of each vertex in the order of the mesh
+    // the numbers of each vertex's neighbours in the order of the mesh, ascending
+    std::vector<std::int32_t> sorted_;
     std::vector<std::size_t> first_sorted_;
     MushMesh mesh_;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Normals of whole meshes: see normals.h for what they are. Products and sums are rounded one by one, in Blender's
-// order: no multiply-add, so that results are Blender's, and the same on each instruction set.
+// Normals of whole meshes: see normals.h for the definition. Products and sums are rounded one by one, in
+// Blender's order and without fused multiply-add, so that results equal Blender's and are the same on each
+// instruction set.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <array>
 #include <cstdint>
@@ -21,13 +22,13 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-// Shorter than its root, a vector has no direction.
+// A vector with a smaller squared length has no direction.
 constexpr float kShortest = 1e-35f;
 
-// The cosine from which on Blender has no space for custom normals.
+// Blender defines no custom normals where the absolute cosine reaches this.
 constexpr float kTooSteep = 0.9999f;
 
-// A point or normal at once, or one number after the other where vectors have one lane.
+// Processes a point or normal at once, or one number after the other where vectors have one lane.
 using Four = hn::CappedTag<float, 4>;
 
 template <class D>
@@ -40,7 +41,7 @@ HWY_INLINE Vec<D> rounded_dot(const Points<D>& a, const Points<D>& b) {
     return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
 
-/// 0 where it has no direction, or a length beyond the range of floats.
+/// The unit vector of `v`; 0 if it has no direction, or a length beyond the range of floats.
 template <class D>
 HWY_INLINE Points<D> direction(D d, const Points<D>& v) {
     const auto squared = rounded_dot<D>(v, v);
@@ -52,7 +53,7 @@ HWY_INLINE Points<D> direction(D d, const Points<D>& v) {
             hn::IfThenElseZero(has_one, hn::Div(v.z, length))};
 }
 
-/// Blender's acos.
+/// Blender's polynomial for acos.
 template <class D>
 HWY_INLINE Vec<D> polynomial_angle(D d, Vec<D> cosine) {
     const auto one = hn::Set(d, 1.0f);
@@ -80,7 +81,7 @@ HWY_INLINE void store_interleaved(D d, Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e, f
     }
 }
 
-/// The four numbers of each lane to every other of `to`.
+/// Stores the four numbers of each lane to every other Float4 of `to`.
 template <class D>
 HWY_INLINE void store_slots(D d, Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e, Float4* to) {
     alignas(64) Float4 numbers[hn::MaxLanes(D())];
@@ -95,7 +96,7 @@ HWY_INLINE Points<D> face_normal(D d, const Points<D>& newell) {
     const auto has_area = hn::Gt(squared, hn::Set(d, kShortest));
     const auto is_finite = hn::Le(squared, hn::Set(d, std::numeric_limits<float>::max()));
     const auto one = hn::Set(d, 1.0f);
-    // 0 where it is infinite.
+    // 0 if the squared length is infinite.
     const auto inverse = hn::IfThenElseZero(hn::And(has_area, is_finite), hn::Div(one, hn::Sqrt(squared)));
     const auto scaled = [inverse, is_finite](Vec<D> number)
                             HWY_ATTR { return hn::IfThenElseZero(is_finite, hn::Mul(number, inverse)); };
@@ -108,12 +109,13 @@ struct SineCosine {
     Vec<D> cosine;
 };
 
-/// Of angles of at most a turn or so, to 1e-7: by Taylor series, made to fit by Moshier (Cephes), of an eighth of a turn.
+/// Sine and cosine of angles up to about 360 degrees, to 1e-7: by Taylor polynomials on 45 degrees, fitted by
+/// Moshier (Cephes).
 template <class D>
 HWY_INLINE SineCosine<D> sine_cosine(D d, Vec<D> angle) {
     const auto set = [d](float value) HWY_ATTR { return hn::Set(d, value); };
     const auto quarters = hn::Round(hn::Mul(angle, set(0.636619772367581f)));
-    // A quarter of a turn in two parts, the first of few digits.
+    // 90 degrees as the sum of two numbers, the first of them with few digits, so that its products are exact.
     auto r = hn::Sub(angle, hn::Mul(quarters, set(1.5703125f)));
     r = hn::Sub(r, hn::Mul(quarters, set(4.83826794896619e-4f)));
     const auto r2 = hn::Mul(r, r);
@@ -132,9 +134,10 @@ HWY_INLINE SineCosine<D> sine_cosine(D d, Vec<D> angle) {
             hn::IfThenElse(is_first_or_last, b, hn::Neg(b))};
 }
 
-/// How far `part` turns: by as much of `whole`, or backwards of what is left of a turn.
+/// The angle for a stored number: `part` of `whole`, or if negative, backwards by that part of 360 degrees minus
+/// `whole`.
 template <class D>
-HWY_INLINE Vec<D> turned(D d, Vec<D> part, Vec<D> whole) {
+HWY_INLINE Vec<D> stored_angle(D d, Vec<D> part, Vec<D> whole) {
     const auto rest = hn::Sub(hn::Set(d, 6.28318530717959f), whole);
     return hn::Mul(part, hn::IfThenElse(hn::Gt(part, hn::Zero(d)), whole, rest));
 }
@@ -145,14 +148,14 @@ HWY_INLINE Points<D> rounded_cross(const Points<D>& a, const Points<D>& b) {
             hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
 }
 
-/// The direction of what is perpendicular to `n`, of cosine `along`.
+/// The direction of the component of `v` perpendicular to `n`; `along` is their cosine.
 template <class D>
 HWY_INLINE Points<D> perpendicular(D d, const Points<D>& v, const Points<D>& n, Vec<D> along) {
     const Points<D> of_n{hn::Mul(n.x, along), hn::Mul(n.y, along), hn::Mul(n.z, along)};
     return direction(d, minus<D>(v, of_n));
 }
 
-/// The edges of fans between which their custom normals are.
+/// The edges of fans that define the space of their custom normals.
 template <class D>
 struct FanEdges {
     Points<D> first;
@@ -160,13 +163,13 @@ struct FanEdges {
     // Cosines of their angles to the normal.
     Vec<D> along_first;
     Vec<D> along_last;
-    Vec<D> mean_angle;  // of all edges to it
+    Vec<D> mean_angle;  // of all edges to the normal
 };
 
-/// The normals `n`, tilted and turned.
+/// The normals `n`, tilted and then rotated.
 template <class D>
 HWY_INLINE Points<D> custom_normals(D d, const Points<D>& n, const FanEdges<D>& edges, Vec<D> tilt,
-                                    Vec<D> turn) {
+                                    Vec<D> spin) {
     const Points<D> x = perpendicular<D>(d, edges.first, n, edges.along_first);
     const Points<D> y = direction(d, rounded_cross<D>(n, x));
     const Points<D> to_last = perpendicular<D>(d, edges.last, n, edges.along_last);
@@ -177,10 +180,10 @@ HWY_INLINE Points<D> custom_normals(D d, const Points<D>& n, const FanEdges<D>& 
     const auto is_behind = hn::Lt(rounded_dot<D>(y, to_last), hn::Zero(d));
     const auto beta =
         hn::IfThenElse(hn::Lt(cosine, steep), hn::IfThenElse(is_behind, hn::Sub(whole, acute), acute), whole);
-    const SineCosine<D> of_tilt = sine_cosine(d, turned(d, tilt, edges.mean_angle));
-    const SineCosine<D> of_turn = sine_cosine(d, turned(d, turn, beta));
-    const auto on_x = hn::Mul(of_tilt.sine, of_turn.cosine);
-    const auto on_y = hn::Mul(of_tilt.sine, of_turn.sine);
+    const SineCosine<D> of_tilt = sine_cosine(d, stored_angle(d, tilt, edges.mean_angle));
+    const SineCosine<D> of_spin = sine_cosine(d, stored_angle(d, spin, beta));
+    const auto on_x = hn::Mul(of_tilt.sine, of_spin.cosine);
+    const auto on_y = hn::Mul(of_tilt.sine, of_spin.sine);
     const auto zero = hn::Zero(d);
     const auto stays = hn::Or(hn::Eq(tilt, zero), hn::Or(hn::Eq(edges.mean_angle, zero), hn::Eq(beta, zero)));
     const auto has_space =
@@ -192,12 +195,12 @@ HWY_INLINE Points<D> custom_normals(D d, const Points<D>& n, const FanEdges<D>& 
     return {of(n.x, x.x, y.x), of(n.y, x.y, y.y), of(n.z, x.z, y.z)};
 }
 
-// --- Faces and the angles of their corners
+// --- Face normals and the angles of corners
 
-/// Lanes of a block from `lane` on.
+/// Computes the lanes of a block from `lane` on.
 ///
 /// kCorners  of each face; 0: those of the block
-/// kLone     with the custom normals of lone fans
+/// kLone     also compute the custom normals of lone fans
 template <std::size_t kCorners, bool kAngles, bool kIsLast, bool kLone, class D>
 HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& block, std::size_t lane) {
     const std::size_t count = kCorners > 0 ? kCorners : block.corners;
@@ -211,13 +214,13 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
         newell.z = hn::Add(newell.z, hn::Mul(hn::Sub(from.x, to.x), hn::Add(from.y, to.y)));
     };
     Float4* const slots = frame.slots + 2 * (block.first_slot + lane);
-    // From each corner to the next.
+    // The edge from each corner to the next.
     [[maybe_unused]] Points<D> edges[kLone ? kCorners : 1];
     if (count > 0) {
         const Points<D> first = points_of<kIsLast>(d, frame.points, vertices);
         const Points<D> last = points_of<kIsLast>(d, frame.points, vertices + (count - 1) * lanes);
         add_edge(last, first);
-        // Along the edge of the corner before and of this one, forwards.
+        // Directions of the edges before and after the corner, along the face.
         const Points<D> closing = kAngles ? direction(d, minus<D>(first, last)) : first;
         Points<D> before = closing;
         Points<D> current = first;
@@ -256,7 +259,7 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
             const auto mean = hn::Div(angles, hn::Set(d, 2.0f));
             const Points<D> normals = custom_normals<D>(
                 d, normal, {edges[k], back, along_first, along_last, mean},
-                hn::Load(d, fans.tilt.lane.data() + lane), hn::Load(d, fans.turn.lane.data() + lane));
+                hn::Load(d, fans.tilt.lane.data() + lane), hn::Load(d, fans.spin.lane.data() + lane));
             store_interleaved(d, normals.x, normals.y, normals.z, zero,
                               numbers_of(frame.lone_normals + kLanes * (block.first_lone + k) + lane));
         }
@@ -272,7 +275,7 @@ HWY_INLINE void compute_block(const NormalFrame& frame, const FaceBlock& block) 
     }
 }
 
-/// Apart, so that its stack is not that of every block.
+/// Not inlined, so that its stack frame does not burden every block.
 template <bool kAngles>
 HWY_NOINLINE void compute_any_block(const NormalFrame& frame, const FaceBlock& block) {
     compute_block<0, kAngles, true>(frame, block);
@@ -308,14 +311,14 @@ void corners(const NormalFrame& frame, std::size_t begin, std::size_t end) {
     compute_blocks<true>(frame, begin, end);
 }
 
-/// The sum of a group.
+/// Sums the corners of a group.
 HWY_INLINE void sum_group(const NormalFrame& frame, std::size_t group, Float4& sum) {
     const Four d;
     const std::uint32_t* const offsets = frame.groups->offsets.data() + group;
     const std::uint32_t* const sources = frame.groups->sources.data();
     const float* const slots = numbers_of(frame.slots);
     if (offsets[0] == offsets[1]) {
-        // Of a vertex without faces: fans have corners.
+        // A vertex without faces (fans always have corners).
         const Vec3<float>& point = frame.points[group];
         sum = {{point.x, point.y, point.z, 0.0f}};
         return;
@@ -331,7 +334,7 @@ HWY_INLINE void sum_group(const NormalFrame& frame, std::size_t group, Float4& s
     }
 }
 
-/// Calls store(first group, its number, unit vectors of the lanes) for the groups [begin, end).
+/// Calls store(first group, number of groups, unit vectors in lanes) for groups [begin, end).
 template <class Store>
 HWY_INLINE void sum_lanes(const NormalFrame& frame, std::size_t begin, std::size_t end, const Store& store) {
     const Full d;
@@ -371,11 +374,11 @@ void sum_groups(const NormalFrame& frame, std::size_t begin, std::size_t end) {
 
 // --- Custom normals of other fans
 
-/// Those of the lanes of a block from `lane` on.
+/// The custom normals for the lanes of a block from `lane` on.
 template <bool kIsLast, class D>
 HWY_INLINE Points<D> fan_normals(D d, const NormalFrame& frame, const FanBlock& block, std::size_t lane) {
     const std::int32_t* const vertices = frame.mesh->fan_vertices.data() + block.first_vertex + lane;
-    // All normals are in one array.
+    // The index applies to the array of all normals, which starts at the slots.
     const Points<D> n =
         points_of<false>(d, static_cast<const Float4*>(frame.slots), block.normals.lane.data() + lane);
     const Points<D> point = points_of<kIsLast>(d, frame.points, vertices);
@@ -394,7 +397,7 @@ HWY_INLINE Points<D> fan_normals(D d, const NormalFrame& frame, const FanBlock& 
     const auto mean = hn::Div(angles, hn::Set(d, static_cast<float>(block.edges)));
     return custom_normals<D>(d, n, {first, last, along_first, along_last, mean},
                              hn::Load(d, block.tilt.lane.data() + lane),
-                             hn::Load(d, block.turn.lane.data() + lane));
+                             hn::Load(d, block.spin.lane.data() + lane));
 }
 
 void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {

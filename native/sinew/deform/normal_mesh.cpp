@@ -10,10 +10,11 @@
 namespace sinew {
 namespace {
 
-// Faces that are grouped by their corners: so many that blocks are full, so few that they are near each other.
+// Faces are grouped by their number of corners within batches of this size: many enough to fill blocks, few
+// enough to stay close in memory.
 constexpr std::size_t kFacesTogether = 2048;
 
-/// The Float4 with the normal of the slot that has the angle `source`.
+/// The index in Float4 of the normal in the slot that has the angle `source`.
 std::int32_t normal_of(std::uint32_t source) { return static_cast<std::int32_t>(source / 8 * 2); }
 
 class FaceBlocks {
@@ -21,7 +22,7 @@ public:
     FaceBlocks(const MeshTopology& topology, std::size_t vertex_count, NormalMesh& mesh)
         : topology_(topology), last_vertex_(static_cast<std::int32_t>(vertex_count) - 1), mesh_(mesh) {}
 
-    /// Returns the index of each corner's angle.
+    /// Makes the blocks. Returns the index of each corner's angle.
     std::vector<std::uint32_t> make() {
         const std::size_t face_count = topology_.face_offsets.size() - 1;
         mesh_.face_sources.resize(face_count);
@@ -85,7 +86,7 @@ CornerGroups groups_of_vertices(const ByVertex& corners, const std::vector<std::
     return groups;
 }
 
-/// The two corners that go along an edge, and how many do.
+/// The first two corners whose edge this is, and how many there are.
 struct EdgeUse {
     std::int32_t first = -1;
     std::int32_t second = -1;
@@ -93,10 +94,12 @@ struct EdgeUse {
     bool is_flat = false;
 };
 
-/// How one goes around a vertex from corner to corner, across smooth edges.
+/// The walk around a vertex from corner to corner, across smooth edges.
 struct Walks {
-    std::vector<std::int32_t> next;        // [corners] across its preceding edge; -1 where that is not smooth
-    std::vector<std::uint8_t> is_reached;  // [corners] from another, or itself: its following edge is smooth
+    // [corners] the corner across the preceding edge; -1 if that edge is not smooth
+    std::vector<std::int32_t> next;
+    // [corners] whether some corner leads to it, which means that its following edge is smooth
+    std::vector<std::uint8_t> is_reached;
 };
 
 Walks walks_of(const MeshTopology& topology, const Sharpness& sharpness, const CornerNeighbours& around,
@@ -116,7 +119,7 @@ Walks walks_of(const MeshTopology& topology, const Sharpness& sharpness, const C
         const auto [a, b, count, is_flat] = uses[edge];
         const bool is_sharp = is_flat || (!sharpness.edges.empty() && sharpness.edges[edge] != 0);
         if (is_sharp || count != 2) continue;
-        // Both from the same end: one of the faces is the wrong way round.
+        // Both traverse the edge from the same end: one of the faces is flipped.
         if (topology.corner_vertices[index(a)] == topology.corner_vertices[index(b)]) continue;
         walks.next[index(around.next[index(a)])] = b;
         walks.next[index(around.next[index(b)])] = a;
@@ -125,7 +128,7 @@ Walks walks_of(const MeshTopology& topology, const Sharpness& sharpness, const C
     return walks;
 }
 
-/// Fans, by the vertices that they are at.
+/// Makes fans, grouped by their vertices.
 class FanMaker {
 public:
     FanMaker(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness,
@@ -162,9 +165,9 @@ public:
 private:
     static constexpr std::uint32_t kNoBlock = std::numeric_limits<std::uint32_t>::max();
 
-    /// What customise() needs of a fan.
+    /// What customise() needs to know about a fan.
     struct Custom {
-        std::size_t first_corner;  // of walked_
+        std::size_t first_corner;  // into walked_
         std::uint32_t corners;
         std::uint32_t edges;
     };
@@ -184,7 +187,7 @@ private:
         walked_.insert(walked_.end(), fan_.begin(), fan_.end());
     }
 
-    /// Vertices at the other ends of a corner's edges.
+    /// The vertex at the other end of a corner's following edge.
     [[nodiscard]] std::int32_t following(std::int32_t corner) const {
         return topology_.corner_vertices[index(around_.next[index(corner)])];
     }
@@ -192,12 +195,12 @@ private:
         return topology_.corner_vertices[index(around_.previous[index(corner)])];
     }
 
-    /// Takes those of customs_ that are computed along with faces.
+    /// Removes from customs_ those fans that are computed along with faces.
     void add_lone_fans() {
         std::vector<std::uint32_t> block_of_slot(mesh_.slot_count, kNoBlock);
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             const FaceBlock& block = mesh_.blocks[b];
-            // The others are computed for any number of corners, one lane or one point at a time.
+            // Other blocks are computed for any number of corners, with one lane or one point at a time.
             if (block.lanes != kLanes || block.reads_last_point || block.corners < 3 || block.corners > 4)
                 continue;
             std::fill_n(block_of_slot.begin() + block.first_slot, kLanes, static_cast<std::uint32_t>(b));
@@ -214,7 +217,7 @@ private:
         }
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             FaceBlock& block = mesh_.blocks[b];
-            // Lanes without a fan take as long as those that have one.
+            // Lanes without a fan take as much time as lanes with one.
             if (2 * counts[b] < block.corners * kLanes) continue;
             block.first_lone = static_cast<std::uint32_t>(mesh_.lone_fans.size());
             mesh_.lone_fans.resize(mesh_.lone_fans.size() + block.corners);
@@ -226,7 +229,7 @@ private:
             const std::size_t lane = source_of(fan) / 8 - mesh_.blocks[b].first_slot;
             const std::size_t row = mesh_.blocks[b].first_lone + source_of(fan) % 4;
             mesh_.lone_fans[row].tilt.lane[lane] = part(sharpness_.custom[2 * corner]);
-            mesh_.lone_fans[row].turn.lane[lane] = part(sharpness_.custom[2 * corner + 1]);
+            mesh_.lone_fans[row].spin.lane[lane] = part(sharpness_.custom[2 * corner + 1]);
             mesh_.corner_sources[corner] =
                 static_cast<std::int32_t>(mesh_.first_of_lone_fans() + kLanes * row + lane);
             return true;
@@ -262,17 +265,17 @@ private:
             std::int32_t* const vertices = mesh_.fan_vertices.data() + first_vertex + lane;
             vertices[0] = topology_.corner_vertices[index(corners.front())];
             vertices[kLanes] = preceding(corners.back());
-            // Of a fan that is not round the last edge has no corner that it follows.
+            // In a fan that is not closed, the last edge is not the following edge of any corner.
             vertices[(1 + block.edges) * kLanes] = vertices[kLanes];
-            std::int64_t tilt = 0, turn = 0;
+            std::int64_t tilt = 0, spin = 0;
             for (std::size_t k = 0; k < corners.size(); ++k) {
                 vertices[(2 + k) * kLanes] = following(corners[k]);
                 tilt += sharpness_.custom[2 * index(corners[k])];
-                turn += sharpness_.custom[2 * index(corners[k]) + 1];
+                spin += sharpness_.custom[2 * index(corners[k]) + 1];
             }
             block.normals.lane[lane] = mesh_.corner_sources[index(corners.front())];
             block.tilt.lane[lane] = part(tilt / static_cast<std::int64_t>(corners.size()));
-            block.turn.lane[lane] = part(turn / static_cast<std::int64_t>(corners.size()));
+            block.spin.lane[lane] = part(spin / static_cast<std::int64_t>(corners.size()));
         }
         const auto vertices = std::span<const std::int32_t>(mesh_.fan_vertices).subspan(first_vertex);
         block.reads_last_point = std::ranges::find(vertices, last_vertex_) != vertices.end();
@@ -295,7 +298,7 @@ private:
     Walks walks_;
     NormalMesh& mesh_;
     std::vector<std::int32_t> fan_;     // in the order of the walk
-    std::vector<std::int32_t> walked_;  // those of all
+    std::vector<std::int32_t> walked_;  // the corners of all fans
     std::vector<Custom> customs_;
 };
 

@@ -24,7 +24,7 @@ bool any(std::span<const std::uint8_t> flags) {
     return std::ranges::any_of(flags, [](std::uint8_t flag) { return flag != 0; });
 }
 
-/// Whether there are some, and all are set.
+/// Whether there are flags, and all are set.
 bool all(std::span<const std::uint8_t> flags) {
     return !flags.empty() && std::ranges::all_of(flags, [](std::uint8_t flag) { return flag != 0; });
 }
@@ -63,7 +63,7 @@ NormalDomain domain_of(const MeshTopology& topology, const Sharpness& sharpness)
     return any(sharpness.faces) || any(sharpness.edges) ? NormalDomain::corner : NormalDomain::vertex;
 }
 
-/// A kernel's function on [0, count).
+/// Runs a kernel's function on [0, count).
 void run(decltype(NormalKernel::sum) function, const NormalFrame& frame, std::size_t count,
          std::size_t threads, std::size_t chunk) {
     struct Work {
@@ -89,7 +89,7 @@ struct Normals::State {
           mesh(make_normal_mesh(topology, vertices, sharpness, domain)),
           normals(mesh.normal_count()) {}
 
-    /// Those that corners have the normals of, where these are not the faces'.
+    /// The groups whose normals corners have, unless they have the faces' normals.
     [[nodiscard]] const CornerGroups& corner_groups() const noexcept {
         return domain == NormalDomain::corner ? mesh.fans : mesh.vertices;
     }
@@ -99,11 +99,11 @@ struct Normals::State {
         return std::min(hardware_threads(), 1 + corner_vertices.size() / kCornersWorthAThread);
     }
 
-    /// Each of `to` from the slot or group that it is to have.
+    /// Writes to each element of `to` the normal that `sources` names.
     void write(std::span<Vec3<float>> to, const std::int32_t* sources, const Float4* from,
                std::size_t threads) const noexcept;
 
-    // As they came.
+    // The data given to the constructor.
     std::vector<std::int32_t> face_offsets;
     std::vector<std::int32_t> corner_vertices;
     std::vector<std::int32_t> edges;
@@ -114,9 +114,9 @@ struct Normals::State {
     NormalDomain domain;
     NormalMesh mesh;
 
-    // Of one call at a time.
+    // Scratch for one call at a time.
     mutable std::mutex mutex;
-    mutable std::vector<Float4> normals;  // as of NormalMesh::corner_sources
+    mutable std::vector<Float4> normals;  // indexed as NormalMesh::corner_sources
 };
 
 void Normals::State::write(std::span<Vec3<float>> to, const std::int32_t* sources, const Float4* from,
@@ -179,7 +179,7 @@ void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
                             domain == NormalDomain::corner ? all + mesh.first_of_lone_fans() : nullptr,
                             all + mesh.first_of_blocks(),
                             normals.data()};
-    // The corners of a mesh that is all flat have the normals of their faces.
+    // If the whole mesh is flat, corners have the normals of their faces.
     if (domain == NormalDomain::face ||
         (domain == NormalDomain::corner && state.domain == NormalDomain::face)) {
         run(kernel.faces, frame, mesh.blocks.size(), threads, kBlocksOfChunk);

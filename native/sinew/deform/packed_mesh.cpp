@@ -8,11 +8,12 @@
 namespace sinew {
 namespace {
 
-// A block costs the same however few of its lanes are filled: as much as two to six vertices of a mixed one,
-// which depends on the processor. It also bounds the memory: 16 / 6 of 24 bytes a vertex at four influences.
+// A block costs the same however few of its lanes are used: as much as two to six vertices of a mixed one,
+// depending on the processor. This also bounds the memory: 16 / 6 of 24 bytes for each vertex with four
+// influences.
 constexpr std::size_t kMinLanes = 6;
 
-// A run takes three masked stores; with more runs than this, one for each vertex is as fast.
+// A run takes three masked stores. With more runs than this, one store for each vertex is as fast.
 constexpr std::size_t kMaxRuns = 5;
 
 class BoneSets {
@@ -20,7 +21,7 @@ public:
     BoneSets(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences)
         : offsets_(offsets), influences_(influences), set_of_(offsets.size() - 1), slots_(1024, kNone) {
         for (std::size_t vertex = 0; vertex < set_of_.size(); ++vertex) {
-            // Neighbours mostly share their bones.
+            // Adjacent vertices mostly have the same bones.
             const bool as_before = vertex > 0 && equal(vertex, vertex - 1);
             const std::uint32_t set = as_before ? set_of_[vertex - 1] : find_or_add(vertex);
             set_of_[vertex] = set;
@@ -30,7 +31,7 @@ public:
 
     [[nodiscard]] std::size_t count() const { return sizes_.size(); }
 
-    /// Vertices by set, sets in order of their first vertex, and where each set starts.
+    /// Lists the vertices by set, with sets in the order of their first vertex, and where each set starts.
     void order(std::vector<std::uint32_t>& vertices, std::vector<std::uint32_t>& starts) const {
         starts.assign(sizes_.size() + 1, 0);
         std::partial_sum(sizes_.begin(), sizes_.end(), starts.begin() + 1);
@@ -107,7 +108,7 @@ public:
         for (std::size_t set = 0; set + 1 < starts.size(); ++set) {
             add_set(std::span(order).subspan(starts[set], starts[set + 1] - starts[set]), scattered);
         }
-        // Neighbours in number of influences, so that few are filled up with weight 0.
+        // Vertices with similar numbers of influences become adjacent, which minimises padding.
         std::ranges::stable_sort(scattered, {}, [this](std::uint32_t vertex) { return count(vertex); });
         for (std::size_t i = 0; i < scattered.size(); i += kLanes) {
             add_mixed(std::span(scattered).subspan(i, std::min(kLanes, scattered.size() - i)));
@@ -165,7 +166,7 @@ private:
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             numbers.lane[lane] = static_cast<std::int32_t>(vertices[std::min(lane, vertices.size() - 1)]);
         }
-        // Rising within a set, and within a number of influences.
+        // Vertices ascend within a set, and within a number of influences.
         const bool consecutive =
             !mixed && vertices.size() == kLanes && vertices.back() - vertices.front() == kLanes - 1;
         const std::size_t runs = consecutive ? 0 : add_runs(vertices);
@@ -182,7 +183,7 @@ private:
         return influences - std::min<std::size_t>(influences, 1);
     }
 
-    /// The number of runs, or 0 where there are too many.
+    /// Adds the runs of a block. Returns their number, or 0 if there are too many.
     std::size_t add_runs(std::span<const std::uint32_t> vertices) {
         const std::size_t before = mesh_.runs.size();
         for (std::size_t begin = 0, end = 0; begin < vertices.size(); begin = end) {
@@ -220,8 +221,8 @@ private:
         }
     }
 
-    /// Finds the bones that are used, and numbers those of the mesh by their index among them: the memory
-    /// of a frame does not grow with the highest number.
+    /// Collects the bones that are used, and replaces bone numbers by indices into them, so that a frame's memory
+    /// does not grow with the highest number.
     void number_used_bones(std::span<const std::int32_t> more_bones) {
         std::int32_t highest = -1;
         for (const auto& bones : {std::span<const std::int32_t>(mesh_.bones), more_bones}) {
@@ -240,8 +241,7 @@ private:
         for (std::int32_t& bone : mesh_.bones) bone = index_of_bone[static_cast<std::size_t>(bone)];
     }
 
-    /// Fills PackedMesh::pairs. In linear time, as a mesh may have as many sets of bones as
-    /// vertices.
+    /// Fills PackedMesh::pairs. Takes linear time, as a mesh may have as many sets of bones as vertices.
     void list_bone_pairs() {
         struct Set {
             std::uint32_t begin;
@@ -321,7 +321,7 @@ UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows, 
     UnpackedMesh result;
     result.rest_points.resize(vertices);
     result.offsets.assign(vertices + 1, 0);
-    // call(vertex, influence) for each influence of each vertex.
+    // Calls call(vertex, influence) for each influence of each vertex.
     const auto for_each_influence = [&](const auto& call) {
         for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
             const Block& block = mesh.blocks[b];
@@ -335,7 +335,7 @@ UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows, 
                 const auto vertex = static_cast<std::size_t>(mesh.vertices[b].lane[lane]);
                 result.rest_points[vertex] = {xyz[0].lane[lane], xyz[1].lane[lane], xyz[2].lane[lane]};
                 for (std::size_t k = 0; k < block.influences; ++k) {
-                    // Of weight 0 are those that fill up a mixed block.
+                    // Influences of weight 0 are padding in a mixed block.
                     if (weight_of(k) == 0.0f) continue;
                     const auto bone = static_cast<std::size_t>(mesh.bones[first + k]);
                     call(vertex, Influence<float>{mesh.used_bones[bone], weight_of(k)});

@@ -8,7 +8,7 @@
 
 namespace sinew {
 
-// In double, but for a single subtraction: a few hundred bones, against the rounding of every vertex.
+// Computed in double, except for a single subtraction: bones are few, and their rounding affects every vertex.
 
 void write_displacement(const Mat3<double>& m, const Vec3<double>& translation, Float4* rows) noexcept {
     rows[0] = float4(m[0].x, m[1].x, m[2].x, translation.x);
@@ -16,7 +16,7 @@ void write_displacement(const Mat3<double>& m, const Vec3<double>& translation, 
     rows[2] = float4(m[0].z, m[1].z, m[2].z, translation.z);
 }
 
-// Without the identity a vertex far from the origin keeps its digits, and the rest pose every bit.
+// Without the identity, a vertex far from the origin keeps its digits, and the rest pose is exact.
 void write_displacement(const Affine<double>& a, Float4* rows) noexcept {
     write_displacement(a.linear - Mat3<double>(1.0), a.translation, rows);
 }
@@ -34,7 +34,7 @@ void prepare(const Kernel& kernel, const Bones& bones, Palette& palette) noexcep
     palette.scaled_count = 0;
     palette.any_scale = false;
     if (kernel.set_bone_size > 0) return kernel.prepare(kernel, bones, palette);
-    // Nearly always all of them.
+    // Nearly always all of them are posed.
     std::size_t posed = bones.used.size();
     while (posed > 0 && static_cast<std::size_t>(bones.used[posed - 1]) >= bones.posed_from_rest.size()) {
         --posed;

@@ -13,8 +13,8 @@ constexpr std::uint32_t kWriter = kReaders + 1;
 constexpr std::uint32_t kForks = ~(kReaders | kWriter);
 constexpr std::uint32_t kOneFork = kWriter << 1;
 
-/// `state` as it is for this process: a forked child has none of the threads that used its parent's palettes, and
-/// would wait for them for ever.
+/// `state` as it applies to this process. A forked child has none of the threads that used its parent's palettes,
+/// and would otherwise wait for them forever.
 std::uint32_t of_this_process(std::uint32_t state) noexcept {
     const std::uint32_t forked = kOneFork * forks();
     return (state & kForks) == forked ? state : forked;
@@ -23,7 +23,8 @@ std::uint32_t of_this_process(std::uint32_t state) noexcept {
 }  // namespace
 
 PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries) {
-    // Left as the system gives it: only the first palette is ever touched where one thread at a time deforms.
+    // Not initialised, so that the system provides no pages for palettes that are never used: only the first is,
+    // if one thread at a time deforms.
     for (std::size_t k = 0; k < kernels.size(); ++k) {
         const bool may_scale = kernels[k]->is_rigid;
         const std::size_t of_set_bones = kernels[k]->set_bone_size * bones;
@@ -36,7 +37,7 @@ PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t b
         memory.sizes = std::make_unique_for_overwrite<float[]>(kMax * of_sizes);
         memory.may_be_plain = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * rows);
         if (may_scale) {
-            // A bone may be listed twice: for its rest axes, and for its pose.
+            // A bone may be listed twice: because of its rest axes, and because of its pose.
             memory.scaled = std::make_unique_for_overwrite<std::int32_t[]>(kMax * 2 * bones);
             memory.has_scale = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * rows);
         }
@@ -56,7 +57,7 @@ PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t b
     }
 }
 
-/// Makes the state what `next` says of it, waiting as long as that is the same; what it was before.
+/// Replaces the state by next(state), and waits while both are equal. Returns the state before.
 template <class Next>
 std::uint32_t PaletteStore::change(const Next& next) noexcept {
     for (std::uint32_t stored = state_.load(std::memory_order_relaxed);;) {
@@ -74,7 +75,7 @@ std::uint32_t PaletteStore::change(const Next& next) noexcept {
 std::uint32_t PaletteStore::start_reading() noexcept {
     const std::uint32_t before = change([](std::uint32_t state) {
         const bool is_free = (state & kWriter) == 0 && (state & kReaders) != kReaders;
-        return is_free ? state | (state + 1) : state;  // the lowest bit that is not set
+        return is_free ? state | (state + 1) : state;  // sets the lowest bit that is not set
     });
     return static_cast<std::uint32_t>(std::countr_one(before));
 }
@@ -85,7 +86,7 @@ void PaletteStore::end_reading(std::uint32_t index) noexcept {
 }
 
 void PaletteStore::start_writing() noexcept {
-    // First this, so that threads which deform without a pause do not keep it waiting.
+    // Set the writer's bit first, so that threads that deform continuously do not keep it waiting.
     change([](std::uint32_t state) { return state | kWriter; });
     for (;;) {
         const std::uint32_t state = state_.load(std::memory_order_acquire);

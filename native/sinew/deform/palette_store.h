@@ -11,21 +11,23 @@
 
 namespace sinew {
 
-/// Room for the bones of each thread that deforms a mesh, made with the mesh, so that a frame allocates nothing;
-/// and who may read the mesh or write it: many threads that deform, or one that changes the rest points.
+/// Palettes for each thread that deforms a mesh, allocated with the mesh, so that a frame does not allocate. Also
+/// a readers-writer lock for the mesh: many threads may deform, or one may change the rest points.
 ///
-/// A thread waits only where kMax others deform this very mesh, or where its rest points are being written.
+/// A thread waits only while kMax others deform this very mesh, or while its rest points are being written.
 class PaletteStore {
 public:
     static constexpr std::uint32_t kMax = 16;
     static constexpr std::size_t kMaxKernels = 2;
 
-    /// kernels  one or two, that each thread deforms by
-    /// bones    that the mesh uses
-    /// entries  of its BoneSets; 0 where no kernel wants them
+    /// Allocates the palettes.
+    ///
+    /// kernels  one or two, all used by each thread
+    /// bones    number of bones that the mesh uses
+    /// entries  number of entries in its BoneSets; 0 if no kernel needs sets
     PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries);
 
-    /// Palettes that are the caller's, and the mesh to read, as long as this lives.
+    /// Holds palettes for the caller, and the mesh for reading, while this object lives.
     class Reading {
     public:
         explicit Reading(PaletteStore& store) noexcept : store_(store), index_(store.start_reading()) {}
@@ -33,7 +35,7 @@ public:
         Reading(const Reading&) = delete;
         Reading& operator=(const Reading&) = delete;
 
-        /// Of the kernel with this index.
+        /// The palette for the kernel with this index.
         [[nodiscard]] Palette& palette(std::size_t kernel) const noexcept {
             return store_.palettes_[kernel][index_];
         }
@@ -43,7 +45,7 @@ public:
         std::uint32_t index_;
     };
 
-    /// The mesh to write, as long as this lives.
+    /// Holds the mesh for writing while this object lives.
     class Writing {
     public:
         explicit Writing(PaletteStore& store) noexcept : store_(store) { store.start_writing(); }
@@ -63,7 +65,7 @@ private:
     template <class Next>
     std::uint32_t change(const Next& next) noexcept;
 
-    /// Of one kernel's palettes.
+    /// The memory of one kernel's palettes.
     struct Memory {
         std::unique_ptr<Float4[]> float4s;
         std::unique_ptr<float[]> sizes;
@@ -75,7 +77,8 @@ private:
 
     Memory memory_[kMaxKernels];
     Palette palettes_[kMaxKernels][kMax];
-    std::atomic<std::uint32_t> state_{0};  // a bit for each palette in use, one for a writer, then the forks
+    // a bit for each palette in use, one for a writer, and above them forks()
+    std::atomic<std::uint32_t> state_{0};
 };
 
 }  // namespace sinew

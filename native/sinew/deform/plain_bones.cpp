@@ -19,7 +19,7 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Sets Palette::may_be_plain of each first bone that one of its pairs says it of.
+/// Sets Palette::may_be_plain for each first bone with a pair that would be added plainly.
 void mark_plain(const BonePairs& pairs, Palette& palette) {
     const hn::CappedTag<float, kLanes> d;
     const hn::RebindToSigned<decltype(d)> indices;

@@ -6,14 +6,14 @@
 
 namespace sinew {
 
-/// How a precomputation runs. All of them take this.
+/// How a precomputation runs. All precomputations take this.
 struct PrecomputeOptions {
-    /// 0: as many as help.
+    /// 0: as many as useful.
     std::size_t threads = 0;
-    /// Called now and then, on the calling thread alone, with the share that is done, 0 to 1. False cancels; what it
-    /// throws comes through.
+    /// Called from time to time, only on the calling thread, with the completed share, 0 to 1. If it returns
+    /// false, the precomputation is cancelled. An exception that it throws is passed on.
     std::function<bool(double)> progress;
-    /// By the definition itself, slowly and with more to keep: for tests.
+    /// Compute by the definition itself, which is slower and keeps more. For tests.
     bool exact = false;
 };
 

@@ -9,12 +9,13 @@
 
 namespace sinew {
 
-/// Calls `options.progress` on the thread that made this, and knows whether it cancelled.
+/// Calls options.progress on the thread that constructed this object, and stores whether it cancelled.
 class ProgressReporter {
 public:
     explicit ProgressReporter(const PrecomputeOptions& options) : progress_(options.progress) {}
 
-    /// False where the work is to end. On other threads, only that.
+    /// Reports progress if called on the constructing thread. Returns false on any thread once the work was
+    /// cancelled.
     bool go_on(double done) {
         if (progress_ && std::this_thread::get_id() == caller_ &&
             !cancelled_.load(std::memory_order_relaxed) && !progress_(done)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Blocks under a rigid method: compiled once for each instruction set, see kernels/.
+// Deforms blocks with a rigid method. Compiled once for each instruction set, see kernels/.
 #if defined(SINEW_DEFORM_RIGID_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_RIGID_INL_H_
 #undef SINEW_DEFORM_RIGID_INL_H_
@@ -17,29 +17,30 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// Rigid in what follows is a method's kernel:
+/// In this file, Rigid is a method's kernel with these members:
 ///
-/// kNumbers        of a bone's row, a multiple of 4; the first four are the quaternion, or what has no sign
-/// kSignedFloat4s  how many Float4 of a row change their sign with the quaternion: 0 to 2
-/// add_scale       adds to a sum what a bone's scale does
-/// finish          the points, of their sum, their rest points and lane `lane` of block `b`
+/// kNumbers        numbers in a bone's row, a multiple of 4; the first four are the quaternion, or numbers
+///                 without a sign
+/// kSignedFloat4s  how many Float4 of a row change sign with the quaternion: 0 to 2
+/// add_scale       adds the effect of a bone's scale to a sum
+/// finish          the points, from their sum and rest points and, if the method has it, their vertex data
 template <class Rigid>
 inline constexpr std::size_t kRowFloat4s = Rigid::kNumbers / 4;
 
-// A little more than the cosine of 45 degrees.
+// Slightly more than the cosine of 45 degrees.
 inline constexpr float kCosine45 = 0.7072f;
 
-// Above this many influences a set's signs are found vertex by vertex.
+// For sets with more influences, signs are found vertex by vertex.
 inline constexpr std::size_t kMaxResolved = 32;
 
 HWY_INLINE float dot(const float* a, const float* b) {
     return (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3]);
 }
 
-/// Whether the sign by which a term joins the running sum of those before it is the same whatever the weights: it is
-/// where the term is in the hemisphere of each of them.
+/// Whether each row joins the running sum of the rows before it with the same sign for all weights: it does if it
+/// is in the hemisphere of each of them.
 HWY_INLINE bool signs_agree(const float* rows, std::size_t stride, std::size_t count) {
-    // Far beyond the rounding of a sum, so that it decides as the sum in floats would.
+    // Far above the rounding error of a sum, so that the result agrees with signs decided by the sum in floats.
     constexpr float kTie = 1e-5f;
     for (std::size_t i = 1; i < count; ++i) {
         for (std::size_t j = 0; j < i; ++j) {
@@ -49,10 +50,10 @@ HWY_INLINE bool signs_agree(const float* rows, std::size_t stride, std::size_t c
     return true;
 }
 
-/// What each row but the first differs from the first.
+/// Subtracts the first row from each other row.
 template <std::size_t kNumbers>
 HWY_INLINE void subtract_first(float* rows, std::size_t count) {
-    // Four and no more where that is what a row is a multiple of.
+    // Vectors of 8 only if a row's size is a multiple of 8.
     const hn::CappedTag<float, kNumbers % 8 == 0 ? 8 : 4> d;
     for (std::size_t i = 0; i < kNumbers; i += hn::Lanes(d)) {
         const auto first = hn::LoadU(d, rows + i);
@@ -67,16 +68,17 @@ HWY_INLINE void subtract_first(float* rows, std::size_t count) {
 
 using Four = hn::CappedTag<float, 4>;
 
-/// The dot product in every lane, rounded as dot().
+/// The dot product in every lane, rounded as by the scalar dot().
 HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
     const Vec<Four> product = hn::Mul(a, b);
     const Vec<Four> pairs = hn::Add(product, hn::Shuffle1032(product));
     return hn::Add(pairs, hn::Shuffle2301(pairs));
 }
 
-/// Copies rows of the palette, each in the hemisphere of the first; the least of their cosines.
+/// Copies rows of the palette, each in the hemisphere of the first. Returns the smallest of their absolute
+/// cosines with the first.
 ///
-/// kDifferences  of all but the first, what they differ from it
+/// kDifferences  copy the differences from the first row, for all rows but the first
 template <class Rigid, bool kDifferences>
 HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count,
                               float* rows) {
@@ -127,9 +129,9 @@ float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_
 
 #endif
 
-/// Copies the first bone of a set to `rows` and what the others differ from it, or if plain the others, each with
-/// the sign by which it is added. False where that depends on the weights, or where a bone has scale and so
-/// depends on the vertex.
+/// Copies the first bone of a set to `rows`, and the differences of the others from it or, if plain, the others
+/// themselves, each with the sign with which it is added. Returns false if a sign depends on the weights, or if a
+/// bone has scale and therefore depends on the vertex.
 template <class Rigid, bool kPlain>
 HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones, std::size_t count,
                               float* rows) {
@@ -139,7 +141,7 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
             if (palette.has_scale[static_cast<std::size_t>(bones[k])] != 0) return false;
         }
     }
-    // Within 45 degrees of the first, all lie within 90 of each other.
+    // Within 45 degrees of the first, all are within 90 degrees of each other.
     const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
     if (Rigid::kSignedFloat4s == 0 || least > kCosine45) return true;
     if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
@@ -148,15 +150,15 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
     return true;
 }
 
-/// Lanes [lane, lane + N) of a block whose bones are resolved. A fixed count makes one run of instructions.
+/// Blends lanes [lane, lane + N) of a block with resolved signs. With a fixed kCount the loop is unrolled.
 ///
-/// first_weight  of the first influence, read if plain
-/// weights       of the second and those after it
+/// first_weight  of the first influence, only read if plain
+/// weights       of the second influence and those after it
 template <std::size_t kNumbers, std::size_t kCount, bool kPlain, class D>
 HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
                                        const float* weights) {
     Sum<D, kNumbers> sum;
-    // Eight numbers at a time, whose sums fit into registers.
+    // Eight numbers at a time, so that their sums fit into registers.
     for (std::size_t begin = 0; begin < kNumbers; begin += kRow) {
         const std::size_t end = std::min(kNumbers, begin + kRow);
         for (std::size_t i = begin; i < end; ++i) sum.value[i] = hn::Set(d, rows[i]);
@@ -171,7 +173,7 @@ HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count
     return sum;
 }
 
-/// The same for bones with scale, or with signs that depend on the weights.
+/// The same for bones with scale, or whose signs depend on the weights.
 template <class Rigid, class D>
 HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, const std::int32_t* bones,
                                                std::size_t count, bool plain, const float* first_weight,
@@ -190,7 +192,7 @@ HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, cons
     return blend.sum;
 }
 
-/// Displacements between model space and the space of the bones, null where they are the same: see Frame.
+/// Displacements between model space and the space of the bones, as in Frame; null if the spaces are the same.
 struct Spaces {
     const float* bones_from_model;
     const float* model_from_bones;
@@ -201,7 +203,7 @@ HWY_INLINE Spaces spaces_of(const Frame& frame) {
     return {frame.bones_from_model->value.data(), frame.model_from_bones->value.data()};
 }
 
-/// Lanes of the first number that a method keeps of each vertex; the others follow kLanes apart. Null: it has none.
+/// Lanes of the first vertex data number; the others follow, kLanes apart. Null if there are none.
 template <std::size_t kVertexFloats>
 HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t b, std::size_t lane) {
     if (pointers.vertex_rows == nullptr) return nullptr;
@@ -231,7 +233,7 @@ HWY_INLINE Points<D> load_rest(D d, const Lanes<float>* rows, const Spaces& spac
 
 HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].lane.data(); }
 
-/// Blocks [begin, end), which have the same resolved bones.
+/// Deforms blocks [begin, end) with the same bones, whose signs are resolved.
 ///
 /// kCount  their influences, or 0 for any number
 template <class Rigid, std::size_t kCount, bool kPlain = false>
@@ -272,7 +274,7 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, b
     }
 }
 
-/// Blocks [begin, end), which have the same bones, where these are added plainly.
+/// Deforms blocks [begin, end) with the same bones, which are added plainly.
 template <class Rigid>
 HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
     alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
@@ -285,7 +287,7 @@ HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::s
     }
 }
 
-/// Blocks [begin, end), which have the same bones.
+/// Deforms blocks [begin, end) with the same bones.
 template <class Rigid>
 void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
@@ -304,7 +306,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// A mixed block vertex by vertex: with scale, or without vectors.
+/// Deforms a mixed block vertex by vertex: for bones with scale, or without vectors.
 template <class Rigid>
 void deform_one_by_one(const Frame& frame, std::size_t b) {
     const One d;
@@ -326,10 +328,10 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// One vertex of a mixed block: a bone's row is added as it lies in memory, Float4 by Float4.
+/// Blends one vertex of a mixed block. A bone's row is added as it is in memory, Float4 by Float4.
 ///
 /// weights  of each influence, kLanes apart
-/// sums     where the sum's Float4s are written, 4 * kLanes apart
+/// sums     receives the sum's Float4s, 4 * kLanes apart
 template <class Rigid, bool kPlain>
 HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
                              const float* weights, float* sums) {
@@ -362,14 +364,14 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
     for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
 }
 
-/// Apart, so that its registers are not those of every vertex.
+/// Not inlined, so that its registers do not burden the usual case.
 template <class Rigid>
 HWY_NOINLINE void blend_vertex_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
                                        const float* weights, float* sums) {
     blend_vertex<Rigid, true>(palette, bones, count, weights, sums);
 }
 
-/// A mixed block: the sums of all vertices are transposed into lanes.
+/// Deforms a mixed block. The sums of all vertices are transposed into lanes.
 template <class Rigid>
 void deform_mixed(const Frame& frame, std::size_t b) {
     const MeshPointers pointers = pointers_of(frame);

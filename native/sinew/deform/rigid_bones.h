@@ -8,8 +8,8 @@
 
 namespace sinew {
 
-/// Kernel::prepare of a rigid method: all bones in lanes as if they were rigid, then one by one those with scale, as
-/// Method::prepare says.
+/// Kernel::prepare for a rigid method: prepares all bones in lanes as if they were rigid, then those with scale
+/// again, one by one, with Method::prepare.
 ///
 /// write  stores one prepared bone: write(bone, row, scale)
 template <class Method, auto write>

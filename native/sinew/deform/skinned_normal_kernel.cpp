@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Normals that move with the skin: see skinned_normals.h for what they are.
+// Normals that move with the skin: see skinned_normals.h for the definition.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/deform/skinned_normal_kernel.h"
 
@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-// Shorter than its root, a vector has no direction.
+// A vector with a smaller squared length has no direction.
 constexpr float kShortest = 1e-35f;
 
 template <class D>
@@ -40,7 +40,7 @@ HWY_INLINE void store(D d, const Points<D>& p, Vec3<float>* to) {
     }
 }
 
-/// What the blends of vertices from `i` on make of the axis.
+/// The images of a unit vector along the axis under the blends of the vertices from `i` on.
 template <class D>
 HWY_INLINE Points<D> column(D d, const SkinnedNormalFrame& frame, std::size_t axis, const Points<D>& points,
                             std::size_t i) {
@@ -50,7 +50,7 @@ HWY_INLINE Points<D> column(D d, const SkinnedNormalFrame& frame, std::size_t ax
             hn::Mul(by, hn::Sub(moved.z, points.z))};
 }
 
-/// The cofactors of these blends, by axis.
+/// The cofactor matrices of the blends, by columns.
 template <class D>
 struct Cofactors {
     Points<D> axis[3];
@@ -65,7 +65,7 @@ HWY_INLINE Cofactors<D> cofactors_of(D d, const SkinnedNormalFrame& frame, std::
     return {{cross<D>(y, z), cross<D>(z, x), cross<D>(x, y)}};
 }
 
-/// Unit vectors; 0 where there is no direction, or a length beyond the range of floats.
+/// Unit vectors; 0 if a vector has no direction, or a length beyond the range of floats.
 template <class D>
 HWY_INLINE Points<D> moved_normals(D d, const Cofactors<D>& of, const Points<D>& n) {
     const Points<D> x{hn::Mul(n.x, of.axis[0].x), hn::Mul(n.x, of.axis[0].y), hn::Mul(n.x, of.axis[0].z)};
@@ -79,7 +79,7 @@ HWY_INLINE Points<D> moved_normals(D d, const Cofactors<D>& of, const Points<D>&
             hn::IfThenElseZero(has_direction, hn::Mul(v.z, scale))};
 }
 
-/// Calls with whole vectors, then with one lane after the other: every lane is rounded alike.
+/// Calls `compute` with whole vectors, then with single lanes. Every lane is rounded in the same way.
 template <class Compute>
 HWY_INLINE void in_lanes(std::size_t begin, std::size_t end, const Compute& compute) {
     const Full full;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kFramesWorthAThread = 8192;
 
-// Shorter than its root, a vector has no direction.
+// A vector with a smaller squared length has no direction.
 constexpr float kShortest = 1e-35f;
 
 void check_finite(const char* argument, std::span<const Vec3<float>> vectors) {
@@ -53,7 +53,7 @@ void check(const RestFrames& rest, std::size_t vertex_count) {
     check_finite("tangents", rest.tangents);
 }
 
-/// A power of two about as large as the mesh, so that differences of points have as many digits as the points.
+/// A power of two of about the mesh's size, so that differences of points have as many digits as the points.
 float step_of(std::span<const Vec3<float>> points) {
     float largest = 0.0f;
     for (const Vec3<float>& point : points) {
@@ -96,7 +96,7 @@ struct SkinnedNormals::State {
         }
     }
 
-    /// Deforms the points that are a step away from those at rest.
+    /// Deforms the rest points displaced by a step along each axis.
     void move_steps(std::span<const Affine<float>> posed_from_rest,
                     const DeformOptions& options) const noexcept {
         for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -128,7 +128,7 @@ struct SkinnedNormals::State {
         compute(kernel.of_frames, to.size());
     }
 
-    /// Of frames [begin, end).
+    /// Moves the tangents of frames [begin, end).
     void move_tangents(std::span<const Vec3<float>> points, std::span<Vec3<float>> to, std::size_t begin,
                        std::size_t end) const noexcept {
         for (std::size_t i = begin; i < end; ++i) {
@@ -141,13 +141,14 @@ struct SkinnedNormals::State {
         }
     }
 
-    std::array<Deformer, 4> deformers;  // of the rest points, then of these a step along each axis away
+    // for the rest points, then for these displaced by a step along each axis
+    std::array<Deformer, 4> deformers;
     float inverse_step = 1.0f;
     std::vector<Vec3<float>> normals;
     std::vector<Vec3<float>> tangents;
     std::vector<std::int32_t> vertices;
 
-    // Of one call at a time.
+    // Scratch for one call at a time.
     mutable std::mutex mutex;
     mutable std::array<std::vector<Vec3<float>>, 3> moved;
     mutable std::array<std::vector<Float4>, 3> cofactors;
@@ -179,7 +180,7 @@ void SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, cons
     state.move_steps(posed_from_rest, options);
     state.move_normals(points, normals, options.threads);
     if (tangents.empty()) return;
-    // One reference: a function that refers to more allocates.
+    // A single reference: with a larger capture std::function would allocate.
     struct Work {
         const State& state;
         std::span<const Vec3<float>> points;

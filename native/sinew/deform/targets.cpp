@@ -20,7 +20,7 @@ constexpr std::int64_t kTargets[kTargetCount] = {HWY_AVX3, HWY_AVX2, HWY_SSE4, H
 std::string_view name_of_target(std::size_t target) { return hwy::TargetName(kTargets[target]); }
 
 bool runs_here(std::int64_t bit) {
-    // What the compiler may use anywhere.
+    // The target that the compiler may use everywhere.
     if (bit == HWY_STATIC_TARGET) return true;
 #if HWY_ARCH_X86
     const X86Support support = x86_support();
@@ -57,7 +57,7 @@ std::size_t target_in_use() noexcept { return chosen().load(std::memory_order_re
 std::vector<std::string_view> simd_targets() {
     std::vector<std::string_view> names;
     for (std::size_t target = 0; target < kTargetCount; ++target) {
-        // The static one is also in the list by its name where the compiler was told to use more.
+        // The static target is listed twice if the compiler was told to use a better one.
         if (is_available(target) && (names.empty() || names.back() != name_of_target(target))) {
             names.push_back(name_of_target(target));
         }

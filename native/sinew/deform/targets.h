@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The instruction sets that kernels are built for. To be included before Highway.
+// The instruction sets that kernels are compiled for. Include before Highway.
 #pragma once
 
-// Disabled are those that have the vectors of another and add integer instructions (AVX3_DL and after it),
-// or whose vectors have a size that the compiler does not know: they can not be members (SVE, RVV).
-// SSSE3 is left out, too: Blender needs SSE4.2.
-// Of several NEON, whose vectors are the same, the one is left that every 64-bit ARM runs; Highway numbers the others
-// from SVE to NEON.
+// Disabled: targets that only add integer instructions to the vectors of another target (AVX3_DL and later);
+// targets whose vector size is unknown at compile time, so that vectors can not be members (SVE, RVV); SSSE3,
+// since Blender needs SSE4.2; and all NEON targets but the one that runs on every 64-bit ARM, since their float
+// vectors are the same. Highway numbers the others from SVE to NEON.
 #ifdef SINEW_HWY_HAS_NEON_WITHOUT_AES
 #define SINEW_OTHER_NEON (HWY_NEON | (HWY_NEON - HWY_SVE))
 #else
@@ -16,10 +15,11 @@
     (HWY_AVX3_DL | (HWY_AVX3_DL - 1) | HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | \
      HWY_RVV | SINEW_OTHER_NEON)
 
-// Kernel::targets, the fastest first. The last is what the compiler may use anywhere.
+// Kernel::targets, the fastest first. The last is the target that the compiler may use everywhere.
 //
-// Highway's own choice (HWY_DYNAMIC_DISPATCH) needs libhwy, which Debian ships as a shared library only: a
-// wheel would then need it on the user's machine. Its headers do without; so the choice is made in targets.cpp.
+// Highway's own choice (HWY_DYNAMIC_DISPATCH) needs libhwy, which Debian ships only as a shared library: a wheel
+// would then need it on the user's machine. Highway's headers alone do not need it, so targets.cpp makes the
+// choice.
 #define SINEW_TARGETS(deform, prepare)                                         \
     {                                                                          \
         {                                                                      \
@@ -30,7 +30,7 @@
         }                                                                      \
     }
 
-// The same for a single function: an array of pointers to it.
+// The same for a single function: an array of pointers to its versions.
 #define SINEW_TARGETS_OF(function)                                                       \
     {                                                                                    \
         HWY_CHOOSE_AVX3(function), HWY_CHOOSE_AVX2(function), HWY_CHOOSE_SSE4(function), \

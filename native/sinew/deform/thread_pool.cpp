@@ -23,8 +23,8 @@
 
 #include "sinew/deform/forks.h"
 
-// Where there is no futex, as under mingw, std::atomic::wait of these compares before it takes the mutex that it sleeps
-// under: it misses wake-ups (tests/python/test_pool_model.py; docs/install.md).
+// Without a futex, as under mingw, this libstdc++'s std::atomic::wait compares the value before it locks the
+// mutex that it sleeps under, and can miss a wake-up (tests/python/test_pool_model.py; docs/install.md).
 #if defined(_GLIBCXX_RELEASE) && _GLIBCXX_RELEASE <= 12 && !defined(_GLIBCXX_HAVE_LINUX_FUTEX)
 #error "std::atomic::wait of this libstdc++ can hang: use one of LLVM's libc++, such as zig's, or MSVC."
 #endif
@@ -34,11 +34,11 @@ namespace {
 
 using Work = std::function<void(std::size_t, std::size_t)>;
 
-// More threads than this wait for memory, not for each other.
+// With more threads, the memory is the bottleneck.
 constexpr std::size_t kMaxThreads = 64;
 
-// How long a thread spins for its next job before it sleeps. Waking one takes 5 to 50 us, the
-// objects of a frame follow each other faster than this; Blender's own threads lose next to nothing.
+// How long a thread spins for its next job before it sleeps. Waking a thread takes 5 to 50 us; the objects of a
+// frame follow each other faster than that, and Blender's own threads lose next to nothing.
 constexpr std::chrono::microseconds kSpin{50};
 
 void pause() {
@@ -49,7 +49,7 @@ void pause() {
 #endif
 }
 
-/// Whether `ready` became true while spinning was worth it.
+/// Spins until `ready()` or until spinning longer is not worthwhile. Returns whether `ready()` became true.
 template <class Ready>
 bool spin_until(const Ready& ready) {
     const auto end = std::chrono::steady_clock::now() + kSpin;
@@ -62,13 +62,13 @@ bool spin_until(const Ready& ready) {
     return ready();
 }
 
-/// A thread of the system. Not std::thread, which allocates, and whose destructor would end the process with the
-/// threads of a pool that nobody destroys.
+/// A thread of the operating system. Not std::thread, because that allocates, and because its destructor would
+/// terminate the process, as nobody joins the threads of the pool.
 class SystemThread {
 public:
     using Main = void (*)(std::size_t);
 
-    /// False where the system refuses one.
+    /// Returns false if the system refuses to start a thread.
     bool start(Main main, std::size_t argument) noexcept {
         main_ = main;
         argument_ = argument;
@@ -112,7 +112,8 @@ private:
 class Pool {
 public:
     void run(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
-        // A flag, not a mutex: a nested call tries to lock on the thread that has locked, which std::mutex forbids.
+        // A flag instead of a mutex: in a nested call the same thread tries to lock again, which std::mutex
+        // forbids.
         if (busy_.exchange(true, std::memory_order_acquire)) {
             work(0, count);
             return;
@@ -134,7 +135,7 @@ public:
         ring();
 
         take_chunks(0);
-        // Workers that have not come yet would find no chunks: close their slots.
+        // Workers that have not joined yet would find no chunks: withdraw their slots.
         const std::uint64_t unused = gate_.exchange(job, std::memory_order_acq_rel) & kSlots;
         const auto came = static_cast<std::uint32_t>(helpers - unused);
         const auto all_done = [this, came] { return done_.load(std::memory_order_acquire) == came; };
@@ -169,7 +170,7 @@ private:
         bell_.notify_all();
     }
 
-    // The number of workers that can help, at most `wanted`: fewer where the system refuses threads.
+    // Starts workers. Returns how many can help, at most `wanted`: fewer if the system refuses threads.
     std::size_t start_workers(std::size_t wanted) noexcept;
 
     void serve(std::size_t self) {
@@ -178,7 +179,7 @@ private:
             const std::uint32_t seen = bell_.load(std::memory_order_acquire);
             if (take_slot(last_job)) {
                 take_chunks(self);
-                // The caller may be gone as soon as this is seen, but the pool never is.
+                // The caller may return as soon as this is visible, but the pool always exists.
                 done_.fetch_add(1, std::memory_order_release);
                 done_.notify_one();
             }
@@ -188,8 +189,8 @@ private:
         }
     }
 
-    /// Takes part in the job at the gate, at most once. The number of the job makes sure that a slot is
-    /// never taken of a job that ended meanwhile; and as long as one is taken, the caller waits.
+    /// Joins the job at the gate, at most once. The job's number in the gate ensures that no slot of a job that
+    /// has ended is taken; while one is taken, the caller waits.
     bool take_slot(std::uint64_t& last_job) {
         std::uint64_t gate = gate_.load(std::memory_order_acquire);
         while ((gate & kSlots) > 0 && job_of(gate) != last_job) {
@@ -202,15 +203,15 @@ private:
         return false;
     }
 
-    /// Where share `share` of the chunks starts.
+    /// The first index of share `share` of the chunks.
     [[nodiscard]] std::size_t share_begin(std::size_t share) const {
         const std::size_t chunks = (count_ - 1) / chunk_ + 1;
         return std::min(chunks * share / shares_ * chunk_, count_);
     }
 
-    /// First the same share in every job, as what it reads and writes is still in this core's cache (with
-    /// chunks dealt out at random two threads took 0.74 of the time of one, not 0.5), then what others have
-    /// not taken. The first exception of all threads is kept for the caller, and ends the job.
+    /// Works first on the same share in every job, since what it reads and writes is still in this core's cache
+    /// (with chunks assigned at random, two threads took 0.74 of the time of one, not 0.5), then on chunks that
+    /// others have not taken. The first exception of all threads is kept for the caller, and ends the job.
     void take_chunks(std::size_t self) noexcept {
         try {
             for (std::size_t step = 0; step < shares_; ++step) {
@@ -236,22 +237,22 @@ private:
     std::atomic<bool> busy_{false};
     std::atomic<bool> ending_{false};
     const Work* work_ = nullptr;
-    std::exception_ptr* error_ = nullptr;  // of the first that failed
+    std::exception_ptr* error_ = nullptr;  // set by the first thread that failed
     std::atomic<bool> failed_{false};
     std::size_t count_ = 0;
     std::size_t chunk_ = 1;
     std::size_t shares_ = 1;
     std::size_t worker_count_ = 0;
-    // Apart, as all threads write them while they read the ones above.
-    alignas(64) std::atomic<std::uint64_t> gate_{0};  // number of the job, then its free slots
-    std::atomic<std::uint32_t> bell_{0};              // changes with every job; what workers sleep on
-    std::array<Next, kMaxThreads> next_{};            // first chunk of each share that nobody has taken
-    alignas(64) std::atomic<std::uint32_t> done_{0};  // workers that are done with the job
+    // On cache lines of their own, as all threads write them while they read the members above.
+    alignas(64) std::atomic<std::uint64_t> gate_{0};  // number of the job, and its free slots
+    std::atomic<std::uint32_t> bell_{0};              // changes with every job; workers sleep on it
+    std::array<Next, kMaxThreads> next_{};            // first chunk of each share that no thread has taken
+    alignas(64) std::atomic<std::uint32_t> done_{0};  // workers that have finished the job
     std::array<SystemThread, kMaxThreads> workers_{};
 };
 
-// Not allocated, and never destroyed: at the end of a process its workers may still wait on it, and joining them
-// from a library's static destructor can hang.
+// Not allocated, and never destroyed: when a process ends, its workers may still wait on it, and joining them in
+// a library's static destructor can hang.
 constinit Pool pool;
 static_assert(std::is_trivially_destructible_v<Pool>);
 
@@ -267,7 +268,7 @@ std::size_t Pool::start_workers(std::size_t wanted) noexcept {
 std::atomic<std::uint32_t> fork_count{0};
 
 #ifndef _WIN32
-// A forked child has none of its parent's threads: it starts over.
+// A forked child has none of its parent's threads: start over.
 [[maybe_unused]] const int at_fork = pthread_atfork(nullptr, nullptr, [] {
     new (&pool) Pool;
     fork_count.fetch_add(1, std::memory_order_relaxed);
@@ -279,7 +280,7 @@ std::atomic<std::uint32_t> fork_count{0};
 std::uint32_t forks() noexcept { return fork_count.load(std::memory_order_relaxed); }
 
 std::size_t hardware_threads() noexcept {
-    // Asking the system takes 10 us: as long as 5,000 vertices.
+    // Querying the system takes 10 us, as long as deforming 5,000 vertices.
     static const std::size_t threads =
         std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMaxThreads);
     return threads;

@@ -8,24 +8,25 @@
 
 namespace sinew {
 
-/// Threads that this machine runs at once; at least 1.
+/// The number of threads that this machine runs at once; at least 1.
 [[nodiscard]] SINEW_EXPORT std::size_t hardware_threads() noexcept;
 
-/// Calls `work(begin, end)` on chunks of `chunk` indices or fewer that cover [0, count), on up to `threads`
-/// threads, the caller one of them, and returns when all are done. One call at a time uses the pool; a second
-/// one made meanwhile runs on its caller alone.
+/// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), on up to `threads` threads
+/// including the caller, and returns when all are done. Only one call at a time uses the pool; a call made
+/// meanwhile runs on its caller's thread alone.
 ///
-/// Where work throws, on whatever thread, the first exception is thrown here once no thread is at work any more;
-/// some chunks may then not have been called.
+/// If work throws on any thread, the first exception is rethrown here once no thread is working any more; some
+/// chunks may then have been skipped.
 ///
-/// The threads are Sinew's own, started at first use and kept: Blender's scheduler is not touched, so a
-/// frame handler can wait here without keeping one of Blender's workers.
+/// The threads are Sinew's own, started at first use and kept. Blender's scheduler is not involved, so a frame
+/// handler can wait here without blocking one of Blender's workers.
 SINEW_EXPORT void parallel_for(std::size_t count, std::size_t threads,
                                const std::function<void(std::size_t, std::size_t)>& work,
                                std::size_t chunk = 4096);
 
-/// Ends the threads of parallel_for() and returns when they are gone; the next call starts others. For a host that
-/// unloads the library, which must call this first. Waits for calls that run. Not to be called by their work.
+/// Ends the threads of parallel_for() and returns when they are gone. The next call of parallel_for() starts new
+/// ones. A host that unloads the library must call this first. Waits for calls in progress. Must not be called
+/// from their work.
 SINEW_EXPORT void end_threads() noexcept;
 
 }  // namespace sinew

@@ -11,19 +11,19 @@
 
 namespace sinew {
 
-/// As an index; 0 or more.
+/// `value`, which must not be negative, as an index.
 [[nodiscard]] constexpr std::size_t index(std::int32_t value) noexcept {
     return static_cast<std::size_t>(value);
 }
 
-/// Throws std::invalid_argument that names the field: offsets that fall or do not fit, vertices that there are not, more
-/// than `most_vertices` vertices or 2^30 - 1 edges.
+/// Throws std::invalid_argument that names the field, for: offsets that decrease or do not match; indices of
+/// vertices that do not exist; more than `most_vertices` vertices or 2^30 - 1 edges.
 ///
-/// argument  what the number of vertices comes from
+/// argument  the name of the argument that determines the number of vertices
 void check(const MeshTopology& topology, std::size_t vertex_count, const std::string& argument,
            std::size_t most_vertices);
 
-/// What belongs to each vertex: of vertex v, items [offsets[v], offsets[v + 1]), rising.
+/// A list of items for each vertex: vertex v has items [offsets[v], offsets[v + 1]), ascending.
 struct ByVertex {
     std::vector<std::size_t> offsets;
     std::vector<std::int32_t> items;
@@ -33,10 +33,12 @@ struct ByVertex {
     }
 };
 
-/// The index of each of `vertices` by the vertex that it names.
+/// Groups the indices of `vertices` by the vertex that each names.
+///
+/// vertices  [any number] vertices below `count`
 [[nodiscard]] ByVertex by_vertex(std::span<const std::int32_t> vertices, std::size_t count);
 
-/// For each corner the corner before and the one after it in its face.
+/// For each corner, the previous and the next corner in its face.
 struct CornerNeighbours {
     std::vector<std::int32_t> previous;
     std::vector<std::int32_t> next;
@@ -44,9 +46,9 @@ struct CornerNeighbours {
 
 [[nodiscard]] CornerNeighbours corners_around(const MeshTopology& topology);
 
-/// [corners] the edge from each corner's vertex to that of the corner after it. Throws where it is not among the edges.
+/// [corners] the edge from each corner's vertex to that of the next corner. Throws if it is not among the edges.
 ///
-/// edge_ends  by_vertex() of the edges
+/// edge_ends  by_vertex() of topology.edges
 [[nodiscard]] std::vector<std::int32_t> edges_of_corners(const MeshTopology& topology,
                                                          const CornerNeighbours& around,
                                                          const ByVertex& edge_ends);

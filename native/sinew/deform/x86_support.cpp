@@ -18,12 +18,12 @@ struct Leaf {
     std::uint32_t a = 0, b = 0, c = 0, d = 0;
 };
 
-/// All zeros where the processor has no such leaf.
+/// All zeros if the processor does not have this leaf.
 Leaf cpuid(std::uint32_t leaf) {
     Leaf result;
 #ifdef _MSC_VER
     int words[4];
-    // Bit 31 is what sets basic and extended leaves apart.
+    // Bit 31 distinguishes extended from basic leaves.
     __cpuid(words, static_cast<int>(leaf & 0x80000000u));
     if (static_cast<std::uint32_t>(words[0]) < leaf) return result;
     __cpuidex(words, static_cast<int>(leaf), 0);
@@ -37,7 +37,7 @@ Leaf cpuid(std::uint32_t leaf) {
     return result;
 }
 
-/// The registers that the operating system keeps for each thread (XCR0). Only where it says that it keeps some.
+/// The registers that the operating system saves for each thread (XCR0). Only valid if OSXSAVE is set.
 std::uint64_t kept_registers() {
 #ifdef _MSC_VER
     return _xgetbv(0);
@@ -56,7 +56,7 @@ constexpr std::uint32_t bit(int index) { return 1u << index; }
 
 X86Support x86_support() noexcept {
     constexpr std::uint32_t kSse4 = bit(9) | bit(19) | bit(20);  // SSSE3, SSE4.1, SSE4.2
-    constexpr std::uint32_t kXsave = bit(27);                    // the operating system uses it
+    constexpr std::uint32_t kXsave = bit(27);                    // the operating system uses XSAVE
     constexpr std::uint32_t kAvx = bit(28) | bit(12) | bit(29);  // AVX, FMA, F16C
     constexpr std::uint32_t kLzcnt = bit(5);
     constexpr std::uint32_t kAvx2 = bit(5) | bit(3) | bit(8);                           // AVX2, BMI, BMI2

@@ -14,7 +14,7 @@
 
 namespace sinew {
 
-/// The mean of poses, and whether it is the only one (see average() and robust_average()).
+/// The mean of poses, and whether it is unique (see average() and robust_average()).
 template <class T>
 struct Averaged {
     DualQuat<T> transform;
@@ -23,18 +23,19 @@ struct Averaged {
 
 namespace detail {
 
-/// Steps after which an average counts as not defined. Poses within 90 degrees take 5 to 20, with outliers 50.
+/// Number of iterations after which an average counts as not defined. Poses within 90 degrees take 5 to 20, with
+/// outliers 50.
 inline constexpr int kAverageSteps = 300;
 
 struct Poses {
     std::vector<DualQuat<double>> poses;
-    std::vector<double> weights;  ///< of sum 1; none is 0
-    double longest = 0.0;         ///< translation
+    std::vector<double> weights;  ///< with sum 1; all positive
+    double longest = 0.0;         ///< the longest translation
 
     [[nodiscard]] std::size_t size() const noexcept { return poses.size(); }
 };
 
-/// The poses of weight above 0; none where the sum of weights is not above 0.
+/// The poses with positive weight; none if there are none.
 template <class T>
 [[nodiscard]] Poses poses_of(std::span<const DualQuat<T>> poses, std::span<const T> weights) {
     Poses result;
@@ -55,8 +56,8 @@ template <class T>
     return result;
 }
 
-/// The mean of the rotations whose signs do not count: the eigenvector of the sum of q q^T (Markley et al. 2007);
-/// and the mean of the translations. Not defined where two rotations are as good.
+/// The mean of the rotations, independent of their signs: the eigenvector of the sum of q q^T (Markley et al.
+/// 2007); and the mean of the translations. Not defined if two rotations are equally good.
 [[nodiscard]] inline Blended<DualQuat<double>> chordal_mean(const Poses& poses) noexcept {
     Mat4Rows<double> k{};
     Mat4Rows<double> vectors{};
@@ -98,7 +99,7 @@ struct Deviation {
     return {apart.angle, apart.translation};
 }
 
-/// The weighted median, of those as good the least.
+/// The weighted median; if several values are, the smallest.
 [[nodiscard]] inline double median(std::vector<std::pair<double, double>>& values_and_weights) noexcept {
     std::sort(values_and_weights.begin(), values_and_weights.end());
     double sum = 0.0;
@@ -111,7 +112,7 @@ struct Deviation {
     return 0.0;
 }
 
-/// The medians of the deviations from `mean`, not below rounding.
+/// The medians of the deviations from `mean`, but at least rounding errors.
 [[nodiscard]] inline Deviation spread(const Poses& poses, const DualQuat<double>& mean, double rounding) {
     std::vector<std::pair<double, double>> angles;
     std::vector<std::pair<double, double>> distances;
@@ -123,15 +124,15 @@ struct Deviation {
     return {std::max(median(angles), rounding), std::max(median(distances), rounding * poses.longest)};
 }
 
-/// The pose from which the weighted sum of the others' deviations is least, each in the medians from it: of the
-/// first of at most 64, evenly apart. More than half of the poses are near it where that many are near each other.
+/// The pose with the smallest product of the median deviations of all poses from it. Tries at most 64 candidates,
+/// evenly spaced. If more than half of the poses are near each other, they are near the result.
 [[nodiscard]] inline DualQuat<double> medoid(const Poses& poses, double rounding) {
     const std::size_t step = (poses.size() + 63) / 64;
     DualQuat<double> best = poses.poses.front();
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < poses.size(); i += step) {
         const Deviation medians = spread(poses, poses.poses[i], rounding);
-        // Of two numbers without common unit, the product does not depend on either unit.
+        // The two deviations have no common unit; their product does not depend on either unit.
         const double size = medians.angle * std::max(medians.distance, std::numeric_limits<double>::min());
         if (size < least) {
             least = size;
@@ -141,7 +142,7 @@ struct Deviation {
     return best;
 }
 
-/// 1 in the middle, 0 from 3.5 medians on (Beaton and Tukey 1974).
+/// Tukey's biweight: 1 in the middle, 0 from 3.5 medians on (Beaton and Tukey 1974).
 [[nodiscard]] inline double biweight(double deviation, double median) noexcept {
     constexpr double kMedians = 3.5;
     const double part = median > 0.0 ? deviation / (kMedians * median) : deviation > 0.0 ? 1.0 : 0.0;
@@ -150,16 +151,17 @@ struct Deviation {
 
 }  // namespace detail
 
-/// The weighted mean of n poses, whatever the signs of the quaternions and the order: where the weighted screws to
-/// the poses cancel, as Dib (Kavan et al. 2008, algorithm 3; Pennec 1998), which neither origin nor unit of length
-/// change; begun at the mean of rotation matrices (Markley et al. 2007).
+/// The weighted mean of n poses, independent of the signs of the quaternions and of the order: the pose relative
+/// to which the weighted screws to all poses sum to 0, as in Dib (Kavan et al. 2008, algorithm 3; Pennec 1998).
+/// It does not depend on the origin or on the unit of length. The iteration starts at the mean of the rotation
+/// matrices (Markley et al. 2007).
 ///
 /// poses    [n] unit
 /// weights  [n] not negative; empty: 1 each
 ///
-/// Not defined without weight above 0 (the identity), where several means are as good (as of rotations by 0, 120
-/// and 240 degrees about one axis), a pose is 180 degrees from the result, or the iteration does not settle: it is
-/// then one of them, finite. Computed in double. Throws std::bad_alloc.
+/// Not defined if no weight is positive (the identity), if several means are equally good (such as for rotations
+/// by 0, 120 and 240 degrees about one axis), if a pose is 180 degrees from the result, or if the iteration does
+/// not converge; the result is then one of the candidates, finite. Computed in double. Throws std::bad_alloc.
 template <class T>
 [[nodiscard]] Averaged<T> average(std::span<const DualQuat<T>> poses, std::span<const T> weights = {}) {
     assert(weights.empty() || weights.size() == poses.size());
@@ -184,17 +186,17 @@ template <class T>
     return {cast<T>(mean), false};
 }
 
-/// The same where up to almost half of the weight may be of poses that are far off: each counts by Tukey's biweight
-/// of its angle and of its distance from the result, 0 from 3.5 times their medians on; begun at the pose in the
-/// midst of most.
+/// The same for poses of which almost half, by weight, may be outliers: each is weighted by Tukey's biweight of
+/// its angle and of its distance from the result, which is 0 from 3.5 times their medians on. The iteration
+/// starts at the pose nearest to most others.
 ///
-/// poses, weights  as of average()
-/// kept            [n] how much each counts, 0 to 1, beside its weight; 0 of an outlier
+/// poses, weights  as for average()
+/// kept            [n] how much each counts besides its weight, 0 to 1; 0 for an outlier
 ///
-/// Distances are those of the origin's images: as for all that weighs rotations against places, the origin should
-/// lie within what moves. Not defined without weight above 0 (the identity), where the poses that count have no more
-/// than half of the weight or are not all within 90 degrees of the result, so that other means may be as good, or where
-/// the iteration does not settle. Throws std::bad_alloc.
+/// Distances are those between images of the origin. As in everything that compares rotations with positions, the
+/// origin should be within what moves. Not defined if no weight is positive (the identity), if the poses that
+/// count do not have more than half of the weight or are not all within 90 degrees of the result, so that other
+/// means may be equally good, or if the iteration does not converge. Throws std::bad_alloc.
 template <class T>
 [[nodiscard]] Averaged<T> robust_average(std::span<const DualQuat<T>> poses, std::span<const T> weights,
                                          std::span<T> kept) {
@@ -208,7 +210,7 @@ template <class T>
     std::vector<double> parts(known.size());
     bool has_settled = false;
     for (int step = 0; step < detail::kAverageSteps && !has_settled; ++step) {
-        // With medians that go on changing the weights could go back and forth for ever.
+        // If the medians kept changing, the weights could oscillate forever.
         if (step < 20) medians = detail::spread(known, mean, rounding);
         Twist<double> correction;
         double sum = 0.0;

@@ -14,12 +14,13 @@
 
 namespace sinew {
 
-/// What hand_eye() gives.
+/// The result of hand_eye().
 ///
 /// transform   x
 /// error       roots of the weighted means of the squared angles (radians) and distances between a x and x b
-/// is_defined  false where the motions do not decide x to within rounding of T: fewer than two, rotations about
-///             parallel axes alone, half turns alone, or no weight above 0. It is then one of many, finite
+/// is_defined  false if the motions do not determine x to within rounding of T: fewer than two motions, rotations
+///             only about parallel axes, only rotations by 180 degrees, or no positive weight. The transform is
+///             then one of many, finite
 template <class T>
 struct HandEye {
     DualQuat<T> transform;
@@ -29,7 +30,7 @@ struct HandEye {
 
 namespace detail {
 
-/// The triangular factor of a matrix of 8 columns whose rows come one after the other (Givens 1958).
+/// The triangular factor of a matrix of 8 columns, to which rows are added one after the other (Givens 1958).
 class Triangle {
 public:
     void add(std::array<double, 8> row) noexcept {
@@ -52,8 +53,8 @@ private:
     Columns<8> columns_{};
 };
 
-/// The six equations of a x = x b for x = (x0, x1, .., x7), where the scalar parts of a and b agree, times `factor`
-/// (Daniilidis 1999, eq. 31).
+/// Adds the six equations of a x = x b for x = (x0, x1, .., x7), multiplied by `factor`. The scalar parts of a
+/// and b must be equal (Daniilidis 1999, eq. 31).
 inline void add_equations(Triangle& rows, const DualQuat<double>& a, const DualQuat<double>& b,
                           double factor) noexcept {
     const auto block = [factor](const Quat<double>& p, const Quat<double>& q) {
@@ -71,7 +72,7 @@ inline void add_equations(Triangle& rows, const DualQuat<double>& a, const DualQ
     }
 }
 
-/// The unit dual quaternion in the space of the last two columns of `s.v` (Daniilidis 1999, eqs. 34 to 36).
+/// The unit dual quaternion in the span of the last two columns of `s.v` (Daniilidis 1999, eqs. 34 to 36).
 [[nodiscard]] inline DualQuat<double> unit_in_null_space(const SingularValues<8>& s) noexcept {
     const auto part = [&](std::size_t column, std::size_t first) {
         const auto& v = s.v[column];
@@ -92,7 +93,7 @@ inline void add_equations(Triangle& rows, const DualQuat<double>& a, const DualQ
         const double scale = length > 0.0 ? 1.0 / length : 0.0;
         return DualQuat<double>{(scale * l1) * u1 + (scale * l2) * u2, (scale * l1) * w1 + (scale * l2) * w2};
     };
-    // One of the roots is a translation alone, whose real part is 0.
+    // One of the roots is a pure translation, with a real part of 0.
     const DualQuat<double> first = combined(q, a);
     const DualQuat<double> second = combined(c, q);
     const bool takes_first = glm::dot(first.real, first.real) >= glm::dot(second.real, second.real);
@@ -106,8 +107,9 @@ template <class T>
     return {exact.real, exact.dual / length};
 }
 
-/// The singular values of the equations. The sign of b is that by `known`, which nearly fits; without it, that which
-/// makes both scalar parts positive, with the less weight the nearer to 0 they are.
+/// The singular values of the equations. With `known`, an approximate solution, the sign of each b is chosen to
+/// fit it. Without it, signs make both scalar parts positive, and equations have less weight the nearer these are
+/// to 0.
 template <class T>
 [[nodiscard]] SingularValues<8> hand_eye_values(std::span<const DualQuat<T>> a,
                                                 std::span<const DualQuat<T>> b, std::span<const T> weights,
@@ -132,8 +134,8 @@ template <class T>
     return singular_values<8>(rows.columns());
 }
 
-/// `x` with the translation that fits its rotation best: (R_a - 1) t = R_x t_b - t_a by least squares (Park, Martin
-/// 1994). Along what the rotations leave open it stays.
+/// `x` with the translation that best fits its rotation: the least squares solution of (R_a - 1) t = R_x t_b -
+/// t_a (Park, Martin 1994). In directions that the rotations do not determine it is not changed.
 template <class T>
 [[nodiscard]] DualQuat<double> with_best_translation(const DualQuat<double>& x,
                                                      std::span<const DualQuat<T>> a,
@@ -161,7 +163,7 @@ template <class T>
     const SingularValues<3> s = singular_values<3>(columns);
     Vec3<double> correction(0.0);
     for (std::size_t i = 0; i < 3; ++i) {
-        // Symmetric: its left and right vectors are one.
+        // Symmetric: left and right singular vectors are the same.
         const Vec3<double> v(s.v[i][0], s.v[i][1], s.v[i][2]);
         if (s.values[i] > 1e-12 * s.values[0]) correction += (glm::dot(v, residual) / s.values[i]) * v;
     }
@@ -170,18 +172,18 @@ template <class T>
 
 }  // namespace detail
 
-/// x of a x = x b, for n motions a of one body and b of another that is fixed to it: where the one is, seen from the
-/// other, as of a camera on a robot's hand or a marker on a bone (Daniilidis 1999, by dual quaternions: rotation and
-/// translation at once).
+/// Solves a x = x b for x, given n motions a of one body and n motions b of another body that is fixed to it: x
+/// is the pose of the second body relative to the first, such as of a camera on a robot's hand, or of a marker on
+/// a bone (Daniilidis 1999, with dual quaternions: rotation and translation at once).
 ///
-/// a, b     [n] unit, in one unit of length; of each pair angle and pitch are alike but for noise, and a[i] is
-///          where the first body goes, seen from where it was
+/// a, b     [n] unit, in one unit of length; a[i] takes the first body from its old pose to its new one, seen
+///          from the old one. The angle and pitch of a[i] and b[i] are equal up to noise
 /// weights  [n] not negative; empty: 1 each
 ///
-/// Lengths are divided by the longest translation of a and b first, so that their unit does not matter. Of half
-/// turns, whose signs are free, others decide the sign. Where motions are noisy the translation that comes with the
-/// rotation is not the best for it, and is solved for again (Park, Martin 1994). Computed in double; nothing is
-/// allocated.
+/// Lengths are first divided by the longest translation in a and b, so their unit does not matter. Rotations by
+/// 180 degrees have free signs, which the other motions decide. If motions are noisy, the translation that
+/// results along with the rotation is not the best one for it, so it is solved for again (Park, Martin 1994).
+/// Computed in double; does not allocate.
 template <class T>
 [[nodiscard]] HandEye<T> hand_eye(std::span<const DualQuat<T>> a, std::span<const DualQuat<T>> b,
                                   std::span<const T> weights = {}) noexcept {
@@ -205,7 +207,8 @@ template <class T>
         detail::with_best_translation(detail::unit_in_null_space(s), a, b, weights, largest_weight, length);
     x.dual *= length;
 
-    // Where scalar parts are but rounding, the first equations, of which they are factors, decide nothing.
+    // The first equations have the scalar parts as factors: if all of these are rounding errors, they determine
+    // nothing.
     const double rounding = 32.0 * std::numeric_limits<T>::epsilon() * s.values[0];
     HandEye<T> result{cast<T>(x), {}, std::min(first.values[5], s.values[5]) > rounding};
     double angles = 0.0;

@@ -12,12 +12,13 @@
 
 namespace sinew {
 
-/// Points and directions of a source, and those of a target that a rigid transform is to take them to.
+/// Points and directions of a source, and the points and directions of a target that a rigid transform should map
+/// them to.
 ///
 /// source, target                        [n] points, finite
 /// weights                               [n] of points, not negative; empty: 1 each
-/// source_directions, target_directions  [m] of any length, of which only the direction counts; one of length 0,
-///                                       on either side, does not count
+/// source_directions, target_directions  [m] of any length, which is ignored; a pair in which either has length 0
+///                                       does not count
 /// direction_weights                     [m] not negative; empty: 1 each. A direction counts as a point at
 ///                                       distance 1 from the middle, so its weight is in squares of lengths
 template <class T>
@@ -30,13 +31,13 @@ struct Pairs {
     std::span<const T> direction_weights{};
 };
 
-/// What a fit gives.
+/// The result of a fit.
 ///
-/// transform    target_from_source: the least weighted sum of squared distances
-/// error        the root of the weighted mean of the squared distances that are left, points and directions
-/// is_defined   false where other rotations are as good to within rounding of T: points on one line or all at one
-///              place, a mirror image with a symmetry, no weight above 0. The transform is then one of the best,
-///              finite; without weight the identity
+/// transform    target_from_source: minimises the weighted sum of squared distances
+/// error        the root of the weighted mean of the remaining squared distances, of points and directions
+/// is_defined   false if other rotations are equally good to within rounding of T: points on one line or all in
+///              one position, a mirror image with a symmetry, no positive weight. The transform is then one of
+///              the best, finite; without positive weights the identity
 /// is_mirrored  a mirror image would fit better, by more than rounding
 template <class Transform, class T>
 struct Fitted {
@@ -48,17 +49,18 @@ struct Fitted {
 
 namespace detail {
 
-/// Sums over pairs, in double, of coordinates about the two middles and divided by `scale`, of weights divided by
-/// the largest.
+/// Sums over pairs, in double. Coordinates are relative to the two middles and divided by `scale`; weights are
+/// divided by the largest.
 struct PairMoments {
     Vec3<double> source_middle{0.0};
     Vec3<double> target_middle{0.0};
     double scale = 1.0;
-    double weight = 0.0;            ///< of points
-    double direction_weight = 0.0;  ///< of directions that count
+    double weight = 0.0;            ///< of all points
+    double direction_weight = 0.0;  ///< of all directions that count
     Mat3<double> covariance{0.0};   ///< the weighted sum of target source^T
-    double size = 0.0;              ///< no singular value of `covariance` is above
-    double noise = 0.0;             ///< what rounding of the input adds to a direction without extent
+    double size = 0.0;              ///< upper bound of the singular values of `covariance`
+    /// contribution of the input's rounding errors to a direction without extent
+    double noise = 0.0;
     double largest_weight = 1.0;
 };
 
@@ -71,7 +73,7 @@ inline double largest_component(const Vec3<double>& v) noexcept {
     return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
-/// f(source, target, weight) of every pair of points of weight above 0.
+/// Calls f(source, target, weight) for each pair of points with positive weight.
 template <class T, class F>
 void for_points(const Pairs<T>& pairs, F f) noexcept {
     assert(pairs.source.size() == pairs.target.size());
@@ -81,7 +83,7 @@ void for_points(const Pairs<T>& pairs, F f) noexcept {
     }
 }
 
-/// f(source, target, weight) of every pair of directions that counts, of length 1.
+/// Calls f(source, target, weight) for each pair of directions that counts, normalised.
 template <class T, class F>
 void for_directions(const Pairs<T>& pairs, F f) noexcept {
     assert(pairs.source_directions.size() == pairs.target_directions.size());
@@ -139,15 +141,16 @@ template <class T>
         add(source, target, weight / largest / m.scale / m.scale);
     });
     m.size = std::sqrt(source_square) * std::sqrt(target_square);
-    // Coordinates are known to half a unit in their last digit; eight times leaves room for what made them.
+    // Coordinates are precise to half a unit in their last digit; a factor of eight leaves room for earlier
+    // errors.
     const double rounding = 8.0 * std::numeric_limits<T>::epsilon();
     m.noise = m.weight * std::pow(rounding * reach / m.scale, 2) +
               m.direction_weight * std::pow(rounding / m.scale, 2);
     return m;
 }
 
-/// The fit of a solver that found `rotation`, with `gap`, the sum of the two smaller singular values of the
-/// covariance, the last negative where that mirrors.
+/// The fit for a solver's result. `gap` is the sum of the two smaller singular values of the covariance, the last
+/// of them negative if the covariance mirrors.
 template <class T>
 [[nodiscard]] Fitted<QuatVec<double>, double> judged(const Pairs<T>& pairs, const PairMoments& m,
                                                      const QuatVec<double>& fit, double gap) noexcept {
@@ -176,7 +179,8 @@ template <class T>
     const double first_order = 8.0 * std::numeric_limits<T>::epsilon() * m.size;
     const double second_order = 64.0 * std::numeric_limits<double>::epsilon() * m.size + m.noise;
     result.is_mirrored = last < -first_order - m.noise;
-    // Beside a mirror the gap is a difference, and rounding counts in full; else it is a sum of squares of extents.
+    // If it mirrors, the gap is a difference, and rounding counts in full; otherwise it is a sum of squared
+    // extents.
     result.is_defined = gap > second_order + (last < -second_order ? first_order : 0.0);
     return result;
 }

@@ -11,12 +11,12 @@
 
 namespace sinew {
 
-// The rigid transform from a source to a target, by one solver for each representation: a type with a name, its
-// Transform, and fit(pairs). All have the same least squares and differ by rounding. Sums are in double, of
-// coordinates about the middle of the points; nothing is allocated.
+// Fits the rigid transform from a source to a target, with one solver for each representation: a type with a
+// name, its Transform, and fit(pairs). All minimise the same squares and differ only by rounding. Sums are in
+// double, with coordinates relative to the middle of the points; nothing is allocated.
 
-/// Rotation by the singular values of the covariance, translation between the middles (Kabsch 1976, 1978; Umeyama
-/// 1991 for mirrors).
+/// Rotation from the singular value decomposition of the covariance, translation between the middles (Kabsch
+/// 1976, 1978; Umeyama 1991 for mirrors).
 struct Kabsch {
     static constexpr std::string_view name = "kabsch";
     template <class T>
@@ -32,7 +32,8 @@ struct Kabsch {
         }
         const SingularValues<3> s = singular_values<3>(covariance);
         const auto vector = [](const std::array<double, 3>& a) { return Vec3<double>(a[0], a[1], a[2]); };
-        // Third axes as cross products: both are rotations, and the last value has the sign of the determinant.
+        // The third axes are cross products, so both are rotations and the last value has the sign of the
+        // determinant.
         const Mat3<double> v(vector(s.v[0]), vector(s.v[1]), glm::cross(vector(s.v[0]), vector(s.v[1])));
         const Vec3<double> u0 = unit(vector(s.scaled[0]), v[0]);
         const Vec3<double> across = vector(s.scaled[1]) - u0 * glm::dot(u0, vector(s.scaled[1]));
@@ -47,18 +48,18 @@ struct Kabsch {
     }
 
 private:
-    /// A direction perpendicular to `u0`: where the shortest rotation from `v0` to `u0` takes `v1`.
+    /// A direction perpendicular to `u0`: the image of `v1` under the shortest rotation from `v0` to `u0`.
     [[nodiscard]] static Vec3<double> beside(const Vec3<double>& u0, const Vec3<double>& v0,
                                              const Vec3<double>& v1) noexcept {
         const Vec3<double> sum = u0 + v0;
         const double square = glm::dot(sum, sum);
-        // Opposite: half a turn about v1.
+        // Opposite: rotates by 180 degrees about v1.
         if (square < 1e-12) return v1;
         return unit(v1 - (2.0 * glm::dot(sum, v1) / square) * sum, v1);
     }
 };
 
-/// Rotation as the eigenvector of a symmetric 4x4 matrix, translation between the middles (Horn 1987).
+/// Rotation as an eigenvector of a symmetric 4x4 matrix, translation between the middles (Horn 1987).
 struct Horn {
     static constexpr std::string_view name = "horn";
     template <class T>
@@ -74,8 +75,9 @@ struct Horn {
     }
 };
 
-/// Rotation and translation at once, as a dual quaternion r + e s (Walker, Shao, Volz 1991): the squared distance
-/// of a pair is |q r - r p - 2 s|^2, linear in both. The best s is linear in r, r an eigenvector.
+/// Rotation and translation at once, as a dual quaternion r + e s (Walker, Shao, Volz 1991). The squared distance
+/// of a pair is |q r - r p - 2 s|^2, whose argument is linear in r and s. The best s is linear in r, and r is an
+/// eigenvector.
 struct Walker {
     static constexpr std::string_view name = "walker";
     template <class T>
@@ -85,7 +87,7 @@ struct Walker {
     [[nodiscard]] static Fitted<DualQuat<T>, T> fit(const Pairs<T>& pairs) noexcept {
         using glm::transpose;
         const detail::PairMoments m = detail::moments_of(pairs);
-        // About the first pair: sums of coordinates that are far from the origin would cancel.
+        // Relative to the first pair: sums of coordinates far from the origin would cancel.
         bool has_origin = false;
         Vec3<double> source_origin(0.0);
         Vec3<double> target_origin(0.0);
@@ -138,7 +140,7 @@ struct Walker {
 private:
     using Mat4 = glm::dmat4;
 
-    /// The matrix that takes a quaternion r to q r - r p: antisymmetric.
+    /// The antisymmetric matrix that maps a quaternion r to q r - r p.
     [[nodiscard]] static Mat4 difference(const Vec3<double>& q, const Vec3<double>& p) noexcept {
         const Vec3<double> d = q - p;
         const Vec3<double> c = q + p;
@@ -149,7 +151,7 @@ private:
     }
 };
 
-/// Every solver: the table that the Python package and the tests read.
+/// All solvers. The Python package and the tests read this list.
 using RigidFits = std::tuple<Kabsch, Horn, Walker>;
 
 }  // namespace sinew

@@ -9,16 +9,17 @@
 
 namespace sinew {
 
-/// Column by column: columns[column][row].
+/// A square matrix by columns: columns[column][row].
 template <std::size_t N>
 using Columns = std::array<std::array<double, N>, N>;
 
-/// a = u diag(values) v^T. `scaled` has the columns of u times their values; v is a rotation, its determinant 1.
+/// The decomposition a = u diag(values) v^T. `scaled` has the columns of u times their values; v is a rotation
+/// with determinant 1.
 template <std::size_t N>
 struct SingularValues {
     Columns<N> scaled{};
     Columns<N> v{};
-    std::array<double, N> values{};  ///< not increasing, >= 0
+    std::array<double, N> values{};  ///< non-increasing, >= 0
 };
 
 namespace detail {
@@ -40,7 +41,7 @@ void rotate_columns(Columns<N>& columns, std::size_t p, std::size_t q, double co
     }
 }
 
-/// Whether the columns p and q were not perpendicular to within rounding; they are now.
+/// Makes columns p and q perpendicular. Returns whether they were not yet, to within rounding.
 template <std::size_t N>
 bool make_perpendicular(SingularValues<N>& s, std::size_t p, std::size_t q) noexcept {
     const double product = dot(s.scaled[p], s.scaled[q]);
@@ -58,14 +59,15 @@ bool make_perpendicular(SingularValues<N>& s, std::size_t p, std::size_t q) noex
 
 }  // namespace detail
 
-/// By rotations of pairs of columns (one-sided Jacobi; Hestenes 1958): small values are as accurate, relative to
-/// their columns, as large ones. `a` is finite, its largest number between 1e-70 and 1e70 or 0.
+/// Singular values by rotating pairs of columns (one-sided Jacobi; Hestenes 1958): small values are as accurate
+/// as large ones, relative to their columns. `a` must be finite, with its largest absolute entry between 1e-70
+/// and 1e70, or 0.
 template <std::size_t N>
 [[nodiscard]] SingularValues<N> singular_values(const Columns<N>& a) noexcept {
     SingularValues<N> s;
     s.scaled = a;
     for (std::size_t i = 0; i < N; ++i) s.v[i][i] = 1.0;
-    // Converges quadratically: rounding is reached in 5 to 8 sweeps.
+    // Converges quadratically: reaches rounding errors in 5 to 8 sweeps.
     for (int sweep = 0; sweep < 30; ++sweep) {
         bool is_done = true;
         for (std::size_t p = 0; p + 1 < N; ++p) {
@@ -82,7 +84,7 @@ template <std::size_t N>
             s.values.begin());
         if (largest == i) continue;
         std::swap(s.values[i], s.values[largest]);
-        // A quarter turn in the plane of the two, so that v stays a rotation.
+        // Rotate by 90 degrees in the plane of the two columns, so that v stays a rotation.
         detail::rotate_columns(s.scaled, i, largest, 0.0, 1.0);
         detail::rotate_columns(s.v, i, largest, 0.0, 1.0);
     }

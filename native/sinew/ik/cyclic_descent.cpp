@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Cyclic descent, and not FABRIK (Aristidou, Lasenby 2011), which is as simple: here each move is a rotation about a
-// bone's own head, so that limits, locked axes, wanted rotations and branches are part of every move and lengths stay by
-// themselves. FABRIK moves points; rotations have to be found for them afterwards, and limits repaired in each pass.
+// Cyclic descent. FABRIK (Aristidou, Lasenby 2011) is as simple, but here each step is a rotation about a bone's
+// own head, so limits, locked axes, goals for rotations and branches are part of every step, and lengths are
+// preserved. FABRIK moves points; rotations have to be found for them afterwards, and limits repaired in each
+// pass.
 //
-// One bone's best rotation about an axis n brings all its tips and their wanted directions nearest at once: from a to b
-// it is by atan2(n . sum a x b, sum (a . b - (n . a) (n . b))), and of all axes that of the sum of the moments a x b
-// gains first; for one tip it is exactly the rotation to its goal. What a bone rotates comes after it, so going from the
+// The best rotation of one bone about an axis n brings all of its tips and their goal directions nearest at once:
+// for pairs (a, b) its angle is atan2(n . sum a x b, sum (a . b - (n . a) (n . b))). Of all axes, the direction
+// of the sum of the moments a x b reduces the error fastest; for one tip it gives exactly the rotation to its
+// goal. A bone's rotation affects only its descendants, so going from the tips to the root the dual quaternions
+// of bones are evaluated once per sweep.
 // tips to the root the dual quaternions of bones are evaluated once a sweep.
 #include <glm/gtc/matrix_access.hpp>
 
@@ -15,10 +18,10 @@
 namespace sinew {
 namespace {
 
-// A sweep that lowers the cost by less than this, relative to itself, is the last.
+// The last sweep is the first one that lowers the cost by less than this, relative to the cost.
 constexpr double kStagnation = 1e-6;
 
-/// Sums over pairs of vectors (a, b), of what a bone moves and where that is wanted, seen from its head: a b^T.
+/// Sums a b^T over pairs of vectors seen from a bone's head: a is moved by the bone, b is where it should be.
 struct Pulls {
     Mat3<double> products{0.0};
 
@@ -60,7 +63,7 @@ void IkSolver::State::descend(std::size_t index) noexcept {
         if (!(rotation > 0.0)) continue;
         const Mat3<double> now = to_mat3(tip.rotation);
         const Mat3<double> wanted = to_mat3(tip.goal_rotation);
-        // Half: three directions have twice the square of the angle together.
+        // Halved: three directions together count twice the squared angle.
         for (int i = 0; i < 3; ++i) pulls.add(0.5 * rotation * rotation, now[i], wanted[i]);
     }
     const Quat<double> at_first = bone.rotation;
@@ -72,7 +75,7 @@ void IkSolver::State::descend(std::size_t index) noexcept {
         for (int i = 0; i < 3; ++i) own[i] *= bone.weight[static_cast<std::size_t>(i)];
         bone.rotate_by(rotate(to_root, own));
         const Quat<double> change = rotation_since(bone, at_first);
-        // Limits may take more than was gained.
+        // Limiting the rotation may lose more than was gained.
         if (!bone.is_ball && !(pulls.gain(change) > 0.0)) {
             bone.rotation = at_first;
             bone.coordinates = coordinates;
@@ -124,7 +127,7 @@ int IkSolver::State::solve_by_descent(const IkOptions& options) noexcept {
             keep(best_rotations, best_coordinates);
         }
         if (!(error - found > kStagnation * found)) {
-            if (bends == kMostBends || is_reached(options.tolerance)) break;
+            if (bends == kMaxBends || is_reached(options.tolerance)) break;
             ++bends;
             update_axes();
             bend();

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Damped least squares on screws. Each free axis of a bone is a unit screw, a line in the space of the root; a small
-// rotation about it moves a tip by the screw's velocity at that point, which is its column of the Jacobian J. A step is
-// W J^T (J W J^T + l 1)^-1 e, of as many equations as there are errors e, not axes; W has the stiffness. l follows the
-// error (Sugihara 2011), so that steps near a goal are Newton's and those to what is out of reach do not oscillate; a
-// step that makes the error larger is taken back (Levenberg 1944, Marquardt 1963). Axes at a limit that a step would go
-// beyond are left out of it.
+// Damped least squares on screws. Each free axis of a bone is a unit screw, a line in the space of the root; a
+// small rotation about it moves a tip with the screw's velocity at that point, which is its column of the
+// Jacobian J. A step is W J^T (J W J^T + l 1)^-1 e, a system with as many equations as there are errors e, not
+// axes; W contains the stiffness. l follows the error (Sugihara 2011), so steps near a goal are Newton steps, and
+// steps towards unreachable goals do not oscillate. A step that increases the error is undone (Levenberg 1944,
+// Marquardt 1963). Axes at a limit that a step would exceed are left out of that step.
 #include <algorithm>
 
 #include "sinew/ik/state.h"
@@ -14,14 +14,14 @@ namespace sinew {
 namespace {
 
 constexpr double kLeastDamping = 1e-12;
-// A cost that falls by less than this in a step, relative to itself, is as low as it gets.
+// A cost that a step lowers by less than this, relative to the cost, is at its minimum.
 constexpr double kStagnation = 1e-9;
-// Nor, however large it is, can it be lowered where the square of its slope is less than this part of it: a saddle.
+// A cost whose squared slope is less than this share of it can not be lowered, however large it is: a saddle.
 constexpr double kLevel = 1e-7;
-// Radians: what turns farther at once goes through limits that it would have gone round.
+// Radians. Larger steps run into limits that smaller ones would move around.
 constexpr double kLargestStep = 0.4;
 constexpr double kAtBoundary = 1e-12;
-constexpr int kMostBlockings = 8;
+constexpr int kMaxBlockings = 8;
 
 Vec3<double> unit_axis(std::size_t axis) noexcept {
     Vec3<double> v(0.0);
@@ -33,10 +33,10 @@ Vec3<double> unit_axis(std::size_t axis) noexcept {
 
 Vec3<double> IkSolver::State::direction_of(const IkBone& bone, std::size_t axis, double& speed) noexcept {
     speed = 1.0;
-    // Its own: a twist comes last, and a ball's axes rotate with it.
+    // A twist is applied last, and the axes of a ball joint rotate with it, so both use the bone's own axes.
     if (bone.is_ball || axis == 1) return rotate(bone.root_from_bone.real, unit_axis(axis));
     if (!bone.swings_about_two) return rotate(bone.root_from_rest.real, unit_axis(axis));
-    // The derivative of the swing by x or z of its quaternion (w, x, 0, z): 2 (dq q*).
+    // The derivative of the swing with respect to x or z of its quaternion (w, x, 0, z): 2 (dq q*).
     const double x = bone.coordinates.x;
     const double z = bone.coordinates.z;
     const double w = std::sqrt(1.0 - x * x - z * z);
@@ -177,7 +177,7 @@ bool IkSolver::State::find_steps(double damping) noexcept {
             }
         }
     }
-    // Cholesky, in place.
+    // Cholesky decomposition, in place.
     for (std::size_t j = 0; j < m; ++j) {
         double* of_j = &normal[j * m];
         for (std::size_t k = 0; k < j; ++k) of_j[j] -= of_j[k] * of_j[k];
@@ -257,7 +257,7 @@ void IkSolver::State::bend() noexcept {
         Vec3<double> axis(0.0);
         double side = 1.0;
         if (has_pole) axis = unit(glm::cross(line, pole - bones[tip.root].head), Vec3<double>(0.0));
-        // Else the first axis across the chain that is free.
+        // Otherwise the first free axis across the chain.
         for (const IkAxis& free : axes) {
             if (axis != Vec3<double>(0.0)) break;
             if (!tip.is_moved_by[free.bone] || free.bone == tip.root) continue;
@@ -268,8 +268,8 @@ void IkSolver::State::bend() noexcept {
             const double at = bone.coordinates[static_cast<int>(free.axis)];
             if (!bone.is_ball && bone.high[free.axis] - at > at - bone.low[free.axis]) side = -1.0;
         }
-        // An arc, and its tip off the line: a goal on the other side of the root pulls only then, and by then should not
-        // have folded the chain.
+        // Bends the chain to an arc and rotates its tip off the line: a goal on the other side of the root pulls
+        // only then, and the chain must not have folded by that time.
         const bool is_behind = glm::dot(line, tip.goal - bones[tip.root].head) < 0.0;
         const double of_root = is_behind ? 0.5 * std::numbers::pi : kBend * static_cast<double>(count);
         for (std::size_t k = 0; k < count; ++k) {
@@ -294,7 +294,7 @@ int IkSolver::State::solve_by_least_squares(const IkOptions& options) noexcept {
         block_axes();
         double slope = 0.0;
         for (const double of_axis : gradient) slope += of_axis * of_axis;
-        if (bends < kMostBends && slope < kLevel * error) {
+        if (bends < kMaxBends && slope < kLevel * error) {
             ++bends;
             if (error < best) {
                 best = error;
@@ -308,7 +308,7 @@ int IkSolver::State::solve_by_least_squares(const IkOptions& options) noexcept {
         double found = error;
         bool is_better = false;
         for (int attempt = 0; attempt < 12 && !is_better; ++attempt) {
-            for (int blocking = 0; blocking < kMostBlockings; ++blocking) {
+            for (int blocking = 0; blocking < kMaxBlockings; ++blocking) {
                 if (!find_steps(damping * error + kLeastDamping)) break;
                 if (!block_steps()) break;
             }

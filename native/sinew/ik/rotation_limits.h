@@ -10,10 +10,10 @@
 
 namespace sinew {
 
-/// How a bone may rotate about one of its own axes, x, y (along the bone) or z, as Blender's pose bones say it.
+/// How a bone may rotate about one of its own axes, x, y (along the bone) or z, as in Blender's pose bones.
 ///
-/// min, max   radians, -pi <= min <= 0 <= max <= pi; read where is_limited
-/// stiffness  0 to below 1: how much less than others the bone rotates about it
+/// min, max   radians, -pi <= min <= 0 <= max <= pi; only read if is_limited
+/// stiffness  0 to below 1: how much less the bone rotates about this axis than about others
 struct AxisLimit {
     bool is_locked = false;
     bool is_limited = false;
@@ -22,14 +22,15 @@ struct AxisLimit {
     double stiffness = 0.0;
 };
 
-/// Of the three axes, x, y, z.
+/// The limits of the three axes x, y, z.
 using BoneLimits = std::array<AxisLimit, 3>;
 
-/// A rotation as a twist about y and then a swing without twist: (x, y, z) in radians. y is the angle of the twist, -pi
-/// to pi; x and z are twice the arcsines of the swing's quaternion, so that of a swing about x alone x is its angle.
+/// Decomposes a rotation into a twist about y followed by a swing without twist. Returns (x, y, z) in radians: y
+/// is the angle of the twist, -pi to pi; x and z are twice the arcsines of the x and z of the swing's quaternion,
+/// so that for a swing about x alone x is its angle.
 ///
-/// The range of each of the three is what Blender's IK limits bound. Of a swing by 180 degrees, whose twist is free, the
-/// twist is 0. The signs of `q`, unit, do not matter.
+/// Blender's IK limits bound these three ranges. For a swing by 180 degrees the twist is not unique, and is 0.
+/// `q` has unit length; its sign does not matter.
 [[nodiscard]] inline Vec3<double> swing_twist_angles(const Quat<double>& q) noexcept {
     const double length = std::hypot(q.w, q.y);
     const double cosine = length > 0.0 ? q.w / length : 1.0;
@@ -42,9 +43,9 @@ using BoneLimits = std::array<AxisLimit, 3>;
     return {2.0 * std::asin(x), twist, 2.0 * std::asin(z)};
 }
 
-/// By how many radians a rotation is beyond the limits of its bone: the largest of the three angles. A locked axis is
-/// at 0. Where both x and z are limited, they are bounded by the ellipse through the four limits, whose half axes are
-/// sines of half angles; an ellipse without width or height is a rectangle.
+/// By how many radians a rotation exceeds the limits of its bone: the largest excess of the three angles. A
+/// locked axis must be at 0. If both x and z are limited, they are bounded by the ellipse through the four
+/// limits, whose semi-axes are sines of half angles; an ellipse without width or height becomes a rectangle.
 [[nodiscard]] inline double limit_violation(const BoneLimits& limits, const Quat<double>& q) noexcept {
     const Vec3<double> angles = swing_twist_angles(q);
     double beyond = 0.0;

@@ -98,7 +98,7 @@ void IkBone::set_coordinates(const Vec3<double>& values) noexcept {
         }
         swing = Quat<double>(std::sqrt(1.0 - c.x * c.x - c.z * c.z), c.x, 0.0, c.z);
     } else {
-        // One of the two at most is not 0.
+        // At most one of the two is not 0.
         const double half = 0.5 * (c.x + c.z);
         swing = Quat<double>(std::cos(half), is_free[0] ? std::sin(half) : 0.0, 0.0,
                              is_free[2] ? std::sin(half) : 0.0);
@@ -113,7 +113,7 @@ void IkBone::set_rotation(const Quat<double>& either) noexcept {
         rotation = glm::normalize(q);
         return;
     }
-    // Without the other axes the nearest rotation about the one; else a swing after a twist.
+    // Without the other axes, the nearest rotation about the one axis; otherwise a twist and then a swing.
     const bool has_swing = is_free[0] || is_free[2];
     const double length = std::hypot(q.w, q.y);
     const bool untwists = has_swing && is_free[1] && length > 0.0;
@@ -213,7 +213,7 @@ void IkSolver::State::start(const IkProblem& problem, std::span<const Quat<doubl
         IkTip& tip = tips[i];
         const DualQuat<double> goal = root_from_space * problem.goals[i];
         tip.goal = scale * translation(goal);
-        // One of the two signs, so that the other gives the same bits.
+        // Always the same sign, so that both signs of the goal give the same bits.
         tip.goal_rotation = goal.real.w < 0.0 ? -goal.real : goal.real;
         tip.offset *= scale;
         tip.reach *= scale;
@@ -222,7 +222,7 @@ void IkSolver::State::start(const IkProblem& problem, std::span<const Quat<doubl
     update();
     if (tips.size() != 1 || !(tips[0].effector.position_weight > 0.0)) return;
     const bool was_moved = tips[0].effector.rotation_weight == 0.0 && move_goal_within_reach();
-    if (has_pole) turn_to_pole();
+    if (has_pole) rotate_to_pole();
     if (was_moved) stretch();
 }
 
@@ -264,7 +264,7 @@ void IkSolver::State::stretch() noexcept {
         const Vec3<double> across = glm::cross(now, wanted);
         const double sine = safe_length(across);
         const double cosine = glm::dot(now, wanted);
-        // Opposite: about any axis across.
+        // Opposite directions: any perpendicular axis.
         const Vec3<double> other =
             std::abs(now.x) < 0.7 ? Vec3<double>(1.0, 0.0, 0.0) : Vec3<double>(0.0, 1.0, 0.0);
         const Vec3<double> axis =
@@ -275,12 +275,12 @@ void IkSolver::State::stretch() noexcept {
     update();
 }
 
-bool IkSolver::State::can_turn_to_goal() const noexcept {
+bool IkSolver::State::can_rotate_to_goal() const noexcept {
     return tips.size() == 1 && !has_pole && tips[0].effector.position_weight > 0.0 &&
            tips[0].chain.size() > 1;
 }
 
-void IkSolver::State::turn_to_goal() noexcept {
+void IkSolver::State::rotate_to_goal() noexcept {
     const IkTip& tip = tips[0];
     IkBone& root = bones[tip.root];
     const Vec3<double> now = tip.position - root.head;
@@ -290,7 +290,7 @@ void IkSolver::State::turn_to_goal() noexcept {
     update();
 }
 
-void IkSolver::State::turn_to_pole() noexcept {
+void IkSolver::State::rotate_to_pole() noexcept {
     const IkTip& tip = tips[0];
     IkBone& root = bones[tip.root];
     const auto frame = [](const Vec3<double>& along, const Vec3<double>& up, Mat3<double>& result) {
@@ -319,7 +319,7 @@ void IkSolver::State::update() noexcept {
         bone.root_from_rest = bone.parent < 0 ? bone.parent_from_rest
                                               : bones[static_cast<std::size_t>(bone.parent)].root_from_bone *
                                                     bone.parent_from_rest;
-        // A product with a quaternion alone: the bone rotates about its own head.
+        // A product with a quaternion only: the bone rotates about its own head.
         bone.root_from_bone = {bone.root_from_rest.real * bone.rotation,
                                bone.root_from_rest.dual * bone.rotation};
         bone.head = translation(bone.root_from_rest);
@@ -399,11 +399,11 @@ IkResult IkSolver::solve(const IkProblem& problem, std::span<Quat<double>> rotat
     state.start(problem, rotations);
     IkResult result;
     result.iterations = run();
-    if (!state.is_reached(options.tolerance) && state.can_turn_to_goal()) {
+    if (!state.is_reached(options.tolerance) && state.can_rotate_to_goal()) {
         const double error = state.cost();
         state.keep(state.first_rotations, state.first_coordinates);
         state.start(problem, rotations);
-        state.turn_to_goal();
+        state.rotate_to_goal();
         result.iterations += run();
         if (!(state.cost() < error)) state.restore(state.first_rotations, state.first_coordinates);
     }
@@ -411,7 +411,7 @@ IkResult IkSolver::solve(const IkProblem& problem, std::span<Quat<double>> rotat
         const Quat<double>& q = state.bones[i].rotation;
         rotations[i] = q.w < 0.0 ? -q : q;
     }
-    // From the goals that were asked for, which start() may have moved.
+    // Relative to the caller's goals, since start() may have moved the solver's.
     const DualQuat<double> root_from_space = inverse(problem.space_from_root);
     for (std::size_t i = 0; i < state.tips.size(); ++i) {
         const IkTip& tip = state.tips[i];

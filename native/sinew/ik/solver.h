@@ -13,14 +13,15 @@
 
 namespace sinew {
 
-/// What of a tree of bones is to be where: the tip of one of them.
+/// The goal for the tip of one bone.
 ///
-/// bone             that the tip belongs to; it and all bones above it rotate
+/// bone             the bone of the tip; it and all of its ancestors rotate
 /// position_weight  0: the position does not count
-/// rotation_weight  0: the rotation of the bone does not count. An error of 1 radian counts as one of the chain's length
-/// has_pole         whether the chain is first rotated about its root, as by Blender's constraint, until its tip lies to
-///                  its goal and the axis cos(pole_angle) x + sin(pole_angle) z of the root bone to the side of the pole:
-///                  what then bends stays in that plane
+/// rotation_weight  0: the rotation of the bone does not count. An error of 1 radian counts like one of the
+///                  chain's length
+/// has_pole         whether to first rotate the chain about its root, as Blender's constraint does, so that its
+///                  tip points at the goal and the axis cos(pole_angle) x + sin(pole_angle) z of the root bone
+///                  points to the side of the pole. Bends then stay in that plane
 struct IkEffector {
     std::int32_t bone = 0;
     double position_weight = 1.0;
@@ -29,32 +30,35 @@ struct IkEffector {
     double pole_angle = 0.0;
 };
 
-/// How the rotations are found.
+/// How to find the rotations.
 ///
-///   damped_least_squares  each free axis is a unit screw; steps solve (J J^T + l 1) y = e, l following the error
+///   damped_least_squares  each free axis is a unit screw; steps solve (J J^T + l 1) y = e, with l following the
+///                         error
 ///                         (Wampler 1986; Sugihara 2011)
-///   cyclic_descent        each bone in turn, from the tip, rotates to where its tips are nearest to their goals (Wang,
-///                         Chen 1991): cheap steps, and many of them where a chain is nearly straight
+///   cyclic_descent        each bone in turn, starting at the tip, rotates to bring its tips as near to their
+///                         goals as
+///                         possible (Wang, Chen 1991): cheap steps, but many of them where a chain is nearly
+///                         straight
 enum class IkMethod : std::uint8_t { damped_least_squares, cyclic_descent };
 
-/// By their names, in the order of IkMethod.
+/// The names of the methods, in the order of IkMethod.
 inline constexpr std::array<std::string_view, 2> kIkMethods{"dls", "ccd"};
 
-/// tolerance   in lengths of the chain, and in radians: what counts as reached
-/// iterations  at most: steps of all axes, or sweeps over all bones
+/// tolerance   errors that count as reached, in lengths of the chain and in radians
+/// iterations  maximum: steps of all axes, or sweeps over all bones
 struct IkOptions {
     IkMethod method = IkMethod::damped_least_squares;
     double tolerance = 1e-6;
     int iterations = 100;
 };
 
-/// A pose of the bones and what is wanted of it, in one unit of length and one space.
+/// The pose of the bones and the goals, in one unit of length and one space.
 ///
-/// space_from_root   placed before every bone without a parent
+/// space_from_root   applied after the transform of every bone without a parent
 /// parent_from_rest  [bones] each bone relative to its parent, not rotated: unit
-/// tips              [effectors] in the space of each one's bone
-/// goals             [effectors] unit: where the tip is to be, and how the bone is to be rotated
-/// poles             [effectors] points; empty where no effector has one
+/// tips              [effectors] each in the space of its bone
+/// goals             [effectors] unit: the goal of the tip, and of the bone's rotation
+/// poles             [effectors] points; empty if no effector has one
 struct IkProblem {
     DualQuat<double> space_from_root;
     std::span<const DualQuat<double>> parent_from_rest;
@@ -63,9 +67,9 @@ struct IkProblem {
     std::span<const Vec3<double>> poles;
 };
 
-/// distance    the largest distance of a tip that counts from its goal
-/// angle       the largest angle of a rotation that counts to its goal, radians
-/// iterations  how many it took
+/// distance    the largest distance of a tip from its goal, of those that count
+/// angle       the largest angle of a rotation to its goal, of those that count, in radians
+/// iterations  how many were used
 /// is_reached  whether both are within the tolerance
 struct IkResult {
     double distance = 0.0;
@@ -76,31 +80,34 @@ struct IkResult {
 
 /// Finds rotations of bones, within their limits, that bring tips of a tree of bones to their goals.
 ///
-/// Each solve starts from the rotations that it is given and depends on nothing else, so the same input gives the same
-/// bits. The signs of quaternions do not matter; a rigid motion of root, goals and poles changes nothing. Computed in
-/// double, lengths divided by that of the longest chain. Nothing is allocated after construction. One solver is used by
-/// one thread at a time.
+/// Each solve starts from the given rotations and depends on nothing else, so the same input gives the same bits.
+/// The signs of quaternions do not matter. A rigid motion of root, goals and poles does not change the result.
+/// Computed in double, with lengths divided by that of the longest chain. Does not allocate after construction. A
+/// solver must be used by one thread at a time.
 ///
-/// What has no solution:
-/// - A goal out of reach of a chain with one effector whose rotation does not count is moved to the nearest end of the
-///   reach first. Chains without limits stretch straight to it. Others, and trees, end near the least sum of squares.
-/// - A goal at the root that the bones can reach is as any other; one nearer than they can fold is brought nearer to
-///   the same side, or, at the root itself, left at the tip's own.
-/// - A chain that is straight to a nearer goal has no direction to bend to: it is bent a little about the first axis
-///   that is free, to the side where the limits leave more, or to the side of the pole.
-/// - A bone of length 0 moves nothing by its own rotation. A chain of length 0 reaches its root alone.
-/// - A pole on the line from the root to the goal does not count, nor, as in Blender, any with several effectors. Limits
-///   are kept where a pole wants otherwise.
-/// - Limits can leave local minima, such as a chain that folds onto itself. A chain of one effector is tried once more,
-///   rotated about its root to its goal first; then the better one stays: within limits, and no step improves it, but
-///   others may be nearer. Of bones with limits a swing ends at 177.7 degrees.
+/// Input without a solution, or with several:
+/// - If a chain with one effector whose rotation does not count can not reach its goal, the goal is first moved
+///   to the nearest point of its range. Chains without limits stretch straight towards it. Other chains, and
+///   trees, end near the smallest sum of squared errors.
+/// - A goal at the root that the bones can reach is like any other. A goal nearer to the root than the bones can
+///   fold is moved outwards to the nearest reachable distance or, if it is exactly at the root, towards the tip's
+///   current direction.
+/// - If a straight chain points at a nearer goal, no direction to bend is given: it is bent a little about the
+///   first free axis, to the side where the limits leave more room, or to the side of the pole.
+/// - A bone of length 0 moves nothing by its own rotation. A chain of length 0 only reaches its root.
+/// - A pole on the line from the root to the goal is ignored, as are, as in Blender, all poles if there are
+///   several effectors. Limits have priority over a pole.
+/// - Limits can cause local minima, such as a chain that folds onto itself. A chain with one effector is solved a
+///   second time, first rotated about its root towards its goal, and the better result is used: it is within
+///   limits, and no step improves it, but a better one may exist. Bones with limits swing by at most 177.7
+///   degrees.
 class SINEW_EXPORT IkSolver {
 public:
-    /// limits     [bones], or empty: none
+    /// limits     [bones]; empty: none
     /// effectors  at least one
     ///
-    /// Throws std::invalid_argument for an effector's bone that is none, weights below 0 or not finite, limits
-    /// that are not -pi <= min <= 0 <= max <= pi, and stiffness that is not 0 to below 1.
+    /// Throws std::invalid_argument for an effector whose bone does not exist, weights that are negative or not
+    /// finite, limits that are not -pi <= min <= 0 <= max <= pi, and stiffness outside of 0 to below 1.
     IkSolver(const Skeleton& skeleton, std::span<const BoneLimits> limits,
              std::span<const IkEffector> effectors);
     ~IkSolver();
@@ -110,8 +117,8 @@ public:
     [[nodiscard]] std::size_t bone_count() const noexcept;
     [[nodiscard]] std::size_t effector_count() const noexcept;
 
-    /// rotations  [bones] each bone's rotation relative to its rest, unit: where to start, and then the solution, with
-    ///            w >= 0. What of the start is beyond limits is brought within.
+    /// rotations  [bones] each bone's rotation relative to its rest, unit: the start, then the solution with w >=
+    ///            0. Start rotations beyond the limits are brought within
     IkResult solve(const IkProblem& problem, std::span<Quat<double>> rotations,
                    const IkOptions& options = {}) noexcept;
 

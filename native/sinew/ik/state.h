@@ -8,18 +8,19 @@
 
 namespace sinew {
 
-/// The least cosine of half a swing about two axes that are not both free without limits: 177.7 degrees. The two
-/// coordinates lose their meaning at 180.
+/// The smallest cosine of half a swing about two axes, unless both are free and without limits: 177.7 degrees. At
+/// 180 degrees the two coordinates are singular.
 inline constexpr double kLeastSwing = 0.02;
 
-/// How often a solve bends a chain that is straight to its goal.
-inline constexpr int kMostBends = 3;
+/// How often a solve bends a chain that points straight at its goal.
+inline constexpr int kMaxBends = 3;
 
 /// A bone of the solver.
 ///
-/// is_ball    no limit and no lock: its rotation is kept as it is. Otherwise three coordinates say it: the twist's angle
-///            about y; and of the swing, about one axis the angle, about two the x and z of its quaternion
-/// low, high  of the coordinates
+/// is_ball    no limit and no lock: the rotation is stored as a quaternion. Otherwise three coordinates represent
+///            it: the angle of the twist about y; and for the swing, about one axis the angle, about two axes the
+///            x and z of its quaternion
+/// low, high  range of the coordinates
 struct IkBone {
     std::int32_t parent = -1;
     bool moves = false;
@@ -35,24 +36,26 @@ struct IkBone {
     Vec3<double> coordinates{0.0};
     DualQuat<double> parent_from_rest;
 
-    /// Not rotated by itself, and rotated; in the space of the root, lengths divided by that of the longest chain.
+    /// Before and after the bone's own rotation; in the space of the root, lengths divided by that of the longest
+    /// chain.
     DualQuat<double> root_from_rest;
     DualQuat<double> root_from_bone;
     Vec3<double> head{0.0};
 
     void set_rotation(const Quat<double>& q) noexcept;
     void set_coordinates(const Vec3<double>& values) noexcept;
-    /// Rotated further by `axis`, a vector in the space of the root of length of the angle, as far as its limits allow.
+    /// Rotates the bone further by `axis`, a rotation vector in the space of the root, as far as its limits
+    /// allow.
     void rotate_by(const Vec3<double>& axis) noexcept;
 };
 
-/// A free axis of a bone: its screw, and how fast its coordinate makes it rotate.
+/// A free axis of a bone: its screw, and the speed of rotation for a change of its coordinate.
 struct IkAxis {
     std::size_t bone;
     std::size_t axis;
     Twist<double> screw;
     double speed = 1.0;
-    Vec3<double> along{0.0};  ///< the coordinates that a step changes: its own, or along a boundary of two
+    Vec3<double> along{0.0};  ///< the coordinates that a step changes: its own, or both along a boundary
     bool is_blocked = false;
 };
 
@@ -60,9 +63,9 @@ struct IkTip {
     IkEffector effector;
     std::size_t bone;
     std::size_t root;
-    std::vector<std::size_t> chain;  ///< bones, from the root
+    std::vector<std::size_t> chain;  ///< bones, starting at the root
     std::vector<bool> is_moved_by;   ///< [bones]
-    double reach = 0.0;              ///< of this solve, in lengths of the longest chain
+    double reach = 0.0;              ///< for this solve, in lengths of the longest chain
     Vec3<double> offset{0.0};        ///< in the space of the bone
     Vec3<double> position{0.0};
     Quat<double> rotation{1.0, 0.0, 0.0, 0.0};
@@ -82,7 +85,7 @@ struct IkSolver::State {
     double length = 1.0;  ///< of the longest chain
     Vec3<double> pole{0.0};
 
-    // Of damped least squares.
+    // For damped least squares.
     std::vector<double> columns;  ///< [axes, rows]
     std::vector<double> residual, solution, normal, factor;
     std::vector<double> steps, gradient;
@@ -90,13 +93,13 @@ struct IkSolver::State {
     std::vector<Vec3<double>> first_coordinates, kept_coordinates, best_coordinates;
 
     void start(const IkProblem& problem, std::span<const Quat<double>> rotations) noexcept;
-    /// Poses of all bones that move, and of the tips.
+    /// Updates the poses of all bones that move, and the tips.
     void update() noexcept;
     /// The rotation vector from the tip's rotation to its goal's.
     [[nodiscard]] static Vec3<double> rotation_error(const IkTip& tip) noexcept {
         return rotation_vector(tip.goal_rotation * glm::conjugate(tip.rotation));
     }
-    /// Half the sum of squares of what is missing.
+    /// Half the sum of squared errors.
     [[nodiscard]] double cost() const noexcept;
     [[nodiscard]] bool is_reached(double tolerance) const noexcept;
     void keep(std::vector<Quat<double>>& rotations, std::vector<Vec3<double>>& coordinates) const noexcept;
@@ -105,22 +108,22 @@ struct IkSolver::State {
 
     int solve_by_least_squares(const IkOptions& options) noexcept;
     int solve_by_descent(const IkOptions& options) noexcept;
-    /// For a second try, where a chain has folded onto itself on the way to a goal behind it.
-    [[nodiscard]] bool can_turn_to_goal() const noexcept;
-    void turn_to_goal() noexcept;
-    /// Bends straight chains a little, where no axis moves a tip nearer to its goal.
+    /// For a second try, if a chain has folded onto itself on the way to a goal behind it.
+    [[nodiscard]] bool can_rotate_to_goal() const noexcept;
+    void rotate_to_goal() noexcept;
+    /// Bends straight chains a little, if no axis moves a tip nearer to its goal.
     void bend() noexcept;
 
 private:
     bool move_goal_within_reach() noexcept;
-    void turn_to_pole() noexcept;
+    void rotate_to_pole() noexcept;
     void stretch() noexcept;
 
     void update_axes() noexcept;
     void update_columns() noexcept;
     void update_residual() noexcept;
     void block_axes() noexcept;
-    /// Of swings at the end of their ellipse whose change, of either axis, leads out of it.
+    /// Blocks swings on the boundary of their ellipse whose change, in either axis, leads out of it.
     template <class Change>
     bool block_at_boundaries(const Change& change_of) noexcept;
     void block_at_boundary(std::size_t x, std::size_t z, const Vec3<double>& outward) noexcept;
@@ -130,7 +133,7 @@ private:
 
     void descend(std::size_t index) noexcept;
     static Quat<double> rotation_since(const IkBone& bone, const Quat<double>& rotation) noexcept;
-    /// The unit vector that the bone rotates about as its coordinate grows, and how fast.
+    /// The unit vector about which the bone rotates as its coordinate grows, and the speed.
     static Vec3<double> direction_of(const IkBone& bone, std::size_t axis, double& speed) noexcept;
 };
 

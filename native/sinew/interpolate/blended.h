@@ -12,34 +12,36 @@
 
 namespace sinew {
 
-/// What interpolating gives. `is_defined` is false where the method has no one answer for this input, or
-/// where rounding would decide which: the transform is then the one that the method's header names, finite.
+/// The result of an interpolation. `is_defined` is false if the method has no unique result for this input, or if
+/// rounding decides between several. The transform is then finite, and is the one that the method's header
+/// specifies.
 template <class Transform>
 struct Blended {
     Transform transform;
     bool is_defined = true;
 };
 
-/// What a blend does with the free signs of quaternions.
+/// How a blend chooses the free signs of quaternions.
 enum class Signs {
-    kToHeaviest,  ///< flips each to the hemisphere of the term of largest weight: the shortest path
-    kRunningSum,  ///< flips each to the hemisphere of the sum of those before it: Blender's rule, and that of Deformer
-    kAsGiven,  ///< leaves them
+    kToHeaviest,  ///< flips each to the hemisphere of the term with the largest weight: the shortest path
+    /// flips each to the hemisphere of the sum of the terms before it: the rule of Blender and of Deformer
+    kRunningSum,
+    kAsGiven,  ///< leaves them unchanged
 };
 
-/// Weights brought to sum 1, and the index of the largest, the first of equals.
+/// Weights normalised to sum 1, and the index of the largest weight (the first, if several are equal).
 template <class T>
 struct Shares {
     std::size_t heaviest = 0;
     T largest = T(1);
-    T scale = T(1);  ///< of weights that are divided by the largest
+    T scale = T(1);  ///< for weights divided by the largest
     bool is_defined = true;
 
-    /// By the largest first: the sum of the largest numbers is infinite, and so is 1 by that of the smallest.
+    /// Divides by the largest first: a sum of large numbers may overflow, and so may 1 over a sum of small ones.
     [[nodiscard]] T of(T weight) const noexcept { return weight / largest * scale; }
 };
 
-/// weights  [n], n >= 1, of any sign. A sum not above kDegenerateBlend times the largest is not defined.
+/// weights  [n], n >= 1, of any sign. Not defined if their sum is at most kDegenerateBlend times the largest.
 template <class T>
 [[nodiscard]] Shares<T> shares(std::span<const T> weights) noexcept {
     assert(!weights.empty());
@@ -80,15 +82,14 @@ template <class T>
     return is_finite(a.real) && is_finite(a.dual);
 }
 
-/// `result`; where it, or a number on the way to it, is too large for its type, `heaviest`, which is then not
-/// defined.
+/// `result` if it is finite; `heaviest`, not defined, if it or an intermediate number overflowed.
 template <class Transform>
 [[nodiscard]] Blended<Transform> finite_or(const Blended<Transform>& result,
                                            const Transform& heaviest) noexcept {
     return is_finite(result.transform) ? result : Blended<Transform>{heaviest, false};
 }
 
-/// `q` or -q, whichever is in the hemisphere of `pivot`.
+/// Whichever of `q` and -q is in the hemisphere of `pivot`.
 template <class T>
 [[nodiscard]] Quat<T> aligned(const Quat<T>& q, const Quat<T>& pivot) noexcept {
     return glm::dot(q, pivot) < T(0) ? -q : q;
@@ -104,16 +105,16 @@ template <class T>
     return glm::dot(a.real, pivot.real) < T(0) ? -a : a;
 }
 
-/// A matrix has no free sign.
+/// Matrices have no free sign.
 template <class T>
 [[nodiscard]] Affine<T> aligned(const Affine<T>& a, const Affine<T>& /*pivot*/) noexcept {
     return a;
 }
 
-/// How far a squared length may be from 1, and products of axes from 0, for a rotation to count as one.
+/// The tolerance for rotations: how far squared lengths may be from 1, and products of axes from 0.
 inline constexpr double kUnitTolerance = 2e-3;
 
-/// Whether the rotation is of unit length, but for what a few operations round: not 2 a, say.
+/// Whether the rotation has unit length, up to the rounding of a few operations.
 template <class T>
 [[nodiscard]] bool has_unit_rotation(const Quat<T>& q) noexcept {
     using std::abs;
@@ -136,7 +137,8 @@ template <class T>
     return true;
 }
 
-/// Whether the linear part of `a` is a rotation: no scale, shear or mirror, but for what a few operations round.
+/// Whether the linear part of `a` is a rotation, without scale, shear or mirroring, up to the rounding of a few
+/// operations.
 template <class T>
 [[nodiscard]] bool is_rigid(const Affine<T>& a) noexcept {
     using std::abs;
@@ -159,20 +161,21 @@ template <class T>
     return glm::dot(a.real, b.real);
 }
 
-/// No two matrices are in different hemispheres.
+/// Matrices have no hemispheres.
 template <class T>
 [[nodiscard]] T rotation_dot(const Affine<T>& /*a*/, const Affine<T>& /*b*/) noexcept {
     return T(1);
 }
 
-/// Whether another order of the terms would choose other signs, and so give another blend: several are of the largest
-/// weight, and from them the others are in different hemispheres.
+/// Whether another order of the terms would give other signs and thus another blend: several terms have the
+/// largest weight, and the remaining terms are in different hemispheres relative to them.
 template <class Transform, class T>
 [[nodiscard]] bool order_decides(std::span<const Transform> transforms, std::span<const T> weights,
                                  const Shares<T>& share) noexcept {
     using std::abs;
     const Transform& pivot = transforms[share.heaviest];
-    // Rotations within 90 degrees of the pivot are within 180 of one another, in one hemisphere from each.
+    // Rotations within 90 degrees of the pivot are within 180 degrees of each other, so all choose the same
+    // signs.
     bool is_wide = false;
     for (std::size_t i = 0; i < transforms.size(); ++i) {
         is_wide = is_wide || (weights[i] != T(0) && abs(rotation_dot(transforms[i], pivot)) < T(0.7072));
@@ -192,7 +195,7 @@ template <class Transform, class T>
     return false;
 }
 
-/// Whether the shorter way from `a` to `b` is decided by rounding: they are 180 degrees apart.
+/// Whether rounding decides which way from `a` to `b` is the shorter one: they are 180 degrees apart.
 template <class T>
 [[nodiscard]] bool is_half_turn_apart(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
     return is_half_turn_apart(a.rotation, b.rotation);
@@ -203,7 +206,7 @@ template <class T>
     return is_half_turn_apart(a.real, b.real);
 }
 
-/// Matrices are not brought to one side, so nothing is decided.
+/// Matrices have no signs to choose.
 template <class T>
 [[nodiscard]] bool is_half_turn_apart(const Affine<T>& /*a*/, const Affine<T>& /*b*/) noexcept {
     return false;
@@ -239,7 +242,7 @@ template <class T>
     return a + b;
 }
 
-// A point is a vector without rotation, for splines.
+// For splines, a point is treated as a vector without rotation.
 
 template <class T>
 [[nodiscard]] Vec3<T> scaled(T factor, const Vec3<T>& a) noexcept {
@@ -266,10 +269,10 @@ template <class T>
     return true;
 }
 
-/// The sum of the components, 12, 7 or 8 of them, each times its weight times `scale`: no rigid transform
-/// (Smith 2013, section 3.2.2). Not defined where a rotation of weight other than 0 is not of unit length;
-/// Signs::kToHeaviest where one is 180 degrees from the heaviest, or order_decides(); Signs::kRunningSum where one is
-/// perpendicular to the sum before it.
+/// The componentwise weighted sum (of 12, 7 or 8 components), with weights times `scale`; not a rigid transform
+/// (Smith 2013, section 3.2.2). Not defined if a rotation of weight other than 0 does not have unit length; with
+/// Signs::kToHeaviest also if one is 180 degrees from the heaviest, or if order_decides(); with
+/// Signs::kRunningSum also if one is perpendicular to the sum before it.
 template <Signs signs, class Transform, class T>
 [[nodiscard]] Blended<Transform> weighted_sum(std::span<const Transform> transforms,
                                               std::span<const T> weights, const Shares<T>& share) noexcept {

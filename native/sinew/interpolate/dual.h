@@ -9,13 +9,14 @@
 
 namespace sinew {
 
-/// Between two: the screw from one to the other at constant pace, the shorter way (ScLERP; Kavan et al.
-/// 2008, section 3.4; Smith 2013, section 2.2.3). Of n: DIB, dual quaternion iterative blending, which is
-/// ScLERP for n = 2 and does not depend on the order (Kavan et al. 2008, algorithm 3). Neither depends on
-/// the origin: x a, x b gives x times the result, and a x, b x the result times x.
+/// Between two transforms: the screw from one to the other at constant speed, along the shorter way (ScLERP;
+/// Kavan et al. 2008, section 3.4; Smith 2013, section 2.2.3). Blend of n: DIB, dual quaternion iterative
+/// blending, which equals ScLERP for n = 2 and does not depend on the order (Kavan et al. 2008, algorithm 3).
+/// Neither depends on the origin: x a, x b gives x times the result, and a x, b x gives the result times x.
 ///
-/// Not defined where two are 180 degrees apart (the signs as given then decide) or t is beyond a thousandth of
-/// 1 / epsilon, and of n as Dlb, where the
+/// Not defined if two transforms are 180 degrees apart (the signs as given then decide), or if |t| exceeds 0.001
+/// / epsilon. A blend of n is not defined where Dlb is not, if the iteration does not converge, or if a rotation
+/// is 180 degrees from the result.
 /// iteration does not settle, or where a rotation is 180 degrees from its result.
 struct Sclerp {
     static constexpr std::string_view name = "sclerp";
@@ -39,7 +40,7 @@ struct Sclerp {
         const Shares<T> share = shares(weights);
         Blended<DualQuat<T>> mean = Dlb::blend<signs, T>(transforms, weights);
         if (!mean.is_defined) return mean;
-        // Translations are known to within rounding of the longest.
+        // Translations are precise only to within rounding of the longest.
         const T rounding = T(8) * std::numeric_limits<T>::epsilon();
         T longest = T(0);
         for (const DualQuat<T>& transform : transforms) {
@@ -68,7 +69,7 @@ struct Sclerp {
     }
 };
 
-/// Sclerp by the name that its blend of n has.
+/// Sclerp under the name of its blend of n.
 struct Dib : Sclerp {
     static constexpr std::string_view name = "dib";
 };

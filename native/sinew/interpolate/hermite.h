@@ -10,16 +10,16 @@
 
 namespace sinew {
 
-/// The interval of `times` that holds a time, and the part of it that is over, 0 to 1.
+/// The interval between two `times` that contains a time, and the elapsed part of it, 0 to 1.
 template <class T>
 struct KeyInterval {
     std::size_t key = 0;
-    std::size_t next = 0;  ///< the same as `key` before the first time, after the last, and at it
+    std::size_t next = 0;  ///< same as `key` before the first time, after the last, and exactly at a time
     T part = T(0);
     T length = T(0);
 };
 
-/// times  [n], n >= 1, not decreasing, finite. Keys of equal time are a cut, as of spline_span().
+/// times  [n], n >= 1, non-decreasing, finite. Keys of equal time are a cut, as in spline_span().
 template <class T>
 [[nodiscard]] KeyInterval<T> key_interval(std::span<const T> times, T time) noexcept {
     assert(!times.empty());
@@ -31,10 +31,10 @@ template <class T>
     return {next - 1, next, (time - times[next - 1]) / length, length};
 }
 
-/// The cubic Hermite spline through points (Smith 2013, section 2.3.2), with tangents of any choice.
+/// The cubic Hermite spline through points (Smith 2013, section 2.3.2), with arbitrary tangents.
 ///
-/// points, tangents  [n], the tangents for a unit of time
-/// times             [n], n >= 1, not decreasing. Before the first the first point, after the last the last
+/// points, tangents  [n]; tangents are per unit of time
+/// times             [n], n >= 1, non-decreasing. The curve is constant before the first time and after the last
 template <class T>
 [[nodiscard]] Vec3<T> hermite(std::span<const Vec3<T>> points, std::span<const Vec3<T>> tangents,
                               std::span<const T> times, T time) noexcept {
@@ -49,15 +49,15 @@ template <class T>
            leave - arrive;
 }
 
-/// The same through rigid transforms, rigid throughout: a Bezier curve whose chords are screws (Shoemake 1985, of
-/// quaternions), with velocities of any choice.
+/// The same for rigid transforms, rigid throughout: a Bezier curve whose chords are screws (Shoemake 1985, for
+/// quaternions), with arbitrary velocities.
 ///
 /// keys        [n] unit
-/// velocities  [n] the twist for a unit of time at each key, in the key's own axes: after a short time h the curve is
-///             key * exp(h velocity)
-/// times       [n], n >= 1, not decreasing. Before the first the first key, after the last the last
+/// velocities  [n] the twist per unit of time at each key, in the key's own axes: after a short time h the curve
+///             is key * exp(h velocity)
+/// times       [n], n >= 1, non-decreasing. The curve is constant before the first time and after the last
 ///
-/// Not defined where Sclerp is not between two of its control poses, such as keys 180 degrees apart.
+/// Not defined where Sclerp is not defined between two of its control poses, such as keys 180 degrees apart.
 template <class T>
 [[nodiscard]] Blended<DualQuat<T>> hermite(std::span<const DualQuat<T>> keys,
                                            std::span<const Twist<T>> velocities, std::span<const T> times,
@@ -70,7 +70,7 @@ template <class T>
                                        keys[at.next] * to_dual_quat(-third * velocities[at.next]),
                                        keys[at.next]};
     bool is_defined = true;
-    // De Casteljau's construction.
+    // De Casteljau's algorithm.
     for (std::size_t left = 3; left > 0; --left) {
         for (std::size_t i = 0; i < left; ++i) {
             const Blended<DualQuat<T>> between = Sclerp::between(control[i], control[i + 1], at.part);

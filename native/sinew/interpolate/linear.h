@@ -7,24 +7,24 @@
 
 namespace sinew {
 
-// Each method is a type with a name, the representation it works on, and
-//   between(a, b, t)             from `a` at t = 0 to `b` at t = 1; other t go on beyond
-//   blend(transforms, weights)   of n >= 1; weights of any sign, brought to sum 1
-// All rotations are of unit length. Where the weights' sum is not above 0, or the type can not hold the result, it
-// is not defined and is the heaviest transform. Of two equal weights the first is the heavier; where another order
-// would then give another blend (order_decides()), it is not defined. Nor is what is made of rotations that are not of
-// unit length (has_unit_rotation()).
+// Each method is a type with a name, the representation that it works with, and
+//   between(a, b, t)             from `a` at t = 0 to `b` at t = 1; other t extrapolate
+//   blend(transforms, weights)   for n >= 1 transforms; weights of any sign, normalised to sum 1
+// All rotations must have unit length; otherwise the result is not defined (has_unit_rotation()). If the sum of
+// the weights is not positive, or if the result overflows, the result is not defined and is the heaviest
+// transform. Of equal weights the first counts as the heaviest; if another order would then give another blend
+// (order_decides()), the result is not defined.
 
-// The linear methods make what they give of a weighted sum by
-//   finished(total, heaviest)    `total` of weights of sum 1, defined where its signs are
+// The linear methods compute their result from a weighted sum with
+//   finished(total, heaviest)    `total` has weights of sum 1, and is defined where its signs are
 
-/// blend() of `a` and `b`, `b` first brought to the hemisphere of `a`; without its loops, in a quarter of the time.
+/// blend() of `a` and `b`, with `b` in the hemisphere of `a`. Has no loops, and takes a quarter of the time.
 template <class Method, class Transform, class T>
 [[nodiscard]] Blended<Transform> blend_of_two(const Transform& a, const Transform& b, T t) noexcept {
     const T s = T(1) - t;
     const Transform onto = aligned(b, a);
     const Transform& heaviest = s < t ? onto : a;
-    // As shares() has it of weights that all but cancel.
+    // Weights that nearly cancel, as in shares().
     if (!(T(1) > T(kDegenerateBlend) * (s < t ? t : s))) return {heaviest, false};
     const bool is_defined =
         (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && has_unit_rotation(a) && has_unit_rotation(b);
@@ -32,7 +32,7 @@ template <class Method, class Transform, class T>
                      heaviest);
 }
 
-/// blend() of the methods that make what they give of a weighted sum.
+/// blend() for methods that compute their result from a weighted sum.
 template <class Method, Signs signs, class Transform, class T>
 [[nodiscard]] Blended<Transform> blend_of_many(std::span<const Transform> transforms,
                                                std::span<const T> weights) noexcept {
@@ -43,8 +43,8 @@ template <class Method, Signs signs, class Transform, class T>
                      heaviest);
 }
 
-/// The matrices' sum, component by component: not rigid between different rotations, and between opposite
-/// ones flat (Smith 2013, section 3.5.2). No sign, so no shortest path to choose; always defined.
+/// The componentwise sum of the matrices. Not rigid between different rotations, and flat between opposite ones
+/// (Smith 2013, section 3.5.2). Matrices have no sign, so there is no shortest path to choose; always defined.
 struct MatrixLinear {
     static constexpr std::string_view name = "matrix_linear";
     template <class T>
@@ -68,12 +68,12 @@ struct MatrixLinear {
     }
 };
 
-/// MatrixLinear made rigid again: the rotation nearest to the sum (polar decomposition; Shoemake and Duff
-/// 1992). Between two it takes the shorter way, not at constant pace: the nearer to 180 degrees, the more of
-/// it happens about t = 1/2. Depends on the origin.
+/// MatrixLinear made rigid: the rotation nearest to the sum (polar decomposition; Shoemake and Duff 1992).
+/// Between two transforms it takes the shorter way, but not at constant speed: the closer to 180 degrees they
+/// are, the more of the motion happens around t = 1/2. Depends on the origin.
 ///
-/// Not defined where several rotations are as near (180 degrees at equal weights): the linear part is then
-/// the heaviest transform's.
+/// Not defined if several rotations are equally near (180 degrees at equal weights): the linear part is then that
+/// of the heaviest transform.
 struct MatrixPolar {
     static constexpr std::string_view name = "matrix_polar";
     template <class T>
@@ -100,11 +100,11 @@ struct MatrixPolar {
     }
 };
 
-/// Rotations by normalised sum, translations by mean (Smith 2013, sections 2.2.1 and 2.3.1, direct
-/// quaternion blending). Between two: the shorter way, not at constant pace. Depends on the origin.
+/// Rotations by normalised sum, translations by mean (Smith 2013, sections 2.2.1 and 2.3.1, direct quaternion
+/// blending). Between two transforms it takes the shorter way, not at constant speed. Depends on the origin.
 ///
-/// Not defined where a rotation is 180 degrees from the heaviest (its sign as given then decides), or where
-/// the sum cancels: the rotation is then the heaviest's.
+/// Not defined if a rotation is 180 degrees from the heaviest (its sign as given then decides), or if the sum
+/// cancels: the rotation is then that of the heaviest.
 struct QvNlerp {
     static constexpr std::string_view name = "qv_nlerp";
     template <class T>
@@ -131,12 +131,13 @@ struct QvNlerp {
     }
 };
 
-/// Unit dual quaternion along the weighted sum (DLB; Kavan et al. 2008, eq. 4; Smith 2013, sections 2.2.3
-/// and 3.5.2). Between two: about the axis of Sclerp's screw, rotation and translation not at constant pace and out of
-/// step by up to 8.15 degrees and 15 % of the shift. Does not depend on the origin.
+/// The normalised weighted sum of unit dual quaternions (DLB; Kavan et al. 2008, eq. 4; Smith 2013, sections
+/// 2.2.3 and 3.5.2). Between two transforms it moves about the axis of Sclerp's screw, but rotation and
+/// translation are not at constant speed, and deviate from Sclerp's by up to 8.15 degrees and 15 % of the
+/// translation. Does not depend on the origin.
 ///
-/// Not defined where a rotation is 180 degrees from the heaviest (its sign as given then decides), or where
-/// the sum of the real parts cancels: the result is then the heaviest.
+/// Not defined if a rotation is 180 degrees from the heaviest (its sign as given then decides), or if the sum of
+/// the real parts cancels: the result is then the heaviest.
 struct Dlb {
     static constexpr std::string_view name = "dlb";
     template <class T>

@@ -8,14 +8,14 @@
 
 namespace sinew {
 
-/// Exponential of the weighted sum of logarithms in se(3) (Alexa 2002; Smith 2013, sections 2.3.1 and
-/// 3.5.2). Rigid; not the shortest path, as every logarithm is taken from the identity. Does not depend on
-/// the origin or the axes, x a x^-1 and x b x^-1 give x times the result times x^-1; but x a and x b give
-/// another path than x times the result. Constant pace, which section 2.2.2 promises, holds only where both
-/// turn about one screw axis, as from or to the identity.
+/// The exponential of the weighted sum of logarithms in se(3) (Alexa 2002; Smith 2013, sections 2.3.1 and 3.5.2).
+/// Rigid. Not the shortest path, since every logarithm is taken from the identity. Does not depend on the origin
+/// or the axes: x a x^-1 and x b x^-1 give x times the result times x^-1. But x a and x b give another path than
+/// x times the result. The speed is constant, as section 2.2.2 claims, only if both rotate about the same screw
+/// axis, such as from or to the identity.
 ///
-/// Not defined where a matrix is 180 degrees from the identity to within rounding: the axis of its
-/// logarithm then has the sign that makes to_quat() of it; nor where one scales, shears or mirrors (is_rigid()).
+/// Not defined if a matrix is 180 degrees from the identity to within rounding: the axis of its logarithm then
+/// has the sign that to_quat() gives it. Also not defined if a matrix scales, shears or mirrors (is_rigid()).
 struct MatrixLog {
     static constexpr std::string_view name = "matrix_log";
     template <class T>
@@ -39,9 +39,9 @@ struct MatrixLog {
             if (weights[i] == T(0)) continue;
             if (!is_rigid(transforms[i])) is_defined = false;
             const QuatVec<T> rigid = to_quat_vec(transforms[i]);
-            // Below this the sign of w, and with it that of the axis, is rounding.
+            // Below this the sign of w, and thus that of the axis, is rounding.
             const bool is_half_turn = rigid.rotation.w < T(kDegenerateBlend);
-            // A matrix of weight 1 is the result whichever logarithm it has.
+            // A matrix of weight 1 is the result, whichever logarithm it has.
             const T weight = share.of(weights[i]);
             if (is_half_turn && weight != T(1)) is_defined = false;
             total = total + weight * to_twist(rigid);

@@ -8,7 +8,7 @@
 
 namespace sinew {
 
-/// Every way of interpolating: the table that the Python package, the tests and the experiments read.
+/// All interpolation methods. The Python package, the tests and the experiments read this list.
 using Interpolations = std::tuple<MatrixLinear, MatrixPolar, MatrixLog, QvNlerp, QvSlerp, Dlb, Sclerp, Dib>;
 
 }  // namespace sinew

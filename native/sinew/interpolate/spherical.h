@@ -9,24 +9,25 @@
 
 namespace sinew {
 
-/// Steps after which an iterated blend counts as not defined. One within 90 degrees takes 5 to 15.
+/// Number of iterations after which a blend counts as not defined. Rotations within 90 degrees take 5 to 15.
 inline constexpr int kBlendSteps = 100;
 
-/// Whether so many times an angle is known to a thousandth of a radian.
+/// Whether t times an angle has an error below a thousandth of a radian.
 template <class T>
 [[nodiscard]] bool is_near(T t) noexcept {
     using std::abs;
     return abs(t) * std::numeric_limits<T>::epsilon() < T(1e-3);
 }
 
-/// Unit quaternions `a` to `b` along the great circle through both, the way their signs say (Shoemake 1985;
-/// Smith 2013, section 2.1.1). Opposite ones (a = -b) lie on no one circle: then along the sum.
+/// Interpolates unit quaternions `a` to `b` on the great circle through both, the way that their signs determine
+/// (Shoemake 1985; Smith 2013, section 2.1.1). Opposite ones (a = -b) have no unique great circle: the result is
+/// then the nearer end.
 template <class T>
 [[nodiscard]] Quat<T> slerp(const Quat<T>& a, const Quat<T>& b, T t) noexcept {
     using std::atan2;
     const Quat<T> sum = a + b;
     if (glm::length(sum) < T(kDegenerateBlend)) return t < T(0.5) ? a : b;
-    // From chords, not acos: exact for equal and for opposite ends.
+    // From chords instead of acos: exact for equal and for opposite ends.
     const T angle = T(2) * atan2(glm::length(b - a), glm::length(sum));
     const T whole = sinc(angle);
     const T from = (T(1) - t) * sinc((T(1) - t) * angle) / whole;
@@ -34,12 +35,12 @@ template <class T>
     return glm::normalize(from * a + onto * b);
 }
 
-/// Rotations by slerp, translations by mean (Smith 2013, section 2.2.1). Between two: the shorter way at
-/// constant pace. Of n: the weighted mean on the sphere (Buss and Fillmore 2001, algorithm A1), which does
-/// not depend on the order. Depends on the origin.
+/// Rotations by slerp, translations by mean (Smith 2013, section 2.2.1). Between two transforms it takes the
+/// shorter way at constant speed. Blend of n: the weighted mean on the sphere (Buss and Fillmore 2001, algorithm
+/// A1), which does not depend on the order. Depends on the origin.
 ///
-/// Not defined as QvNlerp, where t is beyond a thousandth of 1 / epsilon, where the iteration does not settle, or where a rotation is 180 degrees from its
-/// result.
+/// Not defined where QvNlerp is not, if |t| exceeds 0.001 / epsilon, if the iteration does not converge, or if a
+/// rotation is 180 degrees from the result.
 struct QvSlerp {
     static constexpr std::string_view name = "qv_slerp";
     template <class T>

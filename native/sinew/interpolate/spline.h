@@ -10,23 +10,23 @@
 
 namespace sinew {
 
-/// Where a time lies in a Catmull-Rom spline: four keys (at an end one of them twice) and their weights,
-/// of sum 1 and partly negative.
+/// The position of a time in a Catmull-Rom spline: four keys (at an end, one of them twice) and their weights,
+/// which have sum 1 and may be negative.
 template <class T>
 struct SplineSpan {
     std::array<std::size_t, 4> keys{};
     std::array<T, 4> weights{T(0), T(1), T(0), T(0)};
 };
 
-/// The keys and weights at `time` (Catmull and Rom 1974; Smith 2013, section 2.3.2, the tangents scaled to
-/// the interval as its text says; in its algorithm 3 the signs printed as 2t^3 0 3t^2 + 1 and t^3 + t^2 are
-/// 2t^3 - 3t^2 + 1 and t^3 - t^2).
+/// The keys and weights at `time` (Catmull and Rom 1974; Smith 2013, section 2.3.2, with the tangents scaled to
+/// the interval as its text says; in its algorithm 3 the terms printed as 2t^3 0 3t^2 + 1 and t^3 + t^2 are 2t^3
+/// - 3t^2 + 1 and t^3 - t^2).
 ///
-/// times  [n], n >= 1, not decreasing, finite
+/// times  [n], n >= 1, non-decreasing, finite
 ///
-/// The tangent at the first and the last key is that of the straight way to its neighbour. Before the first
-/// time the first key, after the last the last. Keys of equal time are a cut: the curve ends at the first of
-/// them and begins anew at the last, which is the value at that time.
+/// The tangents at the first and the last key have the direction of the straight line to the next one. The curve
+/// is constant before the first time and after the last. Keys of equal time are a cut: the curve ends at the
+/// first of them and starts again at the last, which is the value at that time.
 template <class T>
 [[nodiscard]] SplineSpan<T> spline_span(std::span<const T> times, T time) noexcept {
     assert(!times.empty());
@@ -49,9 +49,9 @@ template <class T>
     return {{before, key, next, beyond}, {-leave, T(1) - onto - arrive, onto + leave, arrive}};
 }
 
-/// The four keys of a span with their signs brought to one hemisphere along the chain, from the second outwards:
-/// each step of the curve takes the shorter way, and no sign changes within it. Whether all steps of weight
-/// other than 0 are clear of 180 degrees.
+/// The four keys of a span with signs chosen along the chain, from the second key outwards, so that adjacent keys
+/// are in one hemisphere: each step of the curve takes the shorter way, and no sign changes within it. Defined if
+/// no step of weight other than 0 is 180 degrees.
 template <class Transform, class T>
 [[nodiscard]] Blended<std::array<Transform, 4>> along_chain(const SplineSpan<T>& span,
                                                             const std::array<Transform, 4>& keys) noexcept {
@@ -66,10 +66,10 @@ template <class Transform, class T>
     return chain;
 }
 
-/// Vector form: the weighted sum of the components, which passes through the keys and is rigid only there;
+/// Vector form: the weighted sum of the components. It passes through the keys and is rigid only there;
 /// normalized() makes it rigid (Smith 2013, algorithm 3). The sign is that of the second key.
 ///
-/// Not defined where neighbours are 180 degrees apart (quaternions): signs as given then decide.
+/// Not defined if adjacent keys are 180 degrees apart (quaternions): the signs as given then decide.
 template <class Transform, class T>
 [[nodiscard]] Blended<Transform> spline_vector(const SplineSpan<T>& span,
                                                const std::array<Transform, 4>& keys) noexcept {
@@ -80,11 +80,11 @@ template <class Transform, class T>
     return finite_or<Transform>({sum.transform, chain.is_defined}, keys[1]);
 }
 
-/// Blend form: the keys' blend by Method with the weights of the spline, rigid for every method but
+/// Blend form: the blend of the keys by Method, with the weights of the spline. Rigid for every method except
 /// MatrixLinear (Smith 2013, section 3.2.2).
 ///
-/// Not defined as spline_vector(), and where the blend is not: with keys more than about 100 degrees apart
-/// the negative weights keep the iterations of QvSlerp and Sclerp from settling here and there.
+/// Not defined where spline_vector() is not, or where the blend is not: if keys are more than about 100 degrees
+/// apart, the negative weights may keep the iterations of QvSlerp and Sclerp from converging.
 template <class Method, class Transform, class T>
 [[nodiscard]] Blended<Transform> spline_blend(const SplineSpan<T>& span,
                                               const std::array<Transform, 4>& keys) noexcept {
@@ -94,17 +94,17 @@ template <class Method, class Transform, class T>
     return result;
 }
 
-/// The four of `keys` that `span` names.
+/// The four elements of `keys` that `span` refers to.
 template <class Transform, class T>
 [[nodiscard]] std::array<Transform, 4> keys_of(const SplineSpan<T>& span,
                                                std::span<const Transform> keys) noexcept {
     return {keys[span.keys[0]], keys[span.keys[1]], keys[span.keys[2]], keys[span.keys[3]]};
 }
 
-/// The Catmull-Rom spline through `keys` at `time`, blend form.
+/// The Catmull-Rom spline through `keys` at `time`, in blend form.
 ///
 /// keys   [n] in a representation of Method
-/// times  [n], n >= 1, not decreasing
+/// times  [n], n >= 1, non-decreasing
 template <class Method, class T>
 [[nodiscard]] auto catmull_rom(std::span<const typename Method::template Transform<T>> keys,
                                std::span<const T> times, T time) noexcept {
@@ -112,7 +112,7 @@ template <class Method, class T>
     return spline_blend<Method>(span, keys_of(span, keys));
 }
 
-/// The same in vector form: not rigid between the keys. Transform may be Vec3, for points.
+/// The same in vector form. Not rigid between keys. Transform may be Vec3, for points.
 template <class Transform, class T>
 [[nodiscard]] Blended<Transform> catmull_rom_vector(std::span<const Transform> keys, std::span<const T> times,
                                                     T time) noexcept {

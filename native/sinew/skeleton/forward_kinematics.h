@@ -8,13 +8,13 @@
 
 namespace sinew {
 
-/// Each bone's transform relative to the root: its parent's, times its own (Smith 2013, algorithm 1).
+/// Computes each bone's transform relative to the root: its parent's times its own (Smith 2013, algorithm 1).
 ///
-/// root_from_parentless  placed before every bone without a parent
+/// root_from_parentless  applied after the transform of every bone without a parent
 /// parent_from_bone      [bones] each bone relative to its parent
 /// root_from_bone        [bones] the result; may be the same memory as parent_from_bone
 ///
-/// Transform is Affine, QuatVec or DualQuat of any scalar.
+/// Transform is Affine, QuatVec or DualQuat of any scalar type.
 template <class Transform>
 void root_relative(const Skeleton& skeleton, const Transform& root_from_parentless,
                    std::span<const Transform> parent_from_bone,
@@ -30,16 +30,16 @@ void root_relative(const Skeleton& skeleton, const Transform& root_from_parentle
     }
 }
 
-/// Whether `bone` is `top` or comes below it.
+/// Whether `bone` is `top` or one of its descendants.
 [[nodiscard]] inline bool is_in_branch(const Skeleton& skeleton, std::size_t bone, std::size_t top) noexcept {
     auto at = static_cast<std::int32_t>(bone);
-    // Parents come first: what is in front of `top` is not below it.
+    // Parents precede their children, so a bone before `top` is not its descendant.
     while (at > static_cast<std::int32_t>(top)) at = skeleton.parents()[static_cast<std::size_t>(at)];
     return at == static_cast<std::int32_t>(top);
 }
 
-/// The same for one bone and those below it alone, after a change of that bone (Smith 2013, algorithm 1, called for a
-/// bone): the others in `root_from_bone` are those of before.
+/// The same for only one bone and its descendants, after a change of that bone (Smith 2013, algorithm 1, called
+/// for a bone). The other elements of `root_from_bone` are not changed.
 template <class Transform>
 void update_branch(const Skeleton& skeleton, const Transform& root_from_parentless,
                    std::span<const Transform> parent_from_bone, std::size_t top,

@@ -9,16 +9,16 @@
 
 namespace sinew {
 
-// Keyframes hold each bone relative to its parent, and the in-betweens are made there; root_relative()
-// comes after. Made from root-relative transforms, bones would rotate about other centres and leave their
-// parents' ends (Smith 2013, figure 3.3).
+// Keyframes store each bone relative to its parent, and are interpolated in that form; root_relative() follows.
+// If root-relative transforms were interpolated, bones would rotate about wrong centres and separate from their
+// parents (Smith 2013, figure 3.3).
 
-/// The skeleton between two keyframes (Smith 2013, algorithm 2), each bone by Method::between().
+/// Interpolates the skeleton between two keyframes (Smith 2013, algorithm 2), each bone with Method::between().
 ///
 /// from, onto        [bones] parent_from_bone at t = 0 and at t = 1, in a representation of Method
 /// parent_from_bone  [bones] the result; may be the same memory as either
 ///
-/// Returns whether every bone's is defined; one that is not has what Method says.
+/// Returns whether all bones' results are defined. For others the result is as described at Method.
 template <class Method, class T>
 bool interpolate_keyframes(const Skeleton& skeleton,
                            std::span<const typename Method::template Transform<T>> from,
@@ -57,14 +57,14 @@ bool spline_bones(const Skeleton& skeleton, std::span<const Transform> keyframes
 
 }  // namespace detail
 
-/// The skeleton on a Catmull-Rom spline through keyframes (Smith 2013, algorithm 3), blend form:
-/// spline_blend() of each bone.
+/// The skeleton on a Catmull-Rom spline through keyframes (Smith 2013, algorithm 3), in blend form:
+/// spline_blend() for each bone.
 ///
 /// keyframes         [keys * bones] parent_from_bone, key after key, in a representation of Method
-/// times             [keys], keys >= 1, not decreasing
+/// times             [keys], keys >= 1, non-decreasing
 /// parent_from_bone  [bones] the result
 ///
-/// Returns whether every bone's is defined.
+/// Returns whether all bones' results are defined.
 template <class Method, class T>
 bool spline_keyframes(const Skeleton& skeleton,
                       std::span<const typename Method::template Transform<T>> keyframes,
@@ -76,7 +76,7 @@ bool spline_keyframes(const Skeleton& skeleton,
         [](const auto& span, const auto& keys) { return spline_blend<Method>(span, keys); });
 }
 
-/// The same in vector form, as algorithm 3 is printed: not rigid between the keys.
+/// The same in vector form, as algorithm 3 is printed. Not rigid between keys.
 template <class Transform, class T>
 bool spline_keyframes_vector(const Skeleton& skeleton, std::span<const Transform> keyframes,
                              std::span<const T> times, T time,

@@ -9,13 +9,13 @@
 
 namespace sinew {
 
-/// A hierarchy of bones in which every parent comes before its children, so that one flat loop visits
-/// parents first. Once constructed it is valid.
+/// A hierarchy of bones in which every parent precedes its children, so that a single loop visits parents first.
+/// A constructed object is valid.
 class SINEW_EXPORT Skeleton {
 public:
     /// parents  [bones] index of each bone's parent, -1 for a root
     ///
-    /// Throws std::invalid_argument where a parent does not come before its child.
+    /// Throws std::invalid_argument if a parent does not precede its child.
     explicit Skeleton(std::span<const std::int32_t> parents);
 
     [[nodiscard]] std::size_t bone_count() const noexcept { return parents_.size(); }

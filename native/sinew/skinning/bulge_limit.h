@@ -12,21 +12,21 @@
 
 namespace sinew {
 
-/// A bone as a line. Of length 0 it is a point.
+/// A bone as a line segment. If its length is 0, it is a point.
 template <class T>
 struct BoneSegment {
     Vec3<T> head;
     Vec3<T> tail;
 };
 
-/// How BulgeLimitStage sees the bones of a vertex. In the order of BulgeLimitStage::kForms.
+/// Which bones of a vertex BulgeLimitStage measures the distance to. In the order of BulgeLimitStage::kForms.
 enum class BulgeForm {
-    continuous,  // all of them, by their weights
-    kim_han,     // the heaviest alone, the first of equals: the surface tears where that changes
+    continuous,  // all of them, weighted
+    kim_han,     // only the heaviest (the first, if several are equal): tears the surface where that changes
 };
 
-/// Limit Bulge: a vertex of two bones or more goes back towards them where blending took it farther away from them than
-/// it is at rest, as at the point of a bent elbow.
+/// Limit Bulge: moves a vertex of two or more bones back towards them where blending took it farther from them
+/// than it is at rest, such as the tip of a bent elbow.
 struct BulgeLimitStage {
     static constexpr std::string_view kForms[] = {"continuous", "kim_han"};
     static constexpr Parameter kParameters[] = {
@@ -50,10 +50,10 @@ struct BulgeLimitStage {
         "Elbows and knees that bulge where they bend stay as thick as they are at rest",
         "Kim, Han 2014; the continuous form is Sinew's own", kParameters};
 
-    /// Distances at rest count as so much longer, so that rounding alone changes nothing, and rest poses not a bit.
+    /// Factor on rest distances that absorbs rounding, so that the rest pose is returned bit for bit.
     static constexpr double kAllowance = 1.0 + 1e-6;
 
-    /// From `point` to the nearest point of the segment.
+    /// The vector from `point` to the nearest point of the segment.
     template <class T>
     [[nodiscard]] static Vec3<T> to_segment(const BoneSegment<T>& segment, const Vec3<T>& point) noexcept {
         const Vec3<T> along = segment.tail - segment.head;
@@ -63,15 +63,16 @@ struct BulgeLimitStage {
         return share * along - from_head;
     }
 
-    /// How much longer a bone's motion makes what is perpendicular to its segment, at most: so far it may go away. Of a point,
-    /// which has no such directions, the root mean square of all.
+    /// The largest factor by which a bone's motion lengthens vectors perpendicular to its segment. The allowed
+    /// distance grows by it. A segment of length 0 has no perpendicular directions; its factor is the root mean
+    /// square over all directions.
     template <class T>
     [[nodiscard]] static T stretch(const Mat3<T>& linear, const BoneSegment<T>& rest_segment) noexcept {
         const Vec3<T> along = rest_segment.tail - rest_segment.head;
         const Vec3<T> columns(glm::dot(linear[0], linear[0]), glm::dot(linear[1], linear[1]),
                               glm::dot(linear[2], linear[2]));
         if (glm::dot(along, along) == T(0)) return std::sqrt((columns.x + columns.y + columns.z) / T(3));
-        // Of the images of two perpendicular directions only what is perpendicular to that of the bone counts.
+        // Only the components of the two images perpendicular to the posed bone count.
         const Vec3<T> axis = glm::normalize(along);
         const Vec3<T> other = std::abs(axis.x) < T(0.6) ? Vec3<T>(1, 0, 0) : Vec3<T>(0, 1, 0);
         const Vec3<T> u = glm::normalize(glm::cross(axis, other));
@@ -83,13 +84,13 @@ struct BulgeLimitStage {
         };
         const Vec3<T> a = across(u);
         const Vec3<T> b = across(glm::cross(axis, u));
-        // The larger eigenvalue of the 2x2 matrix of their products.
+        // The larger eigenvalue of the 2x2 Gram matrix of a and b.
         const T mean = (glm::dot(a, a) + glm::dot(b, b)) / T(2);
         const T difference = (glm::dot(a, a) - glm::dot(b, b)) / T(2);
         return std::sqrt(mean + std::hypot(difference, glm::dot(a, b)));
     }
 
-    /// How far a vertex is from its bones at rest.
+    /// The distance of a vertex from its bones at rest.
     ///
     /// segments    one for each index in `influences`
     /// influences  at least one; weights >= 0 with sum 1
@@ -113,12 +114,12 @@ struct BulgeLimitStage {
         T stretch;
     };
 
-    /// The limited vertex.
+    /// The vertex after limiting.
     ///
     /// bones          posed, one for each index in `influences`
-    /// influences     weights >= 0 with sum 1; where fewer than two are above 0 the vertex stays
-    /// rest_distance  of this form
-    /// amount         the strength times the vertex's weight in the group, 0 to 1
+    /// influences     weights >= 0 with sum 1; with fewer than two positive weights the vertex is not moved
+    /// rest_distance  rest_distance() for the same form
+    /// amount         strength times the vertex's weight in the group, 0 to 1
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(BulgeForm form, std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences, T rest_distance,

@@ -10,8 +10,8 @@
 
 namespace sinew {
 
-/// Skinning with optimised centres of rotation (Le, Hodgins 2016): each vertex is rotated by the blended quaternion
-/// about a point of its own, which linear blending moves. deform/centres_of_rotation.h finds these points.
+/// Skinning with optimised centres of rotation (Le, Hodgins 2016): the blended quaternion rotates each vertex
+/// about the vertex's own centre, which linear blending moves. deform/centres_of_rotation.h computes the centres.
 struct Cor {
     static constexpr MethodInfo info{
         5,
@@ -40,7 +40,8 @@ struct Cor {
     ///
     /// bones       one for each index in `influences`; the signs of their quaternions are free
     /// influences  at least one; weights >= 0 with sum 1
-    /// centre      of rotation, x, y, z; or empty: the vertex itself, which is linear blending of the rigid motions
+    /// centre      of rotation, x, y, z; if empty, the vertex itself, which gives linear blending of the rigid
+    ///             motions
     ///
     /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex.
     template <class T>

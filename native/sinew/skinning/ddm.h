@@ -15,18 +15,19 @@
 
 namespace sinew {
 
-/// A neighbourhood whose second moments have a trace of less than this times its centroid's square is a point: it has no
-/// rotation of its own.
+/// A neighbourhood counts as a point, without a rotation of its own, if the trace of its second moments is less
+/// than this times its centroid's square.
 inline constexpr double kLeastExtent = 1e-10;
 
-/// Where the gap of NearestRotation is less than this times the largest entry, rotations are as near as each other.
+/// If NearestRotation::gap is less than this times the largest entry, no rotation is the nearest.
 inline constexpr double kLeastGap = 1e-6;
 
-/// Direct delta mush (Le, Lewis 2019): the shape that smoothing the rest mesh and the posed one would give, by sums
-/// over bones alone. deform/direct_delta_mush.h finds what they take of the rest mesh.
+/// Direct delta mush (Le, Lewis 2019): the shape that smoothing both the rest mesh and the posed mesh would give,
+/// computed as sums over bones. deform/direct_delta_mush.h precomputes the moments that the sums read.
 ///
-/// Variant 0 rotates a vertex about its neighbourhood's centroid by the rotation that fits the neighbourhood best, 2 by
-/// the blended quaternion; 4 also moves the centroid as if all of the neighbourhood were there.
+/// Variant 0 rotates a vertex about its neighbourhood's centroid by the rotation that fits the posed
+/// neighbourhood best, variant 2 by the blended quaternion. Variant 4 also rotates by the blended quaternion, and
+/// moves the centroid as if the whole neighbourhood were at the centroid.
 struct Ddm {
     static constexpr std::string_view kVariants[] = {"0", "2", "4"};
     static constexpr Parameter kParameters[] = {
@@ -76,15 +77,15 @@ struct Ddm {
     /// The deformed vertex.
     ///
     /// bones       one for each bone that `influences` or `rows` name; the signs of their quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1: what bones scale is blended by them
-    /// rows        [any number][kMomentFloats] of the vertex, by rising numbers of bones, weights >= 0 with sum 1; or
-    ///             empty: the vertex is blended linearly
-    /// parameters  empty, or the index in kVariants, and the radius, which is not read
+    /// influences  at least one; weights >= 0 with sum 1; used to blend the bones' scales
+    /// rows        [any number][kMomentFloats] of the vertex, in ascending order of bones, weights >= 0 with sum
+    ///             1; if empty, the vertex is blended linearly
+    /// parameters  empty, or the index in kVariants and the radius; the radius is not read
     ///
-    /// Quaternions are added in the order of rows, each in the hemisphere of the sum before it: half a turn apart, a
-    /// vertex rotates the one way or the other. A neighbourhood that is a point, or of which no rotation is nearest,
-    /// has the blended quaternion under variant 0, too. Where it is folded over so far that another rotation becomes the
-    /// nearest, the vertex flips.
+    /// Quaternions are added in the order of rows, each in the hemisphere of the sum before it, so rotations that
+    /// are 180 degrees apart may blend either way. Under variant 0, a neighbourhood that is a point, or that no
+    /// single rotation fits best, uses the blended quaternion. Where the neighbourhood is folded so far that
+    /// another rotation becomes the nearest, the vertex jumps.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences, const Vec3<T>& rest,
@@ -129,7 +130,7 @@ struct Ddm {
     }
 
 private:
-    /// What the bone adds to a point, times the weight that `point` was multiplied by.
+    /// How far the bone moves a point, times `weight`; `point` is already multiplied by it.
     template <class T>
     static Vec3<T> moved_by(const Bone<T>& bone, const Vec3<T>& point, T weight) noexcept {
         return rotation_displacement(bone.rigid.rotation, point) + weight * bone.rigid.translation;
@@ -144,7 +145,7 @@ private:
         return largest;
     }
 
-    /// Of the posed neighbourhood with the one at rest, each about its centroid.
+    /// The correlation matrix of the posed neighbourhood with the neighbourhood at rest, each about its centroid.
     ///
     /// displacement  of the centroid
     template <class T>
@@ -155,7 +156,8 @@ private:
             const Bone<T>& bone = bones[static_cast<std::size_t>(rows[i + 1])];
             const Moments<T> moments = moments_of(rows.subspan(i, kMomentFloats));
             const Vec3<T> from_centroid = moments.first - moments.weight * centroid;
-            // These have sum 0: only what bones differ by counts.
+            // The from_centroid vectors have sum 0, so subtracting the common displacement changes nothing but
+            // rounding.
             const Vec3<T> moved = moved_by(bone, centroid, T(1)) - displacement;
             sum += to_mat3(bone.rigid.rotation) * moments.second + glm::outerProduct(moved, from_centroid);
         }

@@ -11,9 +11,9 @@
 
 namespace sinew {
 
-/// Delta mush: the deformed mesh is smoothed, which takes away creases and bulges, and then gets back the details that
-/// the same smoothing takes from the rest mesh, in frames that follow the smoothed surface. It is Blender's modifier
-/// Corrective Smooth behind the Armature modifier.
+/// Delta mush (Mancewicz et al. 2014): smooths the deformed mesh, which removes creases and bulges, and then adds
+/// the details that the same smoothing removed from the rest mesh, in frames that follow the smoothed surface.
+/// Equals Blender's Corrective Smooth modifier after the Armature modifier.
 struct DeltaMushStage {
     /// In the order of SmoothType.
     static constexpr std::string_view kSmoothTypes[] = {"simple", "length_weighted"};
@@ -46,13 +46,13 @@ struct DeltaMushStage {
         "Smooth what crude weights crease or bulge and keep the details, as Corrective Smooth does",
         "Mancewicz, Derksen, Rijpkema, Wilson 2014; Blender's Corrective Smooth", kParameters};
 
-    /// Shorter than this, squared, a vector has no direction: its unit vector is 0.
+    /// A vector with a smaller squared length has no direction; its unit vector is 0.
     static constexpr double kShortest = 1e-35;
-    /// Edges whose directions differ less, coordinate by coordinate, span no frame.
+    /// Edge directions that differ by at most this in every coordinate span no frame.
     static constexpr double kStraight = 10.0 * std::numeric_limits<float>::epsilon();
     static constexpr double kLeastLength = 10.0 * std::numeric_limits<float>::epsilon();
 
-    /// One iteration of SmoothType::simple. A vertex without neighbours stays.
+    /// One iteration of SmoothType::simple. A vertex without neighbours is not moved.
     ///
     /// factor  0 to 1
     template <class T>
@@ -64,7 +64,7 @@ struct DeltaMushStage {
         return point + factor / static_cast<T>(neighbours.size()) * sum;
     }
 
-    /// One iteration of SmoothType::length_weighted. One whose neighbours all are where it is stays.
+    /// One iteration of SmoothType::length_weighted. A vertex whose neighbours all coincide with it is not moved.
     template <class T>
     [[nodiscard]] static Vec3<T> smoothed_by_length(const Vec3<T>& point, std::span<const Vec3<T>> neighbours,
                                                     T factor) noexcept {
@@ -80,14 +80,14 @@ struct DeltaMushStage {
         return divisor > static_cast<T>(kLeastLength) ? point + T(2) * factor / divisor * sum : point;
     }
 
-    /// The frame of a face's corner, and how much it counts at its vertex.
+    /// The frame of a corner of a face, and its weight at its vertex.
     template <class T>
     struct Corner {
-        Mat3<T> axes;  // orthonormal; 0 where the edges go there and back
-        T weight;      // the angle between the edges' directions; 0 where they go straight on
+        Mat3<T> axes;  // orthonormal; 0 where the two edges are antiparallel
+        T weight;      // the angle between the edges' directions; 0 where they are collinear
     };
 
-    /// Of the corner `current` between `previous` and `next` of the face.
+    /// The frame of the corner `current`, which follows `previous` and precedes `next` in the face.
     template <class T>
     [[nodiscard]] static Corner<T> corner(const Vec3<T>& previous, const Vec3<T>& current,
                                           const Vec3<T>& next) noexcept {
@@ -101,8 +101,8 @@ struct DeltaMushStage {
         return {Mat3<T>(x, glm::cross(z, x), z), angle(glm::dot(a, b))};
     }
 
-    /// The angle of a cosine by Blender's polynomial, up to 7e-5 from the exact one, which would count corners
-    /// otherwise than Blender does.
+    /// The angle of a cosine, by the polynomial that Blender uses. Its error is up to 7e-5; the exact function
+    /// would weight corners differently from Blender.
     template <class T>
     [[nodiscard]] static T angle(T cosine) noexcept {
         const T m = std::min(std::abs(cosine), T(1));

@@ -12,12 +12,13 @@
 
 namespace sinew {
 
-/// Dual quaternion iterative blending (Kavan, Collins, Zara, O'Sullivan 2008, algorithm 3): the motion from which the
-/// weighted logarithms of all bones' motions cancel, found from that of Dq on. With two bones it is ScLERP: a twist is
-/// spread evenly, and the whole character may rotate.
-///
-/// Where a bone is 180 degrees from the blend, the shorter way to it changes, and the result jumps. Where bones are so
-/// far apart that kSteps do not suffice, it is what these lead to: finite, and on the way.
+/// Dual quaternion iterative blending (Kavan, Collins, Zara, O'Sullivan 2008, algorithm 3). Starting from the
+/// blend of Dq, it finds the motion relative to which the weighted logarithms of all bones' motions sum to 0.
+/// With two bones this is ScLERP. Twists are spread evenly, and a rotation of the whole character rotates the
+/// result with it.
+/// Where a bone passes 180 degrees from the blend, the shorter way to it changes and the result jumps. If the
+/// iteration has not converged after kSteps, the result is the last iterate, which is finite.
+/// iteration has not converged after kSteps, the result is the last iterate: finite, and close to the limit.
 struct IterativeDq {
     static constexpr MethodInfo info{
         7,
@@ -30,7 +31,8 @@ struct IterativeDq {
         Needs::rest_bones};
     static const Kernel& kernel() noexcept;
 
-    /// The most corrections. Of twelve random rotations the slowest of thousands took 17 to 1e-6 radians.
+    /// The maximum number of iterations. Among thousands of blends of twelve random rotations, the slowest took
+    /// 17 iterations to 1e-6 radians.
     static constexpr int kSteps = 24;
 
     template <class T>
@@ -43,7 +45,7 @@ struct IterativeDq {
         return Dq::prepare(posed_from_rest, rest_bone);
     }
 
-    /// The deformed vertex: see Dq::deform_vertex.
+    /// The deformed vertex. Arguments and degenerate results as for Dq::deform_vertex.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,

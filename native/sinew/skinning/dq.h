@@ -37,7 +37,7 @@ struct Dq {
     ///
     /// bones       one for each index in `influences`; the signs of the dual quaternions are free
     /// influences  at least one; weights >= 0 with sum 1. Their order decides the sign of a term that is
-    ///             perpendicular to the sum of those before it
+    ///             perpendicular to the sum of the terms before it
     ///
     /// If the blend cancels (norm below kDegenerateBlend), the heaviest influence alone moves the vertex.
     template <class T>
@@ -58,8 +58,8 @@ struct Dq {
             sum = {bone.rigid.real, dual_at(bone, rest)};
             squared_norm = T(1);
         }
-        // Dividing once by the squared norm replaces the square root: both products below hold two
-        // factors of the sum. dot(real, dual) != 0 does no harm: a point's image never reads it.
+        // Both products below have two factors of the sum, so dividing once by the squared norm normalises them
+        // without a square root. dot(real, dual) != 0 is harmless: the image of a point does not depend on it.
         const Vec3<T> axis = vector_part(sum.real);
         const Vec3<T> rotated = glm::cross(axis, glm::cross(axis, rest) + sum.real.w * rest);
         const Vec3<T> translation = vector_part(sum.dual * glm::conjugate(sum.real));
@@ -67,7 +67,7 @@ struct Dq {
     }
 
 private:
-    /// The dual part of the rigid motion that takes `rest` where the bone with its scale takes it.
+    /// The dual part of the rigid motion that maps `rest` to where the bone, with its scale, maps it.
     template <class T>
     [[nodiscard]] static Quat<T> dual_at(const Bone<T>& bone, const Vec3<T>& rest) noexcept {
         if (!bone.has_scale) return bone.rigid.dual;

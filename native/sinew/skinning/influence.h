@@ -7,14 +7,14 @@
 
 namespace sinew {
 
-/// One bone's share of one vertex.
+/// The weight of one bone at one vertex.
 template <class T>
 struct Influence {
     std::int32_t bone;
     T weight;
 };
 
-/// The influence of largest weight, the first of equals. Requires at least one.
+/// The influence with the largest weight (the first, if several are equal). Requires at least one influence.
 template <class T>
 [[nodiscard]] const Influence<T>& heaviest(std::span<const Influence<T>> influences) noexcept {
     return *std::max_element(influences.begin(), influences.end(),

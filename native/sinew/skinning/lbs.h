@@ -9,8 +9,8 @@
 
 namespace sinew {
 
-/// Linear blend skinning: the weighted mean of where each bone alone would put the vertex
-/// (Magnenat-Thalmann et al. 1988; Smith 2013, section 2.3.1 with matrix linear blending).
+/// Linear blend skinning: the weighted mean of the vertex's images under each of its bones (Magnenat-Thalmann et
+/// al. 1988; Smith 2013, section 2.3.1 with matrix linear blending).
 struct Lbs {
     static constexpr MethodInfo info{
         1,
@@ -39,8 +39,8 @@ struct Lbs {
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,
                                                const Vec3<T>& rest) noexcept {
-        // The sum of displacements, not of positions: a vertex far from the origin keeps its digits,
-        // and the rest pose returns it unchanged to the last bit.
+        // Summing displacements instead of positions keeps the digits of a vertex far from the origin, and
+        // returns the rest pose unchanged to the last bit.
         Vec3<T> displacement{T(0)};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];

@@ -13,10 +13,10 @@ namespace sinew {
 /// Log-matrix skinning: the exponential of the weighted sum of the logarithms of the bones' motions (Alexa 2002;
 /// Cordier, Magnenat-Thalmann 2005).
 ///
-/// Each logarithm goes the shorter way from the rest pose, 180 degrees at most. There it branches: where a bone passes
-/// 180 degrees from rest, the axis of its logarithm changes its sign, and vertices that it shares with other bones
-/// jump. A vertex of one bone never does. Rotations are measured from the rest pose: if the whole character is
-/// rotated by its bones, the shape of its joints changes.
+/// Each logarithm takes the shorter way from the rest pose, at most 180 degrees. Where a bone passes 180 degrees
+/// from rest, the axis of its logarithm changes sign, and vertices that it shares with other bones jump. Vertices
+/// of one bone never jump. Rotations are measured from the rest pose, so rotating the whole character by its
+/// bones changes the shape where bones meet.
 struct Log {
     static constexpr MethodInfo info{4,
                                      "log",

@@ -22,8 +22,8 @@
 
 namespace sinew {
 
-/// THE list of methods, group by group, in the order in which people see them. Dispatch, bindings, tests, measurements,
-/// command line and panel are made from it.
+/// The only list of methods, group by group, in the order of menus. Dispatch, bindings, tests, benchmarks,
+/// command line and panel are generated from it.
 #if SINEW_WITH_DDM
 using Methods = std::tuple<Lbs, Dq, Cor, Ddm, Sdef, Qv, Sbs, Log, IterativeDq>;
 #else
@@ -32,33 +32,33 @@ using Methods = std::tuple<Lbs, Dq, Cor, Sdef, Qv, Sbs, Log, IterativeDq>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 
-/// call(Method{}) for each method.
+/// Calls call(Method{}) for each method.
 template <class Call>
 constexpr void for_each_method(const Call& call) {
     std::apply([&call](const auto&... methods) { (call(methods), ...); }, Methods{});
 }
 
-/// The facts of each method.
+/// The facts about each method, in the order of Methods.
 inline constexpr std::array<MethodInfo, kMethodCount> kMethods =
     std::apply([](const auto&... methods) { return std::array{methods.info...}; }, Methods{});
 
 static_assert(std::ranges::is_sorted(kMethods, {}, &MethodInfo::group),
               "methods of a group are one behind the other");
 
-/// The most parameters that a method has.
+/// The largest number of parameters of any method.
 inline constexpr std::size_t kMaxMethodParameters =
     std::ranges::max(kMethods, {}, [](const MethodInfo& method) {
         return method.parameters.size();
     }).parameters.size();
 
-/// The index of `method` in the list, or kMethodCount.
+/// The index of `method` in the list; kMethodCount if it is not there.
 [[nodiscard]] constexpr std::size_t index_of(const MethodInfo& method) noexcept {
     std::size_t index = 0;
     while (index < kMethodCount && !(kMethods[index] == method)) ++index;
     return index;
 }
 
-/// The method called `name`, or nothing.
+/// The method with this name, or nullopt.
 [[nodiscard]] constexpr std::optional<MethodInfo> find_method(std::string_view name) noexcept {
     for (const MethodInfo& method : kMethods) {
         if (method.name == name) return method;

@@ -6,8 +6,8 @@
 
 namespace sinew {
 
-/// The painted mix of two methods: each vertex takes its own share of the second. With linear blending and dual
-/// quaternions it is what riggers build in Blender from two Armature modifiers, the second with Preserve Volume,
+/// The painted mix of two methods: a weight at each vertex blends from the first to the second. With linear
+/// blending and dual quaternions it equals two Armature modifiers in Blender, the second with Preserve Volume,
 /// Multi Modifier and the vertex group.
 struct Mix {
     static constexpr Parameter kParameters[] = {
@@ -20,11 +20,11 @@ struct Mix {
         "A vertex group says where another method takes over, as at a twisted wrist or a bent elbow",
         "Kavan, Zara 2005 (as a mix of linear and spherical blending)", kParameters};
 
-    /// a, b    where the first and the second method put the vertex
-    /// weight  0 to 1; at 0 and 1 exactly one of the two
+    /// a, b    the vertex deformed by the first and by the second method
+    /// weight  0 to 1; 0 and 1 give exactly a and b
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(const Vec3<T>& a, const Vec3<T>& b, T weight) noexcept {
-        // Where both agree, as at rest, the result is that to the last bit.
+        // In this form the result equals a and b to the last bit where they are equal, such as at rest.
         return weight < T(1) ? a + weight * (b - a) : b;
     }
 };

@@ -8,23 +8,25 @@
 
 namespace sinew {
 
-/// What a vertex's neighbourhood has of one bone: the moments of the bone's weight about the vertex, model space. A row
-/// of vertex data has the numbers of vertex and bone, then these.
+/// The moments of one bone's weight in the neighbourhood of a vertex, model space. A row of vertex data is the
+/// number of the vertex, the number of the bone, and these moments.
 ///
-/// The weights of a vertex's rows have sum 1. Their first moments have the neighbourhood's centroid as their sum.
+/// The weights of a vertex's rows have sum 1. The sum of their first moments is the neighbourhood's centroid.
 template <class T>
 struct Moments {
     T weight;
-    Vec3<T> first;   // weight times the centroid of what the bone has, from the origin
+    Vec3<T> first;   // weight times the centroid of the bone's part, from the origin
     Mat3<T> second;  // symmetric, about the centroid of the whole neighbourhood
 };
 
-/// vertex, bone, weight, first (x, y, z), second (xx, yy, zz, yz, xz, xy)
+/// Floats of a row: vertex, bone, weight, first (x, y, z), second (xx, yy, zz, yz, xz, xy).
 inline constexpr std::size_t kMomentFloats = 12;
 
-/// Vertices beyond this have no number as a float.
+/// The limit on vertices: a float can not represent all larger numbers exactly.
 inline constexpr std::size_t kMaxMomentVertices = std::size_t{1} << 24;
 
+/// The moments in a row.
+///
 /// row  [kMomentFloats]
 template <class T>
 [[nodiscard]] Moments<T> moments_of(std::span<const T> row) noexcept {

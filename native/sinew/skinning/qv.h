@@ -9,9 +9,9 @@
 
 namespace sinew {
 
-/// Quaternion-vector blending: rotations by normalised sum, translations by weighted mean
-/// (Smith 2013, section 3.6, "direct quaternion blending"; Hejl 2004). Every blend rotates about the
-/// origin of the space it is computed in, so the result depends on where that origin is.
+/// Quaternion-vector blending: rotations by normalised sum, translations by weighted mean (Smith 2013, section
+/// 3.6, "direct quaternion blending"; Hejl 2004). The blend rotates about the origin of the space in which it is
+/// computed, so the result depends on where that origin is.
 struct Qv {
     static constexpr MethodInfo info{
         2,
@@ -38,7 +38,7 @@ struct Qv {
     /// bones       one for each index in `influences`; the signs of their quaternions are free
     /// influences  at least one; weights >= 0 with sum 1
     ///
-    /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence's rotation stands.
+    /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence's rotation is used.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,
@@ -47,7 +47,8 @@ struct Qv {
         Vec3<T> translation{T(0)};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
-            // q and -q are one rotation but blend to two: keep each term in the hemisphere of the sum so far.
+            // q and -q are the same rotation but blend differently: keep each term in the hemisphere of the sum
+            // so far.
             const T sign = glm::dot(bone.rigid.rotation, rotation) < T(0) ? T(-1) : T(1);
             rotation = rotation + (sign * influence.weight) * bone.rigid.rotation;
             Vec3<T> offset = bone.rigid.translation;

@@ -8,17 +8,17 @@
 
 namespace sinew {
 
-/// What the rotation by the unit quaternion `q` adds to `v`.
+/// The displacement of `v` under the rotation by the unit quaternion `q`.
 template <class T>
 [[nodiscard]] Vec3<T> rotation_displacement(const Quat<T>& q, const Vec3<T>& v) noexcept {
     const Vec3<T> axis = vector_part(q);
     return T(2) * glm::cross(axis, glm::cross(axis, v) + q.w * v);
 }
 
-/// `rest` rotated by the blended quaternion about `centre`, which linear blending of the rigid motions moves; what
-/// bones scale is added after each bone's rotation.
+/// Rotates `rest` by the blended quaternion about `centre`, which is moved by linear blending of the rigid
+/// motions. The displacements by the bones' scales are rotated by each bone and added.
 ///
-/// bones       ScaledRigid<QuatVec<T>, T>, one for each index in `influences`; the signs of quaternions are free
+/// bones       ScaledRigid<QuatVec<T>, T>, one for each index in `influences`; signs of the quaternions are free
 /// influences  at least one; weights >= 0 with sum 1
 ///
 /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex.
@@ -26,7 +26,7 @@ template <class T, class Bone>
 [[nodiscard]] Vec3<T> rotated_about(const Vec3<T>& centre, std::span<const Bone> bones,
                                     std::span<const Influence<T>> influences, const Vec3<T>& rest) noexcept {
     Quat<T> rotation(T(0), T(0), T(0), T(0));
-    // A sum of displacements, so that the rest pose returns the vertex unchanged to the last bit.
+    // Summing displacements returns the rest pose unchanged to the last bit.
     Vec3<T> displacement{T(0)};
     for (const Influence<T>& influence : influences) {
         const Bone& bone = bones[static_cast<std::size_t>(influence.bone)];

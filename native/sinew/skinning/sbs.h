@@ -22,12 +22,12 @@ template <class To, class From>
     return {{cast<To>(bone.rigid), cast<To>(bone.scale), bone.has_scale}, Vec3<To>(bone.head)};
 }
 
-/// Spherical blend skinning (Kavan, Zara 2005; Smith 2013, section 3.6.2): vertices rotate by the blended
-/// quaternion about the point that the bones of their set move most alike. With two bones that share a joint this is
-/// the joint, and the shape that of dual quaternions.
+/// Spherical blend skinning (Kavan, Zara 2005; Smith 2013, section 3.6.2): rotates a vertex by the blended
+/// quaternion about the point on whose image the bones of its set differ least. For two bones that meet in a
+/// common point this is that point, and the shape is that of dual quaternions.
 ///
-/// Each set of bones has a point of its own, whatever the weights: where a bone joins the set, the surface is torn if
-/// the bones have no common point. The influences of positive weight are the set.
+/// The set consists of the influences with positive weight. The centre depends only on the set, not on the
+/// weights, so the surface tears where a bone joins the set, unless the bones have a common point.
 struct Sbs {
     static constexpr MethodInfo info{
         6,
@@ -43,8 +43,9 @@ struct Sbs {
     template <class T>
     using Bone = SphericalBone<T>;
 
-    /// Below this the rotations of a set agree along a direction: the root of the mean squared difference of its
-    /// images from their mean. Of two bones it is the sine of half the angle between them.
+    /// Along a direction in which the rotations differ by less than this, the set counts as agreeing. The measure
+    /// is the root mean square difference of the direction's images from their mean; for two bones, the sine of
+    /// half the angle between them.
     static constexpr double kSameRotation = 1e-3;
 
     /// rest_bone  orthonormal; its axes are only read where the motion has scale
@@ -54,12 +55,12 @@ struct Sbs {
         return {scaled_rigid(posed_from_rest, rest_bone), rest_bone.translation};
     }
 
-    /// The point r of least sum of |(R_a - R_b) r + t_a - t_b|^2 over all pairs of a set's motions; of several the
-    /// nearest to the mean of the bones' heads. Directions along which the rotations agree (kSameRotation) count as
-    /// free.
+    /// The point r that minimises the sum of |(R_a - R_b) r + t_a - t_b|^2 over all pairs of motions in a set.
+    /// Where it is not unique, the one nearest to the mean of the bones' heads. Directions along which the
+    /// rotations agree (kSameRotation) count as free.
     ///
-    /// count    of bones
-    /// bone_at  Bone<double> of each number below that
+    /// count    number of bones
+    /// bone_at  bone_at(i) returns the Bone<double> i, 0 <= i < count
     template <class BoneAt>
     [[nodiscard]] static Vec3<double> rotation_centre(std::size_t count, const BoneAt& bone_at) noexcept;
 
@@ -85,13 +86,13 @@ struct Sbs {
     }
 
 private:
-    /// The solution of least length of n y = g for a symmetric, not negative n, whose eigenvalues below `least`
-    /// count as 0.
+    /// The solution of n y = g of least length, for a symmetric positive semi-definite n. Eigenvalues up to
+    /// `least` count as 0.
     [[nodiscard]] static Vec3<double> solved(Mat3<double> n, const Vec3<double>& g, double least) noexcept {
         const double half_trace = 0.5 * (n[0][0] + n[1][1] + n[2][2]);
-        // The determinant over this square is no larger than the least eigenvalue.
+        // The determinant divided by this square is a lower bound of the least eigenvalue.
         if (glm::determinant(n) > least * half_trace * half_trace) return glm::inverse(n) * g;
-        // Jacobi's rotations, which leave small eigenvalues their digits.
+        // Jacobi rotations keep the relative precision of small eigenvalues.
         Mat3<double> vectors(1.0);
         for (int sweep = 0; sweep < 12; ++sweep) {
             for (int pair = 0; pair < 3; ++pair) {
@@ -130,8 +131,8 @@ template <class BoneAt>
 Vec3<double> Sbs::rotation_centre(std::size_t count, const BoneAt& bone_at) noexcept {
     if (count == 0) return Vec3<double>(0.0);
     const auto n = static_cast<double>(count);
-    // What each motion does differently from the first, about the mean of the heads: sums of such lose no digits where
-    // all are alike. The sum over pairs is n times that of squared differences from the mean.
+    // Differences of the motions from the first one, with the mean of the heads as origin, lose no digits where
+    // all motions are alike. The sum over pairs is n times the sum of squared differences from the mean.
     const Bone<double> first = bone_at(0);
     Vec3<double> origin(0.0);
     for (std::size_t i = 0; i < count; ++i) origin += (1.0 / n) * bone_at(i).head;
@@ -142,8 +143,8 @@ Vec3<double> Sbs::rotation_centre(std::size_t count, const BoneAt& bone_at) noex
         return Affine<double>{rotation, rotation * origin + bone.rigid.translation - first.rigid.translation};
     };
     if (count == 2) {
-        // The square of the difference is 4 |v|^2 times what is perpendicular to v, the vector part of the rotation from
-        // one to the other.
+        // With v the vector part of the rotation from one bone to the other, the matrix (R_a - R_b)^T (R_a - R_b)
+        // is 4 |v|^2 times the projection perpendicular to v.
         const Vec3<double> v = vector_part(glm::conjugate(first.rigid.rotation) * bone_at(1).rigid.rotation);
         const double squared = glm::dot(v, v);
         if (squared < kSameRotation * kSameRotation) return origin;

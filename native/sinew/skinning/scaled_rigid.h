@@ -6,17 +6,17 @@
 
 namespace sinew {
 
-/// A bone's motion as the rigid methods need it: `rigid` after a scale about the bone's head.
+/// A bone's motion as the rigid methods need it: a scale about the bone's head, then `rigid`.
 ///
-/// The scale rule of all rigid methods: each bone's term of the blend is the rigid motion that maps this
-/// vertex exactly where that bone alone, scale included, would put it (Blender's rule since 4.0).
+/// Scale rule of all rigid methods: each bone's term of the blend is the rigid motion that maps this vertex
+/// exactly to where that bone alone, scale included, would map it (Blender's rule since 4.0).
 template <class Rigid, class T>
 struct ScaledRigid {
     Rigid rigid;
     Affine<T> scale;
     bool has_scale = false;
 
-    /// How far the scale moves `rest` before the rigid motion applies.
+    /// The displacement of `rest` by the scale, before the rigid motion.
     [[nodiscard]] Vec3<T> scale_displacement(const Vec3<T>& rest) const noexcept {
         return transform_point(scale, rest) - rest;
     }
@@ -26,8 +26,8 @@ struct ScaledRigid {
 ///
 /// rest_bone  orthonormal; only read where the motion has scale
 ///
-/// Blender's rest axes are up to 4e-5 off orthonormal, those of bones near -Y, and so is the rigid part of what it
-/// then takes for scale: the quaternion is read as Blender reads it.
+/// The rest axes of Blender's bones near -Y deviate from orthonormal by up to 4e-5, and so does the rigid part
+/// that results. The quaternion is extracted in the same way as Blender extracts it.
 template <class T>
 [[nodiscard]] ScaledRigid<QuatVec<T>, T> scaled_rigid(const Affine<T>& posed_from_rest,
                                                       const Affine<T>& rest_bone) noexcept {

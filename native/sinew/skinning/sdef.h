@@ -13,11 +13,11 @@
 
 namespace sinew {
 
-/// Spherical deform, as MikuMikuDance has it: a vertex of two bones is rotated by their blended rotation about a point
-/// that the modeller gave it, C, which the bones move together with two more points, R0 and R1. Every other vertex is
-/// blended linearly.
+/// Spherical deform (SDEF) of MikuMikuDance: rotates a vertex of two bones by their blended rotation about C, a
+/// point that the modeller gave the vertex. The bones move C, together with two more points, R0 and R1. Every
+/// other vertex is blended linearly.
 ///
-/// Bones are scaled by the rule of all rigid methods (ScaledRigid), which MikuMikuDance does not have.
+/// Scaled bones follow the rule of all rigid methods (ScaledRigid); MikuMikuDance has no scale.
 struct Sdef {
     static constexpr std::string_view kInterpolations[] = {"nlerp", "slerp"};
     static constexpr Parameter kParameters[] = {
@@ -56,13 +56,13 @@ struct Sdef {
     ///
     /// bones       one for each index in `influences`; the signs of their quaternions are free
     /// influences  at least one; weights >= 0 with sum 1
-    /// spheres     C, R0, R1 (x, y, z each), then 0 where the vertex is blended linearly all the same; or empty: it is.
-    ///             Of two influences of positive weight R0 belongs to the first, R1 to the second; a vertex that has
-    ///             another number of them is blended linearly
+    /// spheres     C, R0, R1 (x, y, z each), then a flag: 0 means the vertex is blended linearly; if empty, it is
+    ///             as well. R0 belongs to the first influence of positive weight, R1 to the second; a vertex that
+    ///             does not have exactly two is blended linearly
     /// parameters  empty, or the index in kInterpolations
     ///
-    /// Two rotations that are half a turn apart are blended by the signs that they have: the vertex then rotates the
-    /// one way or the other.
+    /// Two rotations that are 180 degrees apart are blended with the signs that their quaternions have, so the
+    /// vertex may rotate either way.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences, const Vec3<T>& rest,
@@ -71,7 +71,8 @@ struct Sdef {
         const auto bone_of = [&](const Influence<T>& influence) -> const Bone<T>& {
             return bones[static_cast<std::size_t>(influence.bone)];
         };
-        // What the influence adds: its bone's rigid motion of `point`, and what the bone scales.
+        // The influence's term: the displacement of `point` by the bone's rigid motion, and that of `rest` by its
+        // scale.
         const auto moved_by = [&](const Influence<T>& influence, const Vec3<T>& point) {
             const Bone<T>& bone = bone_of(influence);
             const Quat<T>& q = bone.rigid.rotation;

@@ -9,7 +9,7 @@
 
 namespace sinew {
 
-/// THE list of stages: what may follow a method, in the order in which they do.
+/// The only list of stages, in the order in which they run after a method.
 inline constexpr std::array kStages{Mix::info, BulgeLimitStage::info, DeltaMushStage::info};
 
 }  // namespace sinew

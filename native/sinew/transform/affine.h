@@ -15,7 +15,7 @@ struct Affine {
     Vec3<T> translation{T(0)};
 };
 
-/// First `b`, then `a`: model_from_bone * bone_from_rest = model_from_rest.
+/// Applies `b` first, then `a`: model_from_bone * bone_from_rest = model_from_rest.
 template <class T>
 [[nodiscard]] Affine<T> operator*(const Affine<T>& a, const Affine<T>& b) noexcept {
     return {a.linear * b.linear, a.linear * b.translation + a.translation};
@@ -23,8 +23,9 @@ template <class T>
 
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
-/// The same in registers of four: the twelve numbers, column after column, are three of them. Equal to the last bit
-/// but where the compiler joins products and sums (-ffp-contract=fast with FMA), which it may do otherwise here.
+/// The same product with vectors of four floats: the twelve numbers, column after column, fill three of them.
+/// Equal to the generic product to the last bit, unless the compiler contracts products and sums
+/// (-ffp-contract=fast with FMA), which it may do differently here.
 [[nodiscard]] inline Affine<float> operator*(const Affine<float>& a, const Affine<float>& b) noexcept {
     using Lanes = float __attribute__((vector_size(16)));
     struct Registers {
@@ -33,7 +34,7 @@ template <class T>
     static_assert(sizeof(Registers) == sizeof(Affine<float>));
     const auto [a0, a1, a2] = std::bit_cast<Registers>(a);
     const auto [b0, b1, b2] = std::bit_cast<Registers>(b);
-    // The fourth lane of a column is not used.
+    // The fourth lane of each column is unused.
     const Lanes x = a0;
     const Lanes y = __builtin_shufflevector(a0, a1, 3, 4, 5, 5);
     const Lanes z = __builtin_shufflevector(a1, a2, 2, 3, 4, 4);
@@ -49,7 +50,7 @@ template <class T>
 #endif
 #endif
 
-/// The transform that undoes `a`. Requires an invertible linear part; a singular one gives infinities.
+/// The inverse of `a`. Requires an invertible linear part; a singular one gives infinities.
 template <class T>
 [[nodiscard]] Affine<T> inverse(const Affine<T>& a) noexcept {
     const Mat3<T> linear = glm::inverse(a.linear);
@@ -66,19 +67,19 @@ template <class T>
     return a.linear * vector;
 }
 
-/// The unit normal of a surface with normal `normal` after `a`: along the inverse transpose of its linear
-/// part (Turkowski 1990). A linear part that flattens the surface to a line gives (0, 0, 0).
+/// The unit normal, after `a`, of a surface with normal `normal`: along the inverse transpose of the linear part
+/// (Turkowski 1990). A linear part that flattens the surface to a line gives (0, 0, 0).
 template <class T>
 [[nodiscard]] Vec3<T> transform_normal(const Affine<T>& a, const Vec3<T>& normal) noexcept {
     const Vec3<T> yz = glm::cross(a.linear[1], a.linear[2]);
-    // The cofactors are the inverse transpose times the determinant, and exist where it is 0.
+    // The cofactors are the inverse transpose times the determinant; they exist for determinant 0, too.
     const Mat3<T> cofactors(yz, glm::cross(a.linear[2], a.linear[0]), glm::cross(a.linear[0], a.linear[1]));
     const Vec3<T> rotated = unit(cofactors * normal, Vec3<T>(T(0)));
     return glm::dot(a.linear[0], yz) < T(0) ? -rotated : rotated;
 }
 
-/// The rigid transform nearest to `a`: its linear part becomes nearest_rotation(). One without
-/// a direction (zero, or all of it on one line) gives any of the nearest.
+/// The rigid transform nearest to `a`: the linear part becomes nearest_rotation(). If that is not unique, as for
+/// rank 0 or 1, it is one of the nearest.
 template <class T>
 [[nodiscard]] Affine<T> normalized(const Affine<T>& a) noexcept {
     return {to_mat3(nearest_rotation(a.linear).rotation), a.translation};

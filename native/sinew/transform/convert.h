@@ -7,7 +7,7 @@
 
 namespace sinew {
 
-// From an Affine: its linear part must be a rotation; split_scale() makes it one.
+// Conversions between representations. The linear part of an Affine must be a rotation; see split_scale().
 
 template <class T>
 [[nodiscard]] Affine<T> to_affine(const Affine<T>& a) noexcept {
@@ -54,7 +54,7 @@ template <class T>
     return {to_mat3(a.real), translation(a)};
 }
 
-/// The same transform in another scalar type.
+/// The same transform with another scalar type.
 template <class To, class From>
 [[nodiscard]] Affine<To> cast(const Affine<From>& a) noexcept {
     return {Mat3<To>(a.linear), Vec3<To>(a.translation)};

@@ -5,8 +5,8 @@
 
 namespace sinew {
 
-/// Dual number real + e dual, e^2 = 0 (Clifford 1873; Smith 2013, section 2.2.3, where the printed product
-/// a1 b1 is a misprint of a1 a2). The default is 0.
+/// Dual number real + e dual, e^2 = 0 (Clifford 1873; Smith 2013, section 2.2.3, whose printed product a1 b1 is a
+/// misprint of a1 a2). The default is 0.
 template <class T>
 struct Dual {
     T real = T(0);
@@ -35,19 +35,19 @@ template <class T>
     return {a.real * b.real, a.real * b.dual + a.dual * b.real};
 }
 
-/// Requires b.real != 0; a dual number without real part has no inverse.
+/// Requires b.real != 0: a dual number without a real part has no inverse.
 template <class T>
 [[nodiscard]] Dual<T> operator/(const Dual<T>& a, const Dual<T>& b) noexcept {
     return {a.real / b.real, (a.dual * b.real - a.real * b.dual) / (b.real * b.real)};
 }
 
-/// real - e dual.
+/// The conjugate: real - e dual.
 template <class T>
 [[nodiscard]] Dual<T> conjugate(const Dual<T>& a) noexcept {
     return {a.real, -a.dual};
 }
 
-// A function of a dual number is f(real) + e dual f'(real): its Taylor series ends after one term.
+// A function f of a dual number is f(real) + e dual f'(real), since its Taylor series ends after one term.
 
 /// Requires real > 0.
 template <class T>

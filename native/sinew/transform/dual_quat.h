@@ -6,15 +6,15 @@
 
 namespace sinew {
 
-/// Dual quaternion real + e dual, e^2 = 0 (Smith 2013, section 2.2.3; Kavan et al. 2008).
-/// A rigid transform is a unit one: |real| = 1 and dot(real, dual) = 0. The default is the identity.
+/// Dual quaternion real + e dual, e^2 = 0 (Smith 2013, section 2.2.3; Kavan et al. 2008). A rigid transform is a
+/// unit dual quaternion: |real| = 1 and dot(real, dual) = 0. The default is the identity.
 template <class T>
 struct DualQuat {
     Quat<T> real{T(1), T(0), T(0), T(0)};
     Quat<T> dual{T(0), T(0), T(0), T(0)};
 };
 
-/// First `b`, then `a`.
+/// Applies `b` first, then `a`.
 template <class T>
 [[nodiscard]] DualQuat<T> operator*(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
     return {a.real * b.real, a.real * b.dual + a.dual * b.real};
@@ -25,38 +25,38 @@ template <class T>
     return {a.real + b.real, a.dual + b.dual};
 }
 
-/// The same motion as the unit dual quaternion `a`.
+/// -a. For a unit `a` this is the same motion.
 template <class T>
 [[nodiscard]] DualQuat<T> operator-(const DualQuat<T>& a) noexcept {
     return {-a.real, -a.dual};
 }
 
-/// The product with a dual number; its order does not matter.
+/// The product with a dual number. It is commutative.
 template <class T>
 [[nodiscard]] DualQuat<T> operator*(const Dual<T>& factor, const DualQuat<T>& a) noexcept {
     return {factor.real * a.real, factor.real * a.dual + factor.dual * a.real};
 }
 
-/// real* + e dual*: the quaternion conjugate, which reverses products. It undoes a unit `a`.
+/// The quaternion conjugate, real* + e dual*. It reverses products, and is the inverse of a unit `a`.
 template <class T>
 [[nodiscard]] DualQuat<T> conjugate(const DualQuat<T>& a) noexcept {
     return {glm::conjugate(a.real), glm::conjugate(a.dual)};
 }
 
-/// real - e dual: the dual conjugate.
+/// The dual conjugate: real - e dual.
 template <class T>
 [[nodiscard]] DualQuat<T> dual_conjugate(const DualQuat<T>& a) noexcept {
     return {a.real, -a.dual};
 }
 
-/// real* - e dual*: both at once. A point 1 + e p moves to a (1 + e p) times this (Smith 2013, section
+/// Both conjugates: real* - e dual*. The image of a point 1 + e p is a (1 + e p) times this (Smith 2013, section
 /// 2.2.3).
 template <class T>
 [[nodiscard]] DualQuat<T> combined_conjugate(const DualQuat<T>& a) noexcept {
     return {glm::conjugate(a.real), -glm::conjugate(a.dual)};
 }
 
-/// sqrt(a a*), a dual number: |real| + e dot(real, dual) / |real|. A real part of length 0 gives 0.
+/// sqrt(a a*), a dual number: |real| + e dot(real, dual) / |real|. If the real part is 0, the result is 0.
 template <class T>
 [[nodiscard]] Dual<T> norm(const DualQuat<T>& a) noexcept {
     const T length = glm::length(a.real);
@@ -70,14 +70,14 @@ template <class T>
     return {length, glm::dot(a.real, a.dual) / length};
 }
 
-/// The transform that undoes the unit dual quaternion `a`: its quaternion conjugate.
+/// The inverse of the unit dual quaternion `a`: its quaternion conjugate.
 template <class T>
 [[nodiscard]] DualQuat<T> inverse(const DualQuat<T>& a) noexcept {
     return conjugate(a);
 }
 
-/// The unit dual quaternion `a` / norm(a): divided by |real|, and the part of `dual` along `real` taken
-/// off. A real part of length 0 gives the identity.
+/// The unit dual quaternion `a` / norm(a): `a` divided by |real|, without the component of `dual` along `real`.
+/// If the real part is 0, the result is the identity.
 template <class T>
 [[nodiscard]] DualQuat<T> normalized(const DualQuat<T>& a) noexcept {
     const T length = glm::length(a.real);
@@ -90,7 +90,7 @@ template <class T>
     return {real, dual - real * glm::dot(real, dual)};
 }
 
-/// The translation of `a`: 2 dual real*, for a unit `a`.
+/// The translation of a unit `a`: 2 dual real*.
 template <class T>
 [[nodiscard]] Vec3<T> translation(const DualQuat<T>& a) noexcept {
     return T(2) * vector_part(a.dual * glm::conjugate(a.real));
@@ -106,7 +106,7 @@ template <class T>
     return rotate(a.real, vector);
 }
 
-/// `normal` rotated and brought to unit length; (0, 0, 0) stays.
+/// The rotated `normal`, normalised; (0, 0, 0) gives (0, 0, 0).
 template <class T>
 [[nodiscard]] Vec3<T> transform_normal(const DualQuat<T>& a, const Vec3<T>& normal) noexcept {
     return rotate(a.real, unit(normal, Vec3<T>(T(0))));

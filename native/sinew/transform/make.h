@@ -7,10 +7,10 @@
 
 namespace sinew {
 
-// One function for the three representations: from_translation<DualQuat>(v). The identity is what each has
-// as its default: DualQuat<double>{}.
+// Functions for all three representations: from_translation<DualQuat>(v). The identity is each type's default
+// value, such as DualQuat<double>{}.
 
-/// `source`, any representation or a Screw or a Twist, as the representation named: to<DualQuat>(affine).
+/// Converts `source`, a representation, a Screw or a Twist, to the named representation: to<DualQuat>(affine).
 template <template <class> class Target, template <class> class Source, class T>
 [[nodiscard]] Target<T> to(const Source<T>& source) noexcept {
     if constexpr (requires(Target<T> target) { target.linear; }) {
@@ -22,14 +22,14 @@ template <template <class> class Target, template <class> class Source, class T>
     }
 }
 
-/// The rotation by `angle` radians about `axis`, of any length, through the origin. An axis of length 0 gives
+/// The rotation by `angle` radians about `axis` through the origin. The axis may have any length; length 0 gives
 /// the identity.
 template <template <class> class Target, class T>
 [[nodiscard]] Target<T> from_axis_angle(const Vec3<T>& axis, T angle) noexcept {
     return to<Target>(QuatVec<T>{quat_from_axis_angle(axis, angle), Vec3<T>(T(0))});
 }
 
-/// The rotation `rotation`. Requires orthonormal columns and determinant +1 to within rounding.
+/// The given rotation. Requires orthonormal columns and determinant +1 to within rounding.
 template <template <class> class Target, class T>
 [[nodiscard]] Target<T> from_rotation_matrix(const Mat3<T>& rotation) noexcept {
     return to<Target>(Affine<T>{rotation, Vec3<T>(T(0))});

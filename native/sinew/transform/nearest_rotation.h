@@ -20,17 +20,17 @@ namespace detail {
 template <class T>
 using Mat4Rows = std::array<std::array<T, 4>, 4>;
 
-/// Diagonalises the symmetric `k`; the columns of `vectors` become its eigenvectors (Jacobi 1846).
+/// Diagonalises the symmetric matrix `k`. The columns of `vectors` become its eigenvectors (Jacobi 1846).
 template <class T>
 void jacobi(Mat4Rows<T>& k, Mat4Rows<T>& vectors) noexcept {
     using std::abs;
     using std::sqrt;
-    // Converges quadratically: rounding is reached in 4 or 5 sweeps.
+    // Converges quadratically: reaches rounding errors in 4 or 5 sweeps.
     for (int sweep = 0; sweep < 12; ++sweep) {
         bool is_diagonal = true;
         for (std::size_t p = 0; p < 3; ++p) {
             for (std::size_t q = p + 1; q < 4; ++q) {
-                // What does not change the diagonal when added to it is rounding.
+                // An off-diagonal entry that does not change the diagonal when added to it is rounding.
                 if (abs(k[p][p]) + abs(k[p][q]) == abs(k[p][p]) &&
                     abs(k[q][q]) + abs(k[p][q]) == abs(k[q][q])) {
                     continue;
@@ -65,11 +65,12 @@ void jacobi(Mat4Rows<T>& k, Mat4Rows<T>& vectors) noexcept {
 
 }  // namespace detail
 
-/// The rotation nearest to `linear` in the sum of squared differences, as a unit quaternion with w >= 0:
-/// the rotation of the polar decomposition where the determinant is positive (Horn 1987, section 4).
+/// The rotation nearest to `linear` in the sum of squared differences, as a unit quaternion with w >= 0. If the
+/// determinant is positive, it is the rotation of the polar decomposition (Horn 1987, section 4).
 ///
-/// `gap` is 2 (s2 + s3), the singular values in falling order, the last negative where `linear` mirrors.
-/// At 0 other rotations are as near and the one returned is any of them; for the zero matrix the identity.
+/// `gap` is 2 (s2 + s3), with the singular values in descending order, the last one negative if `linear` mirrors.
+/// If it is 0, the nearest rotation is not unique and the result is one of them; for the zero matrix, the
+/// identity.
 template <class T>
 [[nodiscard]] NearestRotation<T> nearest_rotation(const Mat3<T>& linear) noexcept {
     const auto m = [&](int row, int column) { return linear[column][row]; };

@@ -5,21 +5,21 @@
 
 namespace sinew {
 
-/// Quaternion-vector pair (QV): x -> rotation x rotation* + translation (Smith 2013, section 2.2.1).
-/// The rotation is of unit length. The default is the identity.
+/// Quaternion-vector pair (QV): x -> rotation x rotation* + translation (Smith 2013, section 2.2.1). The rotation
+/// has unit length. The default is the identity.
 template <class T>
 struct QuatVec {
     Quat<T> rotation{T(1), T(0), T(0), T(0)};
     Vec3<T> translation{T(0)};
 };
 
-/// First `b`, then `a`.
+/// Applies `b` first, then `a`.
 template <class T>
 [[nodiscard]] QuatVec<T> operator*(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
     return {a.rotation * b.rotation, rotate(a.rotation, b.translation) + a.translation};
 }
 
-/// The transform that undoes `a`.
+/// The inverse of `a`.
 template <class T>
 [[nodiscard]] QuatVec<T> inverse(const QuatVec<T>& a) noexcept {
     const Quat<T> rotation = glm::conjugate(a.rotation);
@@ -36,13 +36,13 @@ template <class T>
     return rotate(a.rotation, vector);
 }
 
-/// `normal` rotated and brought to unit length; (0, 0, 0) stays.
+/// The rotated `normal`, normalised; (0, 0, 0) gives (0, 0, 0).
 template <class T>
 [[nodiscard]] Vec3<T> transform_normal(const QuatVec<T>& a, const Vec3<T>& normal) noexcept {
     return rotate(a.rotation, unit(normal, Vec3<T>(T(0))));
 }
 
-/// `a` with its rotation at unit length. A rotation of length 0 gives that of the identity.
+/// `a` with a rotation of unit length. If the rotation is 0, the result has the identity as its rotation.
 template <class T>
 [[nodiscard]] QuatVec<T> normalized(const QuatVec<T>& a) noexcept {
     const T length = glm::length(a.rotation);

@@ -5,17 +5,17 @@
 
 namespace sinew {
 
-/// How far apart two rigid transforms are; two numbers, as radians and lengths have no common unit.
+/// The distance of two rigid transforms: two numbers, as radians and lengths have no common unit.
 template <class T>
 struct RigidDistance {
     T angle = T(0);
     T translation = T(0);
 };
 
-/// The angle of the rotation from `a` to `b`, 0 to pi, and the distance of the images of the origin. The same
-/// for x a and x b, for any rigid x; the angle is also the same for a x and b x.
+/// The angle of the rotation from `a` to `b`, 0 to pi, and the distance between the images of the origin. Both
+/// are the same for x a and x b, for any rigid x; the angle is also the same for a x and b x.
 ///
-/// Rotations of unit length; the signs of quaternions do not matter.
+/// Requires rotations of unit length. The signs of quaternions do not matter.
 template <class T>
 [[nodiscard]] RigidDistance<T> rigid_distance(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
     return {angle_between(a.rotation, b.rotation), safe_length(b.translation - a.translation)};

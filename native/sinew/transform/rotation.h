@@ -7,7 +7,7 @@
 
 namespace sinew {
 
-/// sin(x) / x, 1 at 0.
+/// sin(x) / x; 1 for x = 0.
 template <class T>
 [[nodiscard]] T sinc(T x) noexcept {
     using std::abs;
@@ -15,25 +15,26 @@ template <class T>
     return abs(x) < T(1e-4) ? T(1) - x * x / T(6) : sin(x) / x;
 }
 
-/// `v` at length 1. One of length 0 gives `otherwise`.
+/// `v` normalised; `otherwise` if its length is 0.
 template <class T>
 [[nodiscard]] Vec3<T> unit(const Vec3<T>& v, const Vec3<T>& otherwise) noexcept {
     using std::abs;
     using std::max;
-    // By the largest component first: the square of a short vector is 0 long before the vector is.
+    // Divide by the largest component first: the square of a short vector underflows to 0 long before the vector
+    // does.
     const T largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
     return largest > T(0) ? glm::normalize(v / largest) : otherwise;
 }
 
-/// The length of `v`, where the squares of its components may be below the smallest number.
+/// The length of `v`, also where the squares of its components would underflow or overflow.
 template <class T>
 [[nodiscard]] T safe_length(const Vec3<T>& v) noexcept {
     using std::hypot;
     return hypot(v.x, v.y, v.z);
 }
 
-/// 1 where the squares of the components of `q`, of length `length`, are numbers of full precision; else what to divide
-/// `q` by first: its largest component, 0 only where all are.
+/// What to divide `q`, of length `length`, by so that the squares of its components have full precision: 1 if
+/// they do already, else its largest absolute component, which is 0 only if all are.
 template <class T>
 [[nodiscard]] T prescale(const Quat<T>& q, T length) noexcept {
     using std::abs;
@@ -42,8 +43,8 @@ template <class T>
     return max(max(abs(q.w), abs(q.x)), max(abs(q.y), abs(q.z)));
 }
 
-/// Unit quaternion of the rotation by `angle` radians about `axis`, of any length. An axis of length 0 gives
-/// the identity.
+/// The unit quaternion of the rotation by `angle` radians about `axis`. The axis may have any length; length 0
+/// gives the identity.
 template <class T>
 [[nodiscard]] Quat<T> quat_from_axis_angle(const Vec3<T>& axis, T angle) noexcept {
     using std::cos;
@@ -55,20 +56,21 @@ template <class T>
     return Quat<T>(cos(half), v.x, v.y, v.z);
 }
 
-/// Axis times angle of the unit quaternion `q`, radians, of length 0 to pi: the shorter of the two ways
-/// that q and -q stand for. Where both are 180 degrees (w = 0) the signs of `q` decide.
+/// Axis times angle of the unit quaternion `q`, in radians, with a length of 0 to pi: of the two ways that q and
+/// -q stand for, the shorter one. If both are 180 degrees (w = 0), the signs of `q` decide.
 template <class T>
 [[nodiscard]] Vec3<T> rotation_vector(const Quat<T>& q) noexcept {
     using std::atan2;
     const Quat<T> near = q.w < T(0) ? -q : q;
     const Vec3<T> v = vector_part(near);
     const T length = safe_length(v);
-    // The factor is 2 to the last digit below this; above, atan2 is exact at both ends, acos(w) at neither.
+    // Below this the factor is 2 to the last digit. Above, atan2 is exact at both ends, while acos(w) is exact at
+    // neither.
     const T factor = length < T(1e-9) ? T(2) : T(2) * atan2(length, near.w) / length;
     return factor * v;
 }
 
-/// Unit quaternion of a rotation vector of any length; undoes rotation_vector() up to sign.
+/// The unit quaternion of a rotation vector of any length. The inverse of rotation_vector(), up to sign.
 template <class T>
 [[nodiscard]] Quat<T> quat_from_rotation_vector(const Vec3<T>& rotation) noexcept {
     using std::cos;
@@ -77,16 +79,17 @@ template <class T>
     return Quat<T>(cos(half), v.x, v.y, v.z);
 }
 
-/// x, y and z of the unit quaternion `q` or of -q, whichever has w >= 0 (Smith 2013, section 3.3): what stores a
-/// rotation in three numbers.
+/// x, y and z of the unit quaternion `q` or of -q, whichever has w >= 0: three numbers that represent a rotation
+/// (Smith 2013, section 3.3).
 template <class T>
 [[nodiscard]] Vec3<T> three_numbers(const Quat<T>& q) noexcept {
     return q.w < T(0) ? -vector_part(q) : vector_part(q);
 }
 
-/// The unit quaternion whose three_numbers() are `v`: w is the root of 1 - |v|^2, of a length above 1 by rounding 0.
+/// The unit quaternion whose three_numbers() are `v`. w is the square root of 1 - |v|^2, or 0 if rounding made
+/// |v| > 1.
 ///
-/// Near 180 degrees w is small and lost: it is off by up to the root of the type's rounding there.
+/// Near 180 degrees w is small and imprecise: its error is up to the square root of the type's rounding error.
 template <class T>
 [[nodiscard]] Quat<T> from_three_numbers(const Vec3<T>& v) noexcept {
     using std::max;
@@ -94,7 +97,7 @@ template <class T>
     return glm::normalize(Quat<T>(sqrt(max(T(1) - glm::dot(v, v), T(0))), v.x, v.y, v.z));
 }
 
-/// The angle of the rotation from `a` to `b`, both of unit length and either sign: 0 to pi.
+/// The angle of the rotation from `a` to `b`, 0 to pi. Both have unit length; their signs do not matter.
 template <class T>
 [[nodiscard]] T angle_between(const Quat<T>& a, const Quat<T>& b) noexcept {
     using std::abs;
@@ -103,8 +106,8 @@ template <class T>
     return T(2) * atan2(safe_length(vector_part(difference)), abs(difference.w));
 }
 
-/// Whether two unit quaternions are 180 degrees apart to within rounding, so that neither way round is
-/// the shorter one.
+/// Whether two unit quaternions are 180 degrees apart to within rounding, so that neither way between them is the
+/// shorter one.
 template <class T>
 [[nodiscard]] bool is_half_turn_apart(const Quat<T>& a, const Quat<T>& b) noexcept {
     using std::abs;

@@ -7,7 +7,7 @@
 
 namespace sinew {
 
-/// A rotation about a line and a translation along it: every rigid transform is one (Chasles 1830).
+/// A rotation about a line and a translation along it. Every rigid transform is one (Chasles 1830).
 ///
 /// axis         unit direction of the line
 /// moment       point x axis, for any point on the line
@@ -20,7 +20,7 @@ struct Screw {
     T angle = T(0);
     T translation = T(0);
 
-    /// Translation for each radian; infinite for a translation alone, 0 for the identity.
+    /// Translation per radian; infinite for a pure translation, 0 for the identity.
     [[nodiscard]] T pitch() const noexcept {
         if (angle != T(0)) return translation / angle;
         if (translation == T(0)) return T(0);
@@ -29,7 +29,7 @@ struct Screw {
     }
 };
 
-/// The screw about the line through `point` along `axis`, of any length but 0.
+/// The screw about the line through `point` along `axis`. The axis may have any length except 0.
 template <class T>
 [[nodiscard]] Screw<T> screw_about(const Vec3<T>& axis, const Vec3<T>& point, T angle,
                                    T translation) noexcept {
@@ -37,10 +37,10 @@ template <class T>
     return {direction, glm::cross(point, direction), angle, translation};
 }
 
-/// Unit dual quaternion of `screw` (Daniilidis 1999, eq. 13; Kavan et al. 2008, section 3.3).
+/// The unit dual quaternion of `screw` (Daniilidis 1999, eq. 13; Kavan et al. 2008, section 3.3).
 ///
-/// Axis and moment are Pluecker coordinates: both are divided by the length of the axis, and a part of the
-/// moment along the axis is not read. An axis of length 0 gives the identity.
+/// Axis and moment are Pluecker coordinates: both are divided by the length of the axis, and a component of the
+/// moment along the axis is ignored. An axis of length 0 gives the identity.
 template <class T>
 [[nodiscard]] DualQuat<T> to_dual_quat(const Screw<T>& screw) noexcept {
     using std::cos;
@@ -68,11 +68,11 @@ template <class T>
     return to_affine(to_dual_quat(screw));
 }
 
-/// The screw of the unit dual quaternion `a`, its angle 0 to pi (Kavan et al. 2008, section 3.3).
+/// The screw of the unit dual quaternion `a`, with an angle of 0 to pi (Kavan et al. 2008, section 3.3).
 ///
-/// A rotation that moves nothing beyond rounding counts as none: the axis is then that of the translation, the
-/// moment 0, the translation >= 0; for the identity the axis is z. At 180 degrees the signs of `a` decide
-/// between the two directions of the axis. The moment grows as 1 / angle for small rotations.
+/// A rotation within rounding of the identity counts as none: then the axis is the direction of the translation,
+/// the moment is 0 and the translation >= 0; for the identity the axis is z. At 180 degrees the signs of `a`
+/// decide between the two directions of the axis. For small rotations the moment grows as 1 / angle.
 template <class T>
 [[nodiscard]] Screw<T> to_screw(const DualQuat<T>& a) noexcept {
     using std::atan2;
@@ -87,7 +87,7 @@ template <class T>
     const T along = glm::dot(axis, translation(near));
     // From the dual part: sin(angle/2) moment + (along/2) cos(angle/2) axis.
     Vec3<T> moment = vector_part(near.dual);
-    // Twice: the difference of long vectors is perpendicular to the axis only to its rounding.
+    // Twice: the difference of long vectors is perpendicular to the axis only within their rounding.
     for (int pass = 0; pass < 2; ++pass) moment -= axis * glm::dot(axis, moment);
     return {axis, moment / sine, T(2) * atan2(sine, near.real.w), along};
 }

@@ -8,10 +8,11 @@
 
 namespace sinew {
 
-/// How far squares of lengths and dot products of a rotation's columns may be from 1 and 0.
+/// The tolerance for rotations: squared lengths of columns differ from 1, and dot products from 0, by less than
+/// this.
 inline constexpr double kOrthonormal = 1e-5;
 
-/// Whether the axes of a bone at rest are of unit length: to twice kOrthonormal, which leaves room below the
+/// Whether the rest axes of a bone have unit length, within twice kOrthonormal. This leaves a margin below the
 /// size that counts as scale.
 template <class T>
 [[nodiscard]] bool has_unit_axes(const Affine<T>& rest_bone) noexcept {
@@ -23,7 +24,7 @@ template <class T>
     return unit;
 }
 
-/// posed_from_rest = rigid * scale.
+/// The parts of a motion: posed_from_rest = rigid * scale.
 template <class T>
 struct ScaleSplit {
     Affine<T> rigid;
@@ -31,13 +32,13 @@ struct ScaleSplit {
     bool has_scale = false;
 };
 
-/// Unit quaternion that Blender reads from `axes`, whose columns are of unit length or zero.
+/// The unit quaternion that Blender extracts from `axes`, whose columns have unit length or are zero.
 ///
-/// For a rotation it is the rotation's. With zero columns it is nobody's, and kept for what follows from it:
-/// the positions of vertices that share a bone of no width with another.
+/// For a rotation it is the rotation's quaternion. With zero columns it is arbitrary, but Blender's vertices
+/// depend on it where they share a bone of width 0 with another bone.
 template <class T>
 [[nodiscard]] Quat<T> quat_of_columns(const Mat3<T>& axes) noexcept {
-    // Which of the four components is computed first decides the result where the columns are no rotation.
+    // If the columns are no rotation, the result depends on which of the four components is computed first.
     int first = 3;
     if (axes[2][2] < T(0)) {
         first = axes[0][0] > axes[1][1] ? 0 : 1;
@@ -60,14 +61,14 @@ template <class T>
     return glm::normalize(Quat<T>(difference[first] / s, v.x, v.y, v.z));
 }
 
-/// The right-handed rotation that keeps the direction of the Y column of `linear` and makes the others
-/// perpendicular to it. A mirror in `linear` is not in the rotation.
+/// The right-handed rotation that keeps the direction of the Y column of `linear` and makes the other columns
+/// perpendicular to it. If `linear` mirrors, the rotation does not.
 ///
-/// Columns below 1e-6 of the longest count as zero. Without Y it is the identity; where X or Z is zero, or X
-/// along Y, quat_of_columns() of the others decides.
+/// Columns shorter than 1e-6 of the longest count as zero. If Y is zero, the result is the identity. If X or Z is
+/// zero, or X is along Y, it is quat_of_columns() of the remaining columns.
 template <class T>
 [[nodiscard]] Mat3<T> rotation_keeping_y(const Mat3<T>& linear) noexcept {
-    // Bones come as float32: what is shorter than this is their rounding.
+    // Bones are given as float32; anything shorter than this is rounding.
     constexpr T kNoDirection = T(1e-6);
     const T size = std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
     if (!(size > T(0))) return Mat3<T>(T(1));
@@ -76,8 +77,8 @@ template <class T>
     if (is_zero(c[1])) return Mat3<T>(T(1));
     const Vec3<T> y = glm::normalize(c[1]);
 
-    // The odd tests against 1, with x and z not normalised and the second of x against z, are Blender's:
-    // under extreme shear and scale they pick another axis, and so must we.
+    // The odd tests against 1, with x and z not normalised and the second one of x against z, are Blender's:
+    // under extreme shear and scale they select another axis, and so must these.
     Vec3<T> x;
     if (glm::dot(y, linear[0]) < T(1)) {
         x = c[0] - y * glm::dot(y, c[0]);
@@ -87,7 +88,7 @@ template <class T>
         x = glm::cross(y, Vec3<T>(y.y, y.z, y.x));
     }
     if (is_zero(x)) return to_mat3(quat_of_columns(Mat3<T>(Vec3<T>(T(0)), y, Vec3<T>(T(0)))));
-    // Twice, because a short difference of long vectors is not perpendicular to y.
+    // Twice, since a short difference of long vectors is not perpendicular to y.
     x = glm::normalize(x);
     x = glm::normalize(x - y * glm::dot(y, x));
     Mat3<T> axes(x, y, glm::cross(x, y));
@@ -102,9 +103,9 @@ template <class T>
 /// posed_from_rest  model or armature space
 /// rest_bone        the bone's rest axes (Y along the bone) and head in the same space, orthonormal
 ///
-/// A motion within 1e-5 of orthonormal, unmirrored and within 1e-4 of unit size counts as rigid.
-/// The rigid part is always a rotation, also where axes vanish. Source: the rule that Blender's Armature
-/// modifier has for Preserve Volume.
+/// A motion counts as rigid if it is within 1e-5 of orthonormal, does not mirror, and is within 1e-4 of unit
+/// scale. The rigid part is always a rotation, even if axes vanish. Source: the rule of Blender's Armature
+/// modifier for Preserve Volume.
 template <class T>
 [[nodiscard]] ScaleSplit<T> split_scale(const Affine<T>& posed_from_rest,
                                         const Affine<T>& rest_bone) noexcept {
@@ -114,7 +115,7 @@ template <class T>
         orthonormal = orthonormal && std::abs(glm::dot(c[i], c[i]) - T(1)) < T(kOrthonormal) &&
                       std::abs(glm::dot(c[i], c[(i + 1) % 3])) < T(kOrthonormal);
     }
-    // Most bones of most frames, at a third of the cost of measuring the scale.
+    // Most bones in most frames; costs a third of measuring the scale.
     if (orthonormal && glm::determinant(c) >= T(0) && has_unit_axes(rest_bone)) {
         return {posed_from_rest, {}, false};
     }

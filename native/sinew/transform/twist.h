@@ -5,8 +5,8 @@
 
 namespace sinew {
 
-/// The logarithm of a rigid transform, in se(3): the constant velocity that reaches it in unit time.
-/// The matrix [[angular]x, linear; 0, 0]. The default is that of the identity.
+/// The logarithm of a rigid transform, in se(3): the constant velocity that reaches the transform in unit time.
+/// It stands for the matrix [[angular]x, linear; 0, 0]. The default is the logarithm of the identity.
 template <class T>
 struct Twist {
     Vec3<T> angular{T(0)};
@@ -23,15 +23,15 @@ template <class T>
     return {factor * a.angular, factor * a.linear};
 }
 
-/// The logarithm of `a`, its angle 0 to pi. At 180 degrees the two signs of the axis are both logarithms,
-/// and those of a.rotation decide (Murray, Li, Sastry 1994, section 2.3.3).
+/// The logarithm of `a`, with an angle of 0 to pi. At 180 degrees there are two, with opposite axes, and the
+/// signs of a.rotation decide (Murray, Li, Sastry 1994, section 2.3.3).
 template <class T>
 [[nodiscard]] Twist<T> to_twist(const QuatVec<T>& a) noexcept {
     using std::cos;
     using std::sin;
     const Vec3<T> angular = rotation_vector(a.rotation);
     const T half = safe_length(angular) * T(0.5);
-    // (1 - x cot x) / 4 x^2, which stays finite to 360 degrees; its series where the difference cancels.
+    // (1 - x cot x) / 4 x^2, which is finite up to 360 degrees; the series where the difference would cancel.
     const T x2 = half * half;
     const T factor = half < T(1e-2) ? T(1) / T(12) + x2 * (T(1) / T(180) + x2 / T(1890))
                                     : (T(1) - half * cos(half) / sin(half)) / (T(4) * x2);
@@ -49,14 +49,15 @@ template <class T>
     return to_twist(to_quat_vec(a));
 }
 
-/// The exponential of `twist`, of any angle: undoes to_twist(). From angles of 1 / epsilon on the rotation is one of
-/// any; infinities and NaN where the length of an argument is beyond the type.
+/// The exponential of `twist`, of any angle: the inverse of to_twist(). From angles of 1 / epsilon on the
+/// rotation is arbitrary. Gives infinities and NaN where the length of `angular` or `linear` exceeds the type's
+/// range.
 template <class T>
 [[nodiscard]] QuatVec<T> to_quat_vec(const Twist<T>& twist) noexcept {
     using std::sin;
     const T angle = safe_length(twist.angular);
     if (angle > T(1e4)) {
-        // In powers of the angle below there would be infinities.
+        // Powers of the angle, as used below, would overflow.
         const Vec3<T> axis = twist.angular / angle;
         const T half = sin(angle * T(0.5));
         const T along = glm::dot(axis, twist.linear);
@@ -85,22 +86,22 @@ template <class T>
     return to_dual_quat(to_quat_vec(twist));
 }
 
-/// The logarithm of the unit dual quaternion `a`, half its twist in the vector parts and 0 in the scalar
-/// parts. Of a and -a, one motion, the one with real.w >= 0 is taken (Kavan et al. 2008, section 3.4).
+/// The logarithm of the unit dual quaternion `a`: half its twist in the vector parts, and 0 in the scalar parts.
+/// a and -a are one motion; the one with real.w >= 0 is used (Kavan et al. 2008, section 3.4).
 template <class T>
 [[nodiscard]] DualQuat<T> log(const DualQuat<T>& a) noexcept {
     const Twist<T> half = T(0.5) * to_twist(a);
     return {pure(half.angular), pure(half.linear)};
 }
 
-/// The unit dual quaternion whose logarithm is `a`. The scalar parts of `a` are not read.
+/// The unit dual quaternion whose logarithm is `a`. The scalar parts of `a` are ignored.
 template <class T>
 [[nodiscard]] DualQuat<T> exp(const DualQuat<T>& a) noexcept {
     return to_dual_quat(T(2) * Twist<T>{vector_part(a.real), vector_part(a.dual)});
 }
 
-/// `a`, unit, done `exponent` times: the same screw with angle and translation times `exponent`, the
-/// shorter way round (Kavan et al. 2008, section 3.4).
+/// The power of a unit `a`: the same screw with angle and translation multiplied by `exponent`, taken along the
+/// shorter way (Kavan et al. 2008, section 3.4).
 template <class T>
 [[nodiscard]] DualQuat<T> power(const DualQuat<T>& a, T exponent) noexcept {
     return to_dual_quat(exponent * to_twist(a));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Calls all that the installed library exports, and checks the results.
+// Calls everything that the installed library exports, and checks the results.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

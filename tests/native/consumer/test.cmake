@@ -1,7 +1,8 @@
 # Installs the library, builds the programs of this folder against it and runs them.
 #   cmake -DSOURCE=... -DBUILD=... [-DGLM=...] -P test.cmake
-# GLM  a folder with GLM's headers: the library is first built as where the system has none, with these in the place
-#      of what is fetched; the one in BUILD is not read then
+# GLM  a folder with GLM's headers: the library is first built as on a system without GLM, with these headers
+#      instead of
+#      fetched ones; the build in BUILD is then not used
 set(folder "${BUILD}/consumer")
 set(build "${BUILD}")
 set(without_glm "")
@@ -32,7 +33,7 @@ endif()
 file(WRITE "${folder}/build/readme.cpp" "${CMAKE_MATCH_1}")
 run(${CMAKE_COMMAND} --install "${build}" --prefix "${folder}/installed")
 
-# What is compatible for CMake must be so for the linker.
+# Versions that are compatible for CMake must be compatible for the linker.
 file(GLOB_RECURSE libraries "${folder}/installed/libsinew.*")
 if(UNIX AND NOT APPLE AND NOT libraries MATCHES "libsinew\\.so\\.0\\.1;")
   message(FATAL_ERROR "no libsinew.so.0.1 among ${libraries}")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Optimised centres of rotation on lanes. A row is as CentreRows has it. A vertex has its centre: x, y, z.
+// Optimised centres of rotation on lanes. Rows are those of CentreRows. The vertex data is the centre: x, y, z.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/skinning/cor.h"
 
@@ -23,7 +23,7 @@ struct CorKernel : CentreRows {
     static constexpr std::size_t kVertexFloats = 3;
     static constexpr std::size_t kSignedFloat4s = 1;
 
-    /// centre  x, y and z, kLanes apart, in model space; null: that of each vertex is the vertex
+    /// centre  x, y and z, kLanes apart, in model space; if null, each vertex is its own centre
     template <class D>
     static HWY_INLINE Points<D> finish(D d, const Sum<D, kNumbers>& sum, const Points<D>& p,
                                        const float* centre, const float* bones_from_model) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Direct delta mush on lanes. A row is as CentreRows has it. Vertices have moments of bones: Frame::moments.
+// Direct delta mush on lanes. Rows are those of CentreRows. The vertex data is Frame::moments.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/skinning/ddm.h"
 
@@ -24,31 +24,32 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-// The nearest rotation is found where a step's two parts, tangents of half angles, have at most this product, squared.
+// The nearest rotation is found if the two parts of a step, tangents of half angles, have at most this squared
+// product.
 inline constexpr float kLastStep = 1e-14f;
 
-// From the blended quaternion on; what takes longer is far from it, and found one by one.
-inline constexpr int kMostSteps = 6;
+// Steps from the blended quaternion. Lanes that need more are far from it, and are solved one by one.
+inline constexpr int kMaxSteps = 6;
 
-// Where the determinant of a step's matrix, over the cube of its trace, is less, it has no maximum to go to.
+// Below this, the determinant of a step's matrix relative to the cube of its trace shows no maximum to go to.
 inline constexpr float kSingularStep = 1e-6f;
 
 enum class Variant { nearest, quaternion, weights };
 
 inline constexpr std::size_t kDdmNumbers = CentreRows::kNumbers;
 
-// Bones of more rows are prepared one by one for each vector.
+// Rows of further bones are computed again for each vector.
 inline constexpr std::size_t kMaxPrepared = kMaxResolved;
 
-/// As copy_aligned() takes it.
+/// The form that copy_aligned() expects.
 struct SignedRows : CentreRows {
     static constexpr std::size_t kSignedFloat4s = 1;
 };
 
-/// The bones of blocks, as their rows are added.
+/// The bones of a range of blocks, with rows in the form in which they are added.
 ///
-/// The last 12 numbers of a row take points of model space. Unless they are added plainly, those of all but the first
-/// are what they differ from the first; where signs are resolved, quaternions, too.
+/// The last 12 numbers of a row apply to points in model space. Unless bones are added plainly, these are
+/// differences from the first bone for all but the first; if signs are resolved, so are the quaternions.
 class MomentBones {
 public:
     HWY_INLINE MomentBones(const Frame& frame, const std::int32_t* bones, std::size_t bone_count)
@@ -60,7 +61,7 @@ public:
         float least = palette_.sizes[bones[0]];
         for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette_.sizes[bones[k]]);
         is_plain = sinew::is_plain(palette_.sizes[bones[0]], least);
-        // Within 45 degrees of the first, all lie within 90 of each other.
+        // Within 45 degrees of the first, all are within 90 degrees of each other.
         is_resolved = !is_plain && count <= kMaxPrepared &&
                       copy_aligned<SignedRows, true>(palette_, bones, count, rows_) > kCosine45;
         if (HWY_LIKELY(is_resolved)) {
@@ -75,12 +76,12 @@ public:
         }
     }
 
-    /// Of each bone kDdmNumbers, of up to kMaxPrepared.
+    /// kDdmNumbers for each bone, of up to kMaxPrepared.
     [[nodiscard]] HWY_INLINE const float* rows() const { return rows_; }
 
-    /// [kDdmNumbers]
+    /// The row [kDdmNumbers] of bone k.
     ///
-    /// space  for a row that is not kept
+    /// space  for a row that is not stored
     HWY_INLINE const float* row(std::size_t k, float* space) const {
         if (HWY_LIKELY(k < kMaxPrepared)) return rows_ + kDdmNumbers * k;
         load(k, space);
@@ -94,7 +95,7 @@ private:
         to_model(row);
     }
 
-    /// Of a row, or of what it differs from another.
+    /// Converts a row, or a difference of rows, to model space.
     HWY_INLINE void to_model(float* row) const {
         if (from_model_ == nullptr) return;
         for (std::size_t i = 4; i < kDdmNumbers; i += 4) {
@@ -135,7 +136,7 @@ public:
     bool is_resolved = false;
 };
 
-/// The parts of a block's moments, from the lanes at work on.
+/// The parts of a block's moments, from the current lanes on.
 struct MomentRows {
     const float* weight;
     const float* first;
@@ -151,8 +152,8 @@ HWY_INLINE MomentRows rows_of(const BoneMoments& moments, std::size_t b, std::si
     return {part(MomentPart::weight), part(MomentPart::first), part(MomentPart::second)};
 }
 
-/// Has the processor fetch the moments of block `b`, if there is one. It does not by itself: the rows of the first bone
-/// are left out, as those are but for sums over all bones.
+/// Prefetches the moments of block `b`, if it exists. The hardware prefetcher does not, because the rows of the
+/// first bone are skipped: apart from sums over all bones they are not needed.
 HWY_INLINE void prefetch_moments(const Frame& frame, std::size_t b) {
     const BoneMoments& moments = *frame.moments;
     if (b >= moments.blocks.size()) return;
@@ -168,19 +169,19 @@ HWY_INLINE void prefetch_moments(const Frame& frame, std::size_t b) {
     fetch(rows.second, 12, 6 + 6 * bones);
 }
 
-/// A row of a part.
+/// One row of a part.
 template <class D>
 HWY_INLINE Vec<D> load_row(D d, const float* part, std::size_t row) {
     return hn::Load(d, part + kLanes * row);
 }
 
-/// Three rows that follow each other.
+/// Three consecutive rows of a part.
 template <class D>
 HWY_INLINE Points<D> load_point(D d, const float* part, std::size_t row) {
     return {load_row(d, part, row), load_row(d, part, row + 1), load_row(d, part, row + 2)};
 }
 
-/// The rows x, y, z of what `row` of a bone makes of a point and its weight, added to `sum`.
+/// Adds to `sum` the image of the point `p` and its weight under a bone's `row`.
 template <class D>
 HWY_INLINE void add_moved(D d, const float* row, const Points<D>& p, Vec<D> weight, Points<D>& sum) {
     const auto along = [d, &p, weight](const float* r, Vec<D> to) HWY_ATTR {
@@ -192,14 +193,14 @@ HWY_INLINE void add_moved(D d, const float* row, const Points<D>& p, Vec<D> weig
     sum = {along(row + 4, sum.x), along(row + 8, sum.y), along(row + 12, sum.z)};
 }
 
-/// The blended quaternion and the displacement of the centroid.
+/// The blended quaternion, and the displacement of the centroid.
 template <class D>
 struct Motion {
     Vec<D> rotation[4];
     Points<D> displacement;
 };
 
-/// Adds a quaternion in the hemisphere of the sum before it. Rounded as dot() is.
+/// Adds a quaternion in the hemisphere of the sum before it. Rounded as by dot().
 template <class D>
 HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
     const Vec<D> along =
@@ -209,7 +210,9 @@ HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
     for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(by, hn::Set(d, q[i]), sum[i]);
 }
 
-/// kCount  the bones, or 0 for any number
+/// Blends the bones by the moments.
+///
+/// kCount  the number of bones, or 0 for any number
 template <bool kFirst, bool kPlain, bool kResolved, std::size_t kCount, class D>
 HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const MomentRows& rows,
                                    const Points<D>& centroid) {
@@ -247,7 +250,7 @@ HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const MomentRo
     return sum;
 }
 
-/// Rows of a 3x3 matrix.
+/// A 3x3 matrix, by rows.
 template <class D>
 struct Rows3 {
     Points<D> x;
@@ -255,7 +258,7 @@ struct Rows3 {
     Points<D> z;
 };
 
-/// A symmetric matrix.
+/// A symmetric 3x3 matrix.
 template <class D>
 struct Symmetric {
     Vec<D> xx, yy, zz, yz, xz, xy;
@@ -267,7 +270,7 @@ HWY_INLINE Symmetric<D> load_symmetric(D d, const float* part, std::size_t at) {
             load_row(d, part, at + 3), load_row(d, part, at + 4), load_row(d, part, at + 5)};
 }
 
-/// r m, the row r of three numbers, added to `sum`.
+/// Adds r m to `sum`, for a row r of three numbers.
 template <class D>
 HWY_INLINE Points<D> add_product(D d, const float* r, const Symmetric<D>& m, const Points<D>& sum) {
     const Vec<D> x = hn::Set(d, r[0]);
@@ -278,7 +281,8 @@ HWY_INLINE Points<D> add_product(D d, const float* r, const Symmetric<D>& m, con
             hn::MulAdd(x, m.xz, hn::MulAdd(y, m.yz, hn::MulAdd(z, m.zz, sum.z)))};
 }
 
-/// Of the posed neighbourhood, in the space of the bones, with the one at rest in model space.
+/// The correlation matrix of the posed neighbourhood, in the space of the bones, with the neighbourhood at rest,
+/// in model space.
 ///
 /// displacement  of the centroid
 template <bool kPlain, std::size_t kCount, class D>
@@ -306,7 +310,7 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
     for (std::size_t k = kPlain ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
         add_rows(row + 4, row + 8, row + 12, load_symmetric(d, rows.second, 6 + 6 * k));
-        // Only what bones differ by counts, as the first moments about the centroid have sum 0.
+        // The first moments about the centroid have sum 0, so only differences between bones count.
         Points<D> moved =
             kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
                    : Points<D>{zero, zero, zero};
@@ -320,7 +324,7 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
     return sum;
 }
 
-/// The row r, and what the displacement `from_model` makes of it from the right, transposed.
+/// The row r plus the row r times the transposed displacement `from_model`.
 template <class D>
 HWY_INLINE Points<D> in_space(D d, const Points<D>& r, const float* from_model) {
     const auto along = [d, &r](const float* m, Vec<D> own) HWY_ATTR {
@@ -363,7 +367,8 @@ HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
     const Vec<D> yy = hn::Mul(y, q[2]);
     const Vec<D> yz = hn::Mul(y, q[3]);
     const Vec<D> zz = hn::Mul(z, q[3]);
-    // Row i of the result is the rows of m by column i of the rotation; the identity is added apart.
+    // Row i of the result is the rows of m weighted by column i of the rotation. The identity is added
+    // separately.
     const auto combined = [&](const Points<D>& own, Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
         return add_scaled<D>(add_scaled<D>(add_scaled<D>(own, a, m.x), b, m.y), c, m.z);
     };
@@ -372,14 +377,13 @@ HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
             combined(m.z, hn::Add(xz, wy), hn::Sub(yz, wx), hn::Neg(hn::Add(xx, yy)))};
 }
 
-/// One step from `q`, of any length, to the rotation nearest to `matrix`: q times (1, v). There is none where its matrix
-/// has no maximum to go to. Of all rotations only the nearest is a maximum.
+/// Takes one step from `q`, of any length, towards the rotation nearest to `matrix`: q times (1, v). Lanes whose
+/// matrix has no maximum to go to take no step; of all rotations only the nearest one is a maximum. Returns
+/// whether it is found.
 ///
-/// With S = R(q)^T matrix, its vector a of S - S^T and H = trace(S) - (S + S^T) / 2, Newton's step is v = H^-1 a / 2.
-/// Behind it a is exactly -(a.v) v / (1 + v.v), so that the same H gives a second part: what is left is of the fourth
-/// order, about the product of both.
-///
-/// Whether it is found.
+/// With S = R(q)^T matrix, a the axial vector of S - S^T and H = trace(S) - (S + S^T) / 2, Newton's step is v =
+/// H^-1 a / 2. After it, a is exactly -(a.v) v / (1 + v.v), so the same H gives a second part of the step. The
+/// remaining error is of the fourth order: about the product of both parts.
 template <class D>
 HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
     const Rows3<D> s = rotated_back(d, q, matrix);
@@ -415,7 +419,7 @@ HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
     const Points<D> second = solved(newton, hn::Mul(hn::Neg(scale), dot<D>(slope, newton)));
     const Vec<D> square = dot<D>(newton, newton);
     const Vec<D> second_square = dot<D>(second, second);
-    // Far from the nearest rotation it may lead away.
+    // Far from the nearest rotation the second part may lead away from it.
     const auto is_near = hn::Lt(second_square, hn::Mul(hn::Set(d, 0.25f), square));
     const Points<D> v = add_scaled<D>(newton, hn::IfThenElseZero(is_near, hn::Set(d, 1.0f)), second);
     const Vec<D> w = hn::NegMulAdd(q[1], v.x, hn::NegMulAdd(q[2], v.y, hn::NegMulAdd(q[3], v.z, q[0])));
@@ -430,9 +434,10 @@ HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
     return hn::And(has_maximum, hn::Lt(left, hn::Set(d, kLastStep)));
 }
 
-/// The nearest rotations of lanes where `is_found` is false, one by one; the blended quaternion where there is none.
+/// Finds the nearest rotations of lanes where `is_found` is false, one by one; the blended quaternion if there is
+/// none.
 ///
-/// matrix  its largest entry is 1
+/// matrix  its largest entry must be 1
 template <class D>
 HWY_NOINLINE void find_others(D d, const Rows3<D>& matrix, hn::Mask<D> is_found, const Vec<D>* blended,
                               Vec<D>* q) {
@@ -466,22 +471,22 @@ HWY_NOINLINE void find_others(D d, const Rows3<D>& matrix, hn::Mask<D> is_found,
     for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Load(d, rotations[i]);
 }
 
-/// From the blended quaternion `q` to the rotation that is nearest to `matrix`.
+/// Replaces the blended quaternion `q` by the rotation nearest to `matrix`.
 ///
-/// is_point  where it stays
+/// is_point  lanes that keep their quaternion
 template <class D>
 HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const float* from_model, Vec<D>* q) {
     if (from_model != nullptr) {
         matrix = {in_space(d, matrix.x, from_model), in_space(d, matrix.y, from_model),
                   in_space(d, matrix.z, from_model)};
     }
-    // Cubes of its numbers are to be floats.
+    // Scaled, so that the cubes of its entries fit into floats.
     const Vec<D> size = hn::Max(largest(matrix.x), hn::Max(largest(matrix.y), largest(matrix.z)));
     const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Max(size, hn::Set(d, 1e-37f)));
     matrix = {times<D>(scale, matrix.x), times<D>(scale, matrix.y), times<D>(scale, matrix.z)};
     const Vec<D> blended[4] = {q[0], q[1], q[2], q[3]};
     hn::Mask<D> is_found = is_point;
-    for (int step = 1; step <= kMostSteps; ++step) {
+    for (int step = 1; step <= kMaxSteps; ++step) {
         is_found = hn::Or(is_point, step_to_nearest(d, matrix, q));
         if (hn::AllTrue(d, is_found)) break;
     }
@@ -489,9 +494,9 @@ HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const flo
     if (HWY_UNLIKELY(!hn::AllTrue(d, is_found))) find_others(d, matrix, is_found, blended, q);
 }
 
-/// Whether the neighbourhood is a point: see Ddm.
+/// Whether the neighbourhood counts as a point, see Ddm.
 ///
-/// second  the part of second moments
+/// second  the part with second moments
 template <class D>
 HWY_INLINE hn::Mask<D> is_point_at(D d, const float* second, const Points<D>& centroid) {
     const Points<D> diagonal = load_point(d, second, 0);
@@ -501,13 +506,13 @@ HWY_INLINE hn::Mask<D> is_point_at(D d, const float* second, const Points<D>& ce
     return hn::Not(hn::Gt(extent, hn::Mul(hn::Set(d, static_cast<float>(kLeastExtent)), square)));
 }
 
-/// What bones scale, by the weights of lane `lane` of block `b`, added to `sum`.
+/// Adds to `sum` the displacements by the bones' scales, with the weights of lane `lane` in block `b`.
 template <class D>
 HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::size_t lane,
                                 const Points<D>& rest, const Points<D>& sum) {
     Points<D> total = sum;
     const Block& block = frame.mesh->blocks[b];
-    // Lanes of mixed blocks come one by one.
+    // Lanes of mixed blocks are processed one by one.
     const std::int32_t* const bones =
         frame.bones + block.first_bone + (block.mixed ? block.influences * lane : 0);
     const float* weights = weights_of(frame.rows + block.first_row) + lane;
@@ -523,7 +528,7 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
     return total;
 }
 
-/// The same by weights alone, of bones whose signs are resolved.
+/// The blend by weights alone, for bones whose signs are resolved.
 template <std::size_t kCount, class D>
 HWY_INLINE Motion<D> blend_weights(D d, const MomentBones& bones, const MomentRows& rows,
                                    const Points<D>& centroid) {
@@ -566,9 +571,9 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     store_points(d, pointers, b, lane, points);
 }
 
-/// Blocks [begin, end), which have the same bones.
+/// Deforms blocks [begin, end) with the same bones.
 ///
-/// kCount  these, or 0 for any number
+/// kCount  the number of bones, or 0 for any number
 template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0>
 void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t begin, std::size_t end) {
     const Full d;
@@ -598,7 +603,7 @@ void deform_set_of(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// Each lane by bones of its own: of the moments, or of what bones scale.
+/// Deforms a block lane by lane, where lanes have their own bones: those of the moments, or those with scale.
 template <Variant kVariant>
 void deform_lane_by_lane(const Frame& frame, std::size_t b) {
     const One d;

@@ -19,10 +19,10 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// Radians by which a blend may be off, and the same as a share of lengths.
+/// How many radians a blend may be off, and which share of lengths.
 inline constexpr float kSettled = 2e-7f;
 
-/// Unit dual quaternions: a real and a dual part, (w, x, y, z).
+/// Unit dual quaternions: a real and a dual part, each (w, x, y, z).
 template <class D>
 struct Motion {
     Vec<D> real[4];
@@ -64,18 +64,18 @@ HWY_INLINE Vec<D> squared(const Points<D>& p) {
     return hn::MulAdd(p.x, p.x, hn::MulAdd(p.y, p.y, hn::Mul(p.z, p.z)));
 }
 
-/// Angular and linear parts of logarithms.
+/// Logarithms: their angular and linear parts.
 template <class D>
 struct Twists {
     Points<D> angular;
     Points<D> linear;
 };
 
-/// The logarithm of `m`, the shorter way, as in transform/twist.h.
+/// The logarithm of `m`, along the shorter way, as in transform/twist.h.
 template <class D>
 HWY_INLINE Twists<D> logarithm(D d, const Motion<D>& m) {
-    // By u = 1 - w of the quaternion with w >= 0, both to 4e-8: angle / sin(angle / 2), and
-    // (1 - (angle / 2) cot(angle / 2)) / angle^2.
+    // Polynomials in u = 1 - w of the quaternion with w >= 0, both to 4e-8: angle / sin(angle / 2), and (1 -
+    // (angle / 2) cot(angle / 2)) / angle^2.
     static constexpr float kAngle[] = {2.0f,
                                        0.6666707396507263f,
                                        0.26653313636779785f,
@@ -108,7 +108,7 @@ HWY_INLINE Twists<D> logarithm(D d, const Motion<D>& m) {
     return {angular, linear};
 }
 
-/// The exponential of `twist`, of an angle of 180 degrees at most, as in transform/twist.h.
+/// The exponential of `twist`, whose angle is at most 180 degrees, as in transform/twist.h.
 template <class D>
 HWY_INLINE Motion<D> exponential(D d, const Twists<D>& twist) {
     const ExponentialFactors<D> by(d, hn::Mul(hn::Set(d, 0.25f), squared<D>(twist.angular)));
@@ -129,7 +129,7 @@ HWY_INLINE Motion<D> exponential(D d, const Twists<D>& twist) {
     return m;
 }
 
-/// Bones that all lanes share.
+/// Bones that all lanes have in common.
 template <class D>
 struct SharedBones {
     const Palette& palette;
@@ -148,9 +148,9 @@ struct SharedBones {
     }
 };
 
-/// Bones of each lane's own, none of which has scale.
+/// Each lane has its own bones, none of which has scale.
 ///
-/// bones  of the first lane; those of the next are `influences` after it
+/// bones  of the first lane; those of the next lane are `influences` after them
 template <class D>
 struct OwnBones {
     const Palette& palette;
@@ -170,10 +170,10 @@ struct OwnBones {
     }
 };
 
-/// Whether corrections after this one would add up to more than kSettled: each leaves at most the share
-/// (angle / 180 degrees)^2 of the one before, of the widest angle.
+/// Whether the corrections after this one could sum to more than kSettled: each leaves at most the share (angle /
+/// 180 degrees)^2 of the one before, for the largest angle.
 ///
-/// widest, longest  the squares of the largest angle and of the longest linear part
+/// widest, longest  squares of the largest angle and of the longest linear part
 template <class D>
 HWY_INLINE auto has_more_to_do(D d, const Twists<D>& correction, Vec<D> widest, Vec<D> longest,
                                const Motion<D>& blend) {
@@ -191,9 +191,10 @@ HWY_INLINE auto has_more_to_do(D d, const Twists<D>& correction, Vec<D> widest, 
                   hn::Gt(linear, hn::Mul(settled, hn::Add(length, far))));
 }
 
-/// Lanes of one vector. A lane's result does not depend on the other lanes: each has as many corrections as it needs.
+/// Blends the lanes of one vector. Each lane gets as many corrections as it needs, so its result does not depend
+/// on other lanes.
 ///
-/// first_weight  of the first influence; the others' are at `weights`, kLanes apart
+/// first_weight  of the first influence; those of the others are at `weights`, kLanes apart
 template <class D, class BonesOf>
 HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t count,
                                        const float* first_weight, const float* weights,
@@ -213,7 +214,7 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
         for (std::size_t i = 0; i < 4; ++i) blend.real[i] = hn::MulAdd(by, m.real[i], blend.real[i]);
         for (std::size_t i = 0; i < 4; ++i) blend.dual[i] = hn::MulAdd(by, m.dual[i], blend.dual[i]);
     }
-    // What is left in the dual part along the real part, no logarithm and no point ever reads.
+    // The component of the dual part along the real part may stay: neither logarithms nor points depend on it.
     const Vec<D> norm = hn::Sqrt(hn::MulAdd(
         blend.real[0], blend.real[0],
         hn::MulAdd(blend.real[1], blend.real[1],

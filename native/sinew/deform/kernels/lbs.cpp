@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Linear blend on lanes. A bone is the columns x, y, z and translation of its displacement, each with a 0 behind it.
-// The bones of a vertex are added up as Palette says.
+// Linear blending on lanes. A bone is the columns x, y, z and translation of its displacement, each followed by a
+// 0. Bones are summed as described at Palette.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/skinning/lbs.h"
 
@@ -22,8 +22,8 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// `v`, which the compiler then does not load again for each of its uses, as GCC would: a tenth of the
-/// time of a kernel that is bound by loads on AVX-512.
+/// Returns `v`, and keeps GCC from loading it again for each of its uses. On AVX-512, where the kernel is bound
+/// by loads, the reloads cost a tenth of its time.
 template <class V>
 HWY_INLINE V in_register(V v) {
 #if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_SCALAR
@@ -32,14 +32,14 @@ HWY_INLINE V in_register(V v) {
     return v;
 }
 
-/// Of a bone's displacement.
+/// Columns of a bone's displacement.
 inline constexpr std::size_t kLbsColumns = 4;
 
-/// The numbers of these columns.
+/// The numbers in these columns.
 inline constexpr std::size_t kColumns = 4 * kLbsColumns;
 
-/// `columns`, of which the compiler then does not know that they stay the same for all blocks: it would keep
-/// each spread over a vector on the stack, at three times the bytes to read.
+/// Returns `columns`, and hides from the compiler that the numbers are the same for all blocks. It would
+/// otherwise keep each number broadcast to a vector on the stack, which triples the bytes to read.
 HWY_INLINE const float* loaded_anew(const float* columns) {
 #if HWY_COMPILER_GCC || HWY_COMPILER_CLANG
     asm volatile("" : "+r"(columns) : : "memory");
@@ -47,7 +47,7 @@ HWY_INLINE const float* loaded_anew(const float* columns) {
     return columns;
 }
 
-/// A bone's columns, or differences of them that are stored.
+/// A bone's columns, or stored differences of them.
 struct Columns {
     const float* columns;
 
@@ -57,7 +57,7 @@ struct Columns {
     }
 };
 
-/// What a bone's columns differ from those of the first.
+/// The differences of a bone's columns from those of the first bone.
 struct Differences {
     const float* columns;
     const float* first;
@@ -68,7 +68,7 @@ struct Differences {
     }
 };
 
-/// One coordinate of add_bone().
+/// add_bone() for one coordinate.
 template <std::size_t kVectors, bool kWeighted, class D, class Bone>
 HWY_INLINE void add_along(D d, const Bone& bone, std::size_t row, Vec<D> Points<D>::*axis,
                           const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
@@ -82,20 +82,20 @@ HWY_INLINE void add_along(D d, const Bone& bone, std::size_t row, Vec<D> Points<
     }
 }
 
-/// Adds to each of kVectors `sum` the displacement of `p` by this bone, times `weight` where there is one.
+/// Adds to each of kVectors `sum` the displacement of `p` by the bone, times `weight` if kWeighted.
 template <std::size_t kVectors, bool kWeighted, class D, class Bone>
 HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
-    // Coordinate by coordinate, so that few of the bone's numbers are in registers at once. A lambda for one is at
-    // times called instead of inlined.
+    // One coordinate after the other, so that few of the bone's numbers are in registers at once. Not a lambda,
+    // because those are sometimes called instead of inlined.
     add_along<kVectors, kWeighted>(d, bone, 0, &Points<D>::x, weight, p, sum);
     add_along<kVectors, kWeighted>(d, bone, 1, &Points<D>::y, weight, p, sum);
     add_along<kVectors, kWeighted>(d, bone, 2, &Points<D>::z, weight, p, sum);
 }
 
-/// Lanes [lane, lane + kVectors * N) of block `b`, which is not mixed.
+/// Deforms lanes [lane, lane + kVectors * N) of block `b`, which must not be mixed.
 ///
 /// first     columns of the first bone
-/// other_of  what the bone of an influence differs from it; if plain, that bone
+/// other_of  other_of(k) is the difference of the k-th bone from the first; if plain, the k-th bone
 /// kCount    the number of influences, or 0 for `count`
 template <std::size_t kCount, std::size_t kVectors, bool kPlain, class D, class OtherOf>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b,
@@ -129,7 +129,7 @@ template <std::size_t kCount, bool kPlain, class OtherOf>
 HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t end, const float* first,
                             const OtherOf& other_of) {
     const Full d;
-    // A bone's numbers are spread over a vector once for two: a quarter of the time on AVX2.
+    // Broadcasting each of a bone's numbers once for two vectors saves a quarter of the time on AVX2.
     constexpr std::size_t kVectors = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
     const MeshPointers pointers = pointers_of(frame);
     const std::size_t count = pointers.blocks[begin].influences;
@@ -141,12 +141,12 @@ HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t e
     }
 }
 
-/// Blocks [begin, end), which have the same bones.
+/// Deforms blocks [begin, end) with the same bones.
 template <std::size_t kCount>
 void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
     const float* const first = columns_of_bone(frame, bones[0]);
-    // What is stored can not be read at once: for one block alone that takes longer than it saves.
+    // Stored differences can not be loaded again at once; for a single block this takes longer than it saves.
     if (kCount == 0 || end - begin == 1) {
         return deform_each<kCount, false>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
             return Differences{columns_of_bone(frame, bones[k]), first};
@@ -166,7 +166,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     });
 }
 
-/// The same where they are added plainly.
+/// The same for bones that are added plainly.
 inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
     const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
     deform_each<0, true>(frame, begin, end, columns_of_bone(frame, bones[0]),
@@ -177,7 +177,7 @@ inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t 
 
 using Four = hn::CappedTag<float, 4>;
 
-/// One vertex, x, y and z in the lanes: the same operations in the same order.
+/// Deforms one vertex, with x, y and z in the lanes: the same operations in the same order.
 ///
 /// rows  of the block, from this vertex's lane on
 /// to    the vertex's point
@@ -193,7 +193,7 @@ HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std
     const auto moved_by = [&](const V4* columns) HWY_ATTR {
         return hn::MulAdd(columns[0], x, hn::MulAdd(columns[1], y, hn::MulAdd(columns[2], z, columns[3])));
     };
-    // Not by way of memory: a vector load of what was just stored in parts waits for it.
+    // Not through memory: a vector load of something just stored in parts has to wait for it.
     V4 sum = hn::IfThenElse(hn::FirstN(four, 1), x, hn::IfThenElse(hn::FirstN(four, 2), y, z));
     V4 first[kLbsColumns];
     const float* const stored_first = columns_of_bone(frame, bones[0]);
@@ -214,7 +214,7 @@ HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std
     std::memcpy(to, point, sizeof(Vec3<float>));
 }
 
-/// Apart, so that its registers are not those of every vertex.
+/// Not inlined, so that its registers do not burden the usual case.
 inline HWY_NOINLINE void deform_plain_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
                                              const float* rows, Vec3<float>* to) {
     deform_vertex<true>(frame, bones, count, rows, to);
@@ -277,7 +277,7 @@ void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
             b = after;
             continue;
         }
-        // A fixed count makes one run of instructions.
+        // With a fixed count the loop is unrolled.
         switch (block.influences) {
             case 0: keep_blocks(frame, b, after); break;
             case 1: deform_set<1>(frame, b, after); break;
@@ -296,12 +296,12 @@ void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// The columns of each displacement, for lbs.
+/// Writes the columns of each bone's displacement.
 void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
                  Palette& palette) {
     const hn::CappedTag<float, 4> d;
     const auto three = hn::FirstN(d, 3);
-    // Of vectors, as the identity's other columns are this one in other lanes.
+    // The identity's columns as whole vectors, so that each takes one load.
     alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     for (std::size_t i = 0; i < used.size(); ++i) {
         const float* const from = &posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
@@ -313,7 +313,7 @@ void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<floa
             squares = hn::MulAdd(displacement, displacement, squares);
             hn::Store(displacement, d, to + 4 * c);
         }
-        // From one before, as there is none after the last.
+        // Loaded from one number earlier, as there may be none behind the last.
         const auto translation = hn::ShiftRightLanes<1>(d, hn::LoadU(d, from + 8));
         hn::Store(translation, d, to + 12);
         const float size = hn::GetLane(hn::SumOfLanes(d, hn::Mul(translation, translation)));

@@ -24,7 +24,7 @@ struct LogKernel {
     static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 0;
 
-    /// Palette::scales holds what the scale adds to the linear part.
+    /// Adds the change of the linear part by the bone's scale, which Palette::scales holds.
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D>& sum) {
@@ -48,7 +48,7 @@ struct LogKernel {
         const Vec<D> sinc = by.sinc;
         const Vec<D> w = by.cosine;
         const Points<D> axis{hn::Mul(sinc, by_half.x), hn::Mul(sinc, by_half.y), hn::Mul(sinc, by_half.z)};
-        // Divided by its square, the quaternion rotates also where rounding changed its length.
+        // Dividing by its squared length makes the quaternion a rotation even where rounding changed its length.
         const Vec<D> squared_norm =
             hn::MulAdd(w, w, hn::MulAdd(axis.x, axis.x, hn::MulAdd(axis.y, axis.y, hn::Mul(axis.z, axis.z))));
         const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
@@ -68,8 +68,8 @@ struct LogKernel {
     static HWY_INLINE void write_row(const Quats& q, const BonePoints& translation, BoneVec* row) {
         const BoneTag d;
         const BoneVec one = hn::Set(d, 1.0);
-        // The angle by the tangent of an eighth of it, sqrt(2) - 1 at most: of the series of the arc tangent the next
-        // term is below 1e-12. w >= 0, so no denominator is small.
+        // The angle from the tangent of an eighth of it, which is at most sqrt(2) - 1: the first omitted term of
+        // the arc tangent's series is below 1e-12. As w >= 0, no denominator is small.
         static constexpr double kArcTangent[] = {
             1.0,         -1.0 / 3.0, 1.0 / 5.0,   -1.0 / 7.0, 1.0 / 9.0,   -1.0 / 11.0, 1.0 / 13.0,
             -1.0 / 15.0, 1.0 / 17.0, -1.0 / 19.0, 1.0 / 21.0, -1.0 / 23.0, 1.0 / 25.0,  -1.0 / 27.0};
@@ -78,11 +78,11 @@ struct LogKernel {
         const BoneVec quarter_squared = hn::Div(sine_squared, hn::Mul(more, more));
         const BoneVec root = hn::Add(one, hn::Sqrt(hn::Add(one, quarter_squared)));
         const BoneVec eighth_squared = hn::Div(quarter_squared, hn::Mul(root, root));
-        // Angle / sine of its half.
+        // The angle over the sine of half the angle.
         const BoneVec factor = hn::Div(hn::Mul(hn::Set(d, 8.0), polynomial(d, eighth_squared, kArcTangent)),
                                        hn::Mul(more, root));
         const BonePoints angular{hn::Mul(factor, q.v.x), hn::Mul(factor, q.v.y), hn::Mul(factor, q.v.z)};
-        // (1 - x cot(x)) / 4 x^2 with x half the angle; its series where the difference cancels.
+        // (1 - x cot(x)) / 4 x^2 with x half the angle; the series where the difference would cancel.
         static constexpr double kSeries[] = {1.0 / 12.0, 1.0 / 720.0, 1.0 / 30240.0};
         const BoneVec angle_squared = dot(angular, angular);
         const BoneVec cotangent = hn::Mul(hn::Set(d, 0.5), hn::Mul(factor, q.w));
@@ -128,7 +128,7 @@ void write_bone(const Log::Bone<double>& bone, Float4* row, Float4* scale) {
     const Twist<double> twist = to_twist(bone.rigid);
     row[0] = float4(twist.angular.x, twist.angular.y, twist.angular.z, 0.0);
     row[1] = float4(twist.linear.x, twist.linear.y, twist.linear.z, 0.0);
-    // The linear part depends linearly on the translation, and so on what the scale adds to that.
+    // The linear part depends linearly on the translation, and thus on what the scale adds to the translation.
     const auto added = [&bone](const Vec3<double>& displacement) {
         const Quat<double>& rotation = bone.rigid.rotation;
         return to_twist(QuatVec<double>{rotation, rotate(rotation, displacement)}).linear;

@@ -23,7 +23,7 @@ struct QvKernel {
     static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 1;
 
-    /// The translation that also moves by the rotated scale.
+    /// Adds the displacement by the bone's scale, rotated, to the translation.
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D>& sum) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Spherical blend skinning on lanes. A row is a bone of a set of bones: the rotation (w, x, y, z), how the bone moves the
-// set's centre of rotation (x, y, z, 0), and that centre (x, y, z, 0), the same in all rows of the set.
+// Spherical blend skinning on lanes. A row belongs to a bone of a set of bones: the rotation (w, x, y, z), the
+// displacement of the set's centre of rotation by the bone (x, y, z, 0), and that centre (x, y, z, 0), the same
+// in all rows of the set.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/skinning/sbs.h"
 
@@ -24,7 +25,7 @@ struct SbsKernel {
     static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 1;
 
-    /// Palette::scales holds what the scale adds, rotated.
+    /// Adds the bone's scale; Palette::scales holds displacements that are already rotated.
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D, kNumbers>& sum) {
@@ -47,7 +48,7 @@ void deform_sbs(const Frame& frame, std::size_t begin, std::size_t end) {
     deform_rigid<SbsKernel>(frame, begin, end);
 }
 
-/// Rows depend on sets, and are made in prepare_sets().
+/// Does nothing: rows depend on sets, so prepare_sets() makes them.
 void prepare_sbs(std::span<const std::int32_t>, std::span<const Affine<float>>, Palette&) {}
 
 }  // namespace HWY_NAMESPACE

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Spherical deform on lanes. A row is as CentreRows has it. A vertex has the points C, R0 and R1, then whether they are
-// to be used.
+// Spherical deform on lanes. Rows are those of CentreRows. The vertex data is the points C, R0 and R1, and
+// whether to use them.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/skinning/sdef.h"
 
@@ -23,12 +23,12 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// Two bones of a vertex.
+/// The two bones of a vertex.
 struct Pair {
     std::int32_t bones[2];
     const float* rows[2];
-    float sign;                  // by which the second quaternion is added
-    float squared_angle = 0.0f;  // between the quaternions; 0 where they are blended by their sum
+    float sign;                  // with which the second quaternion is added
+    float squared_angle = 0.0f;  // between the quaternions; 0 if they are blended by their sum
 
     HWY_INLINE Pair(const Frame& frame, const std::int32_t* of)
         : bones{of[0], of[1]},
@@ -50,16 +50,16 @@ struct Pair {
     }
 };
 
-/// sin(weight * angle), but for a factor that both weights have: rotations are divided by their length.
+/// sin(weight * angle), up to a factor common to both weights: rotations are divided by their length.
 template <class D>
 HWY_INLINE Vec<D> slerp_weight(D d, Vec<D> weight, float squared_angle) {
     const Vec<D> y = hn::Mul(hn::Mul(weight, weight), hn::Set(d, squared_angle));
     return hn::Mul(weight, ExponentialFactors<D>(d, y).sinc);
 }
 
-/// Where the pair takes `rest`.
+/// The image of `rest` under the pair.
 ///
-/// spheres  the numbers of each vertex, kLanes apart, model space
+/// spheres  the vertex data, kLanes apart, model space
 template <bool kSlerp, class D>
 HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, const Vec<D>* weights,
                                  const Points<D>& rest, const float* spheres, const float* bones_from_model) {
@@ -71,7 +71,7 @@ HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, 
     const Points<D> centre = point_at(0);
     const Points<D> first = point_at(1);
     const Points<D> second = point_at(2);
-    // Elsewhere the centre is the vertex and R0 is R1: linear blending.
+    // Other lanes use the vertex as the centre and R0 = R1, which gives linear blending.
     const auto is_used = hn::Ne(hn::Load(d, spheres + 9 * kLanes), hn::Zero(d));
     const Vec<D> half = hn::IfThenElseZero(is_used, hn::Set(d, 0.5f));
     const Points<D> c{hn::IfThenElse(is_used, centre.x, rest.x), hn::IfThenElse(is_used, centre.y, rest.y),
@@ -79,7 +79,8 @@ HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, 
     const Points<D> between{hn::Mul(half, hn::Sub(first.x, second.x)),
                             hn::Mul(half, hn::Sub(first.y, second.y)),
                             hn::Mul(half, hn::Sub(first.z, second.z))};
-    // The midpoints of the definition: R0 less the mean of R0 and R1 by weights is the second weight times R0 - R1.
+    // The midpoints of the definition: R0 minus the weighted mean of R0 and R1 is the second weight times R0 -
+    // R1.
     const Points<D> midpoints[2] = {add_scaled<D>(c, weights[1], between),
                                     add_scaled<D>(c, hn::Neg(weights[0]), between)};
     Points<D> displacement;
@@ -117,7 +118,7 @@ HWY_INLINE void deform_and_store(D d, const Frame& frame, const MeshPointers& po
     store_points(d, pointers, b, lane, points);
 }
 
-/// Blocks [begin, end), which have the same two bones.
+/// Deforms blocks [begin, end) with the same two bones.
 template <bool kSlerp>
 void deform_pairs(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
@@ -134,7 +135,7 @@ void deform_pairs(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// The vertices of two bones in a mixed block: one by one, as each has bones of its own.
+/// Deforms the vertices of two bones in a mixed block, one by one, since each has its own bones.
 template <bool kSlerp>
 void deform_pairs_among(const Frame& frame, std::size_t b) {
     const One d;
