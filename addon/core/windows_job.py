@@ -3,6 +3,11 @@
 
 A job object ends what was assigned to it when its last handle is closed, which the system does for a process
 that ends (Microsoft: JOBOBJECT_BASIC_LIMIT_INFORMATION, JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE).
+
+A process can only be assigned once it is there. Where this process is killed before that, the new one stays,
+and even suspended, as CreateProcess makes its first thread. What a process in a job starts is in the job from
+its first moment. So a batch is in its own job. A Blender with a window is not: what its user opens from it,
+such as a web browser, is to stay.
 """
 
 from __future__ import annotations
@@ -56,14 +61,27 @@ if sys.platform == "win32":
             return None
         return job
 
-    def end_with_this_process(process: subprocess.Popen) -> None:
+    def _assign(process: int) -> None:
+        """process: its handle"""
         job = _job()
         if job is not None:
             kernel = ctypes.WinDLL("kernel32", use_last_error=True)
             kernel.AssignProcessToJobObject.argtypes = [wintypes.HANDLE, wintypes.HANDLE]
-            kernel.AssignProcessToJobObject(job, int(process._handle))  # type: ignore[attr-defined]
+            kernel.AssignProcessToJobObject(job, process)
+
+    def end_with_this_process(process: subprocess.Popen) -> None:
+        _assign(int(process._handle))  # type: ignore[attr-defined]
+
+    @cache
+    def end_all_with_this_process() -> None:
+        kernel = ctypes.WinDLL("kernel32", use_last_error=True)
+        kernel.GetCurrentProcess.restype = wintypes.HANDLE
+        _assign(kernel.GetCurrentProcess())
 
 else:
 
     def end_with_this_process(process: subprocess.Popen) -> None:
         """Does nothing: elsewhere it is the child that asks for it, where it can (worker.py)."""
+
+    def end_all_with_this_process() -> None:
+        """Does nothing either."""
