@@ -47,11 +47,7 @@ BLENDER_TESTS = (
 # Single tests that do not run there, each with the reason.
 LEFT_OUT: dict[str, dict[str, str]] = {
     "linux-arm64": {},
-    "windows-x64": {
-        "tests/python/test_batch_plans.py::test_linked_folders_and_their_circles": (
-            "wine 8 says that it made a symbolic link, and made none"
-        ),
-    },
+    "windows-x64": {},
 }
 BPY = "bpy==4.5.*"
 # As Blender 4.5 has it, whose compiled code wants this one.
