@@ -52,8 +52,8 @@ LEFT_OUT: dict[str, dict[str, str]] = {
 BPY = "bpy==4.5.*"
 # As Blender 4.5 has it, whose compiled code wants this one.
 NUMPY = "numpy==1.26.*"
-# Complex logarithms of scipy's call what wine 8 lacks (ucrtbase.dll.carg), and end the process.
-WITHOUT_LOGARITHMS = ("-k", "not log")
+# A plugin, found as pytest starts in the checkout.
+WINE_LACKS = ("-p", "tools.wine_lacks")
 # As long as it takes on a machine of two processors, some times over.
 LIMITS = {"native": 900, "python": 2400, "blender": 2400}
 
@@ -149,7 +149,8 @@ class Emulated:
 
     def pytest(self, limit: int, *options: str) -> int:
         words: list[str | Path] = ["wine"] if self.platform.is_windows else []
-        words += [self.python, "-X", "faulthandler", "-m", "pytest", "-q", "-p", "no:cacheprovider", *options]
+        words += [self.python, "-X", "faulthandler", "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+        words += [*(WINE_LACKS if self.platform.is_windows else ()), *options]
         for test, reason in LEFT_OUT[self.platform.name].items():
             print(f"left out: {test}: {reason}")
             words.append(f"--deselect={test}")
@@ -168,7 +169,7 @@ def native_tests(platform: Platform) -> int:
 
 def python_tests(emulated: Emulated, options: Sequence[str]) -> int:
     emulated.set_up_python()
-    all_tests = ["tests/python", *(WITHOUT_LOGARITHMS if emulated.platform.is_windows else ())]
+    all_tests = ["tests/python"]
     all_tests += [f"--ignore=tests/python/{name}.py" for name in CHECKOUT_TESTS]
     return emulated.pytest(LIMITS["python"], *(options or all_tests))
 

@@ -19,6 +19,7 @@ VOLATILE = {
     "bl_rna",
     "corner_normals",
     "depsgraph",
+    "edge_selection",  # see below
     "execution_time",
     "id_data",
     "is_evaluated",
@@ -26,6 +27,7 @@ VOLATILE = {
     "loop_triangle_polygons",
     "loop_triangles",
     "original",
+    "pin",  # see below
     "polygon_normals",
     "rna_type",
     "session_uid",
@@ -33,6 +35,9 @@ VOLATILE = {
     "tag",
     "uv_sculpt",  # and when its brush is read
     "vertex_normals",
+    # Of a UV map, as edge_selection and pin. To read one makes an attribute and so moves the map, whose old
+    # memory is read for the next. What is stored is read as attributes of the mesh.
+    "vertex_selection",
 }
 
 
