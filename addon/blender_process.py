@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 from .core.errors import SinewError
 from .core.scratch import ScratchFolder
-from .core.windows_job import end_with_this_process
+from .core.windows_job import end_all_with_this_process, end_with_this_process
 
 # The name of the file in which a Blender reports what it is doing: a JSON object, padded with blanks.
 DOING = "doing"
@@ -74,6 +74,8 @@ class BlenderProcess:
         # Blender's own temporary folder is inside: it remains when Blender is killed.
         self._folder = ScratchFolder()
         own = str(self._folder.path)
+        if not _has_window():
+            end_all_with_this_process()
         try:
             self._process = subprocess.Popen(
                 _command(),
@@ -218,6 +220,11 @@ class BlenderProcess:
 
 
 _started = itertools.count()
+
+
+def _has_window() -> bool:
+    bpy = sys.modules.get("bpy")
+    return bpy is not None and not bpy.app.background
 
 
 def _command() -> list[str]:

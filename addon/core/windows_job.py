@@ -4,6 +4,11 @@ itself.
 
 A job object ends the processes assigned to it when its last handle is closed, which the system does for a
 process that ends (Microsoft: JOBOBJECT_BASIC_LIMIT_INFORMATION, JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE).
+
+A process can only be assigned once it exists. If this process is killed before that, the new one stays, even
+suspended if CreateProcess was still making its first thread. A process that starts from a process in a job is
+in the job from the beginning. So a batch puts itself into its job. A Blender with a window does not: what its
+user opens from it, such as a web browser, must stay.
 """
 
 from __future__ import annotations
@@ -57,14 +62,27 @@ if sys.platform == "win32":
             return None
         return job
 
-    def end_with_this_process(process: subprocess.Popen) -> None:
+    def _assign(process: int) -> None:
+        """process: a handle"""
         job = _job()
         if job is not None:
             kernel = ctypes.WinDLL("kernel32", use_last_error=True)
             kernel.AssignProcessToJobObject.argtypes = [wintypes.HANDLE, wintypes.HANDLE]
-            kernel.AssignProcessToJobObject(job, int(process._handle))  # type: ignore[attr-defined]
+            kernel.AssignProcessToJobObject(job, process)
+
+    def end_with_this_process(process: subprocess.Popen) -> None:
+        _assign(int(process._handle))  # type: ignore[attr-defined]
+
+    @cache
+    def end_all_with_this_process() -> None:
+        kernel = ctypes.WinDLL("kernel32", use_last_error=True)
+        kernel.GetCurrentProcess.restype = wintypes.HANDLE
+        _assign(kernel.GetCurrentProcess())
 
 else:
 
     def end_with_this_process(process: subprocess.Popen) -> None:
         """Does nothing: on other systems the child asks for it, where it can (worker.py)."""
+
+    def end_all_with_this_process() -> None:
+        """Does nothing either."""

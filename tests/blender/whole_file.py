@@ -20,6 +20,7 @@ VOLATILE = {
     "bl_rna",
     "corner_normals",
     "depsgraph",
+    "edge_selection",  # see below
     "execution_time",
     "id_data",
     "is_evaluated",
@@ -27,6 +28,7 @@ VOLATILE = {
     "loop_triangle_polygons",
     "loop_triangles",
     "original",
+    "pin",  # see below
     "polygon_normals",
     "rna_type",
     "session_uid",
@@ -34,6 +36,9 @@ VOLATILE = {
     "tag",
     "uv_sculpt",  # and when its brush is read
     "vertex_normals",
+    # Of a UV map, like edge_selection and pin. Reading one creates an attribute and so moves the map, whose old
+    # memory is read for the next. Stored values are read as attributes of the mesh.
+    "vertex_selection",
 }
 
 
