@@ -11,5 +11,5 @@ def _logarithm(*_arguments: object, **_options: object) -> None:
     pytest.skip("wine 8 has no logarithms and powers of complex numbers (ucrtbase.dll: carg, cpow)")
 
 
-# The logarithm of a matrix, which scipy computes by complex numbers. Plugins load before the tests that import it.
+# The logarithm of a matrix, by complex numbers. A plugin loads before the tests that import it.
 scipy.linalg.logm = _logarithm

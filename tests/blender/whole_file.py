@@ -36,8 +36,8 @@ VOLATILE = {
     "tag",
     "uv_sculpt",  # and when its brush is read
     "vertex_normals",
-    # Of a UV map, like edge_selection and pin. Reading one creates an attribute and so moves the map, whose old
-    # memory is read for the next. Stored values are read as attributes of the mesh.
+    # Of a UV map, like edge_selection and pin. Reading one creates an attribute and so moves the map, whose
+    # old memory is read for the next. Stored values are read as attributes of the mesh.
     "vertex_selection",
 }
 
