@@ -671,6 +671,9 @@ def run(first: int, count: int, keep: Path, wanted: Sequence[str] = routes.ROUTE
             errors = {f"{route} {method}": error for (route, method), error in outcome.errors.items()}
             why = outcome.reason or "another shape"
             print(f"seed {seed} fails: {errors}; {why}; needs {needed}; saved in {keep}", flush=True)
+        if len(outcomes) % 100 == 0 and len(outcomes) < count:
+            failed = sum(each.failed for each in outcomes)
+            print(f"{len(outcomes)} of {count} rigs, {failed} failed", file=sys.stderr, flush=True)
     return outcomes
 
 
