@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ..core.errors import SinewError
 from ..core.output import remove, writing
@@ -42,7 +43,8 @@ def open_file(
     scripts: bool = False,
     importers: Mapping[str, Callable[[str], object]] = IMPORTERS,
 ) -> None:
-    """Makes `path` the open file: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
+    """Makes `path` the open file: a .blend, or a .glb, .gltf or .fbx imported into an empty scene, which has
+    the frames of its animation.
 
     load_ui    with the file's own windows and workspaces, which a copy of it is to keep
     scripts    whether those in the file run
@@ -58,6 +60,7 @@ def open_file(
         else:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
+            _take_frames_of_animation()
     except RuntimeError as error:
         # Blender names the file again, up to twice.
         reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ,")
@@ -65,6 +68,17 @@ def open_file(
             # It begins as one does, and older Blenders say no more of what newer ones write.
             reason += f", or of a Blender newer than {bpy.app.version_string}"
         raise SinewError(f"{path}: Blender can not read it: {reason}") from None
+
+
+def _take_frames_of_animation() -> None:
+    """Importers leave the scene's frames at Blender's 1 to 250."""
+    players = [obj.animation_data for obj in bpy.data.objects]
+    players += [keys.animation_data for keys in bpy.data.shape_keys]
+    played = [each.action for each in players if each is not None and each.action is not None]
+    if played:
+        ranges = np.array([action.frame_range for action in played])
+        scene = bpy.context.scene
+        scene.frame_start, scene.frame_end = max(0, round(ranges[:, 0].min())), round(ranges[:, 1].max())
 
 
 def save_copy(source: Path, target: Path, name_others: Callable[[], None] = lambda: None) -> None:
