@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ..core.errors import SinewError
 from ..core.output import remove, writing
@@ -43,7 +44,8 @@ def open_file(
     scripts: bool = False,
     importers: Mapping[str, Callable[[str], object]] = IMPORTERS,
 ) -> None:
-    """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
+    """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene, which gets the frame range of
+    its animation.
 
     load_ui    also loads the file's windows and workspaces, for a copy that keeps them
     scripts    whether scripts in the file run
@@ -59,6 +61,7 @@ def open_file(
         else:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
+            _use_frames_of_animation()
     except RuntimeError as error:
         # Blender repeats the file name, up to twice.
         reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ,")
@@ -66,6 +69,17 @@ def open_file(
             # It begins like a .blend, and older Blenders report nothing else for files of newer ones.
             reason += f", or of a Blender newer than {bpy.app.version_string}"
         raise SinewError(f"{path}: Blender can not read it: {reason}") from None
+
+
+def _use_frames_of_animation() -> None:
+    """Sets the scene's frame range to that of all actions, since importers leave it at 1 to 250."""
+    players = [obj.animation_data for obj in bpy.data.objects]
+    players += [keys.animation_data for keys in bpy.data.shape_keys]
+    played = [each.action for each in players if each is not None and each.action is not None]
+    if played:
+        ranges = np.array([action.frame_range for action in played])
+        scene = bpy.context.scene
+        scene.frame_start, scene.frame_end = max(0, round(ranges[:, 0].min())), round(ranges[:, 1].max())
 
 
 def save_copy(source: Path, target: Path, name_others: Callable[[], None] = lambda: None) -> None:

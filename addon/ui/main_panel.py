@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ..attach import attach, properties, stage_settings
@@ -10,8 +12,11 @@ from ..deform import session
 from . import character, operators, precomputing, state_text
 from .presets import SINEW_PT_method_presets
 from .settings_layout import draw_method, draw_stages
-from .sidebar import Sidebar, draw_text, names_text
+from .sidebar import Sidebar, characters, draw_text, names_text
 from .translations import counted, tr
+
+# Characters' widths that a panel's header takes beside its label and what stands on its right.
+MARGIN = 4
 
 
 class SINEW_PT_main(Sidebar, bpy.types.Panel):
@@ -100,6 +105,12 @@ def _draw_character(
         layout.prop(context.scene.render, "use_lock_interface", text=text, icon="INFO")
 
 
+def stages_text(names: Sequence[str], room: int) -> str:
+    """Stages by their labels or, where these take more than so many characters, by their number."""
+    text = ", ".join(tr(stage_settings.STAGES[name].label) for name in names)
+    return text if len(text) <= room else counted(len(names), "{count} stage", "{count} stages")
+
+
 class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Stages and Scale"
     bl_parent_id = "SINEW_PT_main"
@@ -109,7 +120,8 @@ class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
         lead = character.lead(context)
         names = [] if lead is None else stage_settings.names_on(properties.of(lead))
         if names:
-            self.layout.label(text=", ".join(tr(stage_settings.STAGES[name].label) for name in names))
+            room = characters(context) - len(tr(self.bl_label)) - MARGIN
+            self.layout.label(text=stages_text(names, room), translate=False)
 
     def draw(self, context: bpy.types.Context) -> None:
         lead = character.lead(context)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import bpy
 
+from ..attach import properties
+
 PAGE = Path(__file__).resolve().parent.parent / "manual.html"
 # By the start of the name, in lower case as Blender looks it up; the first match counts.
 _SECTIONS = {
@@ -46,12 +48,16 @@ _SECTIONS = {
     "bpy.types.sinew*.leave_small*": "stages",
     "bpy.types.sinew*.is_own*": "meshes",
     "bpy.types.sinew*.row*": "meshes",
-    "bpy.types.sinew*.enabled*": "character",
+    "bpy.types.sinewsettings.enabled*": "character",
+    "bpy.types.sinewcharacter.enabled*": "character",
     "bpy.types.sinewsettings.method*": "method",
     "bpy.types.sinewcharacter.method*": "method",
     "bpy.types.sinewmethod*": "method",
     "bpy.types.sinewstage*": "stages",
+    # A character has a group for each method with parameters, and for each stage.
+    **{f"bpy.types.sinewcharacter{name.replace('_', '')}.*": "method" for name in properties.METHOD_GROUPS},
     "bpy.types.sinewcharacter*.*": "stages",
+    "bpy.types.sinewreplaced*": "meshes",
     "bpy.types.sinew*": "character",
 }
 

@@ -12,6 +12,7 @@ from ..attach.subscribers import subscribers
 from ..core.precompute import precomputations
 from ..deform import precompute_watch, precomputing
 from ..deform.skinned_object import SkinnedObject
+from . import status_bar
 from .translations import tr
 
 # Seconds between checks whether there is still something to stop.
@@ -46,7 +47,7 @@ class SINEW_OT_watch_precomputation(bpy.types.Operator):
 
     def _end(self, context: bpy.types.Context) -> None:
         context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
+        status_bar.clear(context.workspace)
 
 
 class SINEW_OT_stop_precomputation(bpy.types.Operator):
@@ -101,10 +102,11 @@ def _show() -> None:
     share = min((run.progress for run in runs), default=1.0)
     for window in bpy.context.window_manager.windows:
         if _watcher_of(window) is not None:
-            text = None
             if runs:
                 text = tr("Sinew computes what its methods need: {share} (Esc stops)", share=f"{share:.0%}")
-            window.workspace.status_text_set(text)
+                status_bar.show(window.workspace, text, share)
+            else:
+                status_bar.clear(window.workspace)
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 for region in area.regions:

@@ -12,6 +12,7 @@ import bpy
 from ..core.errors import SinewError
 from ..deform import evaluate, precompute_watch, session
 from ..io import pose_io
+from . import status_bar
 from .translations import tr
 
 # The window redraws in between: rarely enough to cost little, often enough for Esc.
@@ -81,7 +82,7 @@ class Stepped:
             return self._finished(context)
         context.window_manager.progress_update(share)
         text = tr("{doing}: {share} (Esc stops)", doing=tr(self.saying), share=f"{share:.0%}")
-        context.workspace.status_text_set(text)
+        status_bar.show(context.workspace, text, share)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -110,7 +111,7 @@ class Stepped:
         manager = context.window_manager
         manager.event_timer_remove(self._timer)
         manager.progress_end()
-        context.workspace.status_text_set(None)
+        status_bar.clear(context.workspace)
         for area in context.screen.areas:
             area.tag_redraw()
 

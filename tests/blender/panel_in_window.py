@@ -9,6 +9,7 @@ The window has 1280 x 800 pixels. Places are those of its picture: from the left
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import five_meshes
 import window
+from bl_ui.space_statusbar import STATUSBAR_HT_header
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
@@ -30,6 +32,8 @@ ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
 # Headers of panels while all are closed; what Diagnostics has below its own.
 HEADER, DIAGNOSTICS = (850, 97), (850, 293)
 CHECK, MEND = (830, 350), (835, 501)
+# The height of the status bar in pixels.
+STATUS_BAR = 24
 # Positions in the menu of methods.
 DUAL_QUATERNION = (483, 276)
 # Positions in the dialog of a comparison, which opens here.
@@ -190,16 +194,47 @@ def comparison_by_clicks() -> Iterator[None]:
     yield
 
 
-def brightest(picture: str, place: tuple[int, int]) -> float:
-    """The contrast of letters around a position in a photograph, 0 to 1."""
+def pixels_of(picture: str) -> np.ndarray:
+    """A photograph, float32 [height, width, 3] from 0 to 1, the lowest row first."""
     image = bpy.data.images.load(str(FOLDER / f"{picture}.png"))
     width, height = image.size
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
     bpy.data.images.remove(image)
-    rows = height - place[1]
-    letters = pixels.reshape(height, width, 4)[rows - 8 : rows + 8, place[0] - 60 : place[0] + 60, :3]
+    return pixels.reshape(height, width, 4)[:, :, :3]
+
+
+def brightest(picture: str, place: tuple[int, int]) -> float:
+    """The contrast of letters around a position in a photograph, 0 to 1."""
+    pixels = pixels_of(picture)
+    rows = len(pixels) - place[1]
+    letters = pixels[rows - 8 : rows + 8, place[0] - 60 : place[0] + 60]
     return float(letters.mean(axis=2).max())
+
+
+def filled(picture: str) -> int:
+    """How many pixels of the status bar have the colour of Blender's progress bars."""
+    colour = bpy.context.preferences.themes[0].user_interface.wcol_progress.item[:3]
+    return int((np.abs(pixels_of(picture)[:STATUS_BAR] - colour).max(axis=2) < 0.04).sum())
+
+
+def share_shown() -> float:
+    """The share that the status bar shows; 0 while Blender draws its own."""
+    draw = STATUSBAR_HT_header.draw
+    return 0.0 if draw.__closure__ is None else inspect.getclosurevars(draw).nonlocals.get("share", 0.0)
+
+
+def progress_in_the_status_bar() -> Iterator[None]:
+    with window.in_view3d():
+        bpy.ops.sinew.suggest("INVOKE_DEFAULT", over="SCENE")
+    yield from window.until(lambda: share_shown() > 0.02, "progress")
+    window.photograph(FOLDER / "progress.png")
+    window.press("ESC", VIEW)
+    yield
+    yield
+    yield
+    window.photograph(FOLDER / "stopped.png")
+    facts["progress"] = [filled("progress"), filled("stopped"), share_shown()]
 
 
 def off_greys() -> Iterator[None]:
@@ -341,6 +376,7 @@ def steps() -> Iterator[None]:
     yield from comparison_by_clicks()
     yield from menus()
     yield from off_greys()
+    yield from progress_in_the_status_bar()
     yield from mends_by_clicks()
     yield from corrective_keys()
     yield from modifiers()

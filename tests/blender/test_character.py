@@ -10,7 +10,7 @@ import pytest
 import scenes
 from sinew_addon.attach import properties
 from sinew_addon.deform import small_meshes
-from sinew_addon.ui import character, operators, state_text
+from sinew_addon.ui import character, main_panel, operators, state_text
 from sinew_addon.ui.sidebar import names_text, shortened
 
 
@@ -232,3 +232,9 @@ def test_long_names_lose_their_middle():
     assert shortened("Character_Body_Geometry_low.003", 16) == "Characte\u2026low.003"
     assert len(shortened("x" * 63)) == 24
     assert names_text(["A", "B", "C", "D", "E"]) == "A, B, C and 2 more"
+
+
+def test_stages_that_are_too_many_for_the_panels_header_are_counted():
+    assert main_panel.stages_text(["mix", "delta_mush"], 16) == "Mix, Delta Mush"
+    assert main_panel.stages_text(["mix", "bulge_limit", "delta_mush"], 16) == "3 stages"
+    assert main_panel.stages_text(["delta_mush"], 4) == "1 stage"

@@ -64,6 +64,12 @@ def test_off_greys_the_method(facts):
     assert facts["ways on"] == [True] * 5
 
 
+def test_blenders_progress_bar_is_in_the_status_bar_until_esc(facts):
+    meanwhile, afterwards, share = facts["progress"]
+    assert meanwhile > 100
+    assert (afterwards, share) == (0, 0.0)
+
+
 def test_a_click_mends_and_one_step_of_undo_takes_it_back(facts):
     assert (facts["weights lost"], facts["weights mended"], facts["mending undone"]) == (20, 0, 20)
 

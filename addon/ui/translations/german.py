@@ -350,6 +350,8 @@ TEXTS = {
     "Save Method as Preset…": "Methode als Voreinstellung sichern…",
     # Stages in the panel
     "Stages and Scale": "Stufen, Skala",
+    "{count} stage": "{count} Stufe",
+    "{count} stages": "{count} Stufen",
     "By": "Nach",
     "Choose the vertex group that says where it takes over": (
         "Wähle die Punktgruppe, die sagt, wo sie übernimmt"
