@@ -383,9 +383,7 @@ def main() -> None:
             results[f"{case.name} choices"] = found
         case = next((c for c in cases(arguments.million) if c.rig == "human.blend"), Case(13_380))
         if arguments.k in f"{case.name} methods":
-            say(
-                f"\nAll methods and stages in turns, {case.name}: milliseconds, medians and minima, and"
-            )
+            say(f"\nAll methods and stages in turns, {case.name}: milliseconds, medians and minima, and")
             say("the medians over that of dq")
             found = measure_methods(case, 2.0 if arguments.quick else 4.0)
             for name, spread in found.items():

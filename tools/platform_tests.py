@@ -40,7 +40,8 @@ CHECKOUT_TESTS = (
     *("test_documented", "test_layering", "test_locks", "test_platforms", "test_release", "test_report_map"),
     *("test_sbom", "test_site", "test_wheel", "test_workflows"),
 )
-# Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands, batches with kills.
+# Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands, batches
+# with kills.
 BLENDER_TESTS = (
     *("test_against_armature_modifier", "test_changes", "test_restore", "test_saved_files"),
     *("test_bake", "test_command_line", "test_batch"),

@@ -44,8 +44,8 @@ def open_file(
     scripts: bool = False,
     importers: Mapping[str, Callable[[str], object]] = IMPORTERS,
 ) -> None:
-    """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene, which gets the frame range of
-    its animation.
+    """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene, which gets the frame
+    range of its animation.
 
     load_ui    also loads the file's windows and workspaces, for a copy that keeps them
     scripts    whether scripts in the file run
