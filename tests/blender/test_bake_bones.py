@@ -347,7 +347,7 @@ def test_fbx_plays_to_the_stated_error_once_it_is_imported(arm, tmp_path):
     assert_states(report, played, expected)
 
 
-@pytest.mark.parametrize("of", ["two modifiers", "in front", "bendy", "linked"])
+@pytest.mark.parametrize("of", ["two modifiers", "in front", "bendy", "linked", "no weights"])
 def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
     obj, path = arm
     rig = obj.modifiers["Armature"].object
@@ -358,6 +358,8 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
         obj.modifiers.move(1, 0)
     elif of == "bendy":
         rig.data.bones[0].bbone_segments = 4
+    elif of == "no weights":
+        obj.vertex_groups.clear()
     else:
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -372,6 +374,7 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
         "in front": "Mirror changes the mesh ahead of the armature",
         "bendy": "bone.0 bends in segments",
         "linked": "is linked, and can not have bones of its own",
+        "no weights": "Arm: has no weights of bones of Arm Rig; add some, or bake to mdd or pc2",
     }[of]
     with pytest.raises(SinewError, match=sentence):
         bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False)
