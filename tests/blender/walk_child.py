@@ -269,14 +269,7 @@ class Child:
     def has_other_scale(self, obj) -> bool:
         """Whether Sinew deforms scaled bones differently from the modifier."""
         rule = (self.claims.get(obj.name_full) or {"rule": ""})["rule"]
-        # A constraint between armatures of different sizes scales a bone that has no scale of its own.
-        scaled = any(
-            tuple(round(s, 5) for s in bone.scale) != (1, 1, 1) or len(bone.constraints)
-            for modifier in self.sides.armature_modifiers(obj)
-            if modifier.object is not None and modifier.object.pose is not None
-            for bone in modifier.object.pose.bones
-        )
-        return scaled and rule != "4.0"
+        return rule != "4.0" and self.sides.has_scaled_bones(obj)
 
     def copies(self, depsgraph) -> dict:
         return {

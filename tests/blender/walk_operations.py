@@ -25,6 +25,7 @@ from walk_sides import (
     SinewSide,
     animated_paths,
     armature_modifiers,
+    has_scaled_bones,
     key,
     remove_curves,
 )
@@ -1602,6 +1603,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
             and w.side.is_on(o)
             and w.may_lose_sinew(o)
             and not w.side.has_other_shape(o)
+            and not has_scaled_bones(o)
         ),
     )
     if obj is None or not w.select(obj):
@@ -1619,7 +1621,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: w.is_editable(o) and w.may_lose_sinew(o))
+    obj = w.mesh(r, lambda o: w.is_editable(o) and w.may_lose_sinew(o) and not has_scaled_bones(o))
     if obj is None or w.side.has_other_shape(obj) or not w.select(obj):
         return None
     w.before_evaluation()

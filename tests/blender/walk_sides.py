@@ -71,6 +71,17 @@ def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
 
 
+def has_scaled_bones(obj: bpy.types.Object) -> bool:
+    """Whether its shape can depend on the scale rule."""
+    # A constraint between armatures of different sizes scales a bone that has no scale of its own.
+    return any(
+        tuple(round(s, 5) for s in bone.scale) != (1, 1, 1) or len(bone.constraints)
+        for modifier in armature_modifiers(obj)
+        if modifier.object is not None and modifier.object.pose is not None
+        for bone in modifier.object.pose.bones
+    )
+
+
 def shows_own_shape_in_its_mode(obj: bpy.types.Object) -> bool:
     """Whether Sinew leaves the object to the Armature modifiers in its current mode."""
     if obj.mode != "WEIGHT_PAINT":
