@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake
-from sinew_addon.io import actions
+from sinew_addon.io import actions, files
 from test_bake import FRAMES, read_elsewhere, world_shapes
 
 METHOD = "dq"
@@ -318,6 +318,27 @@ def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
     assert np.isclose(distances.max(), report["after"]["worst"], rtol=0.01)
     assert np.isclose(np.sqrt(np.square(distances[:, once]).mean()), report["after"]["rms"], rtol=0.01)
     assert report["after"]["rms"] < 0.7 * report["before"]["rms"]
+
+
+@pytest.mark.parametrize(
+    ("name", "frames", "motion"), [("CesiumMan.glb", (0, 24, 48), "keys"), ("Fox.glb", (0, 41, 82), "pose")]
+)
+@pytest.mark.once
+def test_other_rigs_play_elsewhere_to_the_stated_error(real_rig, tmp_path, name, frames, motion):
+    path = real_rig(name)
+    files.open_file(path)
+    scene = bpy.context.scene
+    assert (scene.frame_start, scene.frame_end) == (frames[0], frames[-1])
+    (obj,) = (o for o in scene.objects if o.type == "MESH" and o.vertex_groups)
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([obj], frames)[0]
+    options = ("--step", frames[1], "--motion", motion, "--json", "--out", tmp_path / "out")
+    said = json.loads(run_sinew("bake", path, "--method", METHOD, "--to", "bones", *options).stdout)
+    assert said[0]["frames"] == len(frames)
+    (report,) = said[0]["bones"]
+    played = read_elsewhere(tmp_path / "out" / f"{path.stem}.blend", frames, tmp_path)[obj.name]
+    assert_states(report, played, expected)
+    assert report["after"]["rms"] < 0.4 * report["before"]["rms"]
 
 
 FBX = """

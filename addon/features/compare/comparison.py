@@ -32,7 +32,8 @@ from ...deform import evaluate, session
 from ...io import actions
 from . import comparison_state, offset_nodes
 
-# From a colour-blind-safe set (Okabe and Ito, 2008), in the order of the methods.
+# One for each method, in their order: a colour-blind-safe set (Okabe and Ito, 2008), and three that differ as much from
+# it and from the original's white.
 COLOURS = (
     (0.90, 0.60, 0.00),
     (0.34, 0.71, 0.91),
@@ -41,6 +42,9 @@ COLOURS = (
     (0.84, 0.37, 0.00),
     (0.80, 0.47, 0.65),
     (0.00, 0.45, 0.70),
+    (0.20, 0.13, 0.90),
+    (0.35, 0.18, 0.08),
+    (0.75, 0.75, 0.60),
 )
 # In a copy these would run a second time, with separate caches, or affect other simulations.
 LEFT_OUT = upstream_proxy.SIMULATIONS | {"COLLISION", "SURFACE"}

@@ -4,6 +4,8 @@ file."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import blf
 import bpy
 import gpu
@@ -87,20 +89,35 @@ def _draw() -> None:
     scale = context.preferences.system.ui_scale
     blf.size(FONT, SIZE * scale)
     line = (0.75 * SIZE + 2 * PADDING + STRIPE + 2) * scale
-    lowest: dict[tuple[int, int], int] = {}
+    found = []
     for text, colour, place in labels(context):
         point = location_3d_to_region_2d(context.region, context.region_data, place)
-        if point is None:
-            continue
-        # Close up, the label stays visible.
-        point.y = min(point.y, context.region.height - BELOW_TOP * scale)
-        # Labels of copies at the same position are stacked.
-        width = blf.dimensions(FONT, text)[0]
-        spot = next((known for known in lowest if abs(known[0] - point.x) < 4 * line), None)
-        spot = spot or (round(point.x), round(point.y))
-        row = lowest.get(spot, 0)
-        lowest[spot] = row + 1
-        _draw_label(text, colour, point.x - width / 2, spot[1] + ABOVE * scale + row * line, width, scale)
+        if point is not None:
+            # Close up, the label stays visible.
+            y = min(point.y, context.region.height - BELOW_TOP * scale) + ABOVE * scale
+            width = blf.dimensions(FONT, text)[0]
+            found.append((text, colour, point.x - width / 2, y, width))
+    heights = apart([(x, y, width) for _text, _colour, x, y, width in found], line, 2 * PADDING * scale)
+    for (text, colour, x, _y, width), y in zip(found, heights, strict=True):
+        _draw_label(text, colour, x, y, width, scale)
+
+
+def apart(labels: Sequence[tuple[float, float, float]], line: float, gap: float) -> list[float]:
+    """Returns the height at which to draw each label so that none covers another: its own, or above those in
+    its way.
+
+    labels  the left edge, height and width of each, in pixels
+    line    the smallest difference of the heights of two labels above each other
+    gap     the smallest distance of two labels beside each other
+    """
+    placed: list[tuple[float, float, float]] = []
+    for left, height, width in labels:
+        beside = [y for x, y, w in placed if left < x + w + gap and x < left + width + gap]
+        for other in sorted(beside):
+            if abs(height - other) < line:
+                height = other + line
+        placed.append((left, height, width))
+    return [height for _left, height, _width in placed]
 
 
 def _draw_label(
