@@ -32,8 +32,8 @@ from ...deform import evaluate, session
 from ...io import actions
 from . import comparison_state, offset_nodes
 
-# One for each method, in their order: a colour-blind-safe set (Okabe and Ito, 2008), and three that differ as much from
-# it and from the original's white.
+# One for each method, in their order: a colour-blind-safe set (Okabe and Ito, 2008), and three that differ as
+# much from it and from the original's white.
 COLOURS = (
     (0.90, 0.60, 0.00),
     (0.34, 0.71, 0.91),
