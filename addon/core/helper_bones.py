@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import simplex
+from .errors import SinewError
 from .influences import Influences
 from .phrases import Phrase, phrase
 
@@ -248,6 +249,8 @@ def solve(
     """Yields the progress, 0 to 1; returns the helper bones and the weights of all bones.
 
     solver_of  Solver, or a subclass that is restricted to motions of one kind
+
+    Raises SinewError where helper bones are wanted for a shape that moves and no vertex has weights.
     """
     solver = (solver_of or Solver)(motion, wanted.influences)
     before = solver.errors()
@@ -258,6 +261,11 @@ def solve(
     for number, count in enumerate(rounds):
         if solver.errors().rms <= wanted.error:
             break
+        if not len(solver.own):
+            raise SinewError(
+                "no bone has weights here, so helper bones would have none to hang under; add weights, or "
+                "bake to mdd or pc2"
+            )
         for _helper in range(count):
             solver.add_helper()
             yield (number + 0.3) / steps

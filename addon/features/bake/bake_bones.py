@@ -57,8 +57,6 @@ class BoneBake:
             for obj in meshes:
                 _check_bones(obj, bake_state.posed_state_of(obj))
                 rigs.setdefault(_rig_of(obj), []).append(obj)
-            for rig, own in rigs.items():
-                _check_weights(rig, own)
         finally:
             evaluate.set_frame(scene, before)
         self.frames, self.options = frames, options
@@ -276,19 +274,6 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
     if rig.name not in bpy.context.view_layer.objects:
         raise SinewError(f"{rig.name}: is not in this view layer, where bones could be added")
     return rig
-
-
-def _check_weights(rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> None:
-    """Raises SinewError where no bone moves any vertex: helper bones need one to hang under."""
-
-    def has_influences(state: SkinnedObject) -> bool:
-        # Envelopes have theirs where the rest points are at this frame.
-        rest = transformed(state.shown.rest_points, state.shown.frames[0].bones_from_model)
-        return len(state.bound.binding.weighting.influences(rest).bones) > 0
-
-    if not any(has_influences(bake_state.posed_state_of(obj)) for obj in meshes):
-        names = ", ".join(obj.name for obj in meshes)
-        raise SinewError(f"{names}: has no weights of bones of {rig.name}; add some, or bake to mdd or pc2")
 
 
 def _check_bones(obj: bpy.types.Object, state: SkinnedObject) -> None:
