@@ -107,6 +107,7 @@ class Solution:
     weights  float64 [vertices, influences], of sum 1 where there are any
     before   errors of linear blend skinning by the rig's bones with the original weights
     errors   float32 [vertices]: the rms error of each with the solution, over all frames
+    errors_before  the same with the original weights
     blends   of the helper bones, where they follow the pose; otherwise empty
     """
 
@@ -118,6 +119,7 @@ class Solution:
     before: Errors
     after: Errors
     errors: np.ndarray
+    errors_before: np.ndarray
     blends: tuple[Blend, ...] = ()
 
 
@@ -253,7 +255,7 @@ def solve(
     Raises SinewError where helper bones are wanted for a shape that moves and no vertex has weights.
     """
     solver = (solver_of or Solver)(motion, wanted.influences)
-    before = solver.errors()
+    before = solver.errors(), solver.errors_of_vertices()
     for _part in solver.weigh():
         yield 0.0
     rounds = _rounds(wanted.helpers)
@@ -276,7 +278,7 @@ def solve(
         for share in solver.refine():
             yield (len(rounds) + share * _LAST_SWEEPS) / steps
     yield 1.0
-    return solver.solution(before)
+    return solver.solution(*before)
 
 
 def _rounds(helpers: int) -> list[int]:
@@ -586,7 +588,7 @@ class Solver:
 
     # --- The result
 
-    def solution(self, before: Errors) -> Solution:
+    def solution(self, before: Errors, errors_before: np.ndarray) -> Solution:
         first = self.motion.bones.shape[1]
         used = np.unique(self.bones[self.bones >= first]) - first
         numbers = np.full(first + len(self.helpers), -1)
@@ -608,6 +610,7 @@ class Solver:
             before,
             self.errors(),
             self.errors_of_vertices(),
+            errors_before,
             tuple(helper.blend for helper in helpers if helper.blend is not None),
         )
 

@@ -40,12 +40,15 @@ def solve(motion: Motion, wanted: Wanted, rest: np.ndarray) -> Generator[float, 
     return helper_bones.solve(motion, wanted, lambda own, most: _PoseSolver(own, most, rest_bones=rest))
 
 
-def errors_of(solution: Solution, motion: Motion, rest: np.ndarray) -> tuple[Errors, Errors, np.ndarray]:
+def errors_of(
+    solution: Solution, motion: Motion, rest: np.ndarray
+) -> tuple[Errors, Errors, np.ndarray, np.ndarray]:
     """Returns the errors of linear blend skinning with the original weights, and of a solution, in other
-    poses than those it was made from; and its rms error at each vertex, float32 [vertices]."""
+    poses than those it was made from; and the rms errors at each vertex, float32 [vertices], of the solution
+    and of linear blend skinning."""
     solver = _PoseSolver(motion, solution.bones.shape[1], rest_bones=rest)
-    before = solver.errors()
-    return before, *solver.play(solution)
+    before, errors_before = solver.errors(), solver.errors_of_vertices()
+    return before, *solver.play(solution), errors_before
 
 
 @dataclass

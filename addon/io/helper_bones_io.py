@@ -16,7 +16,8 @@ from ..core.rig import Bones
 from . import actions, mesh_io
 
 COLLECTION = "Sinew helpers"
-ERRORS = "Sinew bake error"
+# Attributes of a baked mesh: each vertex's rms error, after the bake and before it.
+ERRORS, ERRORS_BEFORE = "Sinew bake error", "Sinew bake error before"
 # Blender's limit for a bone's name, in bytes.
 _LONGEST_NAME = 63
 # Share of the length of the parent bone.
@@ -224,11 +225,6 @@ def write_weights(
         row.update({int(group_of[bone]): float(v) for bone, v in zip(own, values, strict=True) if bone >= 0})
         rows[vertex] = row
     mesh_io.write_group_weights(obj, rows)
-
-
-def write_errors(mesh: bpy.types.Mesh, errors: np.ndarray) -> None:
-    """Stores float32 [vertices] as an attribute, which overlays and materials can show."""
-    mesh_io.write_values(mesh, ERRORS, errors)
 
 
 def _used(names: Sequence[str], slots: np.ndarray) -> list[str]:

@@ -166,7 +166,7 @@ def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> N
         return
     remove_attribute(mesh, CUSTOM_NORMALS)
     if custom is not None and len(custom) == len(mesh.loops):
-        made = _add_attribute(mesh, CUSTOM_NORMALS, "INT16_2D", "CORNER")
+        made = add_attribute(mesh, CUSTOM_NORMALS, "INT16_2D", "CORNER")
         made.data.foreach_set("value", custom.astype(np.int32).ravel())
     mesh.update()
 
@@ -287,17 +287,17 @@ def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, domain: 
     if not _is_of_vectors(attribute, domain):
         if attribute is not None:
             mesh.attributes.remove(attribute)
-        attribute = _add_attribute(mesh, name, "FLOAT_VECTOR", domain)
+        attribute = add_attribute(mesh, name, "FLOAT_VECTOR", domain)
     attribute.data.foreach_set("vector", vectors.ravel())
 
 
 def write_values(mesh: bpy.types.Mesh, name: str, values: np.ndarray) -> None:
     """Stores float32 [vertices] in the attribute `name`, made anew."""
     remove_attribute(mesh, name)
-    _add_attribute(mesh, name, "FLOAT", "POINT").data.foreach_set("value", values)
+    add_attribute(mesh, name, "FLOAT", "POINT").data.foreach_set("value", values)
 
 
-def _add_attribute(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str) -> bpy.types.Attribute:
+def add_attribute(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str) -> bpy.types.Attribute:
     """Adds an attribute. Blender would make it active; here the artist's choice stays."""
     active = mesh.attributes.active_index
     attribute = mesh.attributes.new(name, data_type, domain)

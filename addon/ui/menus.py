@@ -62,6 +62,8 @@ ENTRIES: tuple[Entry | None, ...] = (
     *_over("sinew.check_frames", "Check"),
     None,
     Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
+    Entry("sinew.bake_error", "Show Bake Error", values={"errors": "AFTER"}),
+    Entry("sinew.bake_error", "Hide Bake Error", values={"errors": "OFF"}),
     Entry("sinew.bake_inbetweens"),
     Entry("sinew.blend_actions"),
     Entry("sinew.blend_import_clip", "Add Clip to the Blend\u2026"),

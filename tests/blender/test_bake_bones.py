@@ -18,7 +18,7 @@ from pygltflib import GLTF2
 from scipy.spatial import cKDTree
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
-from sinew_addon.features.bake import bake
+from sinew_addon.features.bake import bake, error_map
 from sinew_addon.io import actions, files
 from test_bake import FRAMES, read_elsewhere, world_shapes
 
@@ -318,6 +318,44 @@ def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
     assert np.isclose(distances.max(), report["after"]["worst"], rtol=0.01)
     assert np.isclose(np.sqrt(np.square(distances[:, once]).mean()), report["after"]["rms"], rtol=0.01)
     assert report["after"]["rms"] < 0.7 * report["before"]["rms"]
+
+
+@pytest.mark.parametrize("motion", ["keys", "pose"])
+def test_errors_before_and_after_as_heat_maps(arm, motion):
+    obj, _path = arm
+    mesh = obj.data
+    obj.modifiers[0].use_deform_preserve_volume = False
+    lbs = world_shapes([obj], FRAMES)[0]
+    scenes.add_sinew(obj, METHOD)
+    mesh.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+    mesh.attributes.active_color_name = "Paint"
+    expected = world_shapes([obj], FRAMES)[0]
+    before = list(mesh.attributes.keys())
+    assert not bpy.ops.sinew.bake_error.poll()
+    bpy.ops.sinew.bake(kind="bones", frames=",".join(map(str, FRAMES)), motion=motion, helpers=2)
+    played = world_shapes([obj], FRAMES)[0]
+    colours = {}
+    for choice, shape in (("BEFORE", lbs), ("AFTER", played)):
+        wanted = np.sqrt(np.square(shape - expected).sum(axis=2).mean(axis=0))
+        found = error_map.errors([obj], choice)
+        assert np.allclose(found, wanted, atol=1e-4 * scenes.diagonal(obj))
+        bpy.ops.sinew.bake_error(errors=choice)
+        assert error_map.shown([obj]) == choice
+        name = obj.data.attributes.active_color_name
+        shown = np.empty(4 * len(wanted), dtype=np.float32)
+        obj.data.attributes[name].data.foreach_get("color", shown)
+        colours[choice] = shown.reshape(-1, 4)[:, :3]
+        # In one range: from dark violet at 0 to yellow at the largest error before.
+        order = np.argsort(found)
+        light = colours[choice] @ (0.2126, 0.7152, 0.0722)
+        assert (np.diff(light[order]) > -1e-3).all()
+    assert colours["BEFORE"].max() > 0.8
+    assert colours["AFTER"].mean() < colours["BEFORE"].mean()
+    bpy.ops.sinew.bake_error(errors="OFF")
+    kept = {"Sinew bake error", "Sinew bake error before"}
+    assert set(obj.data.attributes.keys()) - kept == set(before) - {"sinew_points"}
+    assert obj.data.attributes.active_color_name == "Paint"
+    assert error_map.shown([obj]) == "OFF"
 
 
 @pytest.mark.parametrize(

@@ -55,11 +55,12 @@ def solved(motion, wanted):
 def test_bend_and_twist_that_they_were_not_made_from(method, count, share):
     solution = solved(random_motion(method, 48, seed=3), Wanted(count))
     motion = motion_by(method)
-    before, after, errors = pose_helpers.errors_of(solution, motion, REST)
+    before, after, errors, errors_before = pose_helpers.errors_of(solution, motion, REST)
     linear = np.array([TUBE.deformed("lbs", *pose)[0] for pose in POSES])
     assert np.allclose((before.rms, before.worst), errors_of(linear, motion.targets), rtol=1e-3)
     assert after.rms < share * before.rms
     assert np.isclose(np.sqrt(np.square(errors).mean()), after.rms, rtol=1e-4)
+    assert np.isclose(np.sqrt(np.square(errors_before).mean()), before.rms, rtol=1e-4)
 
 
 @pytest.mark.parametrize("size", [1.0, 1.4])

@@ -25,7 +25,7 @@ from ...core.spaces import transformed
 from ...core.stages import StageValues
 from ...deform import evaluate, session
 from ...deform.skinned_object import SkinnedObject
-from ...io import helper_bones_io
+from ...io import helper_bones_io, mesh_io
 from . import bake_state, shape_animation
 from .take_off import take_off
 
@@ -171,8 +171,10 @@ class _Rig:
         rest = self._bones.rest
         motion = self._with(at_frames, _POSES, seed=1)
         solution = yield from pose_helpers.solve(motion, options.of(motion), rest)
-        before, after, errors = pose_helpers.errors_of(solution, at_frames, rest)
-        self._solution = replace(solution, before=before, after=after, errors=errors)
+        before, after, errors, errors_before = pose_helpers.errors_of(solution, at_frames, rest)
+        self._solution = replace(
+            solution, before=before, after=after, errors=errors, errors_before=errors_before
+        )
         unseen = pose_helpers.errors_of(solution, self._with(None, _UNSEEN_POSES, seed=2), rest)
         self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal, unseen[:2])
         self._targets.clear()
@@ -235,7 +237,11 @@ class _Rig:
             helper_bones_io.write_weights(
                 obj, bones, [*bones.names, *names], solution.bones[rows], solution.weights[rows]
             )
-            helper_bones_io.write_errors(obj.data, self._unit * solution.errors[rows])
+            for name, errors in (
+                (helper_bones_io.ERRORS, solution.errors),
+                (helper_bones_io.ERRORS_BEFORE, solution.errors_before),
+            ):
+                mesh_io.write_values(obj.data, name, self._unit * errors[rows])
 
 
 def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers bakes: an operator."""
+"""Registers bakes: operators, and the panel of their errors."""
 
-from .bake_operator import CLASSES as CLASSES
+from . import bake_operator, error_panel
+
+CLASSES = (*bake_operator.CLASSES, *error_panel.CLASSES)
 
 
 def register() -> None:

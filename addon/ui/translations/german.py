@@ -860,6 +860,30 @@ TEXTS = {
     "Baked {names}": "Gebacken: {names}",
     "Bake": "Backen",
     "Bake…": "Backen…",
+    "Bake Error": "Backfehler",
+    "Show Bake Error": "Backfehler zeigen",
+    "Hide Bake Error": "Backfehler verbergen",
+    "Colour the meshes that were baked to bones by their distance from Sinew's shape, in 3D views in Solid "
+    "shading. Switch it off before an export, which would write the colours": (
+        "Die Maschen, die zu Knochen gebacken wurden, nach ihrem Abstand von Sinews Form färben, in "
+        "3D-Ansichten mit der Schattierung Solide. Vor einem Export ausschalten, der die Farben schreiben würde"
+    ),
+    "Errors": "Fehler",
+    "Which errors to show": "Welche Fehler gezeigt werden",
+    "Before": "Vorher",
+    "After": "Nachher",
+    "Of the helper bones, over the frames of the bake": (
+        "Die der Hilfsknochen, über die gebackenen Einzelbilder"
+    ),
+    "Of linear blending with the weights before the bake": (
+        "Die der linearen Verformung mit den Gewichten vor dem Backen"
+    ),
+    "No colours; views are as they were": "Keine Farben; die Ansichten sind wie zuvor",
+    "Select a mesh that was baked to bones": "Eine Masche auswählen, die zu Knochen gebacken wurde",
+    "RMS {before} before, {after} after": "RMS {before} vorher, {after} nachher",
+    "Dark violet is 0, yellow {end}: each vertex's RMS over the frames": (
+        "Dunkelviolett ist 0, Gelb {end}: RMS jedes Punktes über die Einzelbilder"
+    ),
     "Bake Shapes…": "Formen backen…",
     "Write what Sinew deforms as data that plays without it": (
         "Was Sinew verformt als Daten schreiben, die ohne Sinew abspielen"
