@@ -36,7 +36,7 @@ NATIVE: dict[str, list[str | Path]] = {
 # About the checkout, its documents and its tools, which are the same wherever they run: ./dev test has them.
 CHECKOUT_TESTS = (
     *("test_documented", "test_layering", "test_locks", "test_platforms", "test_release", "test_report_map"),
-    *("test_sbom", "test_site", "test_wheel", "test_workflows"),
+    *("test_sbom", "test_site", "test_snippets", "test_wheel", "test_workflows"),
 )
 # Shapes as Blender's, Sinew added and removed, files saved and read, bakes, commands, batches with kills.
 BLENDER_TESTS = (
