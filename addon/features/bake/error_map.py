@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map of a bake to bones: the baked mesh's error at each vertex, before and after, as colours that views
-in Solid shading show until it is switched off. Exporters would write them, so they are not there by themselves."""
+"""The heat map of a bake to bones: the baked mesh's error at each vertex, before and after, as colours that
+views in Solid shading show until it is switched off. Exporters would write them, so no bake makes them."""
 
 from __future__ import annotations
 

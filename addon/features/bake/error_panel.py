@@ -21,8 +21,8 @@ class SINEW_OT_bake_error(bpy.types.Operator):
     bl_idname = "sinew.bake_error"
     bl_label = "Show Bake Error"
     bl_description = (
-        "Colour the meshes that were baked to bones by their distance from Sinew's shape, in 3D views in Solid "
-        "shading. Switch it off before an export, which would write the colours"
+        "Colour the meshes that were baked to bones by their distance from Sinew's shape, in 3D views in "
+        "Solid shading. Switch it off before an export, which would write the colours"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -62,7 +62,11 @@ class SINEW_PT_bake_error(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene, meshes = self.layout, context.scene, _baked(context)
         is_shown, row = error_map.shown(meshes), layout.row(align=True)
-        for choice, label in ((error_map.BEFORE, "Before"), (error_map.AFTER, "After"), (error_map.OFF, "Off")):
+        for choice, label in (
+            (error_map.BEFORE, "Before"),
+            (error_map.AFTER, "After"),
+            (error_map.OFF, "Off"),
+        ):
             row.operator("sinew.bake_error", text=label, depress=choice == is_shown).errors = choice
         before, after = (
             units.text(scene, "length", float(np.sqrt(np.square(error_map.errors(meshes, choice)).mean())))

@@ -32,8 +32,8 @@ from ...deform import evaluate, session
 from ...io import actions
 from . import comparison_state, offset_nodes
 
-# In the order of the methods, one each: a colour-blind-safe set (Okabe and Ito, 2008), and three that differ from
-# it and from the original's white as much.
+# In the order of the methods, one each: a colour-blind-safe set (Okabe and Ito, 2008), and three that differ
+# from it and from the original's white as much.
 COLOURS = (
     (0.90, 0.60, 0.00),
     (0.34, 0.71, 0.91),

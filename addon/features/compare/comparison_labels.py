@@ -102,7 +102,7 @@ def _draw() -> None:
 
 
 def apart(labels: Sequence[tuple[float, float, float]], line: float, gap: float) -> list[float]:
-    """The height at which each label is drawn, so that none covers another: its own, or above those in its way.
+    """The height at which each label is drawn, so that none covers another: its own, or above others.
 
     labels  the left, the height and the width of each
     line    the least difference of two heights
