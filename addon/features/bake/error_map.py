@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map of a bake to bones: the baked mesh's error at each vertex, before and after the bake, as colours
-that views in Solid shading show. They exist only while it is on, as exporters would write them."""
+"""The heat map of a bake to bones: the error of the baked mesh at each vertex, before and after the bake, as
+colours that views in Solid shading show. They exist only while it is on, as exporters would write them."""
 
 from __future__ import annotations
 

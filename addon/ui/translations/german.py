@@ -863,10 +863,10 @@ TEXTS = {
     "Bake Error": "Backfehler",
     "Show Bake Error": "Backfehler zeigen",
     "Hide Bake Error": "Backfehler verbergen",
-    "Colour the meshes that were baked to bones by their distance from Sinew's shape, in 3D views in Solid "
-    "shading. Switch it off before an export, which would write the colours": (
+    "Colour the meshes that were baked to bones by their distance from Sinew's shape, in 3D views in "
+    "Solid shading. Switch it off before an export, which would write the colours": (
         "Die Maschen, die zu Knochen gebacken wurden, nach ihrem Abstand von Sinews Form färben, in "
-        "3D-Ansichten mit der Schattierung Solide. Vor einem Export ausschalten, der die Farben schreiben würde"
+        "3D-Ansichten mit der Schattierung Solide. Vor einem Export ausschalten, der die Farben schriebe"
     ),
     "Errors": "Fehler",
     "Which errors to show": "Welche Fehler gezeigt werden",
