@@ -346,6 +346,26 @@ def modifiers() -> Iterator[None]:
     facts["tab"] = [view.spaces[0].show_region_ui, region.active_panel_category]
 
 
+def bake_error() -> Iterator[None]:
+    """By F3, of what was baked to bones; its colours in the view, and views as before afterwards."""
+    for obj in meshes():
+        obj.sinew.enabled = True
+    five_meshes.select(bpy.data.objects["Body"])
+    shading = next(area for area in main_window().screen.areas if area.type == "VIEW_3D").spaces[0].shading
+    before = shading.color_type
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sinew.bake("EXEC_DEFAULT", kind="bones", frames="1-20", helpers=4)
+        bpy.ops.view3d.view_selected()
+    yield from search("show bake error")
+    shown = shading.color_type
+    window.photograph(FOLDER / "bake-error.png")
+    yield from search("hide bake error")
+    window.photograph(FOLDER / "bake-error-off.png")
+    view = (slice(200, -200), slice(100, 700))
+    vivid = [float(np.ptp(pixels_of(name)[view], axis=2).mean()) for name in ("bake-error", "bake-error-off")]
+    facts["bake error"] = [before, shown, shading.color_type, vivid]
+
+
 def shortcuts() -> list[str]:
     keyconfigs = bpy.context.window_manager.keyconfigs
     items = [item for keymap in keyconfigs.addon.keymaps for item in keymap.keymap_items]
@@ -380,6 +400,7 @@ def steps() -> Iterator[None]:
     yield from mends_by_clicks()
     yield from corrective_keys()
     yield from modifiers()
+    yield from bake_error()
     yield from goes_without_a_trace()
     print("FACTS " + json.dumps(facts), flush=True)
 

@@ -38,6 +38,12 @@ def test_a_shortcut_and_f3_flip_the_comparison(facts):
     assert facts["flipped by search"] is True
 
 
+def test_f3_shows_the_errors_of_a_bake_as_colours_and_hides_them(facts):
+    before, shown, afterwards, (vivid, grey) = facts["bake error"]
+    assert (before, shown, afterwards) == ("MATERIAL", "VERTEX", "MATERIAL")
+    assert vivid > 1.2 * grey
+
+
 def test_shortcuts_and_menus_go_with_the_add_on(facts):
     assert facts["shortcuts"] == ["sinew.flip_comparison ", "wm.call_menu_pie SINEW_MT_pie"]
     assert facts["shortcuts afterwards"] == []
