@@ -41,7 +41,7 @@ class SINEW_OT_bake_error(bpy.types.Operator):
         if context.mode.startswith("EDIT"):
             cls.poll_message_set(tr("Leave edit mode first"))
             return False
-        if any(error_map.is_baked(obj) for obj in operators.targets(context)):
+        if _baked(context):
             return operators.can_change(cls)
         cls.poll_message_set(tr("Select a mesh that was baked to bones"))
         return False
@@ -57,7 +57,7 @@ class SINEW_PT_bake_error(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return any(error_map.is_baked(obj) for obj in operators.targets(context))
+        return bool(_baked(context))
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene, meshes = self.layout, context.scene, _baked(context)
