@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 
@@ -88,42 +89,34 @@ struct Sbs {
 private:
     /// The solution of n y = g of least length, for a symmetric positive semi-definite n. Eigenvalues up to
     /// `least` count as 0.
-    [[nodiscard]] static Vec3<double> solved(Mat3<double> n, const Vec3<double>& g, double least) noexcept {
-        const double half_trace = 0.5 * (n[0][0] + n[1][1] + n[2][2]);
-        // The determinant divided by this square is a lower bound of the least eigenvalue.
-        if (glm::determinant(n) > least * half_trace * half_trace) return glm::inverse(n) * g;
-        // Jacobi rotations keep the relative precision of small eigenvalues.
-        Mat3<double> vectors(1.0);
-        for (int sweep = 0; sweep < 12; ++sweep) {
-            for (int pair = 0; pair < 3; ++pair) {
-                const int i = pair == 2 ? 1 : 0;
-                const int j = pair == 0 ? 1 : 2;
-                if (n[i][j] == 0.0) continue;
-                const double theta = (n[j][j] - n[i][i]) / (2.0 * n[i][j]);
-                const double t = (theta < 0.0 ? -1.0 : 1.0) / (std::abs(theta) + std::hypot(theta, 1.0));
-                const double c = 1.0 / std::hypot(t, 1.0);
-                const double s = t * c;
-                for (Mat3<double>* m : {&n, &vectors}) {
-                    const Vec3<double> a = (*m)[i];
-                    const Vec3<double> b = (*m)[j];
-                    (*m)[i] = c * a - s * b;
-                    (*m)[j] = s * a + c * b;
-                }
-                for (int k = 0; k < 3; ++k) {
-                    const double a = n[k][i];
-                    const double b = n[k][j];
-                    n[k][i] = c * a - s * b;
-                    n[k][j] = s * a + c * b;
-                }
-                n[i][j] = n[j][i] = 0.0;
-            }
-            if (n[0][1] == 0.0 && n[0][2] == 0.0 && n[1][2] == 0.0) break;
+    [[nodiscard]] static Vec3<double> solved(const Mat3<double>& n, const Vec3<double>& g,
+                                             double least) noexcept {
+        const double trace = n[0][0] + n[1][1] + n[2][2];
+        const double determinant = glm::determinant(n);
+        // Divided by the square of half the trace, this is a lower bound of the least eigenvalue.
+        if (4.0 * determinant > least * trace * trace) return glm::inverse(n) * g;
+        const double minors = (n[0][0] * n[1][1] - n[0][1] * n[0][1]) +
+                              (n[0][0] * n[2][2] - n[0][2] * n[0][2]) +
+                              (n[1][1] * n[2][2] - n[1][2] * n[1][2]);
+        // From 0, Newton's method rises to the least root of the characteristic polynomial.
+        double a = 0.0;
+        for (int step = 0; step < 60; ++step) {
+            const double slope = (3.0 * a - 2.0 * trace) * a + minors;
+            const double value = determinant - ((a - trace) * a + minors) * a;
+            if (!(slope > 0.0 && value > 1e-17 * trace * slope)) break;
+            a += value / slope;
         }
-        Vec3<double> y(0.0);
-        for (int i = 0; i < 3; ++i) {
-            if (n[i][i] > least) y += (glm::dot(vectors[i], g) / n[i][i]) * vectors[i];
-        }
-        return y;
+        const double sum = trace - a;
+        const double product = minors - a * sum;
+        const double c = 0.5 * (sum + std::sqrt(std::max(sum * sum - 4.0 * product, 0.0)));
+        const double b = sum - c;
+        // The inverse on the eigenvectors that count, 0 on the others, is a polynomial in n.
+        const auto without = [&n](double value, const Vec3<double>& v) { return n * v - value * v; };
+        if (c <= least) return Vec3<double>(0.0);
+        if (b <= least) return (1.0 / ((c - a) * (c - b) * c)) * without(a, without(b, g));
+        if (a > least) return glm::inverse(n) * g;
+        const double size = product * (product - a * (sum - a));
+        return (1.0 / size) * without(a, (sum * (sum - a) - product) * g - (sum - a) * (n * g));
     }
 };
 
@@ -138,7 +131,7 @@ Vec3<double> Sbs::rotation_centre(std::size_t count, const BoneAt& bone_at) noex
     for (std::size_t i = 0; i < count; ++i) origin += (1.0 / n) * bone_at(i).head;
     const Mat3<double> first_rotation = to_mat3(first.rigid.rotation);
     const auto difference = [&](std::size_t i) {
-        const Bone<double> bone = bone_at(i);
+        const auto& bone = bone_at(i);
         const Mat3<double> rotation = to_mat3(bone.rigid.rotation) - first_rotation;
         return Affine<double>{rotation, rotation * origin + bone.rigid.translation - first.rigid.translation};
     };
@@ -152,20 +145,21 @@ Vec3<double> Sbs::rotation_centre(std::size_t count, const BoneAt& bone_at) noex
         const Vec3<double> g = -(glm::transpose(second.linear) * second.translation);
         return origin + (1.0 / (4.0 * squared)) * (g - (glm::dot(v, g) / squared) * v);
     }
-    Affine<double> mean{Mat3<double>(0.0), Vec3<double>(0.0)};
-    for (std::size_t i = 1; i < count; ++i) {
-        const Affine<double> d = difference(i);
-        mean.linear += (1.0 / n) * d.linear;
-        mean.translation += (1.0 / n) * d.translation;
-    }
     Mat3<double> normal(0.0);
     Vec3<double> g(0.0);
-    for (std::size_t i = 0; i < count; ++i) {
+    const auto add = [&](double weight, const Affine<double>& d) {
+        const Mat3<double> by = glm::transpose(d.linear);
+        normal += weight * (by * d.linear);
+        g -= weight * (by * d.translation);
+    };
+    Affine<double> sum{Mat3<double>(0.0), Vec3<double>(0.0)};
+    for (std::size_t i = 1; i < count; ++i) {
         const Affine<double> d = difference(i);
-        const Mat3<double> by = glm::transpose(d.linear - mean.linear);
-        normal += by * (d.linear - mean.linear);
-        g -= by * (d.translation - mean.translation);
+        add(1.0, d);
+        sum.linear += d.linear;
+        sum.translation += d.translation;
     }
+    add(-1.0 / n, sum);
     return origin + solved(normal, g, n * kSameRotation * kSameRotation);
 }
 
