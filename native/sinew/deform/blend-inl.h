@@ -30,14 +30,6 @@ struct Sum {
     Vec<D> value[kNumbers];
 };
 
-template <class D, std::size_t kNumbers>
-HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin, std::size_t end,
-                        Sum<D, kNumbers>& sum) {
-    for (std::size_t i = begin; i < end; ++i) {
-        sum.value[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.value[i]);
-    }
-}
-
 /// A weighted sum of rows, and the weighted sum of only their quaternions, which decides the hemisphere of the
 /// next term.
 template <class D, std::size_t kNumbers>

@@ -66,11 +66,12 @@ private:
     void add_point(std::size_t b, std::size_t lane, std::vector<BoneRow>& found) const {
         found.clear();
         const Block& block = mesh_.blocks[b];
-        const Lanes<float>* const xyz = &mesh_.rows[block.first_row];
+        const Lanes<float>* const xyz = &mesh_.rest_points[kPointRows * b];
+        const Lanes<float>* const weights = &mesh_.weights[block.first_weight];
         for (std::size_t k = 0; k < block.influences; ++k) {
-            const float weight = block.mixed ? xyz[3 + k].lane[lane]
+            const float weight = block.mixed ? weights[k].lane[lane]
                                  : k == 0    ? mesh_.first_weights[b].lane[lane]
-                                             : xyz[2 + k].lane[lane];
+                                             : weights[k - 1].lane[lane];
             if (weight == 0.0f) continue;
             const std::size_t bone = block.first_bone + (block.mixed ? lane * block.influences : 0) + k;
             const Row row{weight, weight * xyz[0].lane[lane], weight * xyz[1].lane[lane],

@@ -12,18 +12,19 @@
 
 namespace sinew {
 
-/// Rows of moments are stored in three parts, each with the rows of all blocks one after the other, so that a
-/// variant reads only the parts that it needs:
+/// Rows of moments are stored in parts, each with the rows of all blocks one after the other, so that a variant
+/// reads only the parts that it needs:
 ///
-///     weight  the centroid of each neighbourhood (x, y, z), then the weight of each bone
-///     first   the first moments of each bone
-///     second  the sum of the second moments over all bones, then those of each bone
-enum class MomentPart : std::size_t { weight, first, second };
-inline constexpr std::size_t kMomentParts = 3;
+///     first_weight  the weight of the first bone, which is rarely read
+///     weight        the centroid of each neighbourhood (x, y, z), then the weights of the other bones
+///     first         the first moments of each bone
+///     second        the sum of the second moments over all bones, then those of each bone
+enum class MomentPart : std::size_t { first_weight, weight, first, second };
+inline constexpr std::size_t kMomentParts = 4;
 
 /// The number of rows of each part, for a block whose vertices have moments of `bones` bones.
 [[nodiscard]] constexpr std::array<std::size_t, kMomentParts> moment_rows(std::size_t bones) {
-    return {3 + bones, 3 * bones, 6 + 6 * bones};
+    return {1, 2 + bones, 3 * bones, 6 + 6 * bones};
 }
 
 /// The row of a block in which number `n` of a bone's Moments is stored.
@@ -32,7 +33,8 @@ struct MomentPosition {
     std::size_t row;
 };
 [[nodiscard]] constexpr MomentPosition moment_position(std::size_t bone, std::size_t n) {
-    if (n == 0) return {MomentPart::weight, 3 + bone};
+    if (n == 0 && bone == 0) return {MomentPart::first_weight, 0};
+    if (n == 0) return {MomentPart::weight, 2 + bone};
     if (n < 4) return {MomentPart::first, 3 * bone + n - 1};
     return {MomentPart::second, 6 + 6 * bone + n - 4};
 }

@@ -11,9 +11,7 @@ namespace {
 
 class Finder {
 public:
-    Finder(const PackedMesh& mesh, std::span<const Lanes<float>> rows) : mesh_(mesh), rows_(rows) {
-        sets_.entries.resize(mesh.bones.size());
-    }
+    explicit Finder(const PackedMesh& mesh) : mesh_(mesh) { sets_.entries.resize(mesh.bones.size()); }
 
     BoneSets run() {
         for (const Block& block : mesh_.blocks) {
@@ -22,7 +20,7 @@ public:
                 add(block.first_bone, block.influences, block.influences);
                 continue;
             }
-            const Lanes<float>* const weights = &rows_[block.first_row] + 3;
+            const Lanes<float>* const weights = &mesh_.weights[block.first_weight];
             for (std::size_t lane = 0; lane < kLanes; ++lane) {
                 std::size_t count = block.influences;
                 // Vertices with fewer influences are padded with weight 0.
@@ -71,15 +69,12 @@ private:
     }
 
     const PackedMesh& mesh_;
-    std::span<const Lanes<float>> rows_;
     BoneSets sets_;
     std::unordered_multimap<std::uint64_t, std::size_t> known_;
 };
 
 }  // namespace
 
-BoneSets find_bone_sets(const PackedMesh& mesh, std::span<const Lanes<float>> rows) {
-    return Finder(mesh, rows).run();
-}
+BoneSets find_bone_sets(const PackedMesh& mesh) { return Finder(mesh).run(); }
 
 }  // namespace sinew

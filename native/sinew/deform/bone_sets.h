@@ -19,8 +19,6 @@ struct BoneSets {
 };
 
 /// Finds the sets, in the order of the mesh's blocks. The same bones in another order are another set.
-///
-/// rows  mesh.rows, or a copy of them
-[[nodiscard]] BoneSets find_bone_sets(const PackedMesh& mesh, std::span<const Lanes<float>> rows);
+[[nodiscard]] BoneSets find_bone_sets(const PackedMesh& mesh);
 
 }  // namespace sinew

@@ -156,7 +156,7 @@ void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_
     const std::int32_t* const bones = frame.mesh->bones.data() + first.first_bone;
     const std::size_t count = kCount > 0 ? kCount : first.influences;
     for (std::size_t b = begin; b < end; ++b) {
-        const float* const rows = pointers.rows[pointers.blocks[b].first_row].lane.data();
+        const float* const weights = weights_of(pointers, b);
         const float* const first_weights = frame.mesh->first_weights[b].lane.data();
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
@@ -167,7 +167,7 @@ void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_
                     return frame.bones[static_cast<std::size_t>(bones[k])];
                 },
                 [&](std::size_t k) HWY_ATTR {
-                    return hn::Load(d, (k == 0 ? first_weights : rows + kLanes * (2 + k)) + lane);
+                    return hn::Load(d, (k == 0 ? first_weights : weights + kLanes * (k - 1)) + lane);
                 },
                 load_deformed(d, pointers, b, lane), changes);
             if (changes) store_points(d, pointers, b, lane, points);
@@ -181,9 +181,8 @@ void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::siz
     const One d;
     const Block& block = pointers.blocks[b];
     if (block.influences < 2) return;
-    const float* const rows = pointers.rows[block.first_row].lane.data();
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-        const float* const weights = rows + 3 * kLanes + lane;
+        const float* const weights = weights_of(pointers, b) + lane;
         if (!(weights[kLanes] > 0.0f)) continue;
         const std::int32_t* const bones =
             frame.mesh->bones.data() + block.first_bone + block.influences * lane;
@@ -211,8 +210,8 @@ std::size_t end_of_same_bones(const PackedMesh& mesh, std::size_t b, std::size_t
 
 MeshPointers pointers_of(const BulgeFrame& frame) {
     const PackedMesh& mesh = *frame.mesh;
-    return {mesh.blocks.data(),   mesh.rows.data(), nullptr,
-            mesh.vertices.data(), mesh.runs.data(), frame.points};
+    return {mesh.blocks.data(),   mesh.rest_points.data(), mesh.weights.data(), nullptr,
+            mesh.vertices.data(), mesh.runs.data(),        frame.points};
 }
 
 template <BulgeForm kForm, bool kStretched>
@@ -255,7 +254,7 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
     constexpr auto kAllowance = static_cast<float>(BulgeLimitStage::kAllowance);
     for (std::size_t b = begin; b < end; ++b) {
         const Block& block = pointers.blocks[b];
-        const float* const rows = pointers.rows[block.first_row].lane.data();
+        const float* const weights = weights_of(pointers, b);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const std::int32_t* const bones =
                 frame.mesh->bones.data() + block.first_bone + (block.mixed ? block.influences * lane : 0);
@@ -266,9 +265,9 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
             float of_heaviest = 0.0f;
             float most = 0.0f;
             for (std::size_t k = 0; k < block.influences; ++k) {
-                const float weight = block.mixed ? rows[kLanes * (3 + k) + lane]
+                const float weight = block.mixed ? weights[kLanes * k + lane]
                                      : k == 0    ? frame.mesh->first_weights[b].lane[lane]
-                                                 : rows[kLanes * (2 + k) + lane];
+                                                 : weights[kLanes * (k - 1) + lane];
                 const auto own = nearest_of_segment(d, frame.bones[static_cast<std::size_t>(bones[k])], p);
                 nearest = add_scaled<One>(nearest, hn::Set(d, weight), own);
                 const float distance = length_of(subtract<One>(own, p));

@@ -136,7 +136,7 @@ void BulgeLimit::State::measure(std::span<const Vec3<float>> rest_points, const 
     same_space = is_identity(space);
     write_displacement(cast<double>(space), to_bones);
     write_displacement(inverse(cast<double>(space)), to_model);
-    repack_points(mesh, rest_points, mesh.rows);
+    pack_points(mesh, rest_points, mesh.rest_points);
     for (std::size_t i = 0; i < bones.size(); ++i) {
         bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
     }
@@ -206,7 +206,7 @@ void BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
 BulgeLimit::Parts BulgeLimit::parts() const {
     const State& state = *state_;
     const std::scoped_lock lock(state.mutex);
-    Parts parts{bound_mesh(state.mesh, state.mesh.rows, state.vertex_count, state.bone_count),
+    Parts parts{bound_mesh(state.mesh, state.mesh.rest_points, state.vertex_count, state.bone_count),
                 {},
                 state.bones_from_model,
                 {}};

@@ -15,7 +15,11 @@ namespace sinew {
 namespace HWY_NAMESPACE {
 
 /// The common part of these kernels. A row is the rotation (w, x, y, z), then the displacement rows of the
-/// motion.
+/// motion. A kernel has these members, too:
+///
+/// kVertexFloats  numbers of vertex data
+/// centre         the point at which motions are blended, from the vertex data, if there is some
+/// finish         the deformed point, from the motion at the centre
 struct CentreRows {
     static constexpr std::size_t kNumbers = 16;
 
@@ -58,18 +62,40 @@ struct CentreRows {
     }
 };
 
+/// A blend of rows at a point: the quaternion, of any length, and the displacement of the point.
+template <class D>
+struct Motion {
+    Vec<D> rotation[4];
+    Points<D> displacement;
+};
+
+/// The displacement of `p` along one axis, by that axis' row of a displacement.
+template <class D>
+HWY_INLINE Vec<D> moved_along(const Vec<D>* row, const Points<D>& p) {
+    return hn::MulAdd(row[0], p.x, hn::MulAdd(row[1], p.y, hn::MulAdd(row[2], p.z, row[3])));
+}
+
+/// The motion of `p` by a sum of rows.
+template <class D>
+HWY_INLINE Motion<D> motion_at(const Sum<D, CentreRows::kNumbers>& sum, const Points<D>& p) {
+    const Vec<D>* const row = sum.value;
+    return {{row[0], row[1], row[2], row[3]},
+            {moved_along(row + 4, p), moved_along(row + 8, p), moved_along(row + 12, p)}};
+}
+
 /// Linear blending, for vertices without data of the method.
 struct LinearRows : CentreRows {
     static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 0;
 
     template <class D>
-    static HWY_INLINE Points<D> finish(D, const Sum<D, kNumbers>& sum, const Points<D>& p) {
-        const auto moved = [&](std::size_t row) HWY_ATTR {
-            const Vec<D>* const m = sum.value + row;
-            return hn::MulAdd(m[0], p.x, hn::MulAdd(m[1], p.y, hn::MulAdd(m[2], p.z, m[3])));
-        };
-        return add<D>(p, {moved(4), moved(8), moved(12)});
+    static HWY_INLINE Points<D> centre(D, const float*, const float*, const Points<D>& p) {
+        return p;
+    }
+
+    template <class D>
+    static HWY_INLINE Points<D> finish(D, const Motion<D>& motion, const Points<D>&, const Points<D>& p) {
+        return add<D>(p, motion.displacement);
     }
 };
 

@@ -103,9 +103,9 @@ void check(const BindData& data) {
     }
 }
 
-BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rows, std::size_t vertex_count,
-                     std::size_t bone_count) {
-    const UnpackedMesh unpacked = unpack(mesh, rows, vertex_count);
+BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points,
+                     std::size_t vertex_count, std::size_t bone_count) {
+    const UnpackedMesh unpacked = unpack(mesh, rest_points, vertex_count);
     BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}, {}};
     bound.influence_offsets.assign(unpacked.offsets.begin(), unpacked.offsets.end());
     for (const auto& [bone, weight] : unpacked.influences) {

@@ -124,8 +124,8 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
 struct Binding::Packed {
     explicit Packed(const BindData& data);
 
-    /// The mesh with the rest points in `rows`.
-    [[nodiscard]] BoundMesh unpack(std::span<const Lanes<float>> rows) const;
+    /// rest_points  mesh.rest_points, or others
+    [[nodiscard]] BoundMesh unpack(std::span<const Lanes<float>> rest_points) const;
 
     PackedMesh mesh;
     std::vector<Affine<float>> rest_bones;  // for each of mesh.used_bones; empty: all identity
@@ -178,8 +178,8 @@ Binding::Packed::Packed(const BindData& data) {
     }
 }
 
-BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rows) const {
-    BoundMesh bound = bound_mesh(mesh, rows, vertex_count, bone_count);
+BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rest_points) const {
+    BoundMesh bound = bound_mesh(mesh, rest_points, vertex_count, bone_count);
     for (std::size_t i = 0; i < kMethodCount; ++i) {
         if (!moments[i].blocks.empty())
             bound.vertex_data.push_back({kMethods[i], unpack_moments(mesh, moments[i])});
@@ -200,31 +200,31 @@ Binding::Binding(const BindData& data) : packed_(std::make_shared<const Packed>(
 std::size_t Binding::vertex_count() const noexcept { return packed_->vertex_count; }
 std::size_t Binding::influence_count() const noexcept { return packed_->influence_count; }
 std::size_t Binding::bone_count() const noexcept { return packed_->bone_count; }
-BoundMesh Binding::unpack() const { return packed_->unpack(packed_->mesh.rows); }
+BoundMesh Binding::unpack() const { return packed_->unpack(packed_->mesh.rest_points); }
 
 struct Deformer::State {
-    State(std::shared_ptr<const Binding::Packed> packed, std::vector<Lanes<float>> own_rows,
+    State(std::shared_ptr<const Binding::Packed> packed, std::vector<Lanes<float>> own_rest_points,
           const MethodInfo& method, const std::optional<MixData>& mix);
 
-    /// With its own binding, whose rows it moves out of `packed`, since nothing else reads them.
+    /// With its own binding, whose rest points it moves out of `packed`, since nothing else reads them.
     static std::unique_ptr<State> alone(const BindData& data, const MethodInfo& method,
                                         const std::optional<MixData>& mix) {
         const auto packed = std::make_shared<Binding::Packed>(data);
-        std::vector<Lanes<float>> rows = std::move(packed->mesh.rows);
-        return std::make_unique<State>(packed, std::move(rows), method, mix);
+        std::vector<Lanes<float>> rest_points = std::move(packed->mesh.rest_points);
+        return std::make_unique<State>(packed, std::move(rest_points), method, mix);
     }
 
     [[nodiscard]] std::span<const Kernel* const> kernels_in_use() const {
         return std::span(kernels).first(mix ? 2 : 1);
     }
 
-    [[nodiscard]] std::span<const Lanes<float>> rows() const {
-        return own_rows.empty() ? std::span(packed->mesh.rows) : std::span(own_rows);
+    [[nodiscard]] std::span<const Lanes<float>> rest_points() const {
+        return own_rest_points.empty() ? std::span(packed->mesh.rest_points) : std::span(own_rest_points);
     }
 
     std::shared_ptr<const Binding::Packed> packed;
-    std::vector<Lanes<float>> own_rows;  // empty: use those of the binding
-    std::array<std::size_t, 2> methods;  // indices into Methods; the second is that of the mix
+    std::vector<Lanes<float>> own_rest_points;  // empty: use those of the binding
+    std::array<std::size_t, 2> methods;         // indices into Methods; the second is that of the mix
     std::array<const Kernel*, 2> kernels;
     std::optional<MixWeights> mix;
     BoneSets sets;  // empty unless a kernel needs sets
@@ -233,15 +233,14 @@ struct Deformer::State {
 private:
     [[nodiscard]] BoneSets wanted_sets() const {
         const auto wants = [](const Kernel* kernel) { return kernel->set_bone_size > 0; };
-        return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh, rows())
-                                                            : BoneSets{};
+        return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh) : BoneSets{};
     }
 };
 
-Deformer::State::State(std::shared_ptr<const Binding::Packed> from, std::vector<Lanes<float>> rows,
+Deformer::State::State(std::shared_ptr<const Binding::Packed> from, std::vector<Lanes<float>> rest_points,
                        const MethodInfo& method, const std::optional<MixData>& with)
     : packed(std::move(from)),
-      own_rows(std::move(rows)),
+      own_rest_points(std::move(rest_points)),
       methods{checked_method("method", method), with ? checked_method("mix", with->method) : 0},
       kernels{&kernel_at(methods[0]), &kernel_at(methods[1])},
       mix(with ? std::optional(checked_mix(packed->mesh, with->weights, packed->vertex_count))
@@ -270,7 +269,7 @@ std::size_t Deformer::bone_count() const noexcept { return state_->packed->bone_
 BoundMesh Deformer::unpack() const {
     const PaletteStore::Reading reading(state_->palettes);
     const Binding::Packed& packed = *state_->packed;
-    return packed.unpack(state_->own_rows.empty() ? packed.mesh.rows : state_->own_rows);
+    return packed.unpack(state_->rest_points());
 }
 
 std::vector<float> Deformer::mix_weights() const {
@@ -285,8 +284,8 @@ void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
     }
     check_points(rest_points);
     const PaletteStore::Writing writing(state_->palettes);
-    if (state_->own_rows.empty()) state_->own_rows = mesh.rows;
-    repack_points(mesh, rest_points, state_->own_rows);
+    state_->own_rest_points.resize(kPointRows * mesh.blocks.size());
+    pack_points(mesh, rest_points, state_->own_rest_points);
 }
 
 void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
@@ -325,7 +324,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         const std::vector<Lanes<float>>& vertex_rows = packed.vertex_rows[state_->methods[k]];
         const BoneMoments& moments = packed.moments[state_->methods[k]];
         work.frames[k] = {&packed.mesh,
-                          state_->rows().data(),
+                          state_->rest_points().data(),
                           vertex_rows.empty() ? nullptr : vertex_rows.data(),
                           moments.blocks.empty() ? nullptr : &moments,
                           kernel.set_bone_size > 0 ? state_->sets.entries.data() : packed.mesh.bones.data(),

@@ -16,7 +16,7 @@ struct BoneMoments;
 /// The input and output of one frame, common to all blocks.
 struct Frame {
     const PackedMesh* mesh;
-    const Lanes<float>* rows;         // mesh->rows, or a copy with other rest points
+    const Lanes<float>* rest_points;  // mesh->rest_points, or others
     const Lanes<float>* vertex_rows;  // [blocks][MethodInfo::vertex_floats]; null if the method has none
     const BoneMoments* moments;       // null if the method has none
     const std::int32_t* bones;        // PackedMesh::bones, or BoneSets::entries

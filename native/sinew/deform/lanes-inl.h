@@ -30,7 +30,8 @@ using Vec = hn::Vec<D>;
 /// frame's own members after every stored vector.
 struct MeshPointers {
     const Block* blocks;
-    const Lanes<float>* rows;
+    const Lanes<float>* rest_points;
+    const Lanes<float>* weights;
     const Lanes<float>* vertex_rows;
     const Lanes<std::int32_t>* vertices;
     const Run* runs;
@@ -39,8 +40,8 @@ struct MeshPointers {
 
 HWY_INLINE MeshPointers pointers_of(const Frame& frame) {
     const PackedMesh& mesh = *frame.mesh;
-    return {mesh.blocks.data(),   frame.rows,       frame.vertex_rows,
-            mesh.vertices.data(), mesh.runs.data(), frame.points};
+    return {mesh.blocks.data(),   frame.rest_points, mesh.weights.data(), frame.vertex_rows,
+            mesh.vertices.data(), mesh.runs.data(),  frame.points};
 }
 
 /// The weights of the first influence in block `b`, which must not be mixed.
@@ -56,10 +57,17 @@ struct Points {
     Vec<D> z;
 };
 
+/// The rest points of block `b`.
 template <class D>
-HWY_INLINE Points<D> load_points(D d, const Lanes<float>* rows, std::size_t lane) {
+HWY_INLINE Points<D> load_points(D d, const MeshPointers& pointers, std::size_t b, std::size_t lane) {
+    const Lanes<float>* const rows = pointers.rest_points + kPointRows * b;
     return {hn::Load(d, rows[0].lane.data() + lane), hn::Load(d, rows[1].lane.data() + lane),
             hn::Load(d, rows[2].lane.data() + lane)};
+}
+
+/// The weights of block `b`, unless it is mixed without those of the first influence.
+HWY_INLINE const float* weights_of(const MeshPointers& pointers, std::size_t b) {
+    return pointers.weights[pointers.blocks[b].first_weight].lane.data();
 }
 
 template <class D>
@@ -309,7 +317,7 @@ inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) 
         const Block& block = pointers.blocks[b];
         const std::size_t lanes = lanes_end(d, block);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            store_points(d, pointers, b, lane, load_points(d, pointers.rows + block.first_row, lane));
+            store_points(d, pointers, b, lane, load_points(d, pointers, b, lane));
         }
     }
 }

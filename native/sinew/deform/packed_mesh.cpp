@@ -172,11 +172,11 @@ private:
         const std::size_t runs = consecutive ? 0 : add_runs(vertices);
         const auto output =
             consecutive ? vertices.front() : static_cast<std::uint32_t>(mesh_.runs.size() - runs);
-        mesh_.blocks.push_back({row_count_, first_bone, static_cast<std::uint32_t>(influences), output,
+        mesh_.blocks.push_back({weight_count_, first_bone, static_cast<std::uint32_t>(influences), output,
                                 static_cast<std::uint8_t>(vertices.size()), static_cast<std::uint8_t>(runs),
                                 mixed, consecutive});
         mesh_.vertices.push_back(numbers);
-        row_count_ += static_cast<std::uint32_t>(3 + (mixed ? influences : weights_kept(influences)));
+        weight_count_ += static_cast<std::uint32_t>(mixed ? influences : weights_kept(influences));
     }
 
     static std::size_t weights_kept(std::size_t influences) {
@@ -203,12 +203,13 @@ private:
     }
 
     void fill(std::span<const Vec3<float>> rest_points) {
-        mesh_.rows.resize(row_count_);
+        mesh_.rest_points.resize(kPointRows * mesh_.blocks.size());
+        mesh_.weights.resize(weight_count_ + 1);
         mesh_.first_weights.resize(mesh_.blocks.size());
-        repack_points(mesh_, rest_points, mesh_.rows);
+        pack_points(mesh_, rest_points, mesh_.rest_points);
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             const Block& block = mesh_.blocks[b];
-            Lanes<float>* const weights = &mesh_.rows[block.first_row] + 3;
+            Lanes<float>* const weights = &mesh_.weights[block.first_weight];
             for (std::size_t lane = 0; lane < kLanes; ++lane) {
                 const auto vertex = static_cast<std::uint32_t>(mesh_.vertices[b].lane[lane]);
                 const std::size_t first = offsets_[vertex];
@@ -294,7 +295,7 @@ private:
     std::span<const std::uint32_t> offsets_;
     std::span<const Influence<float>> influences_;
     PackedMesh mesh_;
-    std::uint32_t row_count_ = 0;
+    std::uint32_t weight_count_ = 0;
 };
 
 }  // namespace
@@ -304,10 +305,10 @@ PackedMesh pack(std::span<const Vec3<float>> rest_points, std::span<const std::u
     return Packer(offsets, influences).run(rest_points, more_bones);
 }
 
-void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
-                   std::span<Lanes<float>> rows) noexcept {
+void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                 std::span<Lanes<float>> packed) noexcept {
     for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
-        Lanes<float>* const xyz = &rows[mesh.blocks[b].first_row];
+        Lanes<float>* const xyz = &packed[kPointRows * b];
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const Vec3<float>& point = rest_points[static_cast<std::size_t>(mesh.vertices[b].lane[lane])];
             xyz[0].lane[lane] = point.x;
@@ -317,7 +318,7 @@ void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_poi
     }
 }
 
-UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows, std::size_t vertices) {
+UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points, std::size_t vertices) {
     UnpackedMesh result;
     result.rest_points.resize(vertices);
     result.offsets.assign(vertices + 1, 0);
@@ -325,11 +326,12 @@ UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows, 
     const auto for_each_influence = [&](const auto& call) {
         for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
             const Block& block = mesh.blocks[b];
-            const Lanes<float>* const xyz = &rows[block.first_row];
+            const Lanes<float>* const xyz = &rest_points[kPointRows * b];
+            const Lanes<float>* const weights = &mesh.weights[block.first_weight];
             for (std::size_t lane = 0; lane < block.vertices; ++lane) {
                 const auto weight_of = [&](std::size_t k) {
-                    if (block.mixed) return xyz[3 + k].lane[lane];
-                    return k == 0 ? mesh.first_weights[b].lane[lane] : xyz[2 + k].lane[lane];
+                    if (block.mixed) return weights[k].lane[lane];
+                    return k == 0 ? mesh.first_weights[b].lane[lane] : weights[k - 1].lane[lane];
                 };
                 const std::size_t first = block.first_bone + (block.mixed ? lane * block.influences : 0);
                 const auto vertex = static_cast<std::size_t>(mesh.vertices[b].lane[lane]);

@@ -15,6 +15,9 @@ namespace sinew {
 /// Vertices of a block: the float lanes of the widest vectors. Narrower vectors process a block in several steps.
 inline constexpr std::size_t kLanes = 16;
 
+/// Lanes of a block's points: x, y and z.
+inline constexpr std::size_t kPointRows = 3;
+
 /// One number for each vertex of a block.
 template <class T>
 struct alignas(kLanes * sizeof(T)) Lanes {
@@ -23,10 +26,8 @@ struct alignas(kLanes * sizeof(T)) Lanes {
 
 /// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
 struct Block {
-    // Into PackedMesh::rows: x, y, z, then the weights of each influence; unless mixed, without those of the
-    // first.
-    std::uint32_t first_row;
-    std::uint32_t first_bone;  // into PackedMesh::bones: [influences], or if mixed [kLanes][influences]
+    std::uint32_t first_weight;  // into PackedMesh::weights: [influences]; unless mixed, without the first
+    std::uint32_t first_bone;    // into PackedMesh::bones: [influences], or if mixed [kLanes][influences]
     std::uint32_t influences;
     std::uint32_t output;  // if consecutive, the first vertex; otherwise the first run
     std::uint8_t vertices;
@@ -52,7 +53,10 @@ struct BonePairs {
 /// adjacent, so that a bone is read once for many vertices.
 struct PackedMesh {
     std::vector<Block> blocks;
-    std::vector<Lanes<float>> rows;
+    // Rest points and weights are stored separately: other rest points may replace these, and a method that keeps
+    // weights of its own reads only the points.
+    std::vector<Lanes<float>> rest_points;      // [blocks][kPointRows]
+    std::vector<Lanes<float>> weights;          // one more than there are
     std::vector<Lanes<float>> first_weights;    // [blocks] separate, as rarely read; unused for mixed blocks
     std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the vertex of each lane
     std::vector<Run> runs;
@@ -72,9 +76,9 @@ struct PackedMesh {
                               std::span<const Influence<float>> influences,
                               std::span<const std::int32_t> more_bones = {});
 
-/// Writes other rest points [vertices] to `rows`, which is mesh.rows or a copy of it.
-void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
-                   std::span<Lanes<float>> rows) noexcept;
+/// The form of PackedMesh::rest_points for other rest points [vertices].
+void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                 std::span<Lanes<float>> packed) noexcept;
 
 /// What a mesh was packed from.
 struct UnpackedMesh {
@@ -85,8 +89,8 @@ struct UnpackedMesh {
 
 /// The inverse of pack(), without influences of weight 0.
 ///
-/// rows  mesh.rows, or a copy with other rest points
-[[nodiscard]] UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows,
+/// rest_points  mesh.rest_points, or others
+[[nodiscard]] UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points,
                                   std::size_t vertices);
 
 /// The inverse of pack_values().

@@ -10,8 +10,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
-#include "sinew/deform/blend-inl.h"
+#include "sinew/deform/centre-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
@@ -20,10 +21,11 @@ namespace HWY_NAMESPACE {
 /// In this file, Rigid is a method's kernel with these members:
 ///
 /// kNumbers        numbers in a bone's row, a multiple of 4; the first four are the quaternion, or numbers
-///                 without a sign
+///                 without a sign. Numbers after the first kRow are the same in all rows of a set of bones,
+///                 except in CentreRows
 /// kSignedFloat4s  how many Float4 of a row change sign with the quaternion: 0 to 2
 /// add_scale       adds the effect of a bone's scale to a sum
-/// finish          the points, from their sum and rest points and, if the method has it, their vertex data
+/// finish          the points, from their sum and rest points; for CentreRows as described there
 template <class Rigid>
 inline constexpr std::size_t kRowFloat4s = Rigid::kNumbers / 4;
 
@@ -158,19 +160,70 @@ template <std::size_t kNumbers, std::size_t kCount, bool kPlain, class D>
 HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
                                        const float* weights) {
     Sum<D, kNumbers> sum;
-    // Eight numbers at a time, so that their sums fit into registers.
-    for (std::size_t begin = 0; begin < kNumbers; begin += kRow) {
-        const std::size_t end = std::min(kNumbers, begin + kRow);
-        for (std::size_t i = begin; i < end; ++i) sum.value[i] = hn::Set(d, rows[i]);
-        if constexpr (kPlain) {
-            const Vec<D> first = hn::Load(d, first_weight);
-            for (std::size_t i = begin; i < end; ++i) sum.value[i] = hn::Mul(first, sum.value[i]);
-        }
-        for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
-            add_row(d, hn::Load(d, weights + kLanes * (k - 1)), rows + kNumbers * k, begin, end, sum);
+    for (std::size_t i = 0; i < kNumbers; ++i) sum.value[i] = hn::Set(d, rows[i]);
+    if constexpr (kPlain) {
+        const Vec<D> first = hn::Load(d, first_weight);
+        for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Mul(first, sum.value[i]);
+    }
+    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+        const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
+        const float* const row = rows + kNumbers * k;
+        for (std::size_t i = 0; i < kRow; ++i) {
+            sum.value[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.value[i]);
         }
     }
     return sum;
+}
+
+/// Neighbouring vectors for which a bone's numbers are read once. Short vectors have no operands that repeat a
+/// number, so each takes a load of its own.
+inline constexpr std::size_t kVectorsAtOnce = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
+
+/// Blends CentreRows of a set of bones for kVectors neighbouring vectors, and writes their motions at the points
+/// `p`. Other arguments are those of blend_rows().
+template <std::size_t kVectors, std::size_t kCount, bool kPlain, class D>
+HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const float* first_weights,
+                              const float* weights, const Points<D>* p, Motion<D>* motions) {
+    constexpr std::size_t kNumbers = CentreRows::kNumbers;
+    const std::size_t step = hn::Lanes(d);
+    // One Float4 after the other, so that its sums fit into registers.
+    const auto blend = [&](std::size_t begin, Vec<D>(*sums)[4]) HWY_ATTR {
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            for (std::size_t i = 0; i < 4; ++i) sums[v][i] = hn::Set(d, rows[begin + i]);
+            if constexpr (kPlain) {
+                const Vec<D> weight = hn::Load(d, first_weights + v * step);
+                for (std::size_t i = 0; i < 4; ++i) sums[v][i] = hn::Mul(weight, sums[v][i]);
+            }
+        }
+        for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+            const float* const row = rows + kNumbers * k + begin;
+            Vec<D> weight[kVectors];
+            for (std::size_t v = 0; v < kVectors; ++v) {
+                weight[v] = hn::Load(d, weights + kLanes * (k - 1) + v * step);
+            }
+            for (std::size_t i = 0; i < 4; ++i) {
+                const Vec<D> number = hn::Set(d, row[i]);
+                for (std::size_t v = 0; v < kVectors; ++v) {
+                    sums[v][i] = hn::MulAdd(weight[v], number, sums[v][i]);
+                }
+            }
+        }
+    };
+    const auto blend_axis = [&](std::size_t begin, Vec<D> Points<D>::*axis) HWY_ATTR {
+        Vec<D> sums[kVectors][4];
+        blend(begin, sums);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            motions[v].displacement.*axis = moved_along(sums[v], p[v]);
+        }
+    };
+    blend_axis(4, &Points<D>::x);
+    blend_axis(8, &Points<D>::y);
+    blend_axis(12, &Points<D>::z);
+    Vec<D> rotations[kVectors][4];
+    blend(0, rotations);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+        for (std::size_t i = 0; i < 4; ++i) motions[v].rotation[i] = rotations[v][i];
+    }
 }
 
 /// The same for bones with scale, or whose signs depend on the weights.
@@ -210,28 +263,72 @@ HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t
     return pointers.vertex_rows[kVertexFloats * b].lane.data() + lane;
 }
 
+template <class D>
+HWY_INLINE void map_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                              std::size_t lane, Points<D> points) {
+    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
+    store_points(d, pointers, b, lane, points);
+}
+
+template <class Rigid>
+inline constexpr bool kHasCentre = std::is_base_of_v<CentreRows, Rigid>;
+
+template <class Rigid, class D>
+HWY_INLINE Points<D> centre_of(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                               std::size_t lane, const Points<D>& rest) {
+    return Rigid::centre(d, vertex_rows_of<Rigid::kVertexFloats>(pointers, b, lane), spaces.bones_from_model,
+                         rest);
+}
+
 template <class Rigid, class D>
 HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
                                  std::size_t lane, const Sum<D, Rigid::kNumbers>& sum,
                                  const Points<D>& rest) {
     Points<D> points;
-    if constexpr (Rigid::kVertexFloats > 0) {
-        points = Rigid::finish(d, sum, rest, vertex_rows_of<Rigid::kVertexFloats>(pointers, b, lane),
-                               spaces.bones_from_model);
+    if constexpr (kHasCentre<Rigid>) {
+        const Points<D> centre = centre_of<Rigid>(d, pointers, spaces, b, lane, rest);
+        points = Rigid::finish(d, motion_at(sum, centre), centre, rest);
     } else {
         points = Rigid::finish(d, sum, rest);
     }
-    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
-    store_points(d, pointers, b, lane, points);
+    map_and_store(d, pointers, spaces, b, lane, points);
 }
 
 template <class D>
-HWY_INLINE Points<D> load_rest(D d, const Lanes<float>* rows, const Spaces& spaces, std::size_t lane) {
-    const Points<D> rest = load_points(d, rows, lane);
+HWY_INLINE Points<D> load_rest(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                               std::size_t lane) {
+    const Points<D> rest = load_points(d, pointers, b, lane);
     return spaces.bones_from_model == nullptr ? rest : displaced(d, spaces.bones_from_model, rest);
 }
 
-HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].lane.data(); }
+/// Deforms lanes [lane, lane + kVectors * N) of a block with resolved signs.
+template <class Rigid, std::size_t kVectors, std::size_t kCount, bool kPlain>
+HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
+                               std::size_t b, std::size_t lane, const float* bone_rows, std::size_t count) {
+    const Full d;
+    const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
+    const float* const weights = weights_of(pointers, b) + lane;
+    if constexpr (kHasCentre<Rigid>) {
+        Points<Full> rest[kVectors];
+        Points<Full> centres[kVectors];
+        Motion<Full> motions[kVectors];
+        const std::size_t step = hn::Lanes(d);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            rest[v] = load_rest(d, pointers, spaces, b, lane + v * step);
+            centres[v] = centre_of<Rigid>(d, pointers, spaces, b, lane + v * step, rest[v]);
+        }
+        blend_motions<kVectors, kCount, kPlain>(d, bone_rows, count, first_weights, weights, centres,
+                                                motions);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            map_and_store(d, pointers, spaces, b, lane + v * step,
+                          Rigid::finish(d, motions[v], centres[v], rest[v]));
+        }
+    } else {
+        const auto sum =
+            blend_rows<Rigid::kNumbers, kCount, kPlain>(d, bone_rows, count, first_weights, weights);
+        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, pointers, spaces, b, lane));
+    }
+}
 
 /// Deforms blocks [begin, end) with the same bones, whose signs are resolved.
 ///
@@ -239,17 +336,20 @@ HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].la
 template <class Rigid, std::size_t kCount, bool kPlain = false>
 void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
     const Full d;
+    constexpr std::size_t kVectors = kHasCentre<Rigid> ? kVectorsAtOnce : 1;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
     const std::size_t influences = pointers.blocks[begin].influences;
     for (std::size_t b = begin; b < end; ++b) {
-        const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
-        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
-            const auto sum = blend_rows<Rigid::kNumbers, kCount, kPlain>(
-                d, bone_rows, influences, first_weights, weights_of(rows) + lane);
-            finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
+        for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
+            if (kVectors > 1 && lane + hn::Lanes(d) >= lanes) {
+                deform_vectors<Rigid, 1, kCount, kPlain>(frame, pointers, spaces, b, lane, bone_rows,
+                                                         influences);
+            } else {
+                deform_vectors<Rigid, kVectors, kCount, kPlain>(frame, pointers, spaces, b, lane, bone_rows,
+                                                                influences);
+            }
         }
     }
 }
@@ -262,13 +362,13 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, b
     const std::size_t influences = pointers.blocks[begin].influences;
     const std::int32_t* const bones = frame.bones + pointers.blocks[begin].first_bone;
     for (std::size_t b = begin; b < end; ++b) {
-        const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
+        const float* const weights_of_block = weights_of(pointers, b);
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            const Points<Full> rest = load_rest(d, rows, spaces, lane);
+            const Points<Full> rest = load_rest(d, pointers, spaces, b, lane);
             const auto sum =
                 blend_bones<Rigid>(d, *frame.palette, bones, influences, plain,
-                                   first_weights_of(frame, b) + lane, weights_of(rows) + lane, rest);
+                                   first_weights_of(frame, b) + lane, weights_of_block + lane, rest);
             finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
         }
     }
@@ -313,13 +413,13 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
     const Block& block = pointers.blocks[b];
-    const Lanes<float>* const rows = pointers.rows + block.first_row;
+    const float* const weights_of_block = weights_of(pointers, b);
     const std::int32_t* const bones = frame.bones + block.first_bone;
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-        const Points<One> rest = load_rest(d, rows, spaces, lane);
+        const Points<One> rest = load_rest(d, pointers, spaces, b, lane);
         const std::int32_t* const of_vertex = bones + block.influences * lane;
         const bool plain = is_plain(*frame.palette, of_vertex, block.influences);
-        const float* const weights = weights_of(rows) + lane;
+        const float* const weights = weights_of_block + lane;
         const auto sum = blend_bones<Rigid>(d, *frame.palette, of_vertex, block.influences, plain, weights,
                                             weights + kLanes, rest);
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
@@ -377,12 +477,12 @@ void deform_mixed(const Frame& frame, std::size_t b) {
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
     const Block& block = pointers.blocks[b];
-    const Lanes<float>* const rows = pointers.rows + block.first_row;
+    const float* const weights_of_block = weights_of(pointers, b);
     const std::int32_t* bones = frame.bones + block.first_bone;
     const Palette palette = *frame.palette;
     alignas(64) float sums[kRowFloat4s<Rigid>][4 * kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
-        const float* const weights = weights_of(rows) + lane;
+        const float* const weights = weights_of_block + lane;
         float* const to = sums[0] + 4 * lane;
         if (is_plain(palette, bones, block.influences)) {
             blend_vertex_plainly<Rigid>(palette, bones, block.influences, weights, to);
@@ -397,7 +497,7 @@ void deform_mixed(const Frame& frame, std::size_t b) {
             Vec<Full>* const value = sum.value + 4 * q;
             hn::LoadInterleaved4(d, sums[q] + 4 * lane, value[0], value[1], value[2], value[3]);
         }
-        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
+        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, pointers, spaces, b, lane));
     }
 }
 

@@ -23,23 +23,20 @@ struct CorKernel : CentreRows {
     static constexpr std::size_t kVertexFloats = 3;
     static constexpr std::size_t kSignedFloat4s = 1;
 
-    /// centre  x, y and z, kLanes apart, in model space; if null, each vertex is its own centre
+    /// data  the centre's x, y and z, kLanes apart, in model space; if null, each vertex is its own centre
     template <class D>
-    static HWY_INLINE Points<D> finish(D d, const Sum<D, kNumbers>& sum, const Points<D>& p,
-                                       const float* centre, const float* bones_from_model) {
-        Points<D> c = p;
-        if (centre != nullptr) {
-            c = {hn::Load(d, centre), hn::Load(d, centre + kLanes), hn::Load(d, centre + 2 * kLanes)};
-            if (bones_from_model != nullptr) c = displaced(d, bones_from_model, c);
-        }
-        const auto moved = [&](std::size_t row) HWY_ATTR {
-            const Vec<D>* const m = sum.value + row;
-            return hn::MulAdd(m[0], c.x, hn::MulAdd(m[1], c.y, hn::MulAdd(m[2], c.z, m[3])));
-        };
-        const Points<D> from_centre{hn::Sub(p.x, c.x), hn::Sub(p.y, c.y), hn::Sub(p.z, c.z)};
-        const Points<D> displacement =
-            add_rotation<D>(d, {moved(4), moved(8), moved(12)}, sum.value, from_centre);
-        return add<D>(p, displacement);
+    static HWY_INLINE Points<D> centre(D d, const float* data, const float* bones_from_model,
+                                       const Points<D>& p) {
+        if (data == nullptr) return p;
+        const Points<D> c{hn::Load(d, data), hn::Load(d, data + kLanes), hn::Load(d, data + 2 * kLanes)};
+        return bones_from_model == nullptr ? c : displaced(d, bones_from_model, c);
+    }
+
+    template <class D>
+    static HWY_INLINE Points<D> finish(D d, const Motion<D>& motion, const Points<D>& centre,
+                                       const Points<D>& p) {
+        const Points<D> from_centre{hn::Sub(p.x, centre.x), hn::Sub(p.y, centre.y), hn::Sub(p.z, centre.z)};
+        return add<D>(p, add_rotation<D>(d, motion.displacement, motion.rotation, from_centre));
     }
 };
 

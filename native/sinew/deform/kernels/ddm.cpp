@@ -138,6 +138,7 @@ public:
 
 /// The parts of a block's moments, from the current lanes on.
 struct MomentRows {
+    const float* first_weight;
     const float* weight;
     const float* first;
     const float* second;
@@ -149,7 +150,8 @@ HWY_INLINE MomentRows rows_of(const BoneMoments& moments, std::size_t b, std::si
         const auto i = static_cast<std::size_t>(of);
         return moments.parts[i].data()[first_rows[i]].lane.data() + lane;
     };
-    return {part(MomentPart::weight), part(MomentPart::first), part(MomentPart::second)};
+    return {part(MomentPart::first_weight), part(MomentPart::weight), part(MomentPart::first),
+            part(MomentPart::second)};
 }
 
 /// Prefetches the moments of block `b`, if it exists. The hardware prefetcher does not, because the rows of the
@@ -162,8 +164,7 @@ HWY_INLINE void prefetch_moments(const Frame& frame, std::size_t b) {
     const auto fetch = [](const float* part, std::size_t begin, std::size_t end) {
         for (std::size_t row = begin; row < end; ++row) hwy::Prefetch(part + kLanes * row);
     };
-    fetch(rows.weight, 0, 3);
-    fetch(rows.weight, 4, 3 + bones);
+    fetch(rows.weight, 0, 2 + bones);
     fetch(rows.first, 3, 3 * bones);
     fetch(rows.second, 0, 6);
     fetch(rows.second, 12, 6 + 6 * bones);
@@ -175,30 +176,42 @@ HWY_INLINE Vec<D> load_row(D d, const float* part, std::size_t row) {
     return hn::Load(d, part + kLanes * row);
 }
 
+/// The weights of bone k, `lane` lanes after the current ones.
+template <class D>
+HWY_INLINE Vec<D> load_weight(D d, const MomentRows& rows, std::size_t k, std::size_t lane = 0) {
+    return hn::Load(d, (k == 0 ? rows.first_weight : rows.weight + kLanes * (2 + k)) + lane);
+}
+
 /// Three consecutive rows of a part.
 template <class D>
 HWY_INLINE Points<D> load_point(D d, const float* part, std::size_t row) {
     return {load_row(d, part, row), load_row(d, part, row + 1), load_row(d, part, row + 2)};
 }
 
-/// Adds to `sum` the image of the point `p` and its weight under a bone's `row`.
 template <class D>
-HWY_INLINE void add_moved(D d, const float* row, const Points<D>& p, Vec<D> weight, Points<D>& sum) {
-    const auto along = [d, &p, weight](const float* r, Vec<D> to) HWY_ATTR {
-        to = hn::MulAdd(hn::Set(d, r[3]), weight, to);
-        to = hn::MulAdd(hn::Set(d, r[0]), p.x, to);
-        to = hn::MulAdd(hn::Set(d, r[1]), p.y, to);
-        return hn::MulAdd(hn::Set(d, r[2]), p.z, to);
-    };
-    sum = {along(row + 4, sum.x), along(row + 8, sum.y), along(row + 12, sum.z)};
+HWY_INLINE Points<D> times(Vec<D> scale, const Points<D>& r) {
+    return {hn::Mul(scale, r.x), hn::Mul(scale, r.y), hn::Mul(scale, r.z)};
 }
 
-/// The blended quaternion, and the displacement of the centroid.
-template <class D>
-struct Motion {
-    Vec<D> rotation[4];
-    Points<D> displacement;
-};
+/// Adds to each of kVectors `sum` the image of the point `p` and its weight under a bone's `row`.
+template <std::size_t kVectors, class D>
+HWY_INLINE void add_moved(D d, const float* row, const Points<D>* p, const Vec<D>* weight, Points<D>* sum) {
+    const auto along = [&](const float* r, Vec<D> Points<D>::*axis) HWY_ATTR {
+        const Vec<D> x = hn::Set(d, r[0]);
+        const Vec<D> y = hn::Set(d, r[1]);
+        const Vec<D> z = hn::Set(d, r[2]);
+        const Vec<D> translation = hn::Set(d, r[3]);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            Vec<D> to = hn::MulAdd(translation, weight[v], sum[v].*axis);
+            to = hn::MulAdd(x, p[v].x, to);
+            to = hn::MulAdd(y, p[v].y, to);
+            sum[v].*axis = hn::MulAdd(z, p[v].z, to);
+        }
+    };
+    along(row + 4, &Points<D>::x);
+    along(row + 8, &Points<D>::y);
+    along(row + 12, &Points<D>::z);
+}
 
 /// Adds a quaternion in the hemisphere of the sum before it. Rounded as by dot().
 template <class D>
@@ -210,44 +223,62 @@ HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
     for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(by, hn::Set(d, q[i]), sum[i]);
 }
 
-/// Blends the bones by the moments.
+/// Blends the bones of kVectors neighbouring vectors by the moments: the quaternion, and the displacement of the
+/// centroid.
 ///
 /// kCount  the number of bones, or 0 for any number
-template <bool kFirst, bool kPlain, bool kResolved, std::size_t kCount, class D>
-HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const MomentRows& rows,
-                                   const Points<D>& centroid) {
+template <bool kFirst, bool kPlain, bool kResolved, std::size_t kCount, std::size_t kVectors, class D>
+HWY_INLINE void blend_moments(D d, const MomentBones& bones, const MomentRows& rows,
+                              const Points<D>* centroids, Motion<D>* motions) {
     alignas(64) float space[kDdmNumbers];
+    const std::size_t step = hn::Lanes(d);
     const Vec<D> zero = hn::Zero(d);
-    Motion<D> sum{{zero, zero, zero, zero}, {zero, zero, zero}};
+    Points<D> moved[kVectors];
+    for (std::size_t v = 0; v < kVectors; ++v) {
+        moved[v] = {zero, zero, zero};
+        for (Vec<D>& number : motions[v].rotation) number = zero;
+    }
     if (!kPlain) {
         const float* const first = bones.row(0, space);
-        add_moved<D>(d, first, centroid, hn::Set(d, 1.0f), sum.displacement);
-        if (kResolved) {
-            for (std::size_t i = 0; i < 4; ++i) sum.rotation[i] = hn::Set(d, first[i]);
-        } else {
-            add_signed<D>(d, first, load_row(d, rows.weight, 3), sum.rotation);
+        Vec<D> one[kVectors];
+        for (Vec<D>& weight : one) weight = hn::Set(d, 1.0f);
+        add_moved<kVectors>(d, first, centroids, one, moved);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            if (kResolved) {
+                for (std::size_t i = 0; i < 4; ++i) motions[v].rotation[i] = hn::Set(d, first[i]);
+            } else {
+                add_signed<D>(d, first, load_weight(d, rows, 0, v * step), motions[v].rotation);
+            }
         }
     }
     const std::size_t count = kCount > 0 ? kCount : bones.count;
     for (std::size_t k = kPlain ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
-        const Vec<D> weight = load_row(d, rows.weight, 3 + k);
-        Points<D> first;
-        if constexpr (kFirst) {
-            first = load_point(d, rows.first, 3 * k);
-        } else {
-            first = {hn::Mul(weight, centroid.x), hn::Mul(weight, centroid.y), hn::Mul(weight, centroid.z)};
+        Vec<D> weight[kVectors];
+        Points<D> first[kVectors];
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            weight[v] = load_weight(d, rows, k, v * step);
+            if constexpr (kFirst) {
+                first[v] = load_point(d, rows.first + v * step, 3 * k);
+            } else {
+                first[v] = times<D>(weight[v], centroids[v]);
+            }
         }
-        add_moved<D>(d, row, first, weight, sum.displacement);
+        add_moved<kVectors>(d, row, first, weight, moved);
         if (kResolved) {
             for (std::size_t i = 0; i < 4; ++i) {
-                sum.rotation[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.rotation[i]);
+                const Vec<D> number = hn::Set(d, row[i]);
+                for (std::size_t v = 0; v < kVectors; ++v) {
+                    motions[v].rotation[i] = hn::MulAdd(weight[v], number, motions[v].rotation[i]);
+                }
             }
         } else {
-            add_signed<D>(d, row, weight, sum.rotation);
+            for (std::size_t v = 0; v < kVectors; ++v) {
+                add_signed<D>(d, row, weight[v], motions[v].rotation);
+            }
         }
     }
-    return sum;
+    for (std::size_t v = 0; v < kVectors; ++v) motions[v].displacement = moved[v];
 }
 
 /// A 3x3 matrix, by rows.
@@ -314,8 +345,8 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
         Points<D> moved =
             kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
                    : Points<D>{zero, zero, zero};
-        add_moved<D>(d, row, centroid, one, moved);
-        const Vec<D> weight = load_row(d, rows.weight, 3 + k);
+        add_moved<1>(d, row, &centroid, &one, &moved);
+        const Vec<D> weight = load_weight(d, rows, k);
         const Points<D> by = add_scaled<D>(load_point(d, rows.first, 3 * k), hn::Neg(weight), centroid);
         sum.x = add_scaled<D>(sum.x, moved.x, by);
         sum.y = add_scaled<D>(sum.y, moved.y, by);
@@ -337,11 +368,6 @@ HWY_INLINE Points<D> in_space(D d, const Points<D>& r, const float* from_model) 
 template <class D>
 HWY_INLINE Vec<D> largest(const Points<D>& r) {
     return hn::Max(hn::Abs(r.x), hn::Max(hn::Abs(r.y), hn::Abs(r.z)));
-}
-
-template <class D>
-HWY_INLINE Points<D> times(Vec<D> scale, const Points<D>& r) {
-    return {hn::Mul(scale, r.x), hn::Mul(scale, r.y), hn::Mul(scale, r.z)};
 }
 
 template <class D>
@@ -515,7 +541,7 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
     // Lanes of mixed blocks are processed one by one.
     const std::int32_t* const bones =
         frame.bones + block.first_bone + (block.mixed ? block.influences * lane : 0);
-    const float* weights = weights_of(frame.rows + block.first_row) + lane;
+    const float* weights = weights_of(pointers_of(frame), b) + lane;
     for (std::size_t k = 0; k < block.influences; ++k) {
         const float* const of_bone = block.mixed ? weights + kLanes * k
                                      : k == 0    ? first_weights_of(frame, b) + lane
@@ -528,47 +554,40 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
     return total;
 }
 
-/// The blend by weights alone, for bones whose signs are resolved.
-template <std::size_t kCount, class D>
-HWY_INLINE Motion<D> blend_weights(D d, const MomentBones& bones, const MomentRows& rows,
-                                   const Points<D>& centroid) {
-    const Sum<D, kDdmNumbers> sum = blend_rows<kDdmNumbers, kCount, false>(d, bones.rows(), bones.count,
-                                                                           nullptr, rows.weight + kLanes * 4);
-    const auto moved = [&](std::size_t row) HWY_ATTR {
-        const Vec<D>* const m = sum.value + row;
-        return hn::MulAdd(m[0], centroid.x, hn::MulAdd(m[1], centroid.y, hn::MulAdd(m[2], centroid.z, m[3])));
-    };
-    return {{sum.value[0], sum.value[1], sum.value[2], sum.value[3]}, {moved(4), moved(8), moved(12)}};
-}
-
-template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0, class D>
+/// Deforms lanes [lane, lane + kVectors * N) of a block.
+template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0, std::size_t kVectors = 1,
+          class D>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                              const MomentBones& bones, std::size_t b, std::size_t lane) {
     const MomentRows rows = rows_of(*frame.moments, b, lane);
-    Points<D> centroid = load_point(d, rows.weight, 0);
-    Motion<D> motion;
+    const std::size_t step = hn::Lanes(d);
+    Points<D> centroids[kVectors];
+    Motion<D> motions[kVectors];
+    for (std::size_t v = 0; v < kVectors; ++v) centroids[v] = load_point(d, rows.weight + v * step, 0);
     if constexpr (kVariant == Variant::weights && kResolved) {
-        motion = blend_weights<kCount>(d, bones, rows, centroid);
+        blend_motions<kVectors, kCount, false>(d, bones.rows(), bones.count, nullptr,
+                                               rows.weight + 3 * kLanes, centroids, motions);
     } else {
-        motion =
-            blend_moments<kVariant != Variant::weights, kPlain, kResolved, kCount>(d, bones, rows, centroid);
+        blend_moments<kVariant != Variant::weights, kPlain, kResolved, kCount, kVectors>(d, bones, rows,
+                                                                                         centroids, motions);
     }
     if constexpr (kVariant == Variant::nearest) {
-        const Rows3<D> matrix = correlation<kPlain, kCount>(d, bones, rows, centroid, motion.displacement,
-                                                            spaces.bones_from_model);
-        to_nearest(d, matrix, is_point_at(d, rows.second, centroid), spaces.bones_from_model,
-                   motion.rotation);
+        const Rows3<D> matrix = correlation<kPlain, kCount>(d, bones, rows, centroids[0],
+                                                            motions[0].displacement, spaces.bones_from_model);
+        to_nearest(d, matrix, is_point_at(d, rows.second, centroids[0]), spaces.bones_from_model,
+                   motions[0].rotation);
     }
-    const Points<D> rest = load_rest(d, pointers.rows + pointers.blocks[b].first_row, spaces, lane);
-    if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
-    if (frame.palette->any_scale) {
-        motion.displacement = add_scales(d, frame, b, lane, rest, motion.displacement);
+    for (std::size_t v = 0; v < kVectors; ++v, lane += step) {
+        const Points<D> rest = load_rest(d, pointers, spaces, b, lane);
+        Points<D> centroid = centroids[v];
+        Points<D> displacement = motions[v].displacement;
+        if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
+        if (frame.palette->any_scale) displacement = add_scales(d, frame, b, lane, rest, displacement);
+        const Points<D> from_centroid{hn::Sub(rest.x, centroid.x), hn::Sub(rest.y, centroid.y),
+                                      hn::Sub(rest.z, centroid.z)};
+        map_and_store(d, pointers, spaces, b, lane,
+                      add<D>(rest, add_rotation<D>(d, displacement, motions[v].rotation, from_centroid)));
     }
-    const Points<D> from_centroid{hn::Sub(rest.x, centroid.x), hn::Sub(rest.y, centroid.y),
-                                  hn::Sub(rest.z, centroid.z)};
-    Points<D> points = add<D>(rest, add_rotation<D>(d, motion.displacement, motion.rotation, from_centroid));
-    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
-    store_points(d, pointers, b, lane, points);
 }
 
 /// Deforms blocks [begin, end) with the same bones.
@@ -577,13 +596,20 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
 template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0>
 void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t begin, std::size_t end) {
     const Full d;
+    // The matrices of variant 0 leave no registers for a second vector.
+    constexpr std::size_t kVectors = kResolved && kVariant != Variant::nearest ? kVectorsAtOnce : 1;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
     for (std::size_t b = begin; b < end; ++b) {
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         if (kVariant == Variant::nearest) prefetch_moments(frame, b + 1);
-        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            deform_lanes<kVariant, kPlain, kResolved, kCount>(d, frame, pointers, spaces, bones, b, lane);
+        for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
+            if (kVectors > 1 && lane + hn::Lanes(d) >= lanes) {
+                deform_lanes<kVariant, kPlain, kResolved, kCount>(d, frame, pointers, spaces, bones, b, lane);
+            } else {
+                deform_lanes<kVariant, kPlain, kResolved, kCount, kVectors>(d, frame, pointers, spaces, bones,
+                                                                            b, lane);
+            }
         }
     }
 }

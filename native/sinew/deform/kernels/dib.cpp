@@ -268,8 +268,7 @@ template <class D, class BonesOf>
 HWY_INLINE void deform_lanes_of_dib(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
                                     std::size_t lane, const BonesOf& bones, std::size_t count,
                                     const float* first_weight, const float* weights) {
-    const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
-    const Points<D> rest = load_rest(d, rows, spaces, lane);
+    const Points<D> rest = load_rest(d, pointers, spaces, b, lane);
     Points<D> points = blend_iteratively(d, bones, count, first_weight, weights, rest);
     if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
     store_points(d, pointers, b, lane, points);
@@ -281,7 +280,7 @@ void deform_dib_block(const Frame& frame, std::size_t b) {
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
     const Block& block = pointers.blocks[b];
-    const float* const weights = weights_of(pointers.rows + block.first_row);
+    const float* const weights = weights_of(pointers, b);
     const std::int32_t* const bones = frame.bones + block.first_bone;
     if (!block.mixed) {
         const std::size_t lanes = lanes_end(d, block);

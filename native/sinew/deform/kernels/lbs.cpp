@@ -101,12 +101,12 @@ template <std::size_t kCount, std::size_t kVectors, bool kPlain, class D, class 
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b,
                              std::size_t lane, std::size_t count, const float* first,
                              const OtherOf& other_of) {
-    const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
+    const float* const weights_of_block = weights_of(pointers, b) + lane;
     const std::size_t step = hn::Lanes(d);
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
     Vec<D> weight[kVectors];
-    for (std::size_t v = 0; v < kVectors; ++v) sum[v] = p[v] = load_points(d, rows, lane + v * step);
+    for (std::size_t v = 0; v < kVectors; ++v) sum[v] = p[v] = load_points(d, pointers, b, lane + v * step);
     if constexpr (kPlain) {
         for (std::size_t v = 0; v < kVectors; ++v) {
             weight[v] = hn::Load(d, first_weights_of(frame, b) + lane + v * step);
@@ -114,7 +114,7 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     }
     add_bone<kVectors, kPlain>(d, Columns{first}, weight, p, sum);
     for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
-        const float* const weights = rows[2 + k].lane.data() + lane;
+        const float* const weights = weights_of_block + kLanes * (k - 1);
         for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
         add_bone<kVectors, true>(d, other_of(k), weight, p, sum);
     }
@@ -179,17 +179,17 @@ using Four = hn::CappedTag<float, 4>;
 
 /// Deforms one vertex, with x, y and z in the lanes: the same operations in the same order.
 ///
-/// rows  of the block, from this vertex's lane on
-/// to    the vertex's point
+/// rest     the vertex's rest point, and
+/// weights  its weights: numbers kLanes apart
+/// to       the vertex's point
 template <bool kPlain>
 HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
-                              const float* rows, Vec3<float>* to) {
+                              const float* rest, const float* weights, Vec3<float>* to) {
     const Four four;
     using V4 = Vec<Four>;
-    const V4 x = hn::Set(four, rows[0]);
-    const V4 y = hn::Set(four, rows[kLanes]);
-    const V4 z = hn::Set(four, rows[2 * kLanes]);
-    const float* const weights = rows + 3 * kLanes;
+    const V4 x = hn::Set(four, rest[0]);
+    const V4 y = hn::Set(four, rest[kLanes]);
+    const V4 z = hn::Set(four, rest[2 * kLanes]);
     const auto moved_by = [&](const V4* columns) HWY_ATTR {
         return hn::MulAdd(columns[0], x, hn::MulAdd(columns[1], y, hn::MulAdd(columns[2], z, columns[3])));
     };
@@ -216,21 +216,21 @@ HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std
 
 /// Not inlined, so that its registers do not burden the usual case.
 inline HWY_NOINLINE void deform_plain_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
-                                             const float* rows, Vec3<float>* to) {
-    deform_vertex<true>(frame, bones, count, rows, to);
+                                             const float* rest, const float* weights, Vec3<float>* to) {
+    deform_vertex<true>(frame, bones, count, rest, weights, to);
 }
 
 inline void deform_mixed(const Frame& frame, std::size_t b) {
     const Block& block = frame.mesh->blocks[b];
-    const Lanes<float>* const rows = &frame.rows[block.first_row];
+    const float* const rest = frame.rest_points[kPointRows * b].lane.data();
+    const float* const weights = frame.mesh->weights[block.first_weight].lane.data();
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
-        const float* const of_vertex = rows->lane.data() + lane;
         Vec3<float>* const to = &frame.points[frame.mesh->vertices[b].lane[lane]];
         if (is_plain(*frame.palette, bones, block.influences)) {
-            deform_plain_vertex(frame, bones, block.influences, of_vertex, to);
+            deform_plain_vertex(frame, bones, block.influences, rest + lane, weights + lane, to);
         } else {
-            deform_vertex<false>(frame, bones, block.influences, of_vertex, to);
+            deform_vertex<false>(frame, bones, block.influences, rest + lane, weights + lane, to);
         }
     }
 }
@@ -241,19 +241,19 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
     const One d;
     const MeshPointers pointers = pointers_of(frame);
     const Block& block = pointers.blocks[b];
-    const Lanes<float>* const rows = pointers.rows + block.first_row;
+    const float* const weights = weights_of(pointers, b);
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
         const bool plain = is_plain(*frame.palette, bones, block.influences);
-        const Points<One> p = load_points(d, rows, lane);
+        const Points<One> p = load_points(d, pointers, b, lane);
         Points<One> sum = p;
         const Columns first{columns_of_bone(frame, bones[0])};
-        const Vec<One> weight_of_first = hn::Load(d, rows[3].lane.data() + lane);
+        const Vec<One> weight_of_first = hn::Load(d, weights + lane);
         plain ? add_bone<1, true>(d, first, &weight_of_first, &p, &sum)
               : add_bone<1, false>(d, first, &weight_of_first, &p, &sum);
         for (std::size_t k = 1; k < block.influences; ++k) {
             const float* const columns = columns_of_bone(frame, bones[k]);
-            const Vec<One> weight = hn::Load(d, rows[3 + k].lane.data() + lane);
+            const Vec<One> weight = hn::Load(d, weights + kLanes * k + lane);
             plain ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
                   : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
         }

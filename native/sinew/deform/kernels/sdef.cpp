@@ -109,11 +109,10 @@ template <bool kSlerp, class D>
 HWY_INLINE void deform_and_store(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                                  const Pair& pair, std::size_t b, std::size_t lane,
                                  const float* first_weights, const float* second_weights) {
-    const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
     const Vec<D> weights[2] = {hn::Load(d, first_weights), hn::Load(d, second_weights)};
-    Points<D> points = deformed_by<kSlerp>(d, *frame.palette, pair, weights, load_rest(d, rows, spaces, lane),
-                                           vertex_rows_of<Sdef::info.vertex_floats>(pointers, b, lane),
-                                           spaces.bones_from_model);
+    Points<D> points = deformed_by<kSlerp>(
+        d, *frame.palette, pair, weights, load_rest(d, pointers, spaces, b, lane),
+        vertex_rows_of<Sdef::info.vertex_floats>(pointers, b, lane), spaces.bones_from_model);
     if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
     store_points(d, pointers, b, lane, points);
 }
@@ -126,7 +125,7 @@ void deform_pairs(const Frame& frame, std::size_t begin, std::size_t end) {
     const Spaces spaces = spaces_of(frame);
     const Pair pair(frame, frame.bones + pointers.blocks[begin].first_bone);
     for (std::size_t b = begin; b < end; ++b) {
-        const float* const weights = weights_of(pointers.rows + pointers.blocks[b].first_row);
+        const float* const weights = weights_of(pointers, b);
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             deform_and_store<kSlerp>(d, frame, pointers, spaces, pair, b, lane,
@@ -144,7 +143,7 @@ void deform_pairs_among(const Frame& frame, std::size_t b) {
     const Block& block = pointers.blocks[b];
     if (block.influences < 2) return;
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-        const float* const weights = weights_of(pointers.rows + block.first_row) + lane;
+        const float* const weights = weights_of(pointers, b) + lane;
         const bool has_two = weights[kLanes] > 0.0f && (block.influences == 2 || weights[2 * kLanes] == 0.0f);
         if (!has_two) continue;
         const Pair pair(frame, frame.bones + block.first_bone + block.influences * lane);
