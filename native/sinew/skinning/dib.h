@@ -18,7 +18,6 @@ namespace sinew {
 /// result with it.
 /// Where a bone passes 180 degrees from the blend, the shorter way to it changes and the result jumps. If the
 /// iteration has not converged after kSteps, the result is the last iterate, which is finite.
-/// iteration has not converged after kSteps, the result is the last iterate: finite, and close to the limit.
 struct IterativeDq {
     static constexpr MethodInfo info{
         7,

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dual quaternion iterative blending on lanes. A row is the real part and the dual part, each (w, x, y, z).
+// Dual quaternion iterative blending on lanes. Rows are those of CentreRows.
+//
+// All motions are taken about the vertex: as a rotation, and the point to which they move the vertex. A motion
+// relative to the blend is then a quotient of rotations and a difference of points, and only the error of the
+// point counts. Logarithms are those of motions that follow the blend; those of motions before it, as in
+// skinning/dib.h, give the same blend.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/skinning/dib.h"
 
+#include "sinew/deform/centre_rows.h"
 #include "sinew/deform/rigid_bones.h"
 #include "sinew/deform/targets.h"
 
@@ -11,7 +17,7 @@
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
-#include "sinew/deform/dual-inl.h"
+#include "sinew/deform/centre-inl.h"
 #include "sinew/deform/exponential-inl.h"
 #include "sinew/deform/rigid-inl.h"
 
@@ -19,40 +25,18 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// How many radians a blend may be off, and which share of lengths.
+/// By which share of lengths a point may be off.
 inline constexpr float kSettled = 2e-7f;
 
-/// Unit dual quaternions: a real and a dual part, each (w, x, y, z).
+/// Images of further bones are computed again for each step.
+inline constexpr std::size_t kMaxStored = 8;
+
+/// A rigid motion about a vertex: its rotation, of unit length, and the vertex's image.
 template <class D>
-struct Motion {
-    Vec<D> real[4];
-    Vec<D> dual[4];
+struct Image {
+    Vec<D> rotation[4];
+    Points<D> point;
 };
-
-/// a b
-template <class D>
-HWY_INLINE void multiply(const Vec<D>* a, const Vec<D>* b, Vec<D>* product) {
-    product[0] =
-        hn::NegMulAdd(a[3], b[3], hn::NegMulAdd(a[2], b[2], hn::NegMulAdd(a[1], b[1], hn::Mul(a[0], b[0]))));
-    product[1] =
-        hn::NegMulAdd(a[3], b[2], hn::MulAdd(a[2], b[3], hn::MulAdd(a[1], b[0], hn::Mul(a[0], b[1]))));
-    product[2] =
-        hn::NegMulAdd(a[1], b[3], hn::MulAdd(a[3], b[1], hn::MulAdd(a[2], b[0], hn::Mul(a[0], b[2]))));
-    product[3] =
-        hn::NegMulAdd(a[2], b[1], hn::MulAdd(a[1], b[2], hn::MulAdd(a[3], b[0], hn::Mul(a[0], b[3]))));
-}
-
-/// a* b
-template <class D>
-HWY_INLINE void multiply_conjugate(const Vec<D>* a, const Vec<D>* b, Vec<D>* product) {
-    product[0] = hn::MulAdd(a[3], b[3], hn::MulAdd(a[2], b[2], hn::MulAdd(a[1], b[1], hn::Mul(a[0], b[0]))));
-    product[1] =
-        hn::MulAdd(a[3], b[2], hn::NegMulAdd(a[2], b[3], hn::NegMulAdd(a[1], b[0], hn::Mul(a[0], b[1]))));
-    product[2] =
-        hn::MulAdd(a[1], b[3], hn::NegMulAdd(a[3], b[1], hn::NegMulAdd(a[2], b[0], hn::Mul(a[0], b[2]))));
-    product[3] =
-        hn::MulAdd(a[2], b[1], hn::NegMulAdd(a[1], b[2], hn::NegMulAdd(a[3], b[0], hn::Mul(a[0], b[3]))));
-}
 
 template <class D>
 HWY_INLINE Points<D> scaled_by(Vec<D> factor, const Points<D>& p) {
@@ -60,22 +44,46 @@ HWY_INLINE Points<D> scaled_by(Vec<D> factor, const Points<D>& p) {
 }
 
 template <class D>
-HWY_INLINE Vec<D> squared(const Points<D>& p) {
-    return hn::MulAdd(p.x, p.x, hn::MulAdd(p.y, p.y, hn::Mul(p.z, p.z)));
+HWY_INLINE Points<D> subtract(const Points<D>& a, const Points<D>& b) {
+    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 
-/// Logarithms: their angular and linear parts.
 template <class D>
-struct Twists {
-    Points<D> angular;
-    Points<D> linear;
-};
+HWY_INLINE Vec<D> dot(const Points<D>& a, const Points<D>& b) {
+    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
+}
 
-/// The logarithm of `m`, along the shorter way, as in transform/twist.h.
+/// The product of quaternions.
 template <class D>
-HWY_INLINE Twists<D> logarithm(D d, const Motion<D>& m) {
-    // Polynomials in u = 1 - w of the quaternion with w >= 0, both to 4e-8: angle / sin(angle / 2), and (1 -
-    // (angle / 2) cot(angle / 2)) / angle^2.
+HWY_INLINE void multiply(const Vec<D>* a, const Vec<D>* b, Vec<D>* product) {
+    const Points<D> u{a[1], a[2], a[3]};
+    const Points<D> v{b[1], b[2], b[3]};
+    const Points<D> vector = add_cross<D>(add_scaled<D>(scaled_by<D>(a[0], v), b[0], u), u, v);
+    product[0] = hn::MulSub(a[0], b[0], dot<D>(u, v));
+    product[1] = vector.x;
+    product[2] = vector.y;
+    product[3] = vector.z;
+}
+
+/// a b*
+template <class D>
+HWY_INLINE void multiply_by_conjugate(const Vec<D>* a, const Vec<D>* b, Vec<D>* product) {
+    const Points<D> u{a[1], a[2], a[3]};
+    const Points<D> v{b[1], b[2], b[3]};
+    const Points<D> vector = add_cross<D>(add_scaled<D>(scaled_by<D>(b[0], u), hn::Neg(a[0]), v), v, u);
+    product[0] = hn::MulAdd(a[0], b[0], dot<D>(u, v));
+    product[1] = vector.x;
+    product[2] = vector.y;
+    product[3] = vector.z;
+}
+
+/// The angular part of the logarithm of the rotation by `q`, along the shorter way, as in transform/twist.h.
+///
+/// These functions return points, not structures of them, which GCC would copy in parts of vectors. Such parts can
+/// not be loaded as a whole vector at once.
+template <class D>
+HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q) {
+    // angle / sin(angle / 2) as a polynomial in 1 - w of the quaternion with w >= 0, to 4e-8.
     static constexpr float kAngle[] = {2.0f,
                                        0.6666707396507263f,
                                        0.26653313636779785f,
@@ -86,47 +94,44 @@ HWY_INLINE Twists<D> logarithm(D d, const Motion<D>& m) {
                                        0.10195151716470718f,
                                        -0.0651833787560463f,
                                        0.022325647994875908f};
+    const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
+    return scaled_by<D>(hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]), {q[1], q[2], q[3]});
+}
+
+/// The linear part, for the motion that rotates by `q`, then adds `translation`.
+template <class D>
+HWY_INLINE Points<D> linear_part(D d, const Vec<D>* q, const Points<D>& angular,
+                                 const Points<D>& translation) {
+    // (1 - (angle / 2) cot(angle / 2)) / angle^2, in the same way.
     static constexpr float kThird[] = {0.083333320915699f,     0.011112410575151443f,   0.003941489849239588f,
                                        0.001828863169066608f,  -5.928325481363572e-05f, 0.001786231528967619f,
                                        -0.001323370961472392f, 0.0007015004521235824f};
-    const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(m.real[0]));
-    const Vec<D> factor = hn::CopySignToAbs(polynomial(d, u, kAngle), m.real[0]);
-    const Points<D> v{m.real[1], m.real[2], m.real[3]};
-    const Points<D> angular = scaled_by<D>(factor, v);
-    // The translation is 2 dual real*.
-    const Points<D> dual{m.dual[1], m.dual[2], m.dual[3]};
-    const Points<D> across_dual = cross<D>(v, dual);
-    const auto along = [&](Vec<D> of_dual, Vec<D> of_v, Vec<D> of_cross) HWY_ATTR {
-        const Vec<D> half = hn::NegMulAdd(m.dual[0], of_v, hn::MulAdd(m.real[0], of_dual, of_cross));
-        return hn::Add(half, half);
-    };
-    const Points<D> translation{along(dual.x, v.x, across_dual.x), along(dual.y, v.y, across_dual.y),
-                                along(dual.z, v.z, across_dual.z)};
+    const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
     const Points<D> across = cross<D>(angular, translation);
-    const Points<D> linear = add_scaled<D>(add_scaled<D>(translation, hn::Set(d, -0.5f), across),
-                                           polynomial(d, u, kThird), cross<D>(angular, across));
-    return {angular, linear};
+    return add_scaled<D>(add_scaled<D>(translation, hn::Set(d, -0.5f), across), polynomial(d, u, kThird),
+                         cross<D>(angular, across));
 }
 
-/// The exponential of `twist`, whose angle is at most 180 degrees, as in transform/twist.h.
+/// Moves `image` by an exponential whose angle is at most 180 degrees, as in transform/twist.h. Its origin is the
+/// point that the image has now.
 template <class D>
-HWY_INLINE Motion<D> exponential(D d, const Twists<D>& twist) {
-    const ExponentialFactors<D> by(d, hn::Mul(hn::Set(d, 0.25f), squared<D>(twist.angular)));
-    const Points<D> axis = scaled_by<D>(hn::Mul(hn::Set(d, 0.5f), by.sinc), twist.angular);
-    const Points<D> across = cross<D>(twist.angular, twist.linear);
+HWY_INLINE void move_by(D d, const Points<D>& angular, const Points<D>& linear, hn::Mask<D> active,
+                        Image<D>& image) {
+    const ExponentialFactors<D> by(d, hn::Mul(hn::Set(d, 0.25f), dot<D>(angular, angular)));
+    const Points<D> axis = scaled_by<D>(hn::Mul(hn::Set(d, 0.5f), by.sinc), angular);
+    const Vec<D> rotation[4] = {by.cosine, axis.x, axis.y, axis.z};
+    Vec<D> rotated[4];
+    multiply<D>(rotation, image.rotation, rotated);
+    for (std::size_t i = 0; i < 4; ++i) {
+        image.rotation[i] = hn::IfThenElse(active, rotated[i], image.rotation[i]);
+    }
+    const Points<D> across = cross<D>(angular, linear);
     const Points<D> first =
-        add_scaled<D>(twist.linear, hn::Mul(hn::Set(d, 0.5f), hn::Mul(by.sinc, by.sinc)), across);
-    const Points<D> translation = add_scaled<D>(first, by.third, cross<D>(twist.angular, across));
-    Motion<D> m;
-    m.real[0] = by.cosine;
-    m.real[1] = axis.x;
-    m.real[2] = axis.y;
-    m.real[3] = axis.z;
-    const Vec<D> half = hn::Set(d, 0.5f);
-    const Vec<D> t[4] = {hn::Zero(d), hn::Mul(half, translation.x), hn::Mul(half, translation.y),
-                         hn::Mul(half, translation.z)};
-    multiply<D>(t, m.real, m.dual);
-    return m;
+        add_scaled<D>(linear, hn::Mul(hn::Set(d, 0.5f), hn::Mul(by.sinc, by.sinc)), across);
+    const Points<D> translation = add_scaled<D>(first, by.third, cross<D>(angular, across));
+    image.point.x = hn::Add(image.point.x, hn::IfThenElseZero(active, translation.x));
+    image.point.y = hn::Add(image.point.y, hn::IfThenElseZero(active, translation.y));
+    image.point.z = hn::Add(image.point.z, hn::IfThenElseZero(active, translation.z));
 }
 
 /// Bones that all lanes have in common.
@@ -135,16 +140,12 @@ struct SharedBones {
     const Palette& palette;
     const std::int32_t* bones;
 
-    HWY_INLINE Motion<D> at(D d, std::size_t k, const Points<D>& rest) const {
-        const float* const row = row_of(palette, bones[k]);
-        Motion<D> m;
-        for (std::size_t i = 0; i < 4; ++i) m.real[i] = hn::Set(d, row[i]);
-        for (std::size_t i = 0; i < 4; ++i) m.dual[i] = hn::Set(d, row[4 + i]);
-        Sum<D> scale;
-        for (std::size_t i = 4; i < kRow; ++i) scale.value[i] = m.dual[i - 4];
-        DqKernel::add_scale(d, palette, bones[k], hn::Set(d, 1.0f), hn::Set(d, 1.0f), rest, scale);
-        for (std::size_t i = 0; i < 4; ++i) m.dual[i] = scale.value[4 + i];
-        return m;
+    HWY_INLINE void find(D d, std::size_t k, const Points<D>& rest, Image<D>& image) const {
+        const float* const row = row_of<CentreRows::kNumbers>(palette, bones[k]);
+        for (std::size_t i = 0; i < 4; ++i) image.rotation[i] = hn::Set(d, row[i]);
+        image.point = displaced(d, row + 4, rest);
+        Points<D> by;
+        if (scaled(d, palette, bones[k], rest, by)) image.point = add<D>(image.point, rotated_by(d, row, by));
     }
 };
 
@@ -157,38 +158,100 @@ struct OwnBones {
     const std::int32_t* bones;
     std::size_t influences;
 
-    HWY_INLINE Motion<D> at(D d, std::size_t k, const Points<D>&) const {
-        alignas(64) float numbers[kRow][kLanes];
+    HWY_INLINE void find(D d, std::size_t k, const Points<D>& rest, Image<D>& image) const {
+        constexpr std::size_t kFloat4s = kRowFloat4s<CentreRows>;
+        alignas(64) float numbers[kFloat4s][4 * kLanes];
         for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-            const float* const row = row_of(palette, bones[influences * lane + k]);
-            for (std::size_t i = 0; i < kRow; ++i) numbers[i][lane] = row[i];
+            const float* const row = row_of<CentreRows::kNumbers>(palette, bones[influences * lane + k]);
+            for (std::size_t i = 0; i < kFloat4s; ++i) {
+                std::memcpy(numbers[i] + 4 * lane, row + 4 * i, sizeof(Float4));
+            }
         }
-        Motion<D> m;
-        for (std::size_t i = 0; i < 4; ++i) m.real[i] = hn::Load(d, numbers[i]);
-        for (std::size_t i = 0; i < 4; ++i) m.dual[i] = hn::Load(d, numbers[4 + i]);
-        return m;
+        load_float4s(d, numbers[0], image.rotation);
+        const auto along = [&](const float* from) HWY_ATTR {
+            Vec<D> r[4];
+            load_float4s(d, from, r);
+            return hn::MulAdd(r[0], rest.x, hn::MulAdd(r[1], rest.y, hn::MulAdd(r[2], rest.z, r[3])));
+        };
+        image.point = add<D>(rest, {along(numbers[1]), along(numbers[2]), along(numbers[3])});
+    }
+
+    static HWY_INLINE void load_float4s(D d, const float* from, Vec<D>* to) {
+        hn::LoadInterleaved4(d, from, to[0], to[1], to[2], to[3]);
     }
 };
 
-/// Whether the corrections after this one could sum to more than kSettled: each leaves at most the share (angle /
-/// 180 degrees)^2 of the one before, for the largest angle.
+/// What the bones of a vector do to its vertices.
+template <class D, class BonesOf>
+class Images {
+public:
+    HWY_INLINE Images(D d, const BonesOf& bones, std::size_t count, const Points<D>& rest)
+        : bones_(bones), rest_(rest) {
+        for (std::size_t k = 0; k < std::min(count, kMaxStored); ++k) bones.find(d, k, rest, stored_[k]);
+    }
+
+    /// space  for an image that is not stored
+    HWY_INLINE const Image<D>& at(D d, std::size_t k, Image<D>& space) const {
+        if (HWY_LIKELY(k < kMaxStored)) return stored_[k];
+        bones_.find(d, k, rest_, space);
+        return space;
+    }
+
+private:
+    const BonesOf& bones_;
+    const Points<D>& rest_;
+    Image<D> stored_[kMaxStored];
+};
+
+/// The blend of dual quaternions, which take the vertex as their origin.
+template <class D, class BonesOf, class WeightOf>
+HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, std::size_t count,
+                                       const WeightOf& weight_of, const Points<D>& rest, Image<D>& blend) {
+    const Vec<D> zero = hn::Zero(d);
+    Vec<D> real[4] = {zero, zero, zero, zero};
+    // Twice the dual part, (0, translation) times the real part.
+    Vec<D> scalar = zero;
+    Points<D> vector{zero, zero, zero};
+    Image<D> space;
+    for (std::size_t k = 0; k < count; ++k) {
+        const Image<D>& m = images.at(d, k, space);
+        const Vec<D>* const q = m.rotation;
+        const Vec<D> along = hn::Add(hn::Add(hn::Mul(q[0], real[0]), hn::Mul(q[2], real[2])),
+                                     hn::Add(hn::Mul(q[1], real[1]), hn::Mul(q[3], real[3])));
+        const Vec<D> weight = weight_of(k);
+        const Vec<D> by = hn::IfThenElse(hn::Lt(along, zero), hn::Neg(weight), weight);
+        for (std::size_t i = 0; i < 4; ++i) real[i] = hn::MulAdd(by, q[i], real[i]);
+        const Points<D> translation = scaled_by<D>(by, subtract<D>(m.point, rest));
+        const Points<D> axis{q[1], q[2], q[3]};
+        scalar = hn::Sub(scalar, dot<D>(translation, axis));
+        vector = add_cross<D>(add_scaled<D>(vector, q[0], translation), translation, axis);
+    }
+    const Vec<D> squared =
+        hn::MulAdd(real[0], real[0],
+                   hn::MulAdd(real[1], real[1], hn::MulAdd(real[2], real[2], hn::Mul(real[3], real[3]))));
+    const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared));
+    for (std::size_t i = 0; i < 4; ++i) blend.rotation[i] = hn::Mul(scale, real[i]);
+    const Points<D> axis{blend.rotation[1], blend.rotation[2], blend.rotation[3]};
+    const Points<D> translation = add_cross<D>(
+        add_scaled<D>(scaled_by<D>(blend.rotation[0], vector), hn::Neg(scalar), axis), axis, vector);
+    blend.point = add_scaled<D>(rest, scale, translation);
+}
+
+/// Whether the corrections after this one could move the point by more than kSettled: each leaves at most the
+/// share (angle / 180 degrees)^2 of the one before, for the largest angle, and what the error of the rotation
+/// adds. In 300,000 random blends up to 2.5 radians apart, the error was at most 0.77 of this bound.
 ///
 /// widest, longest  squares of the largest angle and of the longest linear part
 template <class D>
-HWY_INLINE auto has_more_to_do(D d, const Twists<D>& correction, Vec<D> widest, Vec<D> longest,
-                               const Motion<D>& blend) {
+HWY_INLINE hn::Mask<D> has_more_to_do(D d, const Points<D>& angular, const Points<D>& linear, Vec<D> widest,
+                                      Vec<D> longest, const Points<D>& point) {
     const Vec<D> share = hn::Min(hn::Mul(hn::Set(d, 0.101321184f), widest), hn::Set(d, 0.99f));
     const Vec<D> settled = hn::Mul(hn::Set(d, kSettled), hn::Sub(hn::Set(d, 1.0f), share));
-    const Vec<D> angle = hn::Sqrt(squared<D>(correction.angular));
     const Vec<D> length = hn::Sqrt(longest);
-    const Vec<D> far = hn::Sqrt(hn::MulAdd(
-        blend.dual[0], blend.dual[0],
-        hn::MulAdd(blend.dual[1], blend.dual[1],
-                   hn::MulAdd(blend.dual[2], blend.dual[2], hn::Mul(blend.dual[3], blend.dual[3])))));
-    const Vec<D> by_angle = hn::Mul(angle, hn::Mul(hn::Set(d, 0.2f), hn::Mul(hn::Sqrt(widest), length)));
-    const Vec<D> linear = hn::MulAdd(share, hn::Sqrt(squared<D>(correction.linear)), by_angle);
-    return hn::Or(hn::Gt(hn::Mul(angle, share), settled),
-                  hn::Gt(linear, hn::Mul(settled, hn::Add(length, far))));
+    const Vec<D> angle = hn::Sqrt(hn::Mul(widest, dot<D>(angular, angular)));
+    const Vec<D> more = hn::MulAdd(share, hn::Sqrt(dot<D>(linear, linear)),
+                                   hn::Mul(hn::Set(d, 0.2f), hn::Mul(angle, length)));
+    return hn::Gt(more, hn::Mul(settled, hn::Add(length, hn::Sqrt(dot<D>(point, point)))));
 }
 
 /// Blends the lanes of one vector. Each lane gets as many corrections as it needs, so its result does not depend
@@ -202,66 +265,34 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
     const auto weight_of = [&](std::size_t k) HWY_ATTR {
         return hn::Load(d, k == 0 ? first_weight : weights + kLanes * (k - 1));
     };
-    Motion<D> blend;
-    for (std::size_t i = 0; i < 4; ++i) blend.real[i] = blend.dual[i] = hn::Zero(d);
-    for (std::size_t k = 0; k < count; ++k) {
-        const Motion<D> m = bones.at(d, k, rest);
-        const Vec<D> dot =
-            hn::Add(hn::Add(hn::Mul(m.real[0], blend.real[0]), hn::Mul(m.real[2], blend.real[2])),
-                    hn::Add(hn::Mul(m.real[1], blend.real[1]), hn::Mul(m.real[3], blend.real[3])));
-        const Vec<D> weight = weight_of(k);
-        const Vec<D> by = hn::IfThenElse(hn::Lt(dot, hn::Zero(d)), hn::Neg(weight), weight);
-        for (std::size_t i = 0; i < 4; ++i) blend.real[i] = hn::MulAdd(by, m.real[i], blend.real[i]);
-        for (std::size_t i = 0; i < 4; ++i) blend.dual[i] = hn::MulAdd(by, m.dual[i], blend.dual[i]);
-    }
-    // The component of the dual part along the real part may stay: neither logarithms nor points depend on it.
-    const Vec<D> norm = hn::Sqrt(hn::MulAdd(
-        blend.real[0], blend.real[0],
-        hn::MulAdd(blend.real[1], blend.real[1],
-                   hn::MulAdd(blend.real[2], blend.real[2], hn::Mul(blend.real[3], blend.real[3])))));
-    const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), norm);
-    for (std::size_t i = 0; i < 4; ++i) {
-        blend.real[i] = hn::Mul(scale, blend.real[i]);
-        blend.dual[i] = hn::Mul(scale, blend.dual[i]);
-    }
-    auto active = hn::Ge(norm, hn::Zero(d));
+    const Images<D, BonesOf> images(d, bones, count, rest);
+    Image<D> blend;
+    blend_dual_quaternions(d, images, count, weight_of, rest, blend);
+    hn::Mask<D> active = hn::Eq(rest.x, rest.x);
+    Image<D> space;
     for (int step = 0; step < IterativeDq::kSteps && !hn::AllFalse(d, active); ++step) {
         const Vec<D> zero = hn::Zero(d);
-        Twists<D> correction{{zero, zero, zero}, {zero, zero, zero}};
+        Points<D> angular{zero, zero, zero};
+        Points<D> linear{zero, zero, zero};
         Vec<D> widest = zero;
         Vec<D> longest = zero;
         for (std::size_t k = 0; k < count; ++k) {
-            const Motion<D> m = bones.at(d, k, rest);
-            Motion<D> difference;
-            Vec<D> other[4];
-            multiply_conjugate<D>(blend.real, m.real, difference.real);
-            multiply_conjugate<D>(blend.real, m.dual, difference.dual);
-            multiply_conjugate<D>(blend.dual, m.real, other);
-            for (std::size_t i = 0; i < 4; ++i) difference.dual[i] = hn::Add(difference.dual[i], other[i]);
-            const Twists<D> twist = logarithm(d, difference);
+            const Image<D>& image = images.at(d, k, space);
+            Vec<D> rotation[4];
+            multiply_by_conjugate<D>(image.rotation, blend.rotation, rotation);
+            const Points<D> own_angular = angular_part(d, rotation);
+            const Points<D> own_linear =
+                linear_part(d, rotation, own_angular, subtract<D>(image.point, blend.point));
             const Vec<D> weight = weight_of(k);
-            correction.angular = add_scaled<D>(correction.angular, weight, twist.angular);
-            correction.linear = add_scaled<D>(correction.linear, weight, twist.linear);
-            widest = hn::Max(widest, squared<D>(twist.angular));
-            longest = hn::Max(longest, squared<D>(twist.linear));
+            angular = add_scaled<D>(angular, weight, own_angular);
+            linear = add_scaled<D>(linear, weight, own_linear);
+            widest = hn::Max(widest, dot<D>(own_angular, own_angular));
+            longest = hn::Max(longest, dot<D>(own_linear, own_linear));
         }
-        const Motion<D> by = exponential(d, correction);
-        Motion<D> next;
-        Vec<D> other[4];
-        multiply<D>(blend.real, by.real, next.real);
-        multiply<D>(blend.real, by.dual, next.dual);
-        multiply<D>(blend.dual, by.real, other);
-        for (std::size_t i = 0; i < 4; ++i) {
-            next.dual[i] = hn::Add(next.dual[i], other[i]);
-            blend.real[i] = hn::IfThenElse(active, next.real[i], blend.real[i]);
-            blend.dual[i] = hn::IfThenElse(active, next.dual[i], blend.dual[i]);
-        }
-        active = hn::And(active, has_more_to_do(d, correction, widest, longest, blend));
+        move_by(d, angular, linear, active, blend);
+        active = hn::And(active, has_more_to_do(d, angular, linear, widest, longest, blend.point));
     }
-    Sum<D> sum;
-    for (std::size_t i = 0; i < 4; ++i) sum.value[i] = blend.real[i];
-    for (std::size_t i = 0; i < 4; ++i) sum.value[4 + i] = blend.dual[i];
-    return DqKernel::finish(d, sum, rest);
+    return blend.point;
 }
 
 template <class D, class BonesOf>
@@ -313,7 +344,7 @@ void deform_dib(const Frame& frame, std::size_t begin, std::size_t end) {
 
 void prepare_dib(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
                  Palette& palette) {
-    prepare_rigid<DqKernel>(used, posed_from_rest, palette);
+    prepare_rigid<CentreRows>(used, posed_from_rest, palette);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -325,15 +356,11 @@ HWY_AFTER_NAMESPACE();
 namespace sinew {
 namespace {
 
-constexpr Float4 kRestRow[] = {{{1, 0, 0, 0}}, {{0, 0, 0, 0}}};
-
 void write_bone(const IterativeDq::Bone<double>& bone, Float4* row, Float4* scale) {
-    row[0] = float4(bone.rigid.real);
-    row[1] = float4(bone.rigid.dual);
-    write_displacement(bone.scale, scale);
+    write_centre_bone({to_quat_vec(bone.rigid), bone.scale, bone.has_scale}, row, scale);
 }
 
-constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<IterativeDq, write_bone>,
+constexpr Kernel kKernel{kCentreRestRow, true, 0, prepare_rigid_method<IterativeDq, write_bone>,
                          SINEW_TARGETS(deform_dib, prepare_dib)};
 
 }  // namespace
