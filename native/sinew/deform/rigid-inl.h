@@ -152,26 +152,49 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
     return true;
 }
 
-/// Blends lanes [lane, lane + N) of a block with resolved signs. With a fixed kCount the loop is unrolled.
+/// Blends numbers [begin, begin + kSize) of a set's rows for kVectors neighbouring vectors, with resolved signs. With
+/// a fixed kCount the loop is unrolled.
 ///
 /// first_weight  of the first influence, only read if plain
 /// weights       of the second influence and those after it
+/// sums          [kVectors][kSize]
+template <std::size_t kNumbers, std::size_t kCount, bool kPlain, std::size_t kSize, std::size_t kVectors,
+          class D>
+HWY_INLINE void blend_numbers(D d, const float* rows, std::size_t begin, std::size_t count,
+                              const float* first_weight, const float* weights, Vec<D>* sums) {
+    const std::size_t step = hn::Lanes(d);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+        for (std::size_t i = 0; i < kSize; ++i) sums[kSize * v + i] = hn::Set(d, rows[begin + i]);
+        if constexpr (kPlain) {
+            const Vec<D> weight = hn::Load(d, first_weight + v * step);
+            for (std::size_t i = 0; i < kSize; ++i) {
+                sums[kSize * v + i] = hn::Mul(weight, sums[kSize * v + i]);
+            }
+        }
+    }
+    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+        const float* const row = rows + kNumbers * k + begin;
+        Vec<D> weight[kVectors];
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            weight[v] = hn::Load(d, weights + kLanes * (k - 1) + v * step);
+        }
+        for (std::size_t i = 0; i < kSize; ++i) {
+            const Vec<D> number = hn::Set(d, row[i]);
+            for (std::size_t v = 0; v < kVectors; ++v) {
+                Vec<D>& sum = sums[kSize * v + i];
+                sum = hn::MulAdd(weight[v], number, sum);
+            }
+        }
+    }
+}
+
+/// Blends the rows of a set of bones for one vector. Arguments as above.
 template <std::size_t kNumbers, std::size_t kCount, bool kPlain, class D>
 HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
                                        const float* weights) {
     Sum<D, kNumbers> sum;
-    for (std::size_t i = 0; i < kNumbers; ++i) sum.value[i] = hn::Set(d, rows[i]);
-    if constexpr (kPlain) {
-        const Vec<D> first = hn::Load(d, first_weight);
-        for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Mul(first, sum.value[i]);
-    }
-    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
-        const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
-        const float* const row = rows + kNumbers * k;
-        for (std::size_t i = 0; i < kRow; ++i) {
-            sum.value[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.value[i]);
-        }
-    }
+    blend_numbers<kNumbers, kCount, kPlain, kRow, 1>(d, rows, 0, count, first_weight, weights, sum.value);
+    for (std::size_t i = kRow; i < kNumbers; ++i) sum.value[i] = hn::Set(d, rows[i]);
     return sum;
 }
 
@@ -180,49 +203,39 @@ HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count
 inline constexpr std::size_t kVectorsAtOnce = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
 
 /// Blends CentreRows of a set of bones for kVectors neighbouring vectors, and writes their motions at the points
-/// `p`. Other arguments are those of blend_rows().
+/// `p`. Other arguments as above.
 template <std::size_t kVectors, std::size_t kCount, bool kPlain, class D>
 HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const float* first_weights,
                               const float* weights, const Points<D>* p, Motion<D>* motions) {
     constexpr std::size_t kNumbers = CentreRows::kNumbers;
-    const std::size_t step = hn::Lanes(d);
-    // One Float4 after the other, so that its sums fit into registers.
-    const auto blend = [&](std::size_t begin, Vec<D>(*sums)[4]) HWY_ATTR {
-        for (std::size_t v = 0; v < kVectors; ++v) {
-            for (std::size_t i = 0; i < 4; ++i) sums[v][i] = hn::Set(d, rows[begin + i]);
-            if constexpr (kPlain) {
-                const Vec<D> weight = hn::Load(d, first_weights + v * step);
-                for (std::size_t i = 0; i < 4; ++i) sums[v][i] = hn::Mul(weight, sums[v][i]);
-            }
+    // As many numbers at once as there are registers for their sums.
+    if constexpr (kVectors == 1) {
+        Sum<D, kNumbers> sum;
+        for (std::size_t i = 0; i < kNumbers; i += kRow) {
+            blend_numbers<kNumbers, kCount, kPlain, kRow, 1>(d, rows, i, count, first_weights, weights,
+                                                             sum.value + i);
         }
-        for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
-            const float* const row = rows + kNumbers * k + begin;
-            Vec<D> weight[kVectors];
+        motions[0] = motion_at(sum, p[0]);
+    } else {
+        const auto blend = [&](std::size_t begin, Vec<D>* sums) HWY_ATTR {
+            blend_numbers<kNumbers, kCount, kPlain, 4, kVectors>(d, rows, begin, count, first_weights,
+                                                                 weights, sums);
+        };
+        const auto blend_axis = [&](std::size_t begin, Vec<D> Points<D>::*axis) HWY_ATTR {
+            Vec<D> sums[4 * kVectors];
+            blend(begin, sums);
             for (std::size_t v = 0; v < kVectors; ++v) {
-                weight[v] = hn::Load(d, weights + kLanes * (k - 1) + v * step);
+                motions[v].displacement.*axis = moved_along(sums + 4 * v, p[v]);
             }
-            for (std::size_t i = 0; i < 4; ++i) {
-                const Vec<D> number = hn::Set(d, row[i]);
-                for (std::size_t v = 0; v < kVectors; ++v) {
-                    sums[v][i] = hn::MulAdd(weight[v], number, sums[v][i]);
-                }
-            }
-        }
-    };
-    const auto blend_axis = [&](std::size_t begin, Vec<D> Points<D>::*axis) HWY_ATTR {
-        Vec<D> sums[kVectors][4];
-        blend(begin, sums);
+        };
+        blend_axis(4, &Points<D>::x);
+        blend_axis(8, &Points<D>::y);
+        blend_axis(12, &Points<D>::z);
+        Vec<D> rotations[4 * kVectors];
+        blend(0, rotations);
         for (std::size_t v = 0; v < kVectors; ++v) {
-            motions[v].displacement.*axis = moved_along(sums[v], p[v]);
+            for (std::size_t i = 0; i < 4; ++i) motions[v].rotation[i] = rotations[4 * v + i];
         }
-    };
-    blend_axis(4, &Points<D>::x);
-    blend_axis(8, &Points<D>::y);
-    blend_axis(12, &Points<D>::z);
-    Vec<D> rotations[kVectors][4];
-    blend(0, rotations);
-    for (std::size_t v = 0; v < kVectors; ++v) {
-        for (std::size_t i = 0; i < 4; ++i) motions[v].rotation[i] = rotations[v][i];
     }
 }
 
