@@ -26,8 +26,9 @@ struct alignas(kLanes * sizeof(T)) Lanes {
 
 /// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
 struct Block {
-    std::uint32_t first_weight;  // into PackedMesh::weights: [influences]; unless mixed, without the first
-    std::uint32_t first_bone;    // into PackedMesh::bones: [influences], or if mixed [kLanes][influences]
+    // Into PackedMesh::weights, in the order of the blocks: [influences]; unless mixed, without the first.
+    std::uint32_t first_weight;
+    std::uint32_t first_bone;  // into PackedMesh::bones: [influences], or if mixed [kLanes][influences]
     std::uint32_t influences;
     std::uint32_t output;  // if consecutive, the first vertex; otherwise the first run
     std::uint8_t vertices;
