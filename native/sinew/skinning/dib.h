@@ -17,7 +17,6 @@ namespace sinew {
 /// With two bones this is ScLERP. Twists are spread evenly, and a rotation of the whole character rotates the
 /// result with it.
 /// Where a bone passes 180 degrees from the blend, the shorter way to it changes and the result jumps. If the
-/// iteration has not converged after kSteps, the result is the last iterate, which is finite.
 /// iteration has not converged after kSteps, the result is the last iterate: finite, and close to the limit.
 struct IterativeDq {
     static constexpr MethodInfo info{
@@ -42,7 +41,8 @@ struct IterativeDq {
     template <class T>
     [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
                                          const Affine<T>& rest_bone) noexcept {
-        return Dq::prepare(posed_from_rest, rest_bone);
+        const auto bone = scaled_rigid(posed_from_rest, rest_bone);
+        return {to_dual_quat(bone.rigid), bone.scale, bone.has_scale};
     }
 
     /// The deformed vertex. Arguments and degenerate results as for Dq::deform_vertex.
