@@ -20,26 +20,17 @@ import window
 
 ZIP, PICTURE = window.arguments()
 FRAMES, FRAME, HELPERS = "2-46", 16, 40
-# Columns and rows of the window's picture: the figure, and the same with the sidebar. Rows are from the top.
-FIGURE, WITH_SIDEBAR, ROWS = (120, 640), (120, 1278), (52, 782)
 
 
-def pixels_of(picture: Path) -> np.ndarray:
-    """float32 [height, width, 4], the highest row first."""
-    image = bpy.data.images.load(str(picture))
-    width, height = image.size
-    pixels = np.empty(width * height * 4, dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)[::-1]
-
-
-def save(pixels: np.ndarray) -> None:
-    height, width, _channels = pixels.shape
-    image = bpy.data.images.new("Both", width, height)
-    image.pixels.foreach_set(np.ascontiguousarray(pixels[::-1]).ravel())
-    image.file_format = "WEBP"
-    image.save(filepath=str(PICTURE), quality=80)
+def view_in(picture: Path) -> np.ndarray:
+    """The 3D view without its header and the tools, as window.pixels_of()."""
+    with window.in_view3d("WINDOW"):
+        region, others = bpy.context.region, bpy.context.area.regions
+        left = next(each.width for each in others if each.type == "TOOLS")
+        # The tool settings are above it.
+        top = region.y + region.height - 50
+        rows, columns = slice(region.y, top), slice(region.x + left, region.x + region.width)
+    return window.pixels_of(picture)[rows, columns]
 
 
 def steps() -> Iterator[None]:
@@ -54,14 +45,16 @@ def steps() -> Iterator[None]:
         obj.sinew.method = "dq"
         options = {"frames": FRAMES, "step": 4, "helpers": HELPERS}
         assert bpy.ops.sinew.bake("EXEC_DEFAULT", kind="bones", **options) == {"FINISHED"}
-        bpy.context.space_data.overlay.show_cursor = False
+        overlay = bpy.context.space_data.overlay
+        overlay.show_cursor = overlay.show_outline_selected = overlay.show_object_origins = False
+        overlay.show_axis_x = overlay.show_text = False
     scene.frame_set(FRAME)
     window.open_sidebar()
     with window.in_view3d("WINDOW"):
         view = bpy.context.space_data.region_3d
         view.view_perspective = "ORTHO"
         view.view_rotation = (0.7071068, 0.7071068, 0.0, 0.0)
-        view.view_location, view.view_distance = (0.35, 0.0, 0.0), 2.6
+        view.view_location, view.view_distance = (0.52, 0.0, -0.02), 2.2
     yield
     yield
     window.choose_tab()
@@ -75,9 +68,8 @@ def steps() -> Iterator[None]:
         pictures.append(PICTURE.with_name(f"{choice}.png"))
         window.photograph(pictures[-1])
         shown.append(shading.color_type)
-    columns = zip(pictures, (FIGURE, WITH_SIDEBAR), strict=True)
-    rows = slice(*ROWS)
-    save(np.hstack([pixels_of(picture)[rows, slice(*own)] for picture, own in columns]))
+    left, right = (view_in(picture) for picture in pictures)
+    window.save_webp(np.hstack([left[:, : left.shape[1] // 2], right]), PICTURE)
     with window.in_view3d():
         bpy.ops.sinew.bake_error("INVOKE_DEFAULT", errors="OFF")
     facts = {"color types": [before, *shown, shading.color_type]}
