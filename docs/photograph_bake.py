@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Photographs the panel Bake Error in the window of a real Blender: human.blend baked to bones, with the errors
-before on the left and those after on the right.
+"""Photographs the panel Bake Error in the window of a real Blender: human.blend baked to bones, with the
+errors before on the left and those after on the right.
 
     blender --factory-startup human.blend --python docs/photograph_bake.py -- sinew.zip bake-error.webp
 """
