@@ -34,8 +34,8 @@ def test_f3_finds_operators_without_developer_extras(facts):
 
 
 def test_f3_finds_operators_in_every_mode_with_a_menu(facts):
-    of_meshes = ["MESH EDIT", "MESH SCULPT", "MESH WEIGHT_PAINT", "MESH VERTEX_PAINT"]
-    modes = [*of_meshes, "ARMATURE EDIT", "ARMATURE POSE"]
+    modes = [f"MESH {mode}" for mode in ("EDIT", "SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT")]
+    modes += ["ARMATURE EDIT", "ARMATURE POSE"]
     assert facts["switched in modes"] == {mode: [[False] * 5, [True] * 5] for mode in modes}
 
 
