@@ -47,6 +47,7 @@ def register() -> None:
         precomputing,
         preferences,
         presets,
+        shown_colours,
         translations,
     )
 
@@ -61,6 +62,7 @@ def register() -> None:
     properties.register()
     stored_vertex_data.register()
     character.register()
+    shown_colours.register()
     menus.register()
     manual.register()
     modifier_panel.register()
@@ -92,13 +94,22 @@ def unregister() -> None:
         from .features.ik import feature as ik
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
-        from .ui import character, manual, menus, modifier_panel, precomputing, translations
+        from .ui import (
+            character,
+            manual,
+            menus,
+            modifier_panel,
+            precomputing,
+            shown_colours,
+            translations,
+        )
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
         note.remove()
         for feature in (gltf, diagnose, heat, compare, bake, ik, blend, suggest):
             feature.unregister()
+        shown_colours.unregister()
         exporters.unregister()
         handlers.unregister()
         inbetween.unregister()

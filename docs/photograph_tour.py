@@ -42,13 +42,7 @@ HEADERS = {
 
 
 def photograph(name: str) -> None:
-    picture = FOLDER / f"{name}.png"
-    window.photograph(picture)
-    image = bpy.data.images.load(str(picture))
-    image.file_format = "WEBP"
-    image.save(filepath=str(FOLDER / f"tour-{name}.webp"), quality=80)
-    bpy.data.images.remove(image)
-    picture.unlink()
+    window.photograph(FOLDER / f"tour-{name}.webp")
 
 
 def main_bones(obj: bpy.types.Object) -> list[str]:

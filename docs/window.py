@@ -120,9 +120,35 @@ def click(place: tuple[int, int], **held: bool) -> Iterator[None]:
 
 
 def photograph(picture: Path) -> None:
+    """As PNG or WebP, by the name."""
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
-    subprocess.run(f"xwd -root -silent | xwdtopnm | pnmtopng > '{picture}'", shell=True, check=True)
+    png = picture.with_suffix(".png")
+    subprocess.run(f"xwd -root -silent | xwdtopnm | pnmtopng > '{png}'", shell=True, check=True)
+    if picture.suffix == ".webp":
+        save_webp(pixels_of(png), picture)
+        png.unlink()
     print("PHOTOGRAPHED", flush=True)
+
+
+def pixels_of(picture: Path) -> np.ndarray:
+    """float32 [height, width, 4], the lowest row first."""
+    image = bpy.data.images.load(str(picture))
+    width, height = image.size
+    pixels = np.empty(width * height * 4, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)
+
+
+def save_webp(pixels: np.ndarray, picture: Path) -> None:
+    """As pixels_of() returns them. An image that is loaded from a PNG would be saved as one, whatever its
+    name."""
+    height, width, _channels = pixels.shape
+    image = bpy.data.images.new(picture.stem, width, height)
+    image.pixels.foreach_set(np.ascontiguousarray(pixels).ravel())
+    image.file_format = "WEBP"
+    image.save(filepath=str(picture), quality=90)
+    bpy.data.images.remove(image)
 
 
 def run(steps: Iterator[None], seconds: float = 1.0) -> None:

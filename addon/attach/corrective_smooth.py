@@ -51,6 +51,14 @@ def why_not(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier)
     return phrase("{name} stays Blender's: {reason}", name=modifier.name, reason=whole)
 
 
+def why_none(obj: bpy.types.Object) -> str:
+    """Returns a sentence where the mesh has no Corrective Smooth that the stage can replace, else ""."""
+    modifier = candidate(obj)
+    if modifier is None:
+        return phrase("no Corrective Smooth behind its Armature modifier is on")
+    return why_not(obj, modifier)
+
+
 def _between(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
     """Returns the names of the active modifiers between it and the Armature modifiers."""
     behind = stack.downstream(obj)
@@ -78,13 +86,10 @@ def take_over(obj: bpy.types.Object) -> None:
 
     Raises SinewError, and changes nothing, where the shape would differ.
     """
-    modifier = candidate(obj)
-    if modifier is None:
-        raise SinewError(f"{obj.name}: no Corrective Smooth behind its Armature modifier is on")
-    reason = why_not(obj, modifier)
+    reason = why_none(obj)
     if reason:
         raise SinewError(f"{obj.name}: {reason}")
-    settings = properties.of(obj)
+    modifier, settings = candidate(obj), properties.of(obj)
     replaced = settings.replaced_smooth
     for name, value in (
         ("name", modifier.name),

@@ -121,8 +121,7 @@ class Binding:
         """Computes `points`. Returns False where the frame equals the last one.
 
         out  float32 [vertices, 3], C-contiguous: always written, instead of `points`, which are then computed
-             when
-             they are read
+             when they are read
 
         Raises ValueError where `out` has another shape.
         """

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from itertools import chain
 from operator import itemgetter
 
@@ -298,11 +299,20 @@ def write_values(mesh: bpy.types.Mesh, name: str, values: np.ndarray) -> None:
 
 
 def add_attribute(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str) -> bpy.types.Attribute:
-    """Adds an attribute. Blender would make it active; here the artist's choice stays."""
-    active = mesh.attributes.active_index
-    attribute = mesh.attributes.new(name, data_type, domain)
-    mesh.attributes.active_index = active
-    return attribute
+    """Adds an attribute. Blender would make it active; here the artist's choices stay."""
+    with _same_choices(mesh, name):
+        return mesh.attributes.new(name, data_type, domain)
+
+
+@contextmanager
+def _same_choices(mesh: bpy.types.Mesh, name: str) -> Iterator[None]:
+    """Keeps which attributes are active, and which colours are rendered, while `name` is added or removed."""
+    choices = ("active_index", "active_color_name", "default_color_name")
+    before = [getattr(mesh.attributes, choice) for choice in choices]
+    yield
+    for choice, value in zip(choices, before, strict=True):
+        if value != name and getattr(mesh.attributes, choice) != value:
+            setattr(mesh.attributes, choice, value)
 
 
 def has_vectors(mesh: bpy.types.Mesh, name: str, domain: str) -> bool:
@@ -349,6 +359,5 @@ def _vectors_at(address: int, count: int) -> np.ndarray:
 def remove_attribute(mesh: bpy.types.Mesh, name: str) -> None:
     attribute = find_attribute(mesh, name)
     if attribute is not None:
-        active = mesh.attributes.active_index
-        mesh.attributes.remove(attribute)
-        mesh.attributes.active_index = active
+        with _same_choices(mesh, name):
+            mesh.attributes.remove(attribute)

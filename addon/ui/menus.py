@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import groupby
+from itertools import chain, groupby
+from typing import ClassVar
 
 import bpy
 import rna_keymap_ui
@@ -16,7 +18,7 @@ from .stepped import OVER
 
 @dataclass(frozen=True)
 class Entry:
-    """An operator in the menu.
+    """An operator in a menu.
 
     text    empty: the operator's own label
     values  of the operator's properties
@@ -35,49 +37,6 @@ def _over(operator: str, text: str) -> tuple[Entry, ...]:
     )
 
 
-# All operators that act on the selection, and the lesson, in the menu's order; None is a separator.
-ENTRIES: tuple[Entry | None, ...] = (
-    Entry("sinew.add", icon="MOD_ARMATURE"),
-    Entry("sinew.switch"),
-    Entry("sinew.rebind", icon="FILE_REFRESH"),
-    Entry("sinew.remove", "Remove Sinew", icon="X"),
-    None,
-    Entry("sinew.own_settings", "Own Settings of This Mesh"),
-    Entry("sinew.take_over_smooth", icon="MOD_SMOOTH"),
-    Entry("sinew.make_group", "Make Vertex Group of the Mix", values={"stage": "mix"}),
-    Entry("sinew.make_group", "Make Vertex Group of Limit Bulge", values={"stage": "bulge_limit"}),
-    Entry("sinew.make_group", "Make Vertex Group of Delta Mush", values={"stage": "delta_mush"}),
-    Entry("sinew.method_preset_add", "Save Method as Preset\u2026"),
-    None,
-    *_over("sinew.suggest", "Suggest a Method"),
-    Entry("sinew.compare", "Compare Methods\u2026", icon="MOD_ARRAY"),
-    Entry("sinew.flip_comparison"),
-    Entry("sinew.end_comparison"),
-    None,
-    Entry("sinew.heat_map", icon="SHADING_RENDERED"),
-    *_over("sinew.worst_frames", "Find Worst Frames"),
-    *_over("sinew.fit_heat_range", "Fit Heat Map"),
-    None,
-    Entry("sinew.check", "Check Weights and Pose"),
-    *_over("sinew.check_frames", "Check"),
-    None,
-    Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
-    Entry("sinew.bake_error", "Show Bake Error", values={"errors": "AFTER"}),
-    Entry("sinew.bake_error", "Hide Bake Error", values={"errors": "OFF"}),
-    Entry("sinew.bake_inbetweens"),
-    Entry("sinew.blend_actions"),
-    Entry("sinew.blend_import_clip", "Add Clip to the Blend\u2026"),
-    *_over("sinew.bake_ik", "Bake Sinew IK"),
-    Entry("sinew.live_ik", "Live Sinew IK"),
-    Entry("sinew.remove_ik"),
-    Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
-    Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
-    None,
-    Entry("sinew.open_tab"),
-    Entry("sinew.open_lesson", icon="HELP"),
-)
-
-
 class SINEW_MT_methods(bpy.types.Menu):
     bl_label = "Method"
     bl_description = "How the bones' motions are blended, for all meshes of the character"
@@ -92,24 +51,128 @@ class SINEW_MT_methods(bpy.types.Menu):
                 layout.operator(name, text=method.label).method = method.name
 
 
+def _draw_entries(layout: bpy.types.UILayout, entries: Iterable[Entry]) -> None:
+    # Outside of a sidebar, a menu would execute without the dialog.
+    layout.operator_context = "INVOKE_DEFAULT"
+    for entry in entries:
+        text = {"text": entry.text} if entry.text else {}
+        button = layout.operator(entry.operator, icon=entry.icon, **text)
+        for name, value in entry.values.items():
+            setattr(button, name, value)
+
+
+class _Submenu:
+    """A menu of operators that act on the selection."""
+
+    entries: ClassVar[tuple[Entry, ...]]
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        _draw_entries(self.layout, self.entries)
+
+
+class SINEW_MT_stages(_Submenu, bpy.types.Menu):
+    bl_label = "Stages and Settings"
+    bl_description = "What follows the method, and whose settings count"
+    entries = (
+        Entry("sinew.own_settings", "Own Settings of This Mesh"),
+        Entry("sinew.take_over_smooth", icon="MOD_SMOOTH"),
+        Entry("sinew.make_group", "Make Vertex Group of the Mix", values={"stage": "mix"}),
+        Entry("sinew.make_group", "Make Vertex Group of Limit Bulge", values={"stage": "bulge_limit"}),
+        Entry("sinew.make_group", "Make Vertex Group of Delta Mush", values={"stage": "delta_mush"}),
+        Entry("sinew.method_preset_add", "Save Method as Preset\u2026"),
+    )
+
+
+class SINEW_MT_compare(_Submenu, bpy.types.Menu):
+    bl_label = "Compare"
+    bl_description = "Methods beside each other, and which one suits the character"
+    entries = (
+        Entry("sinew.compare", "Compare Methods\u2026", icon="MOD_ARRAY"),
+        Entry("sinew.flip_comparison"),
+        Entry("sinew.end_comparison"),
+        *_over("sinew.suggest", "Suggest a Method"),
+    )
+
+
+class SINEW_MT_heat(_Submenu, bpy.types.Menu):
+    bl_label = "Heat Map"
+    bl_description = "A measure of the deformation as colours, and where it is worst"
+    entries = (
+        Entry("sinew.heat_map", icon="SHADING_RENDERED"),
+        *_over("sinew.worst_frames", "Find Worst Frames"),
+        *_over("sinew.fit_heat_range", "Fit Heat Map"),
+    )
+
+
+class SINEW_MT_diagnostics(_Submenu, bpy.types.Menu):
+    bl_label = "Diagnostics"
+    bl_description = "Faults of weights and poses"
+    entries = (Entry("sinew.check", "Check Weights and Pose"), *_over("sinew.check_frames", "Check"))
+
+
+class SINEW_MT_animation(_Submenu, bpy.types.Menu):
+    bl_label = "Animation"
+    bl_description = "In-betweens, blends of actions and inverse kinematics"
+    entries = (
+        Entry("sinew.bake_inbetweens"),
+        Entry("sinew.blend_actions"),
+        Entry("sinew.blend_import_clip", "Add Clip to the Blend\u2026"),
+        Entry("sinew.live_ik", "Live Sinew IK"),
+        *_over("sinew.bake_ik", "Bake Sinew IK"),
+        Entry("sinew.remove_ik"),
+    )
+
+
+class SINEW_MT_bake(_Submenu, bpy.types.Menu):
+    bl_label = "Bake"
+    bl_description = "Shapes as data that plays without Sinew"
+    entries = (
+        Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
+        Entry("sinew.bake_error", "Show Bake Error", values={"errors": "AFTER"}),
+        Entry("sinew.bake_error", "Hide Bake Error", values={"errors": "OFF"}),
+        Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
+        Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
+    )
+
+
+SUBMENUS = (
+    SINEW_MT_stages,
+    SINEW_MT_compare,
+    SINEW_MT_heat,
+    SINEW_MT_diagnostics,
+    SINEW_MT_animation,
+    SINEW_MT_bake,
+)
+
+
 class SINEW_MT_menu(bpy.types.Menu):
     bl_label = "Sinew"
     bl_description = "Skinning of the selected character"
+    first = (Entry("sinew.add", icon="MOD_ARMATURE"),)
+    then = (
+        Entry("sinew.switch"),
+        Entry("sinew.rebind", icon="FILE_REFRESH"),
+        Entry("sinew.remove", "Remove Sinew", icon="X"),
+    )
+    last = (Entry("sinew.open_tab"), Entry("sinew.open_lesson", icon="HELP"))
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
-        # Outside of a sidebar, a menu would execute without the dialog.
-        layout.operator_context = "INVOKE_DEFAULT"
-        for entry in ENTRIES:
-            if entry is None:
-                layout.separator()
-                continue
-            text = {"text": entry.text} if entry.text else {}
-            button = layout.operator(entry.operator, icon=entry.icon, **text)
-            for name, value in entry.values.items():
-                setattr(button, name, value)
-            if entry.operator == "sinew.add":
-                layout.menu(SINEW_MT_methods.__name__)
+        _draw_entries(layout, self.first)
+        layout.menu(SINEW_MT_methods.__name__)
+        _draw_entries(layout, self.then)
+        layout.separator()
+        for menu in SUBMENUS:
+            layout.menu(menu.__name__)
+        layout.separator()
+        _draw_entries(layout, self.last)
+
+
+def entries() -> Iterator[Entry]:
+    """Those of the menu and its submenus, but methods: all operators that act on the selection, and the
+    lesson."""
+    menu = SINEW_MT_menu
+    yield from (*menu.first, *menu.then, *chain(*(each.entries for each in SUBMENUS)), *menu.last)
 
 
 class SINEW_MT_pie(bpy.types.Menu):
@@ -149,7 +212,12 @@ MENUS = {
     "TOPBAR_MT_help": _draw_in_help,
     "VIEW3D_MT_object": _draw_in_menu,
     "VIEW3D_MT_pose": _draw_in_menu,
+    # F3 searches those of the current mode. Texture Paint has none.
+    "VIEW3D_MT_edit_mesh": _draw_in_menu,
+    "VIEW3D_MT_edit_armature": _draw_in_menu,
+    "VIEW3D_MT_sculpt": _draw_in_menu,
     "VIEW3D_MT_paint_weight": _draw_in_menu,
+    "VIEW3D_MT_paint_vertex": _draw_in_menu,
     "OBJECT_MT_modifier_add_deform": _draw_in_modifiers,
 }
 # The operator, what it opens, and its key, with Alt and Shift: Blender does not use these in a 3D view.
@@ -196,4 +264,4 @@ def unregister() -> None:
         keymap.keymap_items.remove(item)
 
 
-CLASSES = (SINEW_MT_methods, SINEW_MT_menu, SINEW_MT_pie)
+CLASSES = (SINEW_MT_methods, *SUBMENUS, SINEW_MT_menu, SINEW_MT_pie)

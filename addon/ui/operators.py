@@ -109,10 +109,7 @@ def can_change(operator: type[bpy.types.Operator]) -> bool:
 
 def can_take_over(obj: bpy.types.Object) -> bool:
     """Whether the mesh has a Corrective Smooth that Delta Mush could replace."""
-    modifier = corrective_smooth.candidate(obj)
-    return (
-        modifier is not None and properties.of(obj).enabled and not corrective_smooth.why_not(obj, modifier)
-    )
+    return properties.of(obj).enabled and not corrective_smooth.why_none(obj)
 
 
 def _for_each(
@@ -266,10 +263,27 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
     )
     bl_options = {"REGISTER", "UNDO"}
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        objects = sinew_targets(context)
+        if any(can_take_over(obj) for obj in objects):
+            return True
+        on = [obj for obj in objects if properties.of(obj).enabled]
+        # Of several meshes, one with a Corrective Smooth has more to say.
+        on.sort(key=lambda obj: corrective_smooth.candidate(obj) is None)
+        if on:
+            reason = tr(corrective_smooth.why_none(on[0]))
+            cls.poll_message_set(f"{on[0].name}: {reason}")
+        else:
+            cls.poll_message_set(tr("Switch Sinew on first"))
+        return False
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
         if not self.name:
-            objects = [obj for obj in objects if can_take_over(obj)] or objects
+            objects = [obj for obj in objects if can_take_over(obj)]
         with session.changing(context):
             return _for_each(self, objects, corrective_smooth.take_over, "Took over Corrective Smooth of")
 

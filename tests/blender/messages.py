@@ -111,8 +111,8 @@ def _of_lists() -> Iterator[tuple[str, str]]:
         yield provider.what, "PROVIDERS"
     for text in heat_panel._WORST.values():
         yield text, "heat_panel"
-    for entry in menus.ENTRIES:
-        yield entry.text if entry is not None else "", "ENTRIES"
+    for entry in menus.entries():
+        yield entry.text, "menus"
 
 
 def _of_code() -> Iterator[tuple[str, str]]:

@@ -317,12 +317,46 @@ def corrective_keys() -> Iterator[None]:
     yield
 
 
+def search_in_modes() -> Iterator[None]:
+    """F3 searches other menus in each mode."""
+    found = {}
+    body, rig = bpy.data.objects["Body"], bpy.data.objects["Hero Rig"]
+    for obj, mode in (
+        *((body, mode) for mode in ("EDIT", "SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT")),
+        *((rig, mode) for mode in ("EDIT", "POSE")),
+    ):
+        window.select_only(obj)
+        with window.in_view3d("WINDOW"):
+            bpy.ops.object.mode_set(mode=mode)
+        yield
+        states = []
+        for _time in range(2):
+            yield from search("switch on off")
+            states.append([mesh.sinew.enabled for mesh in meshes()])
+        found[f"{obj.type} {mode}"] = states
+        with window.in_view3d("WINDOW"):
+            bpy.ops.object.mode_set(mode="OBJECT")
+        yield
+    facts["switched in modes"] = found
+    five_meshes.select(body)
+    yield
+
+
+def height_of_change(before: str, after: str) -> int:
+    """How many rows of two photographs are between the first and the last that differ."""
+    differ = np.abs(pixels_of(after) - pixels_of(before)).max(axis=(1, 2)) > 0.1
+    rows = np.flatnonzero(differ)
+    return int(np.ptp(rows)) + 1 if len(rows) else 0
+
+
 def menus() -> Iterator[None]:
+    window.photograph(FOLDER / "no-menu.png")
     with window.in_view3d("WINDOW"):
         bpy.ops.wm.call_menu(name="SINEW_MT_menu")
     yield
     yield
     window.photograph(FOLDER / "menu.png")
+    facts["menu height"] = height_of_change("no-menu", "menu")
     window.press("ESC", VIEW)
     yield
     window.press("ESC", VIEW)
@@ -356,6 +390,12 @@ def bake_error() -> Iterator[None]:
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.bake("EXEC_DEFAULT", kind="bones", frames="1-20", helpers=4)
         bpy.ops.view3d.view_selected()
+        bpy.ops.ed.undo_push(message="baked")
+    yield from search("show bake error")
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
+    facts["bake error undone"] = shading.color_type
     yield from search("show bake error")
     shown = shading.color_type
     window.photograph(FOLDER / "bake-error.png")
@@ -393,6 +433,7 @@ def steps() -> Iterator[None]:
     yield from start()
     yield from one_click_for_a_method()
     yield from by_search_and_keys()
+    yield from search_in_modes()
     yield from comparison_by_clicks()
     yield from menus()
     yield from off_greys()

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 
+import bmesh
 import bpy
 import numpy as np
 import other_gltf
@@ -337,7 +338,9 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     colours = {}
     for choice, shape in (("BEFORE", lbs), ("AFTER", played)):
         wanted = np.sqrt(np.square(shape - expected).sum(axis=2).mean(axis=0))
-        found = error_map.errors([obj], choice)
+        found = error_map.errors_of(obj.data, choice)
+        mean = np.sqrt(np.square(wanted).mean())
+        assert np.isclose(error_map.rms([obj], choice), mean, rtol=1e-3)
         assert np.allclose(found, wanted, atol=1e-4 * scenes.diagonal(obj))
         bpy.ops.sinew.bake_error(errors=choice)
         assert error_map.shown([obj]) == choice
@@ -352,10 +355,20 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     assert colours["BEFORE"].max() > 0.8
     assert colours["AFTER"].mean() < colours["BEFORE"].mean()
     bpy.ops.sinew.bake_error(errors="OFF")
+    # Numbers are read from the mesh once, until it changes.
+    assert error_map.summary_of(obj.data) is error_map.summary_of(obj.data)
     kept = {"Sinew bake error", "Sinew bake error before"}
     assert set(obj.data.attributes.keys()) - kept == set(before) - {"sinew_points"}
     assert obj.data.attributes.active_color_name == "Paint"
     assert error_map.shown([obj]) == "OFF"
+    most = error_map.end_of_scale([obj])
+    edited = bmesh.new()
+    edited.from_mesh(obj.data)
+    worst = [v for v in edited.verts if error_map.errors_of(obj.data, "BEFORE")[v.index] > 0.5 * most]
+    bmesh.ops.delete(edited, geom=worst, context="VERTS")
+    edited.to_mesh(obj.data)
+    edited.free()
+    assert error_map.end_of_scale([obj]) <= 0.5 * most
 
 
 @pytest.mark.parametrize(
@@ -446,7 +459,7 @@ def test_helper_bones_for_a_stage_without_a_weighted_bone_are_refused(arm, tmp_p
     obj.sinew.delta_mush.enabled, obj.sinew.delta_mush.scale = True, 0.0
     options = HelperOptions(helpers=3)
     started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False, helpers=options)
-    with pytest.raises(SinewError, match="no bone has weights here"):
+    with pytest.raises(SinewError, match="Arm: no bone has weights here"):
         for _share in started.sample():
             pass
 

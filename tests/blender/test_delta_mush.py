@@ -424,3 +424,17 @@ def test_one_that_can_not_be_taken_over_exactly_says_why(change, reason):
     with pytest.raises(RuntimeError, match=reason):
         bpy.ops.sinew.take_over_smooth(name=obj.name)
     assert (modifier.show_viewport, modifier.show_render) == flags
+
+
+def test_a_grey_button_says_why_nothing_can_be_taken_over():
+    obj = make_rough_arm()
+    scenes.add_sinew(obj)
+    take_over = bpy.ops.sinew.take_over_smooth
+    for on, reason in ((True, f"{obj.name}: no Corrective Smooth"), (False, "Switch Sinew on first")):
+        properties.of(obj).enabled = on
+        assert not take_over.poll()
+        with pytest.raises(RuntimeError, match=f"poll.* {reason}"):
+            take_over()
+    properties.of(obj).enabled = True
+    add_corrective(obj)
+    assert take_over.poll()

@@ -351,6 +351,11 @@ def test_heat_map_and_diagnostics_in_a_window(photographed):
     assert facts == {"scan": ["RUNNING_MODAL"], "frame after the scan": 16, "played": True, "mode": "EDIT"}
 
 
+def test_the_errors_of_a_bake_in_a_window(photographed):
+    facts = photographed("docs/photograph_bake.py", "bake-error.webp")
+    assert facts == {"color types": ["MATERIAL", "VERTEX", "VERTEX", "MATERIAL"]}
+
+
 def test_bakes_in_a_window(photographed):
     """With the dialog: Esc in the middle of each restores everything, and Ctrl+Z undoes one that is
     finished."""

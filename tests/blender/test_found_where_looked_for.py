@@ -50,7 +50,7 @@ def test_every_button_and_choice_has_a_tooltip():
 
 
 def test_every_operator_is_in_the_menu_but_those_of_a_single_button():
-    listed = {entry.operator for entry in menus.ENTRIES if entry is not None}
+    listed = {entry.operator for entry in menus.entries()}
     known = {f"sinew.{name}" for name in dir(bpy.ops.sinew)}
     inner = {cls.bl_idname for cls, _rna in operator_types() if "INTERNAL" in cls.bl_options}
     assert listed == known - inner
@@ -58,9 +58,7 @@ def test_every_operator_is_in_the_menu_but_those_of_a_single_button():
 
 
 def test_entries_of_the_menu_have_values_that_the_operators_take():
-    for entry in menus.ENTRIES:
-        if entry is None:
-            continue
+    for entry in menus.entries():
         rna = getattr(bpy.ops.sinew, entry.operator.partition(".")[2]).get_rna_type()
         for name, value in entry.values.items():
             prop = rna.properties[name]

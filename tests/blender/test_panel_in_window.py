@@ -33,6 +33,16 @@ def test_f3_finds_operators_without_developer_extras(facts):
     assert facts["switched by search"] == [False] * 5
 
 
+def test_f3_finds_operators_in_every_mode_with_a_menu(facts):
+    modes = [f"MESH {mode}" for mode in ("EDIT", "SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT")]
+    modes += ["ARMATURE EDIT", "ARMATURE POSE"]
+    assert facts["switched in modes"] == {mode: [[False] * 5, [True] * 5] for mode in modes}
+
+
+def test_the_menu_is_lower_than_the_window(facts):
+    assert 200 < facts["menu height"] < 600
+
+
 def test_a_shortcut_and_f3_flip_the_comparison(facts):
     assert facts["flipped"] == ["FLIP", False]
     assert facts["flipped by search"] is True
@@ -41,6 +51,7 @@ def test_a_shortcut_and_f3_flip_the_comparison(facts):
 def test_f3_shows_the_errors_of_a_bake_as_colours_and_hides_them(facts):
     before, shown, afterwards, (vivid, grey) = facts["bake error"]
     assert (before, shown, afterwards) == ("MATERIAL", "VERTEX", "MATERIAL")
+    assert facts["bake error undone"] == "MATERIAL"
     assert vivid > 1.2 * grey
 
 

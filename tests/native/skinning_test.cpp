@@ -377,6 +377,26 @@ TYPED_TEST(RigidSkinning, a_bone_scaled_to_nothing_pulls_to_its_head) {
     EXPECT_TRUE(is_finite(skinned<TypeParam>(prepared<TypeParam>(rig), {{0, 0.5}, {1, 0.5}}, rest)));
 }
 
+// Rest axes of Blender's bones near -Y are not quite orthonormal. Blender's own method misses by as much.
+TYPED_TEST(RigidSkinning, a_scaled_bone_whose_rest_axes_lean_takes_its_vertices_along_but_for_dq) {
+    Random random(18);
+    Rig rig = scaled_rig(19);
+    for (Affine<double>& rest_bone : rig.rest_bones) rest_bone.linear[0] += 3e-5 * rest_bone.linear[1];
+    const Bones<TypeParam> bones = prepared<TypeParam>(rig);
+    double worst = 0.0;
+    for (std::int32_t bone = 0; bone < 6; ++bone) {
+        const Vec3<double> rest = random.vector(3.0);
+        const Vec3<double> expected =
+            transform_point(rig.posed_from_rest[static_cast<std::size_t>(bone)], rest);
+        worst = std::max(worst, distance(skinned<TypeParam>(bones, {{bone, 1.0}}, rest), expected));
+    }
+    if (std::is_same_v<TypeParam, Dq>) {
+        EXPECT_GT(worst, 1e-6);
+    } else {
+        EXPECT_LT(worst, 1e-13);
+    }
+}
+
 TEST(Lbs, is_the_weighted_mean_of_where_bones_put_the_vertex) {
     Random random(18);
     const Rig rig = scaled_rig(19);

@@ -38,6 +38,7 @@ PICTURES = {
     r"ik-panel\.png": ("docs/photograph_ik.py", "panel"),
     r"(panel|inbetween)\.png": ("docs/photograph_panel.py", None),
     r"panel-german\.webp": ("docs/photograph_panel.py", "language"),
+    r"bake-error\.webp": ("docs/photograph_bake.py", None),
     r"motion-panel\.webp": ("docs/photograph_blend.py", "panel"),
     r"sculpt\.webp": ("docs/photograph_sculpt.py", "sculpt"),
     r"tour-[\w-]+\.webp": ("docs/photograph_tour.py", "tour-"),

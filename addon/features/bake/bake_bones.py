@@ -26,7 +26,7 @@ from ...core.stages import StageValues
 from ...deform import evaluate, session
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io, mesh_io
-from . import bake_state, shape_animation
+from . import bake_state, error_map, shape_animation
 from .take_off import take_off
 
 # Share of the time that reading the frames takes.
@@ -85,7 +85,7 @@ class BoneBake:
         finally:
             evaluate.set_frame(scene, before)
         for number, rig in enumerate(self._rigs):
-            for share in rig.solve(self.options):
+            for share in _naming(rig.meshes, rig.solve(self.options)):
                 yield _SAMPLING + (1.0 - _SAMPLING) * (number + share) / len(self._rigs)
         self.reports = [rig.report for rig in self._rigs]
 
@@ -214,6 +214,8 @@ class _Rig:
 
     def place(self, frames: Sequence[float]) -> None:
         solution, bones = self._solution, self._bones
+        # Those of an earlier bake.
+        error_map.hide([obj.data for obj in self.meshes if obj.data.is_editable])
         own = [bones.names[bone] for bone in solution.parents]
         follows_pose = bool(solution.blends)
         # Only visible objects can be edited.
@@ -242,6 +244,16 @@ class _Rig:
                 (helper_bones_io.ERRORS_BEFORE, solution.errors_before),
             ):
                 mesh_io.write_values(obj.data, name, self._unit * errors[rows])
+
+
+def _naming(
+    meshes: Sequence[bpy.types.Object], steps: Generator[float, None, None]
+) -> Generator[float, None, None]:
+    """The steps; errors name the meshes, which the solver does not know."""
+    try:
+        yield from steps
+    except SinewError as error:
+        raise SinewError(f"{', '.join(obj.name for obj in meshes)}: {error}") from error
 
 
 def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:

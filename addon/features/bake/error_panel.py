@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
 
 from ...io import units
 from ...ui import operators
@@ -57,7 +56,8 @@ class SINEW_PT_bake_error(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(_baked(context))
+        # In edit mode attributes can not be read.
+        return not context.mode.startswith("EDIT") and bool(_baked(context))
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene, meshes = self.layout, context.scene, _baked(context)
@@ -66,8 +66,7 @@ class SINEW_PT_bake_error(Sidebar, bpy.types.Panel):
         for choice, label in labels.items():
             row.operator("sinew.bake_error", text=label, depress=choice == is_shown).errors = choice
         before, after = (
-            units.text(scene, "length", float(np.sqrt(np.square(error_map.errors(meshes, choice)).mean())))
-            for choice in error_map.OF_CHOICE
+            units.text(scene, "length", error_map.rms(meshes, choice)) for choice in error_map.OF_CHOICE
         )
         draw_text(layout, context, tr("RMS {before} before, {after} after", before=before, after=after))
         if is_shown != error_map.OFF:

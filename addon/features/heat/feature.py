@@ -9,6 +9,7 @@ from ...attach import properties
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...deform import session
+from ...ui import shown_colours
 from . import heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measures, redraw
 
 CLASSES = (*measures.CLASSES, *heat_panel.CLASSES)
@@ -18,12 +19,14 @@ def register() -> None:
     measures.register()
     measures.Listener.changed = session.refresh
     properties.listeners.heat_changed = _heat_changed
+    shown_colours.sources.append(heat_view.shown)
     for functions, function in _SUBSCRIPTIONS:
         functions.append(function)
 
 
 def unregister() -> None:
     heat_legend.show(False)
+    shown_colours.sources.remove(heat_view.shown)
     for functions, function in _SUBSCRIPTIONS:
         functions.remove(function)
     measures.Listener.changed = properties.listeners.heat_changed = None
@@ -46,8 +49,8 @@ def _take_off(obj: bpy.types.Object) -> None:
         heat_view.take_off(obj)
 
 
-def _objects_changed(objects: list[bpy.types.Object]) -> None:
-    heat_view.sync(objects)
+def _objects_changed(_objects: list[bpy.types.Object]) -> None:
+    heat_view.sync_legend()
     if not is_rendering_in_window():
         heat_nodes.remove_unused_material()
 

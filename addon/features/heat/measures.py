@@ -124,11 +124,7 @@ def register() -> None:
         soft_max=8,
         options=set(),
     )
-    # The artist's settings while a heat map is shown, to be restored.
-    bpy.types.Mesh.sinew_active_colour = bpy.props.StringProperty(options={"HIDDEN"})
-    bpy.types.Screen.sinew_colour_types = bpy.props.StringProperty(options={"HIDDEN"})
 
 
 def unregister() -> None:
     del bpy.types.Scene.sinew_measures, bpy.types.Scene.sinew_most_influences
-    del bpy.types.Mesh.sinew_active_colour, bpy.types.Screen.sinew_colour_types

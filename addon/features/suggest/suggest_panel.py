@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import bpy
 
 from ...attach import properties
-from ...core.suggestion import CRITERIA, Criterion, Worst
+from ...core.suggestion import CRITERIA, Criterion, Suggestion, Worst
 from ...io import units
 from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
@@ -54,21 +54,28 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
         draw_text(layout, context, counted(count, one, many))
         used = {properties.of(obj).method for obj in operators.sinew_targets(context)}
         best = {criterion.name: suggestion.best(criterion) for criterion in CRITERIA}
-        for name in suggestion.rank():
+        texts = {name: _texts(context.scene, suggestion, name) for name in suggestion.rank()}
+        # Two columns, if the sidebar has room for them beside their icons.
+        longest = max((len(text) for own in texts.values() for text in own.values()), default=0)
+        columns = 2 if longest <= characters(context) // 2 - 5 else 1
+        for name, own in texts.items():
             column = layout.column(align=True)
             button = column.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
             button.method = name
-            texts = {}
-            for criterion in CRITERIA:
-                value = value_text(context.scene, criterion, suggestion.worst.get((name, criterion.name)))
-                texts[criterion.name] = f"{tr(criterion.label)} {value}"
-            # Two columns, if the sidebar has room for them beside their icons.
-            columns = 2 if max(map(len, texts.values())) <= characters(context) // 2 - 4 else 1
             values = column.grid_flow(row_major=True, columns=columns, even_columns=True, align=True)
-            for criterion, text in texts.items():
+            for criterion, text in own.items():
                 values.label(text=text, icon="CHECKMARK" if name in best[criterion] else "BLANK1")
         for criterion in CRITERIA:
             draw_text(layout, context, f"{tr(criterion.label)}: {tr(criterion.text)}")
+
+
+def _texts(scene: bpy.types.Scene, suggestion: Suggestion, method: str) -> dict[str, str]:
+    """Returns the text of each criterion."""
+    return {
+        criterion.name: f"{tr(criterion.label)} "
+        + value_text(scene, criterion, suggestion.worst.get((method, criterion.name)))
+        for criterion in CRITERIA
+    }
 
 
 def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:

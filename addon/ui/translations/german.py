@@ -260,6 +260,22 @@ TEXTS = {
     # The panel of a character
     "Sinew": "Sinew",
     "Skinning of the selected character": "Skinning der ausgewählten Figur",
+    "Stages and Settings": "Stufen und Einstellungen",
+    "What follows the method, and whose settings count": (
+        "Was der Methode folgt, und wessen Einstellungen gelten"
+    ),
+    "Methods beside each other, and which one suits the character": (
+        "Methoden nebeneinander, und welche zur Figur passt"
+    ),
+    "A measure of the deformation as colours, and where it is worst": (
+        "Ein Maß der Verformung als Farben, und wo es am schlechtesten ist"
+    ),
+    "Faults of weights and poses": "Fehler von Gewichtungen und Posen",
+    "Animation": "Animation",
+    "In-betweens, blends of actions and inverse kinematics": (
+        "Zwischenbilder, gemischte Aktionen und inverse Kinematik"
+    ),
+    "Shapes as data that plays without Sinew": "Formen als Daten, die ohne Sinew abspielen",
     "What one does most often while posing": "Was man beim Posieren am häufigsten tut",
     "Add": "Hinzufügen",
     "Add Sinew": "Sinew hinzufügen",
@@ -368,6 +384,7 @@ TEXTS = {
     "Make Vertex Group of the Mix": "Punktgruppe zum Mischen anlegen",
     "Make Vertex Group of Limit Bulge": "Punktgruppe für Wölbung begrenzen anlegen",
     "Make Vertex Group of Delta Mush": "Punktgruppe für Delta Mush anlegen",
+    "Switch Sinew on first": "Schalte zuerst Sinew ein",
     "Take Over Corrective Smooth": "Corrective Smooth übernehmen",
     "Have Delta Mush smooth in the place of the Corrective Smooth modifier, by its settings. It stays "
     "in the stack, switched off, until Sinew is removed": (
@@ -459,6 +476,9 @@ TEXTS = {
     "have Sinew deform by them": (
         "Skelett-Modifikatoren abseits des ersten bleiben bei Blender: {names}; rücke sie direkt hinter "
         "ihn, damit Sinew sie übernimmt"
+    ),
+    "no Corrective Smooth behind its Armature modifier is on": (
+        "kein Corrective Smooth hinter ihrem Skelett-Modifikator ist an"
     ),
     "{name} stays Blender's: {reason}": "{name} bleibt bei Blender: {reason}",
     "its Rest Source is not Original Coords, but a shape of its own": (

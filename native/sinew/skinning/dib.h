@@ -41,7 +41,8 @@ struct IterativeDq {
     template <class T>
     [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
                                          const Affine<T>& rest_bone) noexcept {
-        return Dq::prepare(posed_from_rest, rest_bone);
+        const auto bone = scaled_rigid(posed_from_rest, rest_bone);
+        return {to_dual_quat(bone.rigid), bone.scale, bone.has_scale};
     }
 
     /// The deformed vertex. Arguments and degenerate results as for Dq::deform_vertex.

@@ -29,7 +29,7 @@ struct Dq {
     template <class T>
     [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
                                          const Affine<T>& rest_bone) noexcept {
-        const auto bone = scaled_rigid(posed_from_rest, rest_bone);
+        const auto bone = scaled_rigid_of_blender(posed_from_rest, rest_bone);
         return {to_dual_quat(bone.rigid), bone.scale, bone.has_scale};
     }
 

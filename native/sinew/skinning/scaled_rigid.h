@@ -22,15 +22,16 @@ struct ScaledRigid {
     }
 };
 
-/// A bone's motion with its rigid part as a quaternion-vector pair.
+/// A bone's motion, split exactly as Blender's Preserve Volume splits it.
 ///
 /// rest_bone  orthonormal; only read where the motion has scale
 ///
-/// The rest axes of Blender's bones near -Y deviate from orthonormal by up to 4e-5, and so does the rigid part
-/// that results. The quaternion is extracted in the same way as Blender extracts it.
+/// The rest axes of Blender's bones near -Y deviate from orthonormal by up to 4e-5, and so does the rigid part of
+/// split_scale(). Blender extracts a quaternion from it, but measures the scale against the part itself. So the
+/// two together miss the motion by as much.
 template <class T>
-[[nodiscard]] ScaledRigid<QuatVec<T>, T> scaled_rigid(const Affine<T>& posed_from_rest,
-                                                      const Affine<T>& rest_bone) noexcept {
+[[nodiscard]] ScaledRigid<QuatVec<T>, T> scaled_rigid_of_blender(const Affine<T>& posed_from_rest,
+                                                                 const Affine<T>& rest_bone) noexcept {
     const ScaleSplit<T> split = split_scale(posed_from_rest, rest_bone);
     QuatVec<T> rigid = to_quat_vec(split.rigid);
     if (split.has_scale) {
@@ -39,6 +40,15 @@ template <class T>
             Mat3<T>(glm::normalize(axes[0]), glm::normalize(axes[1]), glm::normalize(axes[2])));
     }
     return {rigid, split.scale, split.has_scale};
+}
+
+/// The same with the scale measured against the quaternion: the two together are the motion.
+template <class T>
+[[nodiscard]] ScaledRigid<QuatVec<T>, T> scaled_rigid(const Affine<T>& posed_from_rest,
+                                                      const Affine<T>& rest_bone) noexcept {
+    ScaledRigid<QuatVec<T>, T> bone = scaled_rigid_of_blender(posed_from_rest, rest_bone);
+    if (bone.has_scale) bone.scale = to_affine(inverse(bone.rigid)) * posed_from_rest;
+    return bone;
 }
 
 /// The same motion in another scalar type.
