@@ -82,11 +82,6 @@ HWY_INLINE Points<D> nearest_of_segment(D d, const BulgeBone& bone, const Points
 }
 
 template <class D>
-HWY_INLINE Points<D> subtract(const Points<D>& a, const Points<D>& b) {
-    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-template <class D>
 HWY_INLINE Vec<D> squared_length(const Points<D>& v) {
     return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::Mul(v.z, v.z)));
 }

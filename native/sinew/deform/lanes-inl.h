@@ -65,7 +65,7 @@ HWY_INLINE Points<D> load_points(D d, const MeshPointers& pointers, std::size_t 
             hn::Load(d, rows[2].lane.data() + lane)};
 }
 
-/// The weights of block `b`, unless it is mixed without those of the first influence.
+/// The weights of block `b`: of all influences if it is mixed, otherwise of those after the first.
 HWY_INLINE const float* weights_of(const MeshPointers& pointers, std::size_t b) {
     return pointers.weights[pointers.blocks[b].first_weight].lane.data();
 }
@@ -73,6 +73,21 @@ HWY_INLINE const float* weights_of(const MeshPointers& pointers, std::size_t b) 
 template <class D>
 HWY_INLINE Points<D> add(const Points<D>& a, const Points<D>& b) {
     return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+
+template <class D>
+HWY_INLINE Points<D> subtract(const Points<D>& a, const Points<D>& b) {
+    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
+template <class D>
+HWY_INLINE Points<D> times(Vec<D> factor, const Points<D>& p) {
+    return {hn::Mul(factor, p.x), hn::Mul(factor, p.y), hn::Mul(factor, p.z)};
+}
+
+template <class D>
+HWY_INLINE Vec<D> dot(const Points<D>& a, const Points<D>& b) {
+    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
 /// The displacement of `p` by the rows [3], each (x, y, z, translation).

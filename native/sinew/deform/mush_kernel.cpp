@@ -206,16 +206,6 @@ HWY_INLINE void store_lanes(D d, const Points<D>& p, Float4* to, std::size_t lan
 
 #endif
 
-template <class D>
-HWY_INLINE Points<D> subtract(const Points<D>& a, const Points<D>& b) {
-    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-template <class D>
-HWY_INLINE Vec<D> dot_of(const Points<D>& a, const Points<D>& b) {
-    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-
 /// 1 / length of a vector, from its square; 0 if the vector has no direction.
 template <class D>
 HWY_INLINE Vec<D> inverse_length(D d, Vec<D> squared) {
@@ -225,7 +215,7 @@ HWY_INLINE Vec<D> inverse_length(D d, Vec<D> squared) {
 
 template <class D>
 HWY_INLINE Points<D> unit(D d, const Points<D>& v) {
-    const auto squared = dot_of<D>(v, v);
+    const auto squared = dot<D>(v, v);
     const auto is_finite = hn::Le(squared, hn::Set(d, std::numeric_limits<float>::max()));
     const auto inverse = hn::IfThenElseZero(is_finite, inverse_length(d, squared));
     return {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
@@ -250,8 +240,8 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>&
     corner.x = subtract<D>(previous, next);
     corner.y = add<D>(previous, next);
     corner.z = cross<D>(next, previous);
-    const auto squared_x = dot_of<D>(corner.x, corner.x);
-    const auto squared_y = dot_of<D>(corner.y, corner.y);
+    const auto squared_x = dot<D>(corner.x, corner.x);
+    const auto squared_y = dot<D>(corner.y, corner.y);
     const auto are_two = hn::Gt(hn::Add(squared_x, squared_y), hn::Set(d, 3.0f));
     const auto inverse_y = inverse_length(d, squared_y);
     corner.unit_x = inverse_length(d, squared_x);
@@ -371,9 +361,9 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
                                    HWY_ATTR { hn::Store(detail, d, to.lane.data() + lane); };
             for_each_corner(d, frame, block, lane, point,
                             [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
-                                store(hn::Mul(corner.unit_x, dot_of<D>(corner.x, taken)), details[k].x);
-                                store(hn::Mul(corner.unit_y, dot_of<D>(corner.y, taken)), details[k].y);
-                                store(hn::Mul(corner.unit_z, dot_of<D>(corner.z, taken)), details[k].z);
+                                store(hn::Mul(corner.unit_x, dot<D>(corner.x, taken)), details[k].x);
+                                store(hn::Mul(corner.unit_y, dot<D>(corner.y, taken)), details[k].y);
+                                store(hn::Mul(corner.unit_z, dot<D>(corner.z, taken)), details[k].z);
                             });
         }
     }
@@ -438,7 +428,7 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
                                            HWY_ATTR { return index_of(HWY_MIN(vertex, count - 1), k); };
                 edge = subtract<D>(collected_points(d, frame.from, of_vertex, lane), point);
             }
-            const auto length = root(d, dot_of<D>(edge, edge));
+            const auto length = root(d, dot<D>(edge, edge));
             sum = add_scaled<D>(sum, length, edge);
             lengths = hn::Add(lengths, length);
         }

@@ -32,11 +32,6 @@ constexpr float kTooSteep = 0.9999f;
 using Four = hn::CappedTag<float, 4>;
 
 template <class D>
-HWY_INLINE Points<D> minus(const Points<D>& a, const Points<D>& b) {
-    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-template <class D>
 HWY_INLINE Vec<D> rounded_dot(const Points<D>& a, const Points<D>& b) {
     return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
@@ -152,7 +147,7 @@ HWY_INLINE Points<D> rounded_cross(const Points<D>& a, const Points<D>& b) {
 template <class D>
 HWY_INLINE Points<D> perpendicular(D d, const Points<D>& v, const Points<D>& n, Vec<D> along) {
     const Points<D> of_n{hn::Mul(n.x, along), hn::Mul(n.y, along), hn::Mul(n.z, along)};
-    return direction(d, minus<D>(v, of_n));
+    return direction(d, subtract<D>(v, of_n));
 }
 
 /// The edges of fans that define the space of their custom normals.
@@ -221,14 +216,14 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
         const Points<D> last = points_of<kIsLast>(d, frame.points, vertices + (count - 1) * lanes);
         add_edge(last, first);
         // Directions of the edges before and after the corner, along the face.
-        const Points<D> closing = kAngles ? direction(d, minus<D>(first, last)) : first;
+        const Points<D> closing = kAngles ? direction(d, subtract<D>(first, last)) : first;
         Points<D> before = closing;
         Points<D> current = first;
         Vec<D> of_slot[4] = {zero, zero, zero, zero};
         const auto step = [&](std::size_t k, const Points<D>& next) HWY_ATTR {
             if (k + 1 < count) add_edge(current, next);
             if constexpr (kAngles) {
-                const Points<D> after = k + 1 < count ? direction(d, minus<D>(next, current)) : closing;
+                const Points<D> after = k + 1 < count ? direction(d, subtract<D>(next, current)) : closing;
                 of_slot[k % 4] = polynomial_angle(d, hn::Neg(rounded_dot<D>(before, after)));
                 before = after;
                 if constexpr (kLone) edges[k] = after;
@@ -252,7 +247,7 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
     if constexpr (kLone) {
         for (std::size_t k = 0; k < kCorners; ++k) {
             const LoneFans& fans = frame.mesh->lone_fans[block.first_lone + k];
-            const Points<D> back = minus<D>({zero, zero, zero}, edges[(k + kCorners - 1) % kCorners]);
+            const Points<D> back = subtract<D>({zero, zero, zero}, edges[(k + kCorners - 1) % kCorners]);
             const auto along_first = rounded_dot<D>(edges[k], normal);
             const auto along_last = rounded_dot<D>(back, normal);
             const auto angles = hn::Add(polynomial_angle(d, along_first), polynomial_angle(d, along_last));
@@ -383,8 +378,8 @@ HWY_INLINE Points<D> fan_normals(D d, const NormalFrame& frame, const FanBlock& 
         points_of<false>(d, static_cast<const Float4*>(frame.slots), block.normals.lane.data() + lane);
     const Points<D> point = points_of<kIsLast>(d, frame.points, vertices);
     const auto edge = [&](std::size_t k) HWY_ATTR {
-        return direction(d,
-                         minus<D>(points_of<kIsLast>(d, frame.points, vertices + (1 + k) * kLanes), point));
+        return direction(
+            d, subtract<D>(points_of<kIsLast>(d, frame.points, vertices + (1 + k) * kLanes), point));
     };
     const Points<D> last = edge(0);
     const Points<D> first = edge(1);

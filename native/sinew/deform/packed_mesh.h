@@ -57,7 +57,7 @@ struct PackedMesh {
     // Rest points and weights are stored separately: other rest points may replace these, and a method that keeps
     // weights of its own reads only the points.
     std::vector<Lanes<float>> rest_points;      // [blocks][kPointRows]
-    std::vector<Lanes<float>> weights;          // one more than there are
+    std::vector<Lanes<float>> weights;          // and one more row, which blocks without weights point to
     std::vector<Lanes<float>> first_weights;    // [blocks] separate, as rarely read; unused for mixed blocks
     std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the vertex of each lane
     std::vector<Run> runs;

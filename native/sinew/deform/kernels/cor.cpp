@@ -35,7 +35,7 @@ struct CorKernel : CentreRows {
     template <class D>
     static HWY_INLINE Points<D> finish(D d, const Motion<D>& motion, const Points<D>& centre,
                                        const Points<D>& p) {
-        const Points<D> from_centre{hn::Sub(p.x, centre.x), hn::Sub(p.y, centre.y), hn::Sub(p.z, centre.z)};
+        const Points<D> from_centre = subtract<D>(p, centre);
         return add<D>(p, add_rotation<D>(d, motion.displacement, motion.rotation, from_centre));
     }
 };

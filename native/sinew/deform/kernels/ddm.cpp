@@ -188,11 +188,6 @@ HWY_INLINE Points<D> load_point(D d, const float* part, std::size_t row) {
     return {load_row(d, part, row), load_row(d, part, row + 1), load_row(d, part, row + 2)};
 }
 
-template <class D>
-HWY_INLINE Points<D> times(Vec<D> scale, const Points<D>& r) {
-    return {hn::Mul(scale, r.x), hn::Mul(scale, r.y), hn::Mul(scale, r.z)};
-}
-
 /// Adds to each of kVectors `sum` the image of the point `p` and its weight under a bone's `row`.
 template <std::size_t kVectors, class D>
 HWY_INLINE void add_moved(D d, const float* row, const Points<D>* p, const Vec<D>* weight, Points<D>* sum) {
@@ -368,11 +363,6 @@ HWY_INLINE Points<D> in_space(D d, const Points<D>& r, const float* from_model) 
 template <class D>
 HWY_INLINE Vec<D> largest(const Points<D>& r) {
     return hn::Max(hn::Abs(r.x), hn::Max(hn::Abs(r.y), hn::Abs(r.z)));
-}
-
-template <class D>
-HWY_INLINE Vec<D> dot(const Points<D>& a, const Points<D>& b) {
-    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
 /// R(q)^T m.
@@ -583,8 +573,7 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
         Points<D> displacement = motions[v].displacement;
         if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
         if (frame.palette->any_scale) displacement = add_scales(d, frame, b, lane, rest, displacement);
-        const Points<D> from_centroid{hn::Sub(rest.x, centroid.x), hn::Sub(rest.y, centroid.y),
-                                      hn::Sub(rest.z, centroid.z)};
+        const Points<D> from_centroid = subtract<D>(rest, centroid);
         map_and_store(d, pointers, spaces, b, lane,
                       add<D>(rest, add_rotation<D>(d, displacement, motions[v].rotation, from_centroid)));
     }

@@ -38,27 +38,12 @@ struct Image {
     Points<D> point;
 };
 
-template <class D>
-HWY_INLINE Points<D> scaled_by(Vec<D> factor, const Points<D>& p) {
-    return {hn::Mul(factor, p.x), hn::Mul(factor, p.y), hn::Mul(factor, p.z)};
-}
-
-template <class D>
-HWY_INLINE Points<D> subtract(const Points<D>& a, const Points<D>& b) {
-    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-template <class D>
-HWY_INLINE Vec<D> dot(const Points<D>& a, const Points<D>& b) {
-    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-
 /// The product of quaternions.
 template <class D>
 HWY_INLINE void multiply(const Vec<D>* a, const Vec<D>* b, Vec<D>* product) {
     const Points<D> u{a[1], a[2], a[3]};
     const Points<D> v{b[1], b[2], b[3]};
-    const Points<D> vector = add_cross<D>(add_scaled<D>(scaled_by<D>(a[0], v), b[0], u), u, v);
+    const Points<D> vector = add_cross<D>(add_scaled<D>(times<D>(a[0], v), b[0], u), u, v);
     product[0] = hn::MulSub(a[0], b[0], dot<D>(u, v));
     product[1] = vector.x;
     product[2] = vector.y;
@@ -70,7 +55,7 @@ template <class D>
 HWY_INLINE void multiply_by_conjugate(const Vec<D>* a, const Vec<D>* b, Vec<D>* product) {
     const Points<D> u{a[1], a[2], a[3]};
     const Points<D> v{b[1], b[2], b[3]};
-    const Points<D> vector = add_cross<D>(add_scaled<D>(scaled_by<D>(b[0], u), hn::Neg(a[0]), v), v, u);
+    const Points<D> vector = add_cross<D>(add_scaled<D>(times<D>(b[0], u), hn::Neg(a[0]), v), v, u);
     product[0] = hn::MulAdd(a[0], b[0], dot<D>(u, v));
     product[1] = vector.x;
     product[2] = vector.y;
@@ -95,7 +80,7 @@ HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q) {
                                        -0.0651833787560463f,
                                        0.022325647994875908f};
     const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
-    return scaled_by<D>(hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]), {q[1], q[2], q[3]});
+    return times<D>(hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]), {q[1], q[2], q[3]});
 }
 
 /// The linear part, for the motion that rotates by `q`, then adds `translation`.
@@ -118,7 +103,7 @@ template <class D>
 HWY_INLINE void move_by(D d, const Points<D>& angular, const Points<D>& linear, hn::Mask<D> active,
                         Image<D>& image) {
     const ExponentialFactors<D> by(d, hn::Mul(hn::Set(d, 0.25f), dot<D>(angular, angular)));
-    const Points<D> axis = scaled_by<D>(hn::Mul(hn::Set(d, 0.5f), by.sinc), angular);
+    const Points<D> axis = times<D>(hn::Mul(hn::Set(d, 0.5f), by.sinc), angular);
     const Vec<D> rotation[4] = {by.cosine, axis.x, axis.y, axis.z};
     Vec<D> rotated[4];
     multiply<D>(rotation, image.rotation, rotated);
@@ -221,7 +206,7 @@ HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, st
         const Vec<D> weight = weight_of(k);
         const Vec<D> by = hn::IfThenElse(hn::Lt(along, zero), hn::Neg(weight), weight);
         for (std::size_t i = 0; i < 4; ++i) real[i] = hn::MulAdd(by, q[i], real[i]);
-        const Points<D> translation = scaled_by<D>(by, subtract<D>(m.point, rest));
+        const Points<D> translation = times<D>(by, subtract<D>(m.point, rest));
         const Points<D> axis{q[1], q[2], q[3]};
         scalar = hn::Sub(scalar, dot<D>(translation, axis));
         vector = add_cross<D>(add_scaled<D>(vector, q[0], translation), translation, axis);
@@ -232,8 +217,8 @@ HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, st
     const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared));
     for (std::size_t i = 0; i < 4; ++i) blend.rotation[i] = hn::Mul(scale, real[i]);
     const Points<D> axis{blend.rotation[1], blend.rotation[2], blend.rotation[3]};
-    const Points<D> translation = add_cross<D>(
-        add_scaled<D>(scaled_by<D>(blend.rotation[0], vector), hn::Neg(scalar), axis), axis, vector);
+    const Points<D> translation =
+        add_cross<D>(add_scaled<D>(times<D>(blend.rotation[0], vector), hn::Neg(scalar), axis), axis, vector);
     blend.point = add_scaled<D>(rest, scale, translation);
 }
 
@@ -300,9 +285,8 @@ HWY_INLINE void deform_lanes_of_dib(D d, const MeshPointers& pointers, const Spa
                                     std::size_t lane, const BonesOf& bones, std::size_t count,
                                     const float* first_weight, const float* weights) {
     const Points<D> rest = load_rest(d, pointers, spaces, b, lane);
-    Points<D> points = blend_iteratively(d, bones, count, first_weight, weights, rest);
-    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
-    store_points(d, pointers, b, lane, points);
+    map_and_store(d, pointers, spaces, b, lane,
+                  blend_iteratively(d, bones, count, first_weight, weights, rest));
 }
 
 void deform_dib_block(const Frame& frame, std::size_t b) {

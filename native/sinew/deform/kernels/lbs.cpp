@@ -94,8 +94,8 @@ HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Poin
 
 /// Deforms lanes [lane, lane + kVectors * N) of block `b`, which must not be mixed.
 ///
-/// rest      its rest points, and
-/// weights   its weights without those of the first bone: from these lanes on, kLanes apart
+/// rest      its rest points from these lanes on, kLanes apart
+/// weights   the same for its weights, without those of the first bone
 /// first     columns of the first bone
 /// other_of  other_of(k) is the difference of the k-th bone from the first; if plain, the k-th bone
 /// kCount    the number of influences, or 0 for `count`
@@ -188,8 +188,8 @@ using Four = hn::CappedTag<float, 4>;
 
 /// Deforms one vertex, with x, y and z in the lanes: the same operations in the same order.
 ///
-/// rest     the vertex's rest point, and
-/// weights  its weights: numbers kLanes apart
+/// rest     the vertex's rest point: numbers kLanes apart
+/// weights  its weights, likewise
 /// to       the vertex's point
 template <bool kPlain>
 HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
