@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -292,37 +293,74 @@ def looks(scene: Scene) -> dict[str, Callable[[], None]]:
     }
 
 
-def measure_normals(case: Case, seconds: float) -> dict:
-    """Spreads of seconds of a drawn frame, alternately for the modifier and for each choice of normals."""
-    scene = Scene(case, leave_small=False)
-    times: dict[str, list[float]] = {"modifier": [], **{choice: [] for choice in CHOICES}}
-    number, end = 1, time.perf_counter() + seconds
-    while time.perf_counter() < end or len(times["modifier"]) < 2 * RUN:
+def alternate(scene: Scene, choices: dict[str, Callable[[], None]], seconds: float) -> dict[str, dict]:
+    """Spreads of seconds of a frame by name, alternating between the functions that set the scene up."""
+    times: dict[str, list[float]] = {name: [] for name in choices}
+    number, end = 1, time.perf_counter() + seconds * len(choices)
+    while time.perf_counter() < end or any(len(of) < 2 * RUN for of in times.values()):
         numbers = [1 + (number + 7 * i) % FRAMES for i in range(RUN)]
         number += 7 * RUN
-        for who, of in times.items():
-            scene.switch(who != "modifier")
-            for obj in scene.meshes if who != "modifier" else ():
-                obj.sinew.normals = who
-            scene.run(numbers[:BEFORE])
-            of += scene.run(numbers)
-    return {who: common.spread(of) for who, of in times.items()}
-
-
-def measure_methods(case: Case, seconds: float) -> dict:
-    """Spreads of seconds of a frame, alternately for each of looks()."""
-    scene = Scene(case, leave_small=False)
-    chosen = looks(scene)
-    times: dict[str, list[float]] = {name: [] for name in chosen}
-    number, end = 1, time.perf_counter() + seconds * len(chosen)
-    while time.perf_counter() < end or len(times["modifier"]) < 2 * RUN:
-        numbers = [1 + (number + 7 * i) % FRAMES for i in range(RUN)]
-        number += 7 * RUN
-        for name, choose in chosen.items():
+        for name, choose in choices.items():
             choose()
             scene.run(numbers[:BEFORE])
             times[name] += scene.run(numbers)
     return {name: common.spread(of) for name, of in times.items()}
+
+
+def measure_normals(case: Case, seconds: float) -> dict:
+    """A drawn frame by the modifier and with each choice of normals."""
+    scene = Scene(case, leave_small=False)
+
+    def by(choice: str) -> None:
+        scene.switch(on=True)
+        for obj in scene.meshes:
+            obj.sinew.normals = choice
+
+    choices = {choice: partial(by, choice) for choice in CHOICES}
+    return alternate(scene, {"modifier": partial(scene.switch, on=False), **choices}, seconds)
+
+
+def measure_floor(case: Case, seconds: float) -> dict:
+    """A frame by the modifier, by Sinew, and by Sinew without its arithmetic: it writes its first points and
+    normals again and again, and all else is done."""
+    # In a whole Blender the extension has another name: see window.py.
+    from sinew_addon.core import session
+    from sinew_addon.deform import bound
+
+    scene = Scene(case, leave_small=False)
+    deform, write_normals = session.SkinStack.deform, bound.Bound.write_normals
+    written: dict[tuple[int, str], np.ndarray] = {}
+
+    def write_again(stack: session.SkinStack, rest_points, frames, out=None, values=()) -> bool:
+        if stack.points is None:
+            return deform(stack, rest_points, frames, out, values)
+        if out is not None:
+            out[:] = written.setdefault((id(stack), "points"), stack.points.copy())
+        return True
+
+    def write_normals_again(own: bound.Bound, points, rest_points, given, out) -> None:
+        if (id(own), "normals") not in written:
+            write_normals(own, points, rest_points, given, out)
+            written[id(own), "normals"] = out.copy()
+        out[:] = written[id(own), "normals"]
+
+    def by(on: bool, computes: bool) -> None:
+        scene.switch(on)
+        written.clear()
+        session.SkinStack.deform = deform if computes else write_again
+        bound.Bound.write_normals = write_normals if computes else write_normals_again
+
+    choices = {"modifier": partial(by, False, True), "sinew": partial(by, True, True)}
+    try:
+        return alternate(scene, {**choices, "floor": partial(by, True, False)}, seconds)
+    finally:
+        by(on=True, computes=True)
+
+
+def measure_methods(case: Case, seconds: float) -> dict:
+    """A frame by each of looks()."""
+    scene = Scene(case, leave_small=False)
+    return alternate(scene, looks(scene), seconds)
 
 
 @contextmanager
@@ -344,6 +382,66 @@ def line(name: str, result: dict) -> str:
     return text + f"{moving * 1e6:10.0f}{staying * 1e6:10.1f}{result['away']:10.0e}"
 
 
+def say_cases(arguments: argparse.Namespace, say: Callable[[str], None]) -> dict[str, dict]:
+    results = {}
+    for case in cases(arguments.million):
+        name = f"{case.name} {case.method}"
+        if arguments.k in name:
+            seconds = 2.0 if arguments.quick else 4.0
+            results[name] = measure(case, seconds, not arguments.all_by_sinew)
+            say(line(case.name, results[name]))
+    return results
+
+
+def say_choices(arguments: argparse.Namespace, say: Callable[[str], None]) -> dict[str, dict]:
+    results = {}
+    for size in (13_380, 100_000):
+        for shading in SHADINGS:
+            case = Case(size, normals=True, shading=shading)
+            name = f"{case.name} choices"
+            if arguments.k in name:
+                results[name] = measure_normals(case, 1.0 if arguments.quick else 2.0)
+                times = (
+                    f"{who.lower():>12}{of['median'] * 1e3:7.2f}{of['least'] * 1e3:7.2f}"
+                    for who, of in results[name].items()
+                )
+                say(f"{case.name:34}{''.join(times)}")
+    return results
+
+
+def say_floor(arguments: argparse.Namespace, say: Callable[[str], None]) -> dict[str, dict]:
+    drawn = [case for case in cases(arguments.million) if case.method == "dq" and case.normals]
+    chosen = {name: case for case in drawn if arguments.k in (name := f"{case.name} floor")}
+    if chosen:
+        say("\nThe modifier's frame over Sinew's, and over Sinew's without its arithmetic: medians, minima")
+    results = {}
+    for name, case in chosen.items():
+        found = results[name] = measure_floor(case, 1.0 if arguments.quick else 2.0)
+        ratios = (
+            f"{found['modifier'][kind] / found[who][kind]:8.2f}"
+            for who in ("sinew", "floor")
+            for kind in ("median", "least")
+        )
+        say(f"{case.name:38}{''.join(ratios)}")
+    return results
+
+
+def say_methods(arguments: argparse.Namespace, say: Callable[[str], None]) -> dict[str, dict]:
+    case = next((c for c in cases(arguments.million) if c.rig == "human.blend"), Case(13_380))
+    name = f"{case.name} methods"
+    if arguments.k not in name:
+        return {}
+    say(f"\nAll methods and stages in turns, {case.name}: milliseconds, medians and minima, and")
+    say("the medians over that of dq")
+    found = measure_methods(case, 2.0 if arguments.quick else 4.0)
+    for look, spread in found.items():
+        kinds = ("median", "least")
+        own = "".join(f"{spread[kind] * 1e3:9.2f}" for kind in kinds)
+        ratios = "".join(f"{spread[kind] / found['dq'][kind]:8.2f}" for kind in kinds)
+        say(f"{look:30}{own}{ratios}")
+    return {name: found}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="two seconds a case, not four")
@@ -362,41 +460,14 @@ def main() -> None:
     print("handler for each object after the evaluation, where it moves and where it stays; how far the")
     print("points are from the modifier's, as a part of the mesh's size.\n")
     print(f"{'':42}{'modifier':>9}{'sinew':>9}{'':10}{'moving':>10}{'staying':>10}{'away':>10}")
-    results = {}
+    results: dict[str, dict] = {}
     with quiet_blender() as say:
-        for case in cases(arguments.million):
-            if arguments.k not in f"{case.name} {case.method}":
-                continue
-            result = measure(case, 2.0 if arguments.quick else 4.0, not arguments.all_by_sinew)
-            results[f"{case.name} {case.method}"] = result
-            say(line(case.name, result))
-        drawn = [Case(size, normals=True, shading=each) for size in (13_380, 100_000) for each in SHADINGS]
-        for case in drawn:
-            if arguments.k not in f"{case.name} choices":
-                continue
-            found = measure_normals(case, 4.0 if arguments.quick else 8.0)
-            times = (
-                f"{who.lower():>12}{of['median'] * 1e3:7.2f}{of['least'] * 1e3:7.2f}"
-                for who, of in found.items()
-            )
-            say(f"{case.name:34}{''.join(times)}")
-            results[f"{case.name} choices"] = found
-        case = next((c for c in cases(arguments.million) if c.rig == "human.blend"), Case(13_380))
-        if arguments.k in f"{case.name} methods":
-            say(f"\nAll methods and stages in turns, {case.name}: milliseconds, medians and minima, and")
-            say("the medians over that of dq")
-            found = measure_methods(case, 2.0 if arguments.quick else 4.0)
-            for name, spread in found.items():
-                kinds = ("median", "least")
-                own = "".join(f"{spread[kind] * 1e3:9.2f}" for kind in kinds)
-                ratios = "".join(f"{spread[kind] / found['dq'][kind]:8.2f}" for kind in kinds)
-                say(f"{name:30}{own}{ratios}")
-            results[f"{case.name} methods"] = found
+        for part in (say_cases, say_choices, say_floor, say_methods):
+            results |= part(arguments, say)
     common.write(arguments.name, machine=facts, seconds=results)
 
 
 if __name__ == "__main__":
-    # Not imported in a whole Blender, where the extension has another name: see window.py.
     import sinew_addon
 
     sinew_addon.register()
