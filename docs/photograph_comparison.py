@@ -21,7 +21,7 @@ import window
 ZIP, PICTURE = window.arguments()
 FRAME = 32
 # Blender leaves much room around what it shows.
-CLOSER = 0.62
+CLOSER = 0.7
 METHODS = {"lbs", "qv", "dq"}
 
 
@@ -70,7 +70,7 @@ def look_at_all() -> None:
         bpy.context.space_data.overlay.show_cursor = False
         view = bpy.context.region_data
         view.view_distance *= CLOSER
-        view.view_location.x += 0.05 * view.view_distance
+        view.view_location.x += 0.09 * view.view_distance
 
 
 def steps():

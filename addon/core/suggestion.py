@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -80,13 +81,10 @@ class Suggestion:
         chosen = [m for m, value in values.items() if value <= best + max(SAME_PART * best, least)]
         return chosen if len(chosen) < len(values) else []
 
-    def rank(self) -> list[str]:
-        """Returns the methods, the one that is best at the most criteria first; equals stay in order."""
-        wins = dict.fromkeys(self.methods, 0)
-        for criterion in CRITERIA:
-            for method in self.best(criterion):
-                wins[method] += 1
-        return sorted(self.methods, key=lambda method: -wins[method])
+    def order(self, criterion: Criterion) -> list[str]:
+        """Returns the methods, the best at it first; those without a value last."""
+        worst = {m: self.worst[m, criterion.name].value for m in self.methods if self._has(m, criterion)}
+        return sorted(self.methods, key=lambda method: abs(worst.get(method, math.inf)))
 
     @property
     def text(self) -> str:

@@ -32,6 +32,8 @@ ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
 # Headers of panels while all are closed; what Diagnostics has below its own.
 HEADER, DIAGNOSTICS = (850, 97), (850, 293)
 CHECK, MEND = (830, 350), (835, 501)
+# The header of Suggest, and the best method at the first measure.
+SUGGEST, BEST = (850, 125), (950, 229)
 # The height of the status bar in pixels.
 STATUS_BAR = 24
 # Positions in the menu of methods.
@@ -237,6 +239,34 @@ def progress_in_the_status_bar() -> Iterator[None]:
     facts["progress"] = [filled("progress"), filled("stopped"), share_shown()]
 
 
+def suggested_by_click() -> Iterator[None]:
+    """The best method at the first measure, of which several can be equally good."""
+    for held in ({}, {"ctrl": True}, {}):
+        yield from window.click(HEADER, **held)
+    with window.in_view3d():
+        scene().frame_start, scene().frame_end = 10, 12
+        bpy.ops.sinew.suggest("EXEC_DEFAULT", over="SCENE")
+    yield from window.click(SUGGEST)
+    window.photograph(FOLDER / "suggest.png")
+    yield from window.click(BEST)
+    from bl_ext.user_default.sinew.core.suggestion import CRITERIA
+    from bl_ext.user_default.sinew.features.suggest import suggest
+
+    facts["suggested"] = suggest.suggestions[scene().session_uid].best(CRITERIA[0])
+    facts["suggestion used"] = methods()
+    with window.in_view3d():
+        bpy.ops.sinew.suggestions_by(measure="crossings")
+    for _redraw in range(3):
+        yield
+    window.photograph(FOLDER / "suggest-order.png")
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
+    facts["suggestion undone"] = methods()
+    yield from window.click(SUGGEST)
+    yield from window.click(HEADER)
+
+
 def off_greys() -> Iterator[None]:
     """Settings that have no effect while Sinew is off."""
     yield from window.click(ADD)
@@ -438,6 +468,7 @@ def steps() -> Iterator[None]:
     yield from menus()
     yield from off_greys()
     yield from progress_in_the_status_bar()
+    yield from suggested_by_click()
     yield from mends_by_clicks()
     yield from corrective_keys()
     yield from modifiers()

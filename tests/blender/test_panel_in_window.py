@@ -75,6 +75,12 @@ def test_panels_print_no_errors(facts):
     assert facts["printed"] == []
 
 
+def test_a_click_uses_a_suggested_method(facts):
+    assert facts["suggestion used"][0] in facts["suggested"]
+    assert facts["suggestion used"] == facts["suggestion used"][:1] * 5
+    assert facts["suggestion undone"] == ["dq"] * 5
+
+
 def test_off_greys_the_method(facts):
     on, off = facts["letters"]
     assert off < 0.7 * on

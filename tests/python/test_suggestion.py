@@ -45,9 +45,15 @@ def test_what_is_not_measured_is_nobodys():
     assert made.text == "All methods are equally good here."
 
 
-def test_who_is_best_at_most_comes_first():
+def test_the_best_comes_first_and_what_is_not_measured_last():
+    made = suggestion(volume=[[0.2], [math.nan], [-0.1]], stretch=[[0.2], [0.1], [0.3]])
+    assert made.order(BY_NAME["volume"]) == ["c", "a", "b"]
+    assert made.order(BY_NAME["stretch"]) == ["b", "a", "c"]
+    assert made.order(BY_NAME["crossings"]) == ["a", "b", "c"]
+
+
+def test_one_sentence_says_who_is_best_at_what():
     made = suggestion(
         stretch=[[0.2], [0.1], [0.3]], flips=[[0.2], [0.1], [0.3]], volume=[[0.1], [0.2], [0.3]]
     )
-    assert made.rank() == ["b", "a", "c"]
     assert made.text == "Best at stretch: Method B; volume: Method A; flips: Method B."

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar's list of all methods: the numbers of each, which is best at what, and a click to use it."""
+"""The sidebar's panel of suggestions: the best methods at each measure, or all in order, and a click to use
+one."""
 
 from __future__ import annotations
 
@@ -12,9 +13,13 @@ from ...core.suggestion import CRITERIA, Criterion, Suggestion, Worst
 from ...io import units
 from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
-from ...ui.sidebar import Sidebar, characters, draw_text
+from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
 from . import suggest
+
+BEST = "best"
+# Several methods can be equally good.
+MOST_BEST = 3
 
 
 class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
@@ -37,6 +42,30 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SINEW_OT_suggestions_by(bpy.types.Operator):
+    bl_idname = "sinew.suggestions_by"
+    bl_label = "Suggestions by Measure"
+    bl_description = "Show the best methods at each measure, or all methods in the order of one"
+    bl_options = {"INTERNAL"}
+
+    measure: bpy.props.EnumProperty(
+        items=(
+            (BEST, "Best at Each Measure", "The best methods at each measure, with their worst value"),
+            *((criterion.name, criterion.label, criterion.text) for criterion in CRITERIA),
+        )
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        _View.measure = self.measure
+        return {"FINISHED"}
+
+
+class _View:
+    """What the panel shows: BEST, or a criterion's name."""
+
+    measure = BEST
+
+
 class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Suggest"
     bl_options = {"DEFAULT_CLOSED"}
@@ -49,33 +78,57 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if suggestion is None:
             return
         count = len(suggestion.frames)
-        one = "The worst of {count} frame, the best method marked"
-        many = "The worst of {count} frames, the best method marked"
-        draw_text(layout, context, counted(count, one, many))
-        used = {properties.of(obj).method for obj in operators.sinew_targets(context)}
-        best = {criterion.name: suggestion.best(criterion) for criterion in CRITERIA}
-        texts = {name: _texts(context.scene, suggestion, name) for name in suggestion.rank()}
-        # Two columns, if the sidebar has room for them beside their icons.
-        longest = max((len(text) for own in texts.values() for text in own.values()), default=0)
-        columns = 2 if longest <= characters(context) // 2 - 5 else 1
-        for name, own in texts.items():
-            column = layout.column(align=True)
-            button = column.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
-            button.method = name
-            values = column.grid_flow(row_major=True, columns=columns, even_columns=True, align=True)
-            for criterion, text in own.items():
-                values.label(text=text, icon="CHECKMARK" if name in best[criterion] else "BLANK1")
-        for criterion in CRITERIA:
-            draw_text(layout, context, f"{tr(criterion.label)}: {tr(criterion.text)}")
+        draw_text(
+            layout, context, counted(count, "The worst of {count} frame", "The worst of {count} frames")
+        )
+        criterion = next((c for c in CRITERIA if c.name == _View.measure), None)
+        text = "Best at Each Measure" if criterion is None else criterion.label
+        layout.operator_menu_enum("sinew.suggestions_by", "measure", text=text, icon="SORTSIZE")
+        if criterion is None:
+            _draw_best(layout, context, suggestion)
+        else:
+            draw_text(layout, context, criterion.text)
+            _draw_order(layout, context, suggestion, criterion)
 
 
-def _texts(scene: bpy.types.Scene, suggestion: Suggestion, method: str) -> dict[str, str]:
-    """Returns the text of each criterion."""
-    return {
-        criterion.name: f"{tr(criterion.label)} "
-        + value_text(scene, criterion, suggestion.worst.get((method, criterion.name)))
-        for criterion in CRITERIA
-    }
+def _draw_best(layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion) -> None:
+    for criterion in CRITERIA:
+        best = suggestion.best(criterion)
+        row = layout.split(factor=0.45)
+        measured = suggestion.order(criterion)
+        value = _value(context, suggestion, criterion, measured[0])
+        row.label(text=f"{tr(criterion.label)} {value}", translate=False)
+        column = row.column(align=True)
+        for method in best[:MOST_BEST]:
+            _draw_method(column, context, suggestion, method)
+        if len(best) > MOST_BEST:
+            column.label(text=tr("and {count} more", count=len(best) - MOST_BEST), translate=False)
+        elif not best and (measured[0], criterion.name) in suggestion.worst:
+            column.label(text="All alike")
+
+
+def _draw_order(
+    layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion
+) -> None:
+    best = suggestion.best(criterion)
+    column = layout.column(align=True)
+    for method in suggestion.order(criterion):
+        row = column.split(factor=0.64, align=True)
+        _draw_method(row, context, suggestion, method)
+        value = _value(context, suggestion, criterion, method)
+        row.label(text=value, icon="CHECKMARK" if method in best else "BLANK1", translate=False)
+
+
+def _draw_method(
+    layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, method: str
+) -> None:
+    used = {properties.of(obj).method for obj in sinew_targets(context)}
+    text = suggestion.methods[method]
+    layout.operator("sinew.use_method", text=text, depress=method in used).method = method
+
+
+def _value(context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion, method: str) -> str:
+    return value_text(context.scene, criterion, suggestion.worst.get((method, criterion.name)))
 
 
 def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:
@@ -86,4 +139,4 @@ def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None
     return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")
 
 
-CLASSES = (SINEW_OT_suggest, SINEW_PT_suggest)
+CLASSES = (SINEW_OT_suggest, SINEW_OT_suggestions_by, SINEW_PT_suggest)

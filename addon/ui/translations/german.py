@@ -544,12 +544,18 @@ TEXTS = {
     ),
     "Sinew measures every method": "Sinew misst jede Methode",
     "Measure All Methods": "Alle Methoden messen",
-    "The worst of {count} frame, the best method marked": (
-        "Der schlechteste Wert von {count} Einzelbild, die beste Methode markiert"
+    "The worst of {count} frame": "Der schlechteste Wert von {count} Einzelbild",
+    "The worst of {count} frames": "Der schlechteste Wert von {count} Einzelbildern",
+    "Suggestions by Measure": "Vorschläge nach Maß",
+    "Show the best methods at each measure, or all methods in the order of one": (
+        "Die besten Methoden je Maß zeigen, oder alle Methoden in der Reihenfolge eines Maßes"
     ),
-    "The worst of {count} frames, the best method marked": (
-        "Der schlechteste Wert von {count} Einzelbildern, die beste Methode markiert"
+    "Best at Each Measure": "Beste je Maß",
+    "The best methods at each measure, with their worst value": (
+        "Die besten Methoden je Maß, mit ihrem schlechtesten Wert"
     ),
+    "and {count} more": "und {count} weitere",
+    "All alike": "Alle gleich",
     "Stretch": "Dehnung",
     "How evenly edges keep their length (RMS)": "Wie gleichmäßig Kanten ihre Länge behalten (RMS)",
     "Volume": "Volumen",
