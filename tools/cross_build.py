@@ -204,8 +204,8 @@ def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
         **options,
     }
     words: list[str | Path] = ["cmake", "-G", "Ninja", "-S", ROOT, "-B", build]
-    # Clears what the last run found for another Python. pybind11 would otherwise see another program and ask it
-    # for the name of its modules, though it is of this machine.
+    # Clears what the last run found for another Python. Otherwise pybind11 would see another program, and ask
+    # it for the name of its modules, though it is of this machine.
     for names in ("Python_*", "_Python_*", "PYTHON_*", "PYBIND11_*"):
         words += ["-U", names]
     run(words + [f"-D{name}={value}" for name, value in defined.items()], log)

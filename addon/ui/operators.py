@@ -179,10 +179,13 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(not properties.has_sinew(obj) for obj in _each_target(context)):
+        have_it = [properties.has_sinew(obj) for obj in _each_target(context)]
+        if not all(have_it):
             return can_change(cls)
         others = attach.not_meshes(context.selected_objects)
-        if others:
+        if have_it:
+            cls.poll_message_set(tr("The meshes of the armature have Sinew already"))
+        elif others:
             text = tr("{name} is no mesh: Sinew deforms meshes only", name=others[0].name)
             cls.poll_message_set(text)
         else:

@@ -69,6 +69,18 @@ def test_add_on_the_armature_takes_all_its_meshes():
     assert_follows(second)
 
 
+def test_a_grey_add_says_why():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    with pytest.raises(RuntimeError, match="The meshes of the armature have Sinew already"):
+        bpy.ops.sinew.add()
+    armature.select_set(False)
+    obj.select_set(False)
+    bpy.context.view_layer.objects.active = None
+    with pytest.raises(RuntimeError, match="Select a mesh with an Armature modifier"):
+        bpy.ops.sinew.add()
+
+
 def test_the_rest_mesh_is_never_written():
     obj, _armature = scenes.make_arm()
     before = scenes.rest_points(obj)

@@ -71,9 +71,10 @@ def unit(vector):
     return vector / length if length > np.sqrt(1e-35) else np.zeros(3)
 
 
-def frame(before, at, after):
-    """The axes of a corner, as columns, and its weight."""
-    a, b = unit(before - at), unit(at - after)
+def frame(before, at, after, precision=np.float64):
+    """The axes of a corner, as columns, and its weight. precision: of the directions of its edges. At the tip
+    of a needle they are nearly opposite, and the axes come from their difference."""
+    a, b = (unit(edge).astype(precision).astype(np.float64) for edge in (before - at, at - after))
     if (np.abs(a - b) <= EPSILON).all():
         return np.eye(3), 0.0
     z, x = unit(np.cross(a, b)), unit(a + b)
@@ -94,7 +95,7 @@ def delta_mush(  # noqa: PLR0913 - as the library's
     rounding=0.0,
 ):
     """mesh: (rest points, faces as lists of vertices, edges). rounding: added to smoothed points, to see
-    its effect."""
+    its effect; the directions of edges are then rounded to float32, too."""
     rest, faces, edges = mesh
     rest = np.asarray(rest, np.float64)
     factors = np.full(len(rest), float(factor))
@@ -107,9 +108,10 @@ def delta_mush(  # noqa: PLR0913 - as the library's
     rest_smoothed = smoothed(rest, edges, factors, iterations, smooth_type) - rounding
     result = smoothed(points, edges, factors, iterations, smooth_type) + rounding
     details, weight_sums = np.zeros_like(result), np.zeros(len(result))
+    precision = np.float32 if np.any(rounding) else np.float64
     for at, before, after in corners_of(faces):
-        axes, _ = frame(*rest_smoothed[[before, at, after]])
-        posed_axes, weight = frame(*result[[before, at, after]])
+        axes, _ = frame(*rest_smoothed[[before, at, after]], precision)
+        posed_axes, weight = frame(*result[[before, at, after]], precision)
         details[at] += weight * posed_axes @ axes.T @ (rest[at] - rest_smoothed[at])
         weight_sums[at] += weight
     has_details = weight_sums > 0

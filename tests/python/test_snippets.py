@@ -41,6 +41,7 @@ PICTURES = {
     r"bake-error\.webp": ("docs/photograph_bake.py", None),
     r"motion-panel\.webp": ("docs/photograph_blend.py", "panel"),
     r"sculpt\.webp": ("docs/photograph_sculpt.py", "sculpt"),
+    r"place-\w+\.webp": ("docs/photograph_places.py", "place-"),
     r"tour-[\w-]+\.webp": ("docs/photograph_tour.py", "tour-"),
     r"pictures-[\w-]+\.webp": ("docs/draw_methods.py", "pictures-"),
     r"motion-\w+\.(png|svg)": ("docs/draw_motion.py", None),

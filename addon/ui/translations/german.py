@@ -327,6 +327,7 @@ TEXTS = {
     "Removed Sinew from": "Sinew entfernt von",
     "Took over Corrective Smooth of": "Corrective Smooth übernommen von",
     "Made the vertex group of": "Punktgruppe angelegt für",
+    "The meshes of the armature have Sinew already": "Die Maschen des Skeletts haben Sinew schon",
     "{name} is no mesh: Sinew deforms meshes only": "{name} ist keine Masche: Sinew verformt nur Maschen",
     "{name} is no mesh that Sinew deforms": "{name} ist keine Masche, die Sinew verformt",
     "The active object": "Das aktive Objekt",
