@@ -180,12 +180,12 @@ def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
 
 
 def have_bones_changed(
-    obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph, changes: Changes | None
+    obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph, changes: Changes, are_unknown: bool
 ) -> bool:
     """Whether the bones of one of the armatures differ from those read. An armature in edit mode counts as
     unchanged.
 
-    changes  None where they are unknown, as after Sinew was off
+    are_unknown  the changes do not say which armatures may have other bones
     """
     changed = False
     for stage, replaced in zip(
@@ -194,9 +194,12 @@ def have_bones_changed(
         armature, known = replaced.armature, stage.binding.bones
         if armature is None or armature.data.is_editmode:
             continue
-        if changes is None or armature.data.session_uid in changes.armatures or not known.complete:
-            bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-            changed |= not bones.equals(known)
+        if are_unknown or armature.data.session_uid in changes.armatures or not known.complete:
+            # Clothes and hair have the armature of the body.
+            if armature.session_uid not in changes.bones:
+                bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+                changes.bones[armature.session_uid] = bones
+            changed |= not changes.bones[armature.session_uid].equals(known)
     return changed
 
 

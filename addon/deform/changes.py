@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
+from ..core.rig import Bones
 from .originals import Find
 
 
@@ -29,6 +30,7 @@ class Changes:
                 changed
     after_step  these are the changes of an undo or redo step: what is listed was read anew, however little of
                 it Blender reports as touched
+    bones       those of armature objects, as read for this event
     """
 
     touched: set[int] = field(default_factory=set)
@@ -42,6 +44,7 @@ class Changes:
     complete: bool = False
     lost: bool = False
     after_step: bool = False
+    bones: dict[int, Bones] = field(default_factory=dict)
 
     @staticmethod
     def are_of_meshes_only(depsgraph: bpy.types.Depsgraph) -> bool:

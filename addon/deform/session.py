@@ -306,6 +306,8 @@ def resume_after_save(context: bpy.types.Context) -> None:
 
 def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     """Brings all objects up to date with an evaluation and its changes, and notifies the subscribers."""
+    # Those of another evaluation.
+    changes.bones.clear()
     with updates_suspended():
         if depsgraph.mode == "VIEWPORT":
             current.view_layers.add(identity_of_layer(depsgraph.scene, depsgraph.view_layer))

@@ -99,6 +99,7 @@ class SkinnedObject:
     is_only_user         the mesh has as many users now
     visibility_keyed     for each Armature modifier, whether an animation switches it on and off
     object_state         what the artist can change about the object itself, from object_state_of()
+    groups               the names of its vertex groups
     dependencies         the session_uid of everything that the shape depends on
     builtin_fingerprint  why its Armature modifiers deform it (small_meshes.fingerprint()); else empty
     group_losses         how often its modifier had lost its node group
@@ -124,6 +125,7 @@ class SkinnedObject:
     is_only_user: bool = True
     visibility_keyed: list[bool] = field(default_factory=list)
     object_state: list = field(default_factory=list)
+    groups: list[str] = field(default_factory=list)
     dependencies: set[int] = field(default_factory=set)
     builtin_fingerprint: list[str] = field(default_factory=list)
     group_losses: int = 0
@@ -153,6 +155,7 @@ class SkinnedObject:
         self.visibility_keyed = [is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)]
         self.normals_domain = normals.domain_of(obj.data)
         self.modifier, self.object_state = stack.sinew_modifier(obj).name, object_state_of(obj)
+        self.groups = obj.vertex_groups.keys()
         proxy = properties.of(obj).upstream_proxy
         own = {obj.session_uid, obj.data.session_uid, uid(obj.data.shape_keys), uid(proxy)}
         self.dependencies = own | set(self.bound.armatures)
@@ -202,11 +205,12 @@ class SkinnedObject:
             return True
         if self.needs_recheck or obj.data.session_uid in meshes:
             return False
-        return self.mode == obj.mode and self.is_as_noted(obj)
+        # Where vertex groups are added, removed or renamed, Blender lists the scene as changed, too.
+        return self.mode == obj.mode and self.object_state == object_state_of(obj)
 
     def is_as_noted(self, obj: bpy.types.Object) -> bool:
         """Whether the object itself is as it was when the plan was applied."""
-        return self.object_state == object_state_of(obj)
+        return self.object_state == object_state_of(obj) and self.groups == obj.vertex_groups.keys()
 
     def was_deformed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the last evaluation gave the object its shape."""
@@ -225,7 +229,8 @@ class SkinnedObject:
 
 
 def object_state_of(obj: bpy.types.Object) -> list:
-    """Everything about the object itself that the artist can change and that decides how it is deformed."""
+    """Everything about the object itself that the artist can change and that decides how it is deformed, but
+    for its vertex groups."""
     settings = properties.of(obj)
     mesh, keys = obj.data, obj.data.shape_keys
     state = [
@@ -243,7 +248,6 @@ def object_state_of(obj: bpy.types.Object) -> list:
     state += [armature.mode for armature in settings.armatures]
     # Adding an animation has no event of its own.
     state += sorted(path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers")))
-    state += obj.vertex_groups.keys()
     for modifier in obj.modifiers:
         state += (modifier.name, modifier.show_viewport, modifier.show_render)
         if modifier.type == "SUBSURF":

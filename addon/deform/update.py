@@ -13,7 +13,7 @@ from ..io import armature_io
 from . import after_update, apply_plan, bound, precomputing, source
 from .changes import Changes
 from .plan import ARMATURE_MODIFIER_MODES, Plan, State
-from .skinned_object import SkinnedObject, object_state_of
+from .skinned_object import SkinnedObject
 
 # How often the node group is restored after another add-on removed it.
 MAX_GROUP_LOSSES = 2
@@ -50,9 +50,7 @@ def update(
     was_on = properties.of(obj).replaces_modifiers
     plan = _apply_plan(obj, skinned, changes) if inspect else before
     # Before anything else, as groups are renamed along with bones.
-    bones_changed = skinned is not None and bound.have_bones_changed(
-        obj, skinned.bound, depsgraph, None if _may_have_other_bones(skinned, changes) else changes
-    )
+    bones_changed = skinned is not None and _have_bones_changed(obj, skinned, depsgraph, changes)
     # While Sinew's modifier was off, nothing made Blender evaluate the upstream proxy.
     if not source.is_ready(obj, depsgraph, was_on):
         # What is hidden, or in another scene, stays as it is.
@@ -83,10 +81,12 @@ def update(
     return skinned
 
 
-def _may_have_other_bones(skinned: SkinnedObject, changes: Changes) -> bool:
-    """Whether bones have to be compared regardless of the changes: these were not recorded while it was
-    off."""
-    return skinned.plan.state is State.OFF or changes.after_step
+def _have_bones_changed(
+    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    # While it was off, changes were not recorded.
+    are_unknown = skinned.plan.state is State.OFF or changes.after_step
+    return bound.have_bones_changed(obj, skinned.bound, depsgraph, changes, are_unknown)
 
 
 def _is_in_armature_modifier_mode(obj: bpy.types.Object) -> bool:
@@ -151,7 +151,7 @@ def _needs_inspection(
         return True
     # Requesting points touches the object, too.
     explains_touch = skinned.plan.is_in_depsgraph or skinned.was_deformed(obj, depsgraph)
-    return not explains_touch or object_state_of(obj) != skinned.object_state
+    return not explains_touch or not skinned.is_as_noted(obj)
 
 
 def uid_in(data: bpy.types.ID | None, uids: set[int]) -> bool:
@@ -164,8 +164,9 @@ def _has_shape(
     """Whether the last evaluation gave it its shape, and nothing else changed that has to be read."""
     return (
         skinned.was_deformed(obj, depsgraph)
-        and not changes.armatures
         and obj.data.session_uid not in changes.touched
+        # Blender lists an armature's bones with each change of its pose.
+        and not _have_bones_changed(obj, skinned, depsgraph, changes)
     )
 
 

@@ -118,6 +118,41 @@ def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
+@pytest.mark.parametrize("is_rendered", [False, True], ids=["shown", "rendered"])
+@pytest.mark.parametrize("is_first", [False, True], ids=["behind Sinew's", "before Sinew's"])
+@pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
+def test_a_group_that_a_handler_renames_is_seen(
+    arm, neighbour, rendered_points, event, is_first, is_rendered
+):
+    bpy.context.scene.frame_set(10)
+
+    def act() -> None:
+        if "bone.1" in arm.vertex_groups:
+            arm.vertex_groups["bone.1"].name = "another"
+
+    neighbour(event, act)
+    if is_first:
+        functions = getattr(bpy.app.handlers, event)
+        functions.insert(0, functions.pop())
+    if is_rendered:
+        got = rendered_points(arm)
+    else:
+        bpy.context.scene.frame_set(10)
+        got = scenes.final_points(arm)
+    properties.of(arm).enabled = False
+    expected = rendered_points(arm) if is_rendered else scenes.modifier_shapes(arm, [10], True)[0]
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
+def test_a_group_that_a_script_renames_before_a_frame_is_seen(arm):
+    arm.vertex_groups["bone.1"].name = "another"
+    bpy.context.scene.frame_set(10)
+    got = scenes.final_points(arm)
+    properties.of(arm).enabled = False
+    expected = scenes.modifier_shapes(arm, [10], True)[0]
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
 def beside_nothing(obj: bpy.types.Object) -> None:
     pass
 
