@@ -18,7 +18,7 @@ TOLERANCE = 1e-5
 
 @pytest.fixture
 def reader(monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
+    monkeypatch.setattr(sys, "path", [str(FOLDER), *sys.path])
     yield importlib.import_module("skin")
     for name in ("skin", "methods", "stages"):
         sys.modules.pop(name, None)
