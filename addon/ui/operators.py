@@ -179,11 +179,13 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        have_it = [properties.has_sinew(obj) for obj in _each_target(context)]
-        if not all(have_it):
-            return can_change(cls)
+        has_target = False
+        for obj in _each_target(context):
+            if not properties.has_sinew(obj):
+                return can_change(cls)
+            has_target = True
         others = attach.not_meshes(context.selected_objects)
-        if have_it:
+        if has_target:
             cls.poll_message_set(tr("The meshes of the armature have Sinew already"))
         elif others:
             text = tr("{name} is no mesh: Sinew deforms meshes only", name=others[0].name)
