@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -12,6 +13,10 @@ from pathlib import Path
 
 import pytest
 
+# For tests that send SIGINT.
+needs_interrupts = pytest.mark.skipif(
+    os.name == "nt", reason="Python sends no interrupt to one process of Windows"
+)
 COMMAND = [sys.executable, "-c", "from sinew_addon.cli import run; run()"]
 ENVIRONMENT = {**os.environ, "PYTHONIOENCODING": "utf-8"}
 
@@ -43,6 +48,8 @@ def run_sinew(
 @contextmanager
 def disk(folder: Path, options: str) -> Iterator[Path]:
     """A disk in memory, mounted at a new folder. Skips the test if mounting is not allowed."""
+    if shutil.which("mount") is None:
+        pytest.skip("the system mounts no disks in memory")
     folder.mkdir()
     command = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
     if subprocess.run(command, capture_output=True, check=False).returncode != 0:

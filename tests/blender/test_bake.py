@@ -60,7 +60,9 @@ for obj in [o for o in scene.objects if o.type == "MESH" and len(o.data.vertices
     arrays[obj.name] = np.stack(per_frame)
     uvs.append(len(obj.data.uv_layers))
     materials += [slot.material.name for slot in obj.material_slots if slot.material]
-np.savez(result, uvs=np.array(uvs), materials=np.array(materials), **arrays)
+# Within an archive Windows takes a name's backslash for a slash.
+points = {str(number): array for number, array in enumerate(arrays.values())}
+np.savez(result, uvs=np.array(uvs), materials=np.array(materials), names=np.array([*arrays]), **points)
 """
 
 
@@ -71,7 +73,8 @@ def read_elsewhere(path, frames, tmp_path, hidden=()):
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     with np.load(result) as arrays:
-        return dict(arrays)
+        points = {str(name): arrays[str(number)] for number, name in enumerate(arrays["names"])}
+        return points | {"uvs": arrays["uvs"], "materials": arrays["materials"]}
 
 
 def shown(obj, frames, method=METHOD):
@@ -191,7 +194,7 @@ def test_the_armature_modifier_stays_for_the_way_back(arm, tmp_path):
     obj = bpy.data.objects["Arm"]
     assert not properties.has_sinew(obj)
     assert [m.type for m in obj.modifiers] == ["MESH_CACHE", "ARMATURE"]
-    assert obj.modifiers[0].filepath == "//arm_cache/Arm.mdd"
+    assert obj.modifiers[0].filepath.replace("\\", "/") == "//arm_cache/Arm.mdd"
     armature = obj.modifiers[1]
     assert (armature.object.name, armature.show_viewport, armature.show_render) == ("Arm Rig", False, False)
     assert not [group for group in bpy.data.node_groups if group.name.startswith("Sinew")]
@@ -691,6 +694,7 @@ def test_wrong_use(arm, tmp_path):
 LONG = {kind: 3000 for kind in core.KINDS} | {"gltf": 200}
 
 
+@program.needs_interrupts
 @pytest.mark.parametrize("kind", core.KINDS)
 def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
     """Also within an exporter's single call for all frames."""

@@ -22,7 +22,7 @@ import psutil
 import pytest
 import scenes
 import whole_file
-from program import ENVIRONMENT, run_sinew
+from program import ENVIRONMENT, needs_interrupts, run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.blender_process import BlenderProcess, Limits
 from sinew_addon.io import files
@@ -455,7 +455,7 @@ def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
 
 
 @newest_only
-@pytest.mark.skipif(os.name == "nt", reason="Python sends no interrupt to one process of Windows")
+@needs_interrupts
 def test_ctrl_c_stops_cleanly(tmp_path):
     folder = tmp_path / "in"
     make_rigs(folder, 4)

@@ -353,6 +353,7 @@ def test_compare_draws_a_sheet(tmp_path, engine):
     assert np.abs(columns[1] - columns[2]).mean() > 3.0, "the methods look the same"
 
 
+@program.needs_interrupts
 @pytest.mark.parametrize("round", range(4))
 def test_ctrl_c_stops_what_goes_through_frames(arm_file, tmp_path, round):
     """Wherever it occurs: Blender discards it within its handlers."""
