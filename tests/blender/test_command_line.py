@@ -253,7 +253,7 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
     )
     assert "2 of 5 files" in result.stdout
     written = sorted(
-        str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*.blend") if p.is_file()
+        p.relative_to(tmp_path / "out").as_posix() for p in (tmp_path / "out").rglob("*.blend") if p.is_file()
     )
     assert written == ["a good one.blend", "sub/名前.blend"]
     for name in ("empty.blend", "text.blend", "truncated.blend"):
