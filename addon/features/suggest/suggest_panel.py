@@ -49,6 +49,8 @@ class SINEW_OT_suggestions_by(bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     measure: bpy.props.EnumProperty(
+        name="Measure",
+        description="What the methods are compared by",
         items=(
             (BEST, "Best at Each Measure", "The best methods at each measure, with their worst value"),
             *((criterion.name, criterion.label, criterion.text) for criterion in CRITERIA),

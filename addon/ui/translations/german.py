@@ -552,6 +552,7 @@ TEXTS = {
         "Die besten Methoden je Maß zeigen, oder alle Methoden in der Reihenfolge eines Maßes"
     ),
     "Best at Each Measure": "Beste je Maß",
+    "What the methods are compared by": "Wonach die Methoden verglichen werden",
     "The best methods at each measure, with their worst value": (
         "Die besten Methoden je Maß, mit ihrem schlechtesten Wert"
     ),
