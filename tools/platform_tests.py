@@ -196,11 +196,15 @@ def blender_tests(emulated: Emulated, options: Sequence[str]) -> int:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__.splitlines()[0],
+        epilog="What stands behind -- goes to pytest, in place of all tests of a part.",
+    )
     parser.add_argument("platform", choices=PARTS)
     parser.add_argument("--part", choices=("native", "python", "blender"), action="append", help="only this")
-    parser.add_argument("options", nargs="*", help="for pytest, behind --, in place of all tests of a part")
-    options = parser.parse_args()
+    # Not as arguments: behind an option, argparse takes no others but the first.
+    end = sys.argv.index("--") if "--" in sys.argv else len(sys.argv)
+    options, for_pytest = parser.parse_args(sys.argv[1:end]), sys.argv[end + 1 :]
     platform = PLATFORMS[options.platform]
     parts = options.part or PARTS[options.platform]
     if missing := set(parts) - set(PARTS[options.platform]):
@@ -213,7 +217,7 @@ def main() -> None:
             results[part] = native_tests(platform)
         else:
             tests = python_tests if part == "python" else blender_tests
-            results[part] = tests(emulated, options.options)
+            results[part] = tests(emulated, for_pytest)
     print("\n== Summary ==")
     for part, status in results.items():
         print(f"  {options.platform} {part:8} {'passed' if status == 0 else f'FAILED ({status})'}")
