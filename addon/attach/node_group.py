@@ -344,16 +344,18 @@ def _say_what_is_missing(
     frame.location = (0, 300)
     if not hasattr(bpy.types, "GeometryNodeWarning"):
         return geometry
-    warning, say, choice = add_nodes(group, "GeometryNodeWarning", "GeometryNodeSwitch", "GeometryNodeSwitch")
-    say.input_type = choice.input_type = "GEOMETRY"
+    missing, warning, choice = add_nodes(
+        group, "FunctionNodeBooleanMath", "GeometryNodeWarning", "GeometryNodeSwitch"
+    )
+    missing.operation, choice.input_type = "NOT", "GEOMETRY"
     warning.inputs["Message"].default_value = MISSING
     link = group.links.new
-    # Blender evaluates no warning whose output is not used, and only the side of a switch that is taken.
-    link(warning.outputs["Show"], say.inputs["Switch"])
-    link(source.outputs[PRESENT], choice.inputs["Switch"])
-    for socket in (say.inputs["False"], say.inputs["True"], choice.inputs["True"]):
-        link(geometry, socket)
-    link(say.outputs["Output"], choice.inputs["False"])
+    link(source.outputs[PRESENT], missing.inputs[0])
+    link(missing.outputs[0], warning.inputs["Show"])
+    # Blender does not evaluate a warning whose output is not used.
+    link(warning.outputs["Show"], choice.inputs["Switch"])
+    link(geometry, choice.inputs["False"])
+    link(geometry, choice.inputs["True"])
     return choice.outputs["Output"]
 
 
