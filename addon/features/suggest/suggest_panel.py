@@ -54,7 +54,7 @@ class SINEW_OT_suggestions_by(bpy.types.Operator):
         items=(
             (BEST, "Best at Each Measure", "The best methods at each measure, with their worst value"),
             *((criterion.name, criterion.label, criterion.text) for criterion in CRITERIA),
-        )
+        ),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
