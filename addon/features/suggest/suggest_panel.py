@@ -83,17 +83,21 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
         draw_text(
             layout, context, counted(count, "The worst of {count} frame", "The worst of {count} frames")
         )
+        used = {properties.of(obj).method for obj in sinew_targets(context)}
         criterion = next((c for c in CRITERIA if c.name == _View.measure), None)
         text = "Best at Each Measure" if criterion is None else criterion.label
         layout.operator_menu_enum("sinew.suggestions_by", "measure", text=text, icon="SORTSIZE")
         if criterion is None:
-            _draw_best(layout, context, suggestion)
+            _draw_best(layout, context, suggestion, used)
         else:
             draw_text(layout, context, criterion.text)
-            _draw_order(layout, context, suggestion, criterion)
+            _draw_order(layout, context, suggestion, criterion, used)
 
 
-def _draw_best(layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion) -> None:
+def _draw_best(
+    layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, used: set[str]
+) -> None:
+    """used: the methods of the objects that the panel is about"""
     for criterion in CRITERIA:
         best = suggestion.best(criterion)
         row = layout.split(factor=0.45)
@@ -102,7 +106,7 @@ def _draw_best(layout: bpy.types.UILayout, context: bpy.types.Context, suggestio
         row.label(text=f"{tr(criterion.label)} {value}", translate=False)
         column = row.column(align=True)
         for method in best[:MOST_BEST]:
-            _draw_method(column, context, suggestion, method)
+            _draw_method(column, suggestion, method, used)
         if len(best) > MOST_BEST:
             column.label(text=tr("and {count} more", count=len(best) - MOST_BEST), translate=False)
         elif not best and (measured[0], criterion.name) in suggestion.worst:
@@ -110,21 +114,22 @@ def _draw_best(layout: bpy.types.UILayout, context: bpy.types.Context, suggestio
 
 
 def _draw_order(
-    layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    suggestion: Suggestion,
+    criterion: Criterion,
+    used: set[str],
 ) -> None:
     best = suggestion.best(criterion)
     column = layout.column(align=True)
     for method in suggestion.order(criterion):
         row = column.split(factor=0.64, align=True)
-        _draw_method(row, context, suggestion, method)
+        _draw_method(row, suggestion, method, used)
         value = _value(context, suggestion, criterion, method)
         row.label(text=value, icon="CHECKMARK" if method in best else "BLANK1", translate=False)
 
 
-def _draw_method(
-    layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, method: str
-) -> None:
-    used = {properties.of(obj).method for obj in sinew_targets(context)}
+def _draw_method(layout: bpy.types.UILayout, suggestion: Suggestion, method: str, used: set[str]) -> None:
     text = suggestion.methods[method]
     layout.operator("sinew.use_method", text=text, depress=method in used).method = method
 
