@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 from ...attach import references
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_main_thread, is_rendering_in_window
-from ...deform import events
+from ...deform import events, session
 from . import ik_in_depsgraph, ik_live
 
 
@@ -25,8 +25,15 @@ def sync_all() -> None:
     if not _may_change():
         return
     with references.between_steps():
-        for armature in list(_armatures()):
-            ik_live.sync(armature)
+        _follow([ik_live.sync(armature) for armature in list(_armatures())])
+
+
+def _follow(changed: list[bool]) -> None:
+    """Meshes that Sinew deforms after the update follow other constraints: what is changed within a handler,
+    Blender evaluates without an event."""
+    states = [state for _obj, state in session.current.pairs]
+    if any(changed) and any(state.plan.after_update for state in states):
+        session.refresh_between_steps(bpy.context)
 
 
 @persistent
@@ -36,10 +43,8 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
     # By name: another add-on's handler may have deleted an original.
     names = [update.id.name for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
     with references.between_steps():
-        for name in names:
-            armature = bpy.data.objects.get(name)
-            if armature is not None and ik_live.is_live(armature):
-                ik_live.sync(armature)
+        listed = [bpy.data.objects.get(name) for name in names]
+        _follow([ik_live.sync(each) for each in listed if each is not None and ik_live.is_live(each)])
         _note_problems()
 
 

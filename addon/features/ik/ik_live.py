@@ -192,38 +192,38 @@ def check_apart(trees: list[core.Tree]) -> None:
                 )
 
 
-def sync(armature: bpy.types.Object) -> None:
-    """Updates an armature's constraints and its followers to what is switched on."""
+def sync(armature: bpy.types.Object) -> bool:
+    """Updates an armature's constraints and its followers to what is switched on. Returns whether any
+    changed."""
     uid = armature.session_uid
     trees, state = _session.attached.get(uid, ([], []))
     if trees and not safe_mode.is_on() and _state(armature, trees) == state:
-        return
+        return False
     _drop_what_the_artist_switched_off(armature)
     live = live_constraints(armature)
     may_run = not (safe_mode.is_on() or uid in _session.failed or uid in _session.suspended)
     if not (live and may_run and armature.is_editable):
-        detach(armature)
         if not live:
             _session.problems.pop(uid, None)
-        return
+        return detach(armature)
     try:
         trees = ik_io.read_trees(armature, list(live), live)
         check(armature, trees)
         check_apart(trees)
         _attach(armature, trees)
     except SinewError as error:
-        detach(armature)
         _session.problems[uid] = str(error)
-        return
+        return detach(armature)
     _session.problems.pop(uid, None)
     _session.attached[uid] = trees, _state(armature, trees)
+    return True
 
 
-def detach(armature: bpy.types.Object) -> None:
-    """Lets Blender's constraints play; the followers stay, without users."""
+def detach(armature: bpy.types.Object) -> bool:
+    """Lets Blender's constraints play; the followers stay, without users. Returns whether Sinew's played."""
     _session.attached.pop(armature.session_uid, None)
     if armature.pose is None or not armature.is_editable:
-        return
+        return False
     followed = False
     for bone in armature.pose.bones:
         for constraint in [each for each in bone.constraints if ik_io.follows(each)]:
@@ -231,6 +231,7 @@ def detach(armature: bpy.types.Object) -> None:
             followed = True
     if followed:
         ik_io.set_muted(armature, list(live_constraints(armature).items()), False)
+    return followed
 
 
 def remove_followers(armature: bpy.types.Object | None, but: Collection[bpy.types.Object] = ()) -> None:
