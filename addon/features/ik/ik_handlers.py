@@ -43,8 +43,13 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
     # By name: another add-on's handler may have deleted an original.
     names = [update.id.name for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
     with references.between_steps():
-        listed = [bpy.data.objects.get(name) for name in names]
-        _follow([ik_live.sync(each) for each in listed if each is not None and ik_live.is_live(each)])
+        changed = []
+        for name in names:
+            # Each sync() can remove followers, which are listed, too.
+            armature = bpy.data.objects.get(name)
+            if armature is not None and ik_live.is_live(armature):
+                changed.append(ik_live.sync(armature))
+        _follow(changed)
         _note_problems()
 
 
