@@ -244,22 +244,30 @@ class Scene:
         return [seconds / len(self.meshes) for seconds in times]
 
 
-def measure(case: Case, seconds: float, leave_small: bool) -> dict:
-    scene = Scene(case, leave_small)
-    points, times = {}, {"modifier": [], "sinew": []}
-    number, end = 1, time.perf_counter() + seconds
-    while time.perf_counter() < end or len(times["sinew"]) < 2 * RUN:
+def alternate(scene: Scene, choices: dict[str, Callable[[], None]], seconds: float) -> dict[str, dict]:
+    """Spreads of seconds of a frame by name, alternating between the functions that set the scene up."""
+    times: dict[str, list[float]] = {name: [] for name in choices}
+    number, end = 1, time.perf_counter() + seconds * len(choices)
+    while time.perf_counter() < end or any(len(of) < 2 * RUN for of in times.values()):
         numbers = [1 + (number + 7 * i) % FRAMES for i in range(RUN)]
         number += 7 * RUN
-        for who in times:
-            scene.switch(who == "sinew")
-            if who not in points:
-                points[who] = scene.points(FRAMES // 2)
+        for name, choose in choices.items():
+            choose()
             scene.run(numbers[:BEFORE])
-            times[who] += scene.run(numbers)
+            times[name] += scene.run(numbers)
+    return {name: common.spread(of) for name, of in times.items()}
+
+
+def measure(case: Case, seconds: float, leave_small: bool) -> dict:
+    scene = Scene(case, leave_small)
+    choices = {who: partial(scene.switch, on=who == "sinew") for who in ("modifier", "sinew")}
+    points = {}
+    for who, choose in choices.items():
+        choose()
+        points[who] = scene.points(FRAMES // 2)
+    spreads = alternate(scene, choices, seconds)
     size = float(np.ptp(points["modifier"], axis=0).max())
     away = float(abs(points["modifier"] - points["sinew"]).max()) / size
-    spreads = {who: common.spread(of) for who, of in times.items()}
     vertices = sum(len(obj.data.vertices) for obj in scene.meshes)
     return asdict(case) | {"vertices": vertices} | spreads | {"away": away, "handler": scene.handler()}
 
@@ -293,20 +301,6 @@ def looks(scene: Scene) -> dict[str, Callable[[], None]]:
     }
 
 
-def alternate(scene: Scene, choices: dict[str, Callable[[], None]], seconds: float) -> dict[str, dict]:
-    """Spreads of seconds of a frame by name, alternating between the functions that set the scene up."""
-    times: dict[str, list[float]] = {name: [] for name in choices}
-    number, end = 1, time.perf_counter() + seconds * len(choices)
-    while time.perf_counter() < end or any(len(of) < 2 * RUN for of in times.values()):
-        numbers = [1 + (number + 7 * i) % FRAMES for i in range(RUN)]
-        number += 7 * RUN
-        for name, choose in choices.items():
-            choose()
-            scene.run(numbers[:BEFORE])
-            times[name] += scene.run(numbers)
-    return {name: common.spread(of) for name, of in times.items()}
-
-
 def measure_normals(case: Case, seconds: float) -> dict:
     """A drawn frame by the modifier and with each choice of normals."""
     scene = Scene(case, leave_small=False)
@@ -329,24 +323,25 @@ def measure_floor(case: Case, seconds: float) -> dict:
 
     scene = Scene(case, leave_small=False)
     deform, write_normals = session.SkinStack.deform, bound.Bound.write_normals
-    written: dict[tuple[int, str], np.ndarray] = {}
+    points, normals = {}, {}
 
-    def write_again(stack: session.SkinStack, rest_points, frames, out=None, values=()) -> bool:
-        if stack.points is None:
-            return deform(stack, rest_points, frames, out, values)
-        if out is not None:
-            out[:] = written.setdefault((id(stack), "points"), stack.points.copy())
+    def write_again(stack: session.SkinStack, rest_points, frames, out, values) -> bool:
+        if stack not in points:
+            deform(stack, rest_points, frames, out, values)
+            points[stack] = out.copy()
+        out[:] = points[stack]
         return True
 
-    def write_normals_again(own: bound.Bound, points, rest_points, given, out) -> None:
-        if (id(own), "normals") not in written:
-            write_normals(own, points, rest_points, given, out)
-            written[id(own), "normals"] = out.copy()
-        out[:] = written[id(own), "normals"]
+    def write_normals_again(own: bound.Bound, shape, rest_points, given, out) -> None:
+        if id(own) not in normals:
+            write_normals(own, shape, rest_points, given, out)
+            normals[id(own)] = out.copy()
+        out[:] = normals[id(own)]
 
     def by(on: bool, computes: bool) -> None:
         scene.switch(on)
-        written.clear()
+        points.clear()
+        normals.clear()
         session.SkinStack.deform = deform if computes else write_again
         bound.Bound.write_normals = write_normals if computes else write_normals_again
 
@@ -387,7 +382,7 @@ def say_cases(arguments: argparse.Namespace, say: Callable[[str], None]) -> dict
     for case in cases(arguments.million):
         name = f"{case.name} {case.method}"
         if arguments.k in name:
-            seconds = 2.0 if arguments.quick else 4.0
+            seconds = 1.0 if arguments.quick else 2.0
             results[name] = measure(case, seconds, not arguments.all_by_sinew)
             say(line(case.name, results[name]))
     return results
