@@ -38,7 +38,7 @@ def steps() -> Iterator[None]:
     scene, obj = bpy.context.scene, bpy.data.objects["Human"]
     window.select_only(obj)
     window.open_panels("SINEW_PT_bake_error", first=("SINEW_PT_main", "SINEW_PT_bake_error"))
-    shading = next(area for area in bpy.context.screen.areas if area.type == "VIEW_3D").spaces[0].shading
+    shading = window.area_of("VIEW_3D").spaces[0].shading
     before = shading.color_type
     with window.in_view3d():
         assert bpy.ops.sinew.add("INVOKE_DEFAULT") == {"FINISHED"}
@@ -50,11 +50,7 @@ def steps() -> Iterator[None]:
         overlay.show_axis_x = overlay.show_text = False
     scene.frame_set(FRAME)
     window.open_sidebar()
-    with window.in_view3d("WINDOW"):
-        view = bpy.context.space_data.region_3d
-        view.view_perspective = "ORTHO"
-        view.view_rotation = (0.7071068, 0.7071068, 0.0, 0.0)
-        view.view_location, view.view_distance = (0.52, 0.0, -0.02), 2.2
+    window.look_from_front((0.52, 0.0, -0.02), 2.2)
     yield
     yield
     window.choose_tab()

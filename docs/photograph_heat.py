@@ -25,15 +25,6 @@ ORDER = ("SINEW_PT_main", "SINEW_PT_measures", "SINEW_PT_numbers")
 UNWEIGHTED, SMALL, MANY = (0.05, 0.0, 0.42), (-0.08, 0.0, 0.3), (0.06, 0.0, 0.15)
 
 
-def look_at(place: tuple[float, float, float], distance: float) -> None:
-    """From the front; at once, where the operators take their time."""
-    with window.in_view3d("WINDOW"):
-        view = bpy.context.space_data.region_3d
-        view.view_perspective = "ORTHO"
-        view.view_rotation = (0.7071068, 0.7071068, 0.0, 0.0)
-        view.view_location, view.view_distance = place, distance
-
-
 def plant_faults(obj: bpy.types.Object) -> None:
     points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
     obj.data.vertices.foreach_get("co", points.ravel())
@@ -68,7 +59,7 @@ def steps() -> Iterator[None]:
     scene.sinew_measures.other = "lbs"
     scene.frame_set(FRAME)
     window.open_sidebar()
-    look_at((0.12, 0.0, -0.06), 2.15)
+    window.look_from_front((0.12, 0.0, -0.06), 2.15)
     yield
     yield
     window.choose_tab()
@@ -101,7 +92,7 @@ def steps() -> Iterator[None]:
     window.open_panels("SINEW_PT_diagnostics", first=ORDER)
     yield
     window.open_sidebar()
-    look_at((0.06, 0.0, 0.28), 0.75)
+    window.look_from_front((0.06, 0.0, 0.28), 0.75)
     with window.in_view3d():
         bpy.ops.sinew.check("INVOKE_DEFAULT")
         bpy.ops.sinew.select_finding("INVOKE_DEFAULT", object="Human", finding="no_weights")

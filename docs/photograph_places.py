@@ -27,11 +27,6 @@ BORDER, MOVED = (1057, 500), -160
 MODULE = "bl_ext.user_default.sinew"
 
 
-def wait(ticks: int = 3) -> Iterator[None]:
-    for _tick in range(ticks):
-        yield
-
-
 def photograph(name: str, left: int = 0, right: int = 1280, top: int = 0, bottom: int = 800) -> None:
     """A part of the window, in pixels from its left and its top."""
     whole = FOLDER / f"{name}-whole.png"
@@ -39,10 +34,6 @@ def photograph(name: str, left: int = 0, right: int = 1280, top: int = 0, bottom
     pixels = window.pixels_of(whole)
     window.save_webp(pixels[len(pixels) - bottom : len(pixels) - top, left:right], FOLDER / f"{name}.webp")
     whole.unlink()
-
-
-def area_of(kind: str) -> bpy.types.Area:
-    return next(area for area in bpy.context.window_manager.windows[0].screen.areas if area.type == kind)
 
 
 def start() -> Iterator[None]:
@@ -55,12 +46,8 @@ def start() -> Iterator[None]:
         overlay = bpy.context.space_data.overlay
         overlay.show_cursor = overlay.show_bones = overlay.show_axis_x = False
     bpy.context.scene.frame_set(FRAME)
-    with window.in_view3d("WINDOW"):
-        view = bpy.context.space_data.region_3d
-        view.view_perspective = "ORTHO"
-        view.view_rotation = (0.7071068, 0.7071068, 0.0, 0.0)
-        view.view_location, view.view_distance = (0.1, 0.0, 0.0), 2.4
-    yield from wait()
+    window.look_from_front((0.1, 0.0, 0.0), 2.4)
+    yield from window.wait()
 
 
 def widen_properties() -> Iterator[None]:
@@ -68,7 +55,7 @@ def widen_properties() -> Iterator[None]:
     yield
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
         bpy.ops.screen.area_move(x=BORDER[0], y=800 - BORDER[1], delta=MOVED)
-    yield from wait()
+    yield from window.wait()
 
 
 def menu() -> Iterator[None]:
@@ -77,15 +64,15 @@ def menu() -> Iterator[None]:
     yield
     with window.in_view3d("WINDOW"):
         bpy.ops.wm.call_menu(name="SINEW_MT_menu")
-    yield from wait()
+    yield from window.wait()
     photograph("place-menu", right=860, bottom=700)
     window.press("ESC", MENU)
-    yield from wait()
+    yield from window.wait()
 
 
 def modifier() -> Iterator[None]:
-    area_of("PROPERTIES").spaces[0].context = "MODIFIER"
-    yield from wait()
+    window.area_of("PROPERTIES").spaces[0].context = "MODIFIER"
+    yield from window.wait()
     photograph("place-modifier", left=1058 + MOVED, top=230, bottom=650)
 
 
@@ -94,10 +81,10 @@ def bake() -> Iterator[None]:
     yield
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.bake("INVOKE_DEFAULT", kind="bones")
-    yield from wait()
+    yield from window.wait()
     photograph("place-bake", left=150, right=860, top=180, bottom=640)
     window.press("ESC", DIALOG)
-    yield from wait()
+    yield from window.wait()
 
 
 def corrective() -> Iterator[None]:
@@ -110,15 +97,15 @@ def corrective() -> Iterator[None]:
         bpy.ops.object.mode_set(mode="OBJECT")
     window.select_only(obj)
     yield
-    area_of("PROPERTIES").spaces[0].context = "DATA"
-    yield from wait()
+    window.area_of("PROPERTIES").spaces[0].context = "DATA"
+    yield from window.wait()
     photograph("place-corrective", left=1058 + MOVED, top=230, bottom=660)
 
 
 def preferences() -> Iterator[None]:
     bpy.context.preferences.active_section = "ADDONS"
     bpy.ops.preferences.addon_show(module=MODULE)
-    yield from wait(4)
+    yield from window.wait(4)
     photograph("place-preferences", left=270, right=979, top=88, bottom=330)
 
 

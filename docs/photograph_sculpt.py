@@ -38,11 +38,7 @@ def steps() -> Iterator[None]:
         assert bpy.ops.sinew.add("INVOKE_DEFAULT") == {"FINISHED"}
     obj.sinew.method = "dq"
     window.open_sidebar()
-    with window.in_view3d("WINDOW"):
-        view = bpy.context.space_data.region_3d
-        view.view_perspective = "ORTHO"
-        view.view_rotation = (0.7071068, 0.7071068, 0.0, 0.0)
-        view.view_location, view.view_distance = (0.35, 0.0, 0.0), 2.6
+    window.look_from_front((0.35, 0.0, 0.0), 2.6)
     yield
     yield
     window.choose_tab()

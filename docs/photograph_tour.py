@@ -84,19 +84,6 @@ def _colour(obj: bpy.types.Object, colour: tuple[float, ...]) -> None:
     obj.data.materials.append(material)
 
 
-def look(x: float, distance: float) -> None:
-    with window.in_view3d("WINDOW"):
-        view = bpy.context.space_data.region_3d
-        view.view_perspective = "ORTHO"
-        view.view_rotation = (0.7071068, 0.7071068, 0.0, 0.0)
-        view.view_location, view.view_distance = (x, 0.0, 0.0), distance
-
-
-def wait(ticks: int = 3) -> Iterator[None]:
-    for _tick in range(ticks):
-        yield
-
-
 def start() -> Iterator[None]:
     window.install(ZIP)
     dress(bpy.data.objects["Human"])
@@ -107,10 +94,10 @@ def start() -> Iterator[None]:
         bpy.context.space_data.overlay.show_cursor = False
     window.select_only(bpy.data.objects["Human"])
     window.open_sidebar()
-    look(0.35, 2.6)
-    yield from wait()
+    window.look_from_front((0.35, 0.0, 0.0), 2.6)
+    yield from window.wait()
     window.choose_tab()
-    yield from wait()
+    yield from window.wait()
 
 
 def add_and_choose() -> Iterator[None]:
@@ -118,24 +105,18 @@ def add_and_choose() -> Iterator[None]:
     yield from window.click(ADD)
     photograph("2-added")
     yield from window.click(METHOD)
-    yield from wait()
+    yield from window.wait()
     photograph("3-methods")
     window.press("ESC", METHOD)
-    yield from wait()
+    yield from window.wait()
     bpy.context.scene.sinew_character.method = "dq"
     yield from window.click(MESHES)
     yield from window.click(STAGES)
     bpy.context.scene.sinew_character.delta_mush.enabled = True
-    yield from wait()
+    yield from window.wait()
     photograph("4-stages-and-meshes")
     bpy.context.scene.sinew_character.delta_mush.enabled = False
-    yield from wait()
-
-
-def close_panels() -> Iterator[None]:
-    """Opened with Ctrl, a panel closes all others."""
-    for held in ({}, {"ctrl": True}, {}):
-        yield from window.click(HEADERS["Sinew"], **held)
+    yield from window.wait()
 
 
 def suggest() -> Iterator[None]:
@@ -152,7 +133,7 @@ def heat_map() -> Iterator[None]:
     with window.in_view3d():
         bpy.ops.sinew.heat_map("INVOKE_DEFAULT")
     yield from window.click(HEADERS["Heat Map"])
-    yield from wait()
+    yield from window.wait()
     photograph("6-heat-map")
     with window.in_view3d():
         bpy.ops.sinew.heat_map("INVOKE_DEFAULT")
@@ -167,21 +148,21 @@ def diagnostics() -> Iterator[None]:
     with window.in_view3d():
         bpy.ops.sinew.check("INVOKE_DEFAULT")
     yield from window.click(HEADERS["Diagnostics"])
-    yield from wait()
+    yield from window.wait()
     photograph("7-diagnostics")
     with window.in_view3d():
         bpy.ops.sinew.mend("EXEC_DEFAULT", object="Human", finding="no_weights", how="fill")
         bpy.ops.sinew.mend("EXEC_DEFAULT", object="Shirt", finding="boneless_groups", how="remove")
-    yield from wait()
+    yield from window.wait()
     yield from window.click(HEADERS["Diagnostics"])
 
 
 def pie() -> Iterator[None]:
     window.press("Y", VIEW, alt=True, shift=True)
-    yield from wait(5)
+    yield from window.wait(5)
     photograph("8-pie")
     window.press("ESC", VIEW)
-    yield from wait()
+    yield from window.wait()
 
 
 def compare() -> Iterator[None]:
@@ -190,7 +171,7 @@ def compare() -> Iterator[None]:
     with window.in_view3d():
         bpy.ops.sinew.compare("EXEC_DEFAULT", methods={"lbs", "dq"})
     yield from window.click(HEADERS["Compare"])
-    yield from wait()
+    yield from window.wait()
     photograph("9-compare")
 
 
@@ -221,7 +202,7 @@ def render() -> None:
 def steps() -> Iterator[None]:
     yield from start()
     yield from add_and_choose()
-    yield from close_panels()
+    yield from window.close_panels(HEADERS["Sinew"])
     yield from suggest()
     yield from heat_map()
     yield from diagnostics()

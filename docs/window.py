@@ -37,12 +37,24 @@ def final_points(obj: bpy.types.Object) -> np.ndarray:
     return points
 
 
+def area_of(kind: str) -> bpy.types.Area:
+    """The main window's first area of this type, such as VIEW_3D."""
+    return next(area for area in bpy.context.window_manager.windows[0].screen.areas if area.type == kind)
+
+
 def in_view3d(region_type: str = "UI"):
     """The context of a click in a region of the 3D view; the sidebar's by default."""
-    window = bpy.context.window_manager.windows[0]
-    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    window, area = bpy.context.window_manager.windows[0], area_of("VIEW_3D")
     region = next(region for region in area.regions if region.type == region_type)
     return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def look_from_front(place: tuple[float, float, float], distance: float) -> None:
+    """At once, where the operators take their time."""
+    view = area_of("VIEW_3D").spaces[0].region_3d
+    view.view_perspective = "ORTHO"
+    view.view_rotation = (0.7071068, 0.7071068, 0.0, 0.0)
+    view.view_location, view.view_distance = place, distance
 
 
 def select_only(obj: bpy.types.Object) -> None:
@@ -81,6 +93,12 @@ def open_panels(*opened: str, first: Sequence[str] = ()) -> None:
         bpy.utils.register_class(panel)
 
 
+def wait(ticks: int = 3) -> Iterator[None]:
+    """So many steps of run()."""
+    for _tick in range(ticks):
+        yield
+
+
 def until(wanted: Callable[[], object], what: str, patience: float = 60.0) -> Iterator[None]:
     """Steps of run() until it is so, for as many seconds at most."""
     end = time.monotonic() + patience
@@ -117,6 +135,15 @@ def click(place: tuple[int, int], **held: bool) -> Iterator[None]:
     press("LEFTMOUSE", place, **held)
     yield
     yield
+
+
+def close_panels(header: tuple[int, int]) -> Iterator[None]:
+    """All of the sidebar. Opened with Ctrl, a panel closes all others.
+
+    header  the place of the first one's; it is open
+    """
+    for held in ({}, {"ctrl": True}, {}):
+        yield from click(header, **held)
 
 
 def photograph(picture: Path) -> None:

@@ -17,7 +17,7 @@ quaternions that are within MARGIN of perpendicular (where the sign of a term fl
 is within MARGIN of the modifier's threshold. It also leaves out vertices that a change of the input by its
 rounding moves by the tolerance, directly or by a later modifier; for stages, a change of their input. All of
 these are computed from the input. Behind several modifiers it also leaves out vertices where Sinew is
-within the tolerance of the float64 reference and Blender's rounding is not, or is on the other side of it.
+within the tolerance of the float64 reference: the rest of the difference is Blender's own rounding.
 """
 
 from __future__ import annotations

@@ -35,35 +35,30 @@ def is_own() -> bool:
     return "Unsaved" in bpy.data.objects and "Lesson" not in bpy.data.texts
 
 
-def wait(ticks: int = 3) -> Iterator[None]:
-    for _tick in range(ticks):
-        yield
-
-
 def steps() -> Iterator[None]:
     window.install(ZIP)
-    yield from wait()
+    yield from window.wait()
     bpy.data.objects.new("Unsaved", None)
     bpy.ops.ed.undo_push(message="work")
     facts["is dirty"] = bpy.data.is_dirty
     # Blender asks; Esc keeps the open file.
     open_lesson()
-    yield from wait()
+    yield from window.wait()
     window.photograph(FOLDER / "asked.png")
     facts["asks first"] = is_own()
     window.press("ESC", VIEW)
-    yield from wait()
+    yield from window.wait()
     facts["kept after Esc"] = is_own()
     # Nothing is lost either if the user has switched that question off.
     bpy.context.preferences.view.use_save_prompt = False
     open_lesson()
-    yield from wait()
+    yield from window.wait()
     facts["kept without the question"] = is_own()
     bpy.context.preferences.view.use_save_prompt = True
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "own.blend"))
-    yield from wait()
+    yield from window.wait()
     open_lesson()
-    yield from wait()
+    yield from window.wait()
     facts["opened"] = ["Lesson" in bpy.data.texts, bpy.data.filepath, hasattr(bpy.types.Object, "sinew")]
     facts["reading"] = [area.type for area in bpy.context.window_manager.windows[0].screen.areas]
     window.photograph(FOLDER / "lesson.png")

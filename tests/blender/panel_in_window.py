@@ -154,7 +154,7 @@ def by_search_and_keys() -> Iterator[None]:
 
 def copies_in_view() -> bool:
     """Whether the view shows the corners of all copies beside the sidebar."""
-    area = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
+    area = window.area_of("VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
     sidebar = next(region for region in area.regions if region.type == "UI")
     depsgraph = main_window().view_layer.depsgraph
@@ -241,8 +241,7 @@ def progress_in_the_status_bar() -> Iterator[None]:
 
 def suggested_by_click() -> Iterator[None]:
     """The best method at the first measure, of which several can be equally good."""
-    for held in ({}, {"ctrl": True}, {}):
-        yield from window.click(HEADER, **held)
+    yield from window.close_panels(HEADER)
     with window.in_view3d():
         scene().frame_start, scene().frame_end = 10, 12
         bpy.ops.sinew.suggest("EXEC_DEFAULT", over="SCENE")
@@ -285,9 +284,7 @@ def without_weights() -> int:
 
 
 def mends_by_clicks() -> Iterator[None]:
-    """Opens a panel with Ctrl, which closes all others."""
-    for held in ({}, {"ctrl": True}, {}):
-        yield from window.click(HEADER, **held)
+    yield from window.close_panels(HEADER)
     yield from window.click(DIAGNOSTICS)
     for group in bpy.data.objects["Body"].vertex_groups:
         group.remove(list(range(300, 320)))
@@ -395,9 +392,9 @@ def menus() -> Iterator[None]:
 
 def modifiers() -> Iterator[None]:
     """What is shown above the stack, and its button, while the sidebar is closed."""
-    area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
+    area = window.area_of("PROPERTIES")
     area.spaces[0].context = "MODIFIER"
-    view = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
+    view = window.area_of("VIEW_3D")
     view.spaces[0].show_region_ui = False
     yield
     yield
@@ -415,7 +412,7 @@ def bake_error() -> Iterator[None]:
     for obj in meshes():
         obj.sinew.enabled = True
     five_meshes.select(bpy.data.objects["Body"])
-    shading = next(area for area in main_window().screen.areas if area.type == "VIEW_3D").spaces[0].shading
+    shading = window.area_of("VIEW_3D").spaces[0].shading
     before = shading.color_type
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.bake("EXEC_DEFAULT", kind="bones", frames="1-20", helpers=4)

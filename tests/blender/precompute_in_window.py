@@ -44,7 +44,7 @@ def plan() -> str:
 
 def press(key: str) -> None:
     main = bpy.context.window_manager.windows[0]
-    area = next(area for area in main.screen.areas if area.type == "VIEW_3D")
+    area = window.area_of("VIEW_3D")
     x, y = area.x + area.width // 2, area.y + area.height // 2
     for value in ("PRESS", "RELEASE"):
         main.event_simulate(type=key, value=value, x=x, y=y)

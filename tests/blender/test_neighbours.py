@@ -67,6 +67,14 @@ def assert_equals_modifier(obj: bpy.types.Object, preserve_volume: bool = True) 
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
+def assert_frame_equals_modifier(obj: bpy.types.Object, frame: int, preserve_volume: bool = True) -> None:
+    """The shape as it is now, which should be that of the frame."""
+    got = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    expected = scenes.modifier_shapes(obj, [frame], preserve_volume)[0]
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
 def edit_weights(obj: bpy.types.Object) -> None:
     obj.vertex_groups["bone.0"].add(range(100, 200), 0.5, "REPLACE")
 
@@ -92,10 +100,7 @@ def test_an_edit_after_a_setting_and_before_a_frame_is_seen(arm, setting, edit):
         settings.scale_rule = BLENDER_3.name
     edit(arm)
     bpy.context.scene.frame_set(10)
-    got = scenes.final_points(arm)
-    settings.enabled = False
-    expected = scenes.modifier_shapes(arm, [10], setting != "method")[0]
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+    assert_frame_equals_modifier(arm, 10, preserve_volume=setting != "method")
 
 
 @pytest.mark.parametrize("once", [False, True], ids=["always", "once"])
@@ -112,10 +117,7 @@ def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit
     take_off = neighbour("frame_change_post", act)
     bpy.context.scene.frame_set(9)
     take_off()
-    got = scenes.final_points(arm)
-    properties.of(arm).enabled = False
-    expected = scenes.modifier_shapes(arm, [9], True)[0]
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+    assert_frame_equals_modifier(arm, 9)
 
 
 @pytest.mark.parametrize("is_rendered", [False, True], ids=["shown", "rendered"])
@@ -147,10 +149,7 @@ def test_a_group_that_a_handler_renames_is_seen(
 def test_a_group_that_a_script_renames_before_a_frame_is_seen(arm):
     arm.vertex_groups["bone.1"].name = "another"
     bpy.context.scene.frame_set(10)
-    got = scenes.final_points(arm)
-    properties.of(arm).enabled = False
-    expected = scenes.modifier_shapes(arm, [10], True)[0]
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+    assert_frame_equals_modifier(arm, 10)
 
 
 def beside_nothing(obj: bpy.types.Object) -> None:

@@ -149,7 +149,7 @@ def choose(*names: str) -> None:
 def press(key: str, text: str = "", **held: bool) -> None:
     """text  what the key types"""
     main = bpy.context.window_manager.windows[0]
-    area = next(area for area in main.screen.areas if area.type == "VIEW_3D")
+    area = window.area_of("VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
     x, y = region.x + region.width // 2, region.y + region.height // 2
     main.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)

@@ -25,14 +25,15 @@ def sync_all() -> None:
     if not _may_change():
         return
     with references.between_steps():
-        _follow([ik_live.sync(armature) for armature in list(_armatures())])
+        changed = [ik_live.sync(armature) for armature in list(_armatures())]
+        if any(changed):
+            _refresh_meshes()
 
 
-def _follow(changed: list[bool]) -> None:
-    """Meshes that Sinew deforms after the update follow other constraints: what is changed within a handler,
-    Blender evaluates without an event."""
-    states = [state for _obj, state in session.current.pairs]
-    if any(changed) and any(state.plan.after_update for state in states):
+def _refresh_meshes() -> None:
+    """Called where constraints have changed: what a handler changes, Blender evaluates without an event, so
+    that Sinew would not deform after the update."""
+    if any(state.plan.after_update for _obj, state in session.current.pairs):
         session.refresh_between_steps(bpy.context)
 
 
@@ -43,13 +44,14 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
     # By name: another add-on's handler may have deleted an original.
     names = [update.id.name for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
     with references.between_steps():
-        changed = []
+        changed = False
         for name in names:
             # Each sync() can remove followers, which are listed, too.
             armature = bpy.data.objects.get(name)
             if armature is not None and ik_live.is_live(armature):
-                changed.append(ik_live.sync(armature))
-        _follow(changed)
+                changed |= ik_live.sync(armature)
+        if changed:
+            _refresh_meshes()
         _note_problems()
 
 
