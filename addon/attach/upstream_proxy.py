@@ -175,15 +175,15 @@ def _modifier_values(modifier: bpy.types.Modifier, animated: tuple[str, ...]) ->
     ]
 
 
-# How a modifier is displayed, not what it does.
-_INTERFACE = {"rna_type", "show_expanded", "is_active", "execution_time", "persistent_uid"}
+# How a modifier is displayed, and what Blender found when it evaluated it: not what it does.
+_LEFT_OUT = {"rna_type", "show_expanded", "is_active", "persistent_uid", "execution_time", "face_count"}
 
 
 def _values(struct: bpy.types.bpy_struct, depth: int) -> list:
     """Returns all values of a modifier's settings, nested; data-blocks by their identity."""
     values = [(f'["{key}"]', _id_property(value)) for key, value in _id_properties(struct)]
     for name, prop in struct.bl_rna.properties.items():
-        if name in _INTERFACE:
+        if name in _LEFT_OUT:
             continue
         value = getattr(struct, name)
         if isinstance(value, bpy.types.ID):

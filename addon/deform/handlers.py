@@ -146,8 +146,8 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
     with references.between_steps():
         session.update_all(depsgraph, changes)
     before, current.waiting = current.waiting, session.waiting()
-    # What handlers change, Blender evaluates without an event. Once for each object: one in another scene
-    # goes on waiting.
+    # What handlers change, Blender evaluates without an event. Once for each upstream proxy: one in another
+    # scene goes on waiting.
     if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph:
         _keep_evaluated_shapes(changes)
         session.refresh_between_steps(bpy.context)

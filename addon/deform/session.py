@@ -16,6 +16,7 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
 from . import after_update, apply_plan, events, precomputing, undo
+from .bound import uid
 from .changes import GONE, Changes
 from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
@@ -40,7 +41,7 @@ class Session:
     pairs             these objects, each with what is known of it
     depsgraph         the address of the depsgraph last seen
     view_layers       those whose evaluation was seen, as from identity_of_layer()
-    waiting           the session_uid of the objects that wait for another evaluation
+    waiting           the objects that wait for another evaluation, as from waiting()
     missed            changes of evaluations that were not reacted to
     expected          meshes that Blender lists as changed because Sinew changed one of its settings
     on_before_saving  the objects that Sinew deformed before the file was prepared for saving
@@ -59,7 +60,7 @@ class Session:
     pairs: Pairs = field(default_factory=list)
     depsgraph: int = 0
     view_layers: set[tuple[int, str]] = field(default_factory=set)
-    waiting: set[int] = field(default_factory=set)
+    waiting: set[tuple[int, int]] = field(default_factory=set)
     gate: Gate = field(default_factory=Gate)
     missed: Changes | None = None
     expected: set[int] = field(default_factory=set)
@@ -376,10 +377,15 @@ def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
     return current.objects
 
 
-def waiting() -> set[int]:
-    """Returns the session_uid of each object that waits for Blender to evaluate its upstream proxy."""
+def waiting() -> set[tuple[int, int]]:
+    """Returns the objects that wait for Blender to evaluate their upstream proxy, each by its session_uid and
+    that of the proxy, which may be made anew meanwhile."""
     unknown = [(obj, properties.of(obj)) for obj in objects_with_sinew(Changes()) if state_of(obj) is None]
-    return {obj.session_uid for obj, settings in unknown if settings.enabled and settings.replaces_modifiers}
+    return {
+        (obj.session_uid, uid(settings.upstream_proxy))
+        for obj, settings in unknown
+        if settings.enabled and settings.replaces_modifiers
+    }
 
 
 def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:

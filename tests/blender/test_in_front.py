@@ -9,7 +9,7 @@ import pytest
 import routes
 import scenes
 import snapshot
-from sinew_addon.attach import attach, properties
+from sinew_addon.attach import attach, properties, upstream_proxy
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import safe_mode, session
 from test_against_armature_modifier import assert_equal_to_modifier
@@ -331,6 +331,29 @@ def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
         assert scenes.worst(shown, scenes.rest_points(other)) > 0.1, "nothing is tested"
     finally:
         routes.release()
+
+
+@pytest.mark.parametrize("event", ["shown", "shown and changed"])
+def test_an_object_that_gets_sinew_while_it_is_hidden(event, monkeypatch):
+    """What is in front is evaluated for the first time when it is shown."""
+    made = []
+    make = upstream_proxy._make
+    monkeypatch.setattr(upstream_proxy, "_make", lambda obj: made.append(obj) or make(obj))
+    obj = arm_with("DECIMATE", ratio=0.5)
+    obj.hide_viewport = True
+    bpy.context.scene.frame_set(8)
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.view_layer.update()
+    obj.hide_viewport = False
+    if event == "shown and changed":
+        obj.modifiers["Front"].ratio = 0.7
+    bpy.context.view_layer.update()
+    shown = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(shown, scenes.final_points(obj), atol=1e-5)
+    # What Blender found, the number of faces, changes nothing in front.
+    assert len(made) == (1 if event == "shown" else 2)
 
 
 @pytest.mark.parametrize("route", routes.ROUTES)
