@@ -806,8 +806,9 @@ def test_the_command_solves_a_file_whose_chains_are_live(tmp_path, capfd):
     np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1", "arm.2"]), found, atol=2e-5)
 
 
+@pytest.mark.parametrize("end", ["removed", "fails", "fails at a frame"])
 @pytest.mark.parametrize("keyed", [False, True], ids=["in depsgraph", "after update"])
-def test_meshes_follow_the_end_of_live(none_left_to_blender, keyed):
+def test_meshes_follow_the_end_of_live(none_left_to_blender, keyed, end):
     """Keys of the visibility have Sinew deform after the update, which no event announces here."""
     obj, armature = scenes.make_arm()
     target = make_empty("Target", [(1.0, 1.0, 0.5)])
@@ -818,12 +819,23 @@ def test_meshes_follow_the_end_of_live(none_left_to_blender, keyed):
         modifier = next(each for each in obj.modifiers if each.type == "ARMATURE")
         modifier.show_viewport = True
         modifier.keyframe_insert("show_viewport", frame=1)
+    if end == "fails at a frame":
+        for frame, scale in ((3, 1.0), (4, -1.0)):
+            bone.scale.x = scale
+            bone.keyframe_insert("scale", index=0, frame=frame)
     bpy.context.view_layer.objects.active = armature
+    bpy.context.scene.frame_set(2)
     live(armature)
     bpy.context.view_layer.update()
     assert (session.state_of(obj).plan.state is State.AFTER_UPDATE) == keyed
-    bone.constraints.remove(next(each for each in bone.constraints if each.type == "IK"))
+    if end == "removed":
+        bone.constraints.remove(next(each for each in bone.constraints if each.type == "IK"))
+    elif end == "fails":
+        bone.scale.x = -1.0
+    else:
+        bpy.context.scene.frame_set(5)
     bpy.context.view_layer.update()
+    assert not any(map(ik_io.follows, armature.pose.bones[bone.name].constraints))
     shown = scenes.final_points(obj)
     properties.of(obj).enabled = False
     bpy.context.view_layer.update()

@@ -50,24 +50,28 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
             armature = bpy.data.objects.get(name)
             if armature is not None and ik_live.is_live(armature):
                 changed |= ik_live.sync(armature)
+        changed |= _note_problems()
         if changed:
             _refresh_meshes()
-        _note_problems()
 
 
 @persistent
 def on_frame_change(*_args: object) -> None:
     if ik_in_depsgraph.problems and _may_change():
         with references.between_steps():
-            _note_problems()
+            if _note_problems():
+                _refresh_meshes()
 
 
-def _note_problems() -> None:
+def _note_problems() -> bool:
+    """Returns whether constraints have changed."""
+    changed = False
     while ik_in_depsgraph.problems:
         name, text = ik_in_depsgraph.problems.popitem()
         armature = bpy.data.objects.get(name)
         if armature is not None and ik_live.is_live(armature):
-            ik_live.fail(armature, text)
+            changed |= ik_live.fail(armature, text)
+    return changed
 
 
 def _may_change() -> bool:

@@ -146,11 +146,12 @@ def note_step() -> None:
     _session.in_no_step.clear()
 
 
-def fail(armature: bpy.types.Object, text: str) -> None:
-    """Notes that it could not be solved: Blender's constraints play until it is switched on again."""
+def fail(armature: bpy.types.Object, text: str) -> bool:
+    """Notes that it could not be solved: Blender's constraints play until it is switched on again. Returns
+    whether Sinew's played."""
     _session.failed.add(armature.session_uid)
     _session.problems[armature.session_uid] = text
-    detach(armature)
+    return detach(armature)
 
 
 def check(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
