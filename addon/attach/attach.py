@@ -213,13 +213,11 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
 def prepare_for_save(obj: bpy.types.Object) -> bool:
     """Prepares an object for a Blender without Sinew: its Armature modifiers deform, with the shape nearest
     to Sinew's. Returns whether Sinew deformed it before; switch() reverses this."""
-    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    settings = properties.of(obj)
     was_on = settings.replaces_modifiers
     if not (was_on or settings.enabled):
         return False
     switch(obj, on=False)
-    if nodes is not None and nodes.node_group is not None:
-        node_group.set_inputs(nodes, {node_group.PRESENT: False})
     # What was set for a mode may not be the nearest.
     restore_volume(obj)
     use_nearest_volume(obj)

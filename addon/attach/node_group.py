@@ -14,7 +14,7 @@ from ..io import mesh_io
 # A custom property on the group, by which a renamed or copied group is recognised; its value says where the
 # group gets the points.
 MARK = "sinew_node_group"
-ATTRIBUTE, POINT_BUFFER = 10, 11
+ATTRIBUTE, POINT_BUFFER = 13, 14
 # Added to the value where the group gives normals of this domain.
 _WITH_NORMALS = {"": 0, "POINT": 30, "CORNER": 40}
 # The input with the name of the normals attribute.
@@ -23,12 +23,13 @@ NORMALS = "Normals"
 IN_RENDERS = "Normals in Renders"
 # An input that no node reads; pose_driver puts its driver there.
 POSE = "Pose"
-# An input that is off in saved files: without Sinew the group then says what is missing.
-PRESENT = "Sinew Is There"
+# What a group says to those who open the file without Sinew.
 MISSING = (
     "The extension Sinew deforms this mesh, and is not there. Install it, or leave this modifier off: the "
     "Armature modifier shows the nearest shape that Blender has."
 )
+# The nodes of add_warning().
+_WARNING, _WARNING_USER = "Sinew Is Missing", "User of Sinew Is Missing"
 
 # Inputs that name a helper object, or an attribute where there is no helper.
 _HELPER_INPUTS = ("Points", "Front")
@@ -38,7 +39,6 @@ IN_RENDERS_SOCKET = (
     "NodeSocketBool",
     "Off where a modifier that is on in renders alone needs Blender's",
 )
-PRESENT_SOCKET = ("NodeSocketBool", "Off in saved files, which Blenders without Sinew open too")
 
 
 def find(kind: int) -> bpy.types.NodeTree | None:
@@ -124,6 +124,45 @@ def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
     )
 
 
+def add_warnings() -> None:
+    """Has Sinew's modifiers warn that Sinew is missing: for saved files, as the nodes cost time in each frame.
+    Blender has such warnings since 4.3."""
+    if not hasattr(bpy.types, "GeometryNodeWarning"):
+        return
+    for group in _groups_of_points():
+        if _WARNING in group.nodes:
+            continue
+        warning, user = add_nodes(group, "GeometryNodeWarning", "GeometryNodeSwitch")
+        warning.name, user.name, user.input_type = _WARNING, _WARNING_USER, "GEOMETRY"
+        warning.inputs["Message"].default_value = MISSING
+        warning.inputs["Show"].default_value = True
+        geometry = _output(group).links[0].from_socket
+        # Blender does not evaluate a warning whose output is not used.
+        group.links.new(warning.outputs["Show"], user.inputs["Switch"])
+        group.links.new(geometry, user.inputs["False"])
+        group.links.new(geometry, user.inputs["True"])
+        group.links.new(user.outputs["Output"], _output(group))
+
+
+def remove_warnings() -> None:
+    """Reverses add_warnings()."""
+    for group in _groups_of_points():
+        warning, user = group.nodes.get(_WARNING), group.nodes.get(_WARNING_USER)
+        if warning is not None and user is not None:
+            group.links.new(user.inputs["False"].links[0].from_socket, _output(group))
+            group.nodes.remove(user)
+            group.nodes.remove(warning)
+
+
+def _groups_of_points() -> list[bpy.types.NodeTree]:
+    kinds = {kind + normals for kind in (ATTRIBUTE, POINT_BUFFER) for normals in _WITH_NORMALS.values()}
+    return [g for g in bpy.data.node_groups if g.get(MARK) in kinds and g.library is None]
+
+
+def _output(group: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+    return next(node for node in group.nodes if node.type == "GROUP_OUTPUT").inputs["Geometry"]
+
+
 def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group[MARK] = kind
@@ -135,6 +174,8 @@ def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.t
         made.description = description
         made.hide_in_modifier = True
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    frame = group.nodes.new("NodeFrame")
+    frame.label, frame.label_size, frame.location = MISSING, 20, (0, 300)
     return group
 
 
@@ -154,7 +195,6 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
             **({NORMALS: ("NodeSocketString", "Attribute that holds the normals")} if normals else {}),
             **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
             POSE: POSE_SOCKET,
-            PRESENT: PRESENT_SOCKET,
         },
     )
     # Not Set Position, which would compute an offset for each point.
@@ -180,7 +220,7 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
     moved = remove.outputs["Geometry"]
     if normals:
         moved = _take_normals_of_attribute(group, source, moved, normals)
-    group.links.new(_say_what_is_missing(group, source, moved), result.inputs["Geometry"])
+    group.links.new(moved, result.inputs["Geometry"])
     return group
 
 
@@ -271,7 +311,6 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
             ),
             **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
             POSE: POSE_SOCKET,
-            PRESENT: PRESENT_SOCKET,
         },
     )
     source, info, index, position, place, result = add_nodes(
@@ -302,7 +341,7 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
     link(source.outputs["Front"], upstream_proxy.inputs["Object"])
     link(moved, choice.inputs["False"])
     link(upstream_proxy.outputs["Geometry"], choice.inputs["True"])
-    link(_say_what_is_missing(group, source, choice.outputs["Output"]), result.inputs["Geometry"])
+    link(choice.outputs["Output"], result.inputs["Geometry"])
     return group
 
 
@@ -331,31 +370,6 @@ def _take_normals_of_buffer(
     link(geometry, choice.inputs["False"])
     given = _with_normals(group, geometry, normal, first, source.outputs[IN_RENDERS], domain)
     link(given, choice.inputs["True"])
-    return choice.outputs["Output"]
-
-
-def _say_what_is_missing(
-    group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket
-) -> bpy.types.NodeSocket:
-    """Adds a message for those who open the file without Sinew: a frame in the node editor and, from Blender
-    4.3 on, a warning at the modifier. Returns the geometry for the group's output."""
-    frame = group.nodes.new("NodeFrame")
-    frame.label, frame.label_size = MISSING, 20
-    frame.location = (0, 300)
-    if not hasattr(bpy.types, "GeometryNodeWarning"):
-        return geometry
-    missing, warning, choice = add_nodes(
-        group, "FunctionNodeBooleanMath", "GeometryNodeWarning", "GeometryNodeSwitch"
-    )
-    missing.operation, choice.input_type = "NOT", "GEOMETRY"
-    warning.inputs["Message"].default_value = MISSING
-    link = group.links.new
-    link(source.outputs[PRESENT], missing.inputs[0])
-    link(missing.outputs[0], warning.inputs["Show"])
-    # Blender does not evaluate a warning whose output is not used.
-    link(warning.outputs["Show"], choice.inputs["Switch"])
-    link(geometry, choice.inputs["False"])
-    link(geometry, choice.inputs["True"])
     return choice.outputs["Output"]
 
 

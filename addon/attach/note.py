@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The text block in a saved file that tells people without Sinew what is missing."""
+"""What tells people without Sinew what is missing from a saved file: a text block, and warnings at the
+modifiers."""
 
 from __future__ import annotations
 
 import bpy
 
-from . import properties
+from . import node_group, properties
 
 NAME = "Sinew"
 MARK = "sinew_note"
@@ -20,9 +21,10 @@ modifiers deform them, by the nearest shape that Blender has. Leave the modifier
 
 
 def write(objects: list[bpy.types.Object]) -> None:
-    """Writes the text, before the file is saved; without objects there is none."""
+    """Writes both, before the file is saved; without objects there are none."""
     remove()
     if objects:
+        node_group.add_warnings()
         text = bpy.data.texts.new(NAME)
         text[MARK] = True
         lines = (
@@ -32,6 +34,7 @@ def write(objects: list[bpy.types.Object]) -> None:
 
 
 def remove() -> None:
-    """Removes the text, which nobody who has Sinew needs."""
+    """Removes both, which nobody who has Sinew needs."""
+    node_group.remove_warnings()
     for text in [text for text in bpy.data.texts if text.get(MARK) and text.library is None]:
         bpy.data.texts.remove(text)

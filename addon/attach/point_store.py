@@ -53,7 +53,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
         references.note(obj)
         nodes.node_group = group
         node_group.remove_unused()
-    node_group.set_inputs(nodes, {**inputs, node_group.PRESENT: True})
+    node_group.set_inputs(nodes, inputs)
 
 
 def _ensure_attribute(obj: bpy.types.Object) -> None:

@@ -20,7 +20,7 @@ NAME = "Sinew Heat"
 # The attribute of a point buffer with each vertex's colour.
 COLOURS = "sinew_colours"
 MARK = "sinew_heat"
-_KIND = 12
+_KIND = 15
 
 
 def group_of(obj: bpy.types.Object) -> bpy.types.NodeTree | None:
