@@ -677,10 +677,13 @@ class SinewSide:
         obj.sinew.heat = on
 
     def set_safe(self, on: bool) -> None:
+        from sinew_addon.attach.subscribers import notify, subscribers
         from sinew_addon.deform import safe_mode, session
 
         safe_mode.set_forced(on or self._is_safe)
+        # As the preference does.
         session.refresh(bpy.context)
+        notify(subscribers.safe_mode_changed)
 
     def compute_beside(self, on: bool) -> None:
         """Precomputations run on a thread, as in a window, or before the first frame."""
