@@ -24,8 +24,8 @@ FOLDER = PICTURE.parent / "baked"
 # Blender's folder for the user's files.
 USER = PICTURE.parent / "user"
 FRAME = 16
-# Long enough to be stopped in between; glTF's exporter would take minutes for this many.
-LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "gltf": 500, "bones": 2000}
+# Long enough to be stopped in between.
+LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "gltf": 1500, "bones": 2000}
 # Some distributions' builds of Blender lack the other formats.
 KINDS = [kind for kind in LONG if kind not in ("alembic", "usd") or getattr(bpy.app, kind).supported]
 TICK = 0.1
