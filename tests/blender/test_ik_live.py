@@ -715,6 +715,27 @@ def test_what_can_not_be_live_is_said_and_blenders_constraint_plays():
         ik_live.switch_on(arm)
 
 
+@pytest.mark.parametrize("event", ["update", "save"])
+def test_a_deleted_bone_ends_its_tree(event, tmp_path):
+    """The bone has the constraint; those above it must not follow any longer."""
+    arm = make_arm()
+    constrain(arm, "arm.1", make_empty("Target", near()))
+    live(arm)
+    bpy.ops.object.mode_set(mode="EDIT")
+    arm.data.edit_bones.remove(arm.data.edit_bones["arm.1"])
+    bpy.ops.object.mode_set(mode="OBJECT")
+    if event == "update":
+        bpy.context.view_layer.update()
+    else:
+        path = str(tmp_path / "arm.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        arm = bpy.data.objects["Arm"]
+    assert not any(map(ik_io.follows, arm.pose.bones["arm.0"].constraints))
+    assert not arm.sinew_ik_is_live
+    assert followers() == []
+
+
 def test_linked_armatures_and_overrides_are_refused(tmp_path):
     arm = make_arm()
     constrain(arm, "arm.1", make_empty("Target", near()))

@@ -18,7 +18,7 @@ from . import ik_in_depsgraph, ik_live
 
 
 def _armatures() -> Iterator[bpy.types.Object]:
-    return filter(ik_live.is_live, bpy.data.objects)
+    return filter(ik_live.was_switched_on, bpy.data.objects)
 
 
 def sync_all() -> None:
@@ -48,7 +48,7 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
         for name in names:
             # Each sync() can remove followers, which are listed, too.
             armature = bpy.data.objects.get(name)
-            if armature is not None and ik_live.is_live(armature):
+            if armature is not None and ik_live.was_switched_on(armature):
                 changed |= ik_live.sync(armature)
         changed |= _note_problems()
         if changed:

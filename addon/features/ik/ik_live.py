@@ -58,6 +58,11 @@ def is_live(armature: bpy.types.Object) -> bool:
     return armature.type == "ARMATURE" and bool(live_constraints(armature))
 
 
+def was_switched_on(armature: bpy.types.Object) -> bool:
+    """Whether bones may follow: it was switched on for a tree, whose bones may be deleted since."""
+    return armature.type == "ARMATURE" and armature.sinew_ik_is_live
+
+
 def problem_of(armature: bpy.types.Object) -> str:
     """Returns why Blender's constraints play although Sinew is switched on, in one sentence; otherwise ""."""
     if not is_live(armature):
@@ -94,12 +99,6 @@ def switch_off(armature: bpy.types.Object, only: Collection[str] | None = None) 
         meant = set(live)
     for bone in live if only is None else meant.intersection(live):
         armature.pose.bones[bone].sinew_ik_live = ""
-    if not is_live(armature):
-        remove_followers(armature)
-        armature.property_unset("sinew_ik")
-        armature.property_unset("sinew_ik_is_live")
-        for bone in armature.pose.bones:
-            bone.property_unset("sinew_ik_live")
     sync(armature)
 
 
@@ -203,9 +202,9 @@ def sync(armature: bpy.types.Object) -> bool:
     _drop_what_the_artist_switched_off(armature)
     live = live_constraints(armature)
     may_run = not (safe_mode.is_on() or uid in _session.failed or uid in _session.suspended)
-    if not (live and may_run and armature.is_editable):
-        if not live:
-            _session.problems.pop(uid, None)
+    if not live:
+        return _end(armature)
+    if not (may_run and armature.is_editable):
         return detach(armature)
     try:
         trees = ik_io.read_trees(armature, list(live), live)
@@ -218,6 +217,19 @@ def sync(armature: bpy.types.Object) -> bool:
     _session.problems.pop(uid, None)
     _session.attached[uid] = trees, _state(armature, trees)
     return True
+
+
+def _end(armature: bpy.types.Object) -> bool:
+    """Removes everything made for trees of which none is left. Returns whether any played."""
+    _session.problems.pop(armature.session_uid, None)
+    followed = detach(armature)
+    if armature.is_editable and armature.sinew_ik_is_live:
+        remove_followers(armature)
+        armature.property_unset("sinew_ik")
+        armature.property_unset("sinew_ik_is_live")
+        for bone in armature.pose.bones if armature.pose is not None else ():
+            bone.property_unset("sinew_ik_live")
+    return followed
 
 
 def detach(armature: bpy.types.Object) -> bool:
@@ -255,7 +267,7 @@ def out_of_the_file() -> Iterator[None]:
     remove_followers(None)
     bones = {}
     for armature in [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]:
-        if is_live(armature):
+        if was_switched_on(armature):
             detach(armature)
         for follower in _followers(armature):
             bones[follower], follower.data = follower.data, armature.data
