@@ -170,8 +170,8 @@ def import_library(platform: Platform, python: Python, include: Path) -> Path:
 # --- The build
 
 
-def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
-    build = BUILD / platform.name / "build"
+def configure(platform: Platform, log: Path, options: dict[str, str], name: str = "build") -> Path:
+    build = BUILD / platform.name / name
     headers = str(collect_headers())
     defined = compilers(platform) | {
         "CMAKE_BUILD_TYPE": "Release",
@@ -216,14 +216,20 @@ def jobs() -> str:
     return os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or str(os.cpu_count())
 
 
-def build_tests(platform: Platform) -> list[Path]:
+def build_tests(platform: Platform, quick: bool = False) -> list[Path]:
+    """Returns the programs. quick: for one instruction set, without those that take long or measure memory."""
     if not GOOGLETEST.is_dir():
         fail(f"the sources of googletest are not in {GOOGLETEST}.")
     log = start_log(platform)
-    build = configure(platform, log, {"SINEW_BUILD_TESTS": "ON", "SINEW_BUILD_PYTHON": "OFF"})
-    run(["cmake", "--build", build, "--parallel", jobs(), "--target", *TESTS], log)
+    options = {"SINEW_BUILD_TESTS": "ON", "SINEW_BUILD_PYTHON": "OFF"}
+    programs = TESTS[:1] if quick else TESTS
+    if quick:
+        build = configure(platform, log, options | {"SINEW_ONE_TARGET": "ON"}, "quick")
+    else:
+        build = configure(platform, log, options)
+    run(["cmake", "--build", build, "--parallel", jobs(), "--target", *programs], log)
     suffix = ".exe" if platform.is_windows else ""
-    return [build / "tests" / "native" / (name + suffix) for name in TESTS]
+    return [build / "tests" / "native" / (name + suffix) for name in programs]
 
 
 def build_module(platform: Platform, python: Python, log: Path) -> Path:

@@ -164,9 +164,9 @@ class Emulated:
         return run(words, limit)
 
 
-def native_tests(platform: Platform) -> int:
+def native_tests(platform: Platform, quick: bool) -> int:
     worst = 0
-    for program in build_tests(platform):
+    for program in build_tests(platform, quick):
         start = time.monotonic()
         status = run([*NATIVE[platform.name], program, "--gtest_brief=1"], LIMITS["native"])
         print(f"{program.name}: exit {status}, {time.monotonic() - start:.0f} s", flush=True)
@@ -202,6 +202,9 @@ def main() -> None:
     )
     parser.add_argument("platform", choices=PARTS)
     parser.add_argument("--part", choices=("native", "python", "blender"), action="append", help="only this")
+    parser.add_argument(
+        "--quick", action="store_true", help="C++ tests of kernels for one instruction set, and no long ones"
+    )
     # Not as arguments: behind an option, argparse takes no others but the first.
     end = sys.argv.index("--") if "--" in sys.argv else len(sys.argv)
     options, for_pytest = parser.parse_args(sys.argv[1:end]), sys.argv[end + 1 :]
@@ -214,7 +217,7 @@ def main() -> None:
     for part in parts:
         print(f"\n== {options.platform}: {part} ==", flush=True)
         if part == "native":
-            results[part] = native_tests(platform)
+            results[part] = native_tests(platform, options.quick)
         else:
             tests = python_tests if part == "python" else blender_tests
             results[part] = tests(emulated, for_pytest)

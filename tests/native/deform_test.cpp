@@ -358,6 +358,7 @@ TEST(Deformer, refuses_more_than_it_can_number) {
 }
 
 TEST(Deformer, refuses_more_influences_of_a_vertex_than_the_limit) {
+    if (test::kRunsSlowly) GTEST_SKIP();
     const auto with_influences = [](std::size_t count) {
         Scene scene;
         scene.add_vertex({0, 0, 0}, {{0, 1.0f}});

@@ -19,6 +19,13 @@ inline void PrintTo(const MethodInfo& method, std::ostream* stream) { *stream <<
 
 namespace test {
 
+/// Whether tests take many times longer than usual, with a sanitizer or emulated: then those of minutes are skipped.
+#ifdef SINEW_RUNS_SLOWLY
+inline constexpr bool kRunsSlowly = true;
+#else
+inline constexpr bool kRunsSlowly = false;
+#endif
+
 /// A mesh and a pose that own the data that BindData refers to.
 struct Scene {
     std::vector<Vec3<float>> rest_points;
