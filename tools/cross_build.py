@@ -217,7 +217,10 @@ def jobs() -> str:
 
 
 def build_tests(platform: Platform, quick: bool = False) -> list[Path]:
-    """Returns the programs. quick: for one instruction set, without those that take long or measure memory."""
+    """Returns the programs.
+
+    quick  kernels for one instruction set, no test that takes long, and only the program that tests kernels
+    """
     if not GOOGLETEST.is_dir():
         fail(f"the sources of googletest are not in {GOOGLETEST}.")
     log = start_log(platform)

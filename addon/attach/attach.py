@@ -13,7 +13,6 @@ from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths, is_animated, is_visibility_animated
 from . import (
     corrective_smooth,
-    node_group,
     point_store,
     pose_driver,
     properties,

@@ -125,8 +125,8 @@ def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
 
 
 def add_warnings() -> None:
-    """Has Sinew's modifiers warn that Sinew is missing: for saved files, as the nodes cost time in each frame.
-    Blender has such warnings since 4.3."""
+    """Has Sinew's modifiers warn that Sinew is missing, from Blender 4.3 on. For saved files alone, as the
+    nodes cost time in each frame."""
     if not hasattr(bpy.types, "GeometryNodeWarning"):
         return
     for group in _groups_of_points():
