@@ -50,8 +50,12 @@ def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
 
     normals  the domain of normals that it also takes, POINT or CORNER; empty for none. Needs Blender 4.5
     """
-    make = _make_for_attribute if kind == ATTRIBUTE else _make_for_buffer
-    return find(kind + _WITH_NORMALS[normals]) or make(normals)
+    group = find(kind + _WITH_NORMALS[normals])
+    if group is None:
+        return _make_for_attribute(normals) if kind == ATTRIBUTE else _make_for_buffer(normals)
+    # One that was appended has it from its file.
+    _remove_warning(group)
+    return group
 
 
 def is_sinew(modifier: bpy.types.Modifier) -> bool:
@@ -130,37 +134,47 @@ def add_warnings() -> None:
     if not hasattr(bpy.types, "GeometryNodeWarning"):
         return
     for group in _groups_of_points():
-        if _WARNING in group.nodes:
+        _remove_warning(group)
+        last = _last_link(group)
+        # An artist may have taken the group apart.
+        if last is None:
             continue
         warning, user = add_nodes(group, "GeometryNodeWarning", "GeometryNodeSwitch")
         warning.name, user.name, user.input_type = _WARNING, _WARNING_USER, "GEOMETRY"
         warning.inputs["Message"].default_value = MISSING
         warning.inputs["Show"].default_value = True
-        geometry = _output(group).links[0].from_socket
+        geometry, output = last.from_socket, last.to_socket
         # Blender does not evaluate a warning whose output is not used.
         group.links.new(warning.outputs["Show"], user.inputs["Switch"])
         group.links.new(geometry, user.inputs["False"])
         group.links.new(geometry, user.inputs["True"])
-        group.links.new(user.outputs["Output"], _output(group))
+        group.links.new(user.outputs["Output"], output)
 
 
 def remove_warnings() -> None:
     """Reverses add_warnings()."""
     for group in _groups_of_points():
-        warning, user = group.nodes.get(_WARNING), group.nodes.get(_WARNING_USER)
-        if warning is not None and user is not None:
-            group.links.new(user.inputs["False"].links[0].from_socket, _output(group))
-            group.nodes.remove(user)
-            group.nodes.remove(warning)
+        _remove_warning(group)
+
+
+def _remove_warning(group: bpy.types.NodeTree) -> None:
+    user, last = group.nodes.get(_WARNING_USER), _last_link(group)
+    if user is not None and last is not None and last.from_node == user and user.inputs["False"].links:
+        group.links.new(user.inputs["False"].links[0].from_socket, last.to_socket)
+    for name in (_WARNING_USER, _WARNING):
+        if name in group.nodes:
+            group.nodes.remove(group.nodes[name])
+
+
+def _last_link(group: bpy.types.NodeTree) -> bpy.types.NodeLink | None:
+    """Returns the link that leads to the group's output."""
+    outputs = (node.inputs["Geometry"] for node in group.nodes if node.type == "GROUP_OUTPUT")
+    return next((link for output in outputs for link in output.links), None)
 
 
 def _groups_of_points() -> list[bpy.types.NodeTree]:
     kinds = {kind + normals for kind in (ATTRIBUTE, POINT_BUFFER) for normals in _WITH_NORMALS.values()}
     return [g for g in bpy.data.node_groups if g.get(MARK) in kinds and g.library is None]
-
-
-def _output(group: bpy.types.NodeTree) -> bpy.types.NodeSocket:
-    return next(node for node in group.nodes if node.type == "GROUP_OUTPUT").inputs["Geometry"]
 
 
 def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:

@@ -100,6 +100,43 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
     assert obj.modifiers["Armature"].use_deform_preserve_volume is not preserve_volume
 
 
+def warnings_of(obj: bpy.types.Object) -> list[str]:
+    bpy.context.view_layer.update()
+    return [warning.message for warning in getattr(stack.sinew_modifier(obj), "node_warnings", ())]
+
+
+def test_nothing_is_said_to_be_missing_where_sinew_is_there(tmp_path):
+    """The nodes of the warning are in saved files alone."""
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    nodes = set(stack.sinew_modifier(obj).node_group.nodes.keys())
+    path = tmp_path / "saved.blend"
+    save(path)
+    assert set(stack.sinew_modifier(obj).node_group.nodes.keys()) == nodes
+    assert warnings_of(obj) == []
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(path)) as (_, to):
+        to.objects = ["Arm", "Arm Rig"]
+    for each in to.objects:
+        bpy.context.scene.collection.objects.link(each)
+    appended = to.objects[0]
+    bpy.context.view_layer.update()
+    assert stack.sinew_modifier(appended).show_viewport
+    assert set(stack.sinew_modifier(appended).node_group.nodes.keys()) == nodes
+    assert warnings_of(appended) == []
+
+
+def test_a_group_that_was_taken_apart_is_saved(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    group = stack.sinew_modifier(obj).node_group
+    output = next(node for node in group.nodes if node.type == "GROUP_OUTPUT")
+    group.links.remove(output.inputs["Geometry"].links[0])
+    save(tmp_path / "saved.blend")
+    # Sinew goes on.
+    assert not obj.modifiers["Armature"].show_viewport
+
+
 def test_between_the_handlers_of_saving_nothing_of_the_file_changes(tmp_path):
     """A thumbnail evaluates the scene at that time: so does this handler, in background as in a window."""
     obj, armature = scenes.make_arm()
