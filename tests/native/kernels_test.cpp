@@ -292,6 +292,8 @@ TEST_P(Kernels, write_no_other_point) {
 #if defined(__x86_64__) && defined(__linux__)
 TEST(SimdTargets, x86_support_is_what_the_compiler_finds) {
     __builtin_cpu_init();
+    // Every such processor has it.
+    if (!__builtin_cpu_supports("sse2")) GTEST_SKIP() << "zig's runtime library finds nothing";
     const X86Support support = x86_support();
     EXPECT_EQ(support.sse4, __builtin_cpu_supports("ssse3") && __builtin_cpu_supports("sse4.1") &&
                                 __builtin_cpu_supports("sse4.2"));
