@@ -28,7 +28,7 @@ MISSING = (
     "The extension Sinew deforms this mesh, and is not there. Install it, or leave this modifier off: the "
     "Armature modifier shows the nearest shape that Blender has."
 )
-# The nodes of add_warning().
+# The nodes of add_warnings().
 _WARNING, _WARNING_USER = "Sinew Is Missing", "User of Sinew Is Missing"
 
 # Inputs that name a helper object, or an attribute where there is no helper.
@@ -130,11 +130,10 @@ def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
 
 def add_warnings() -> None:
     """Has Sinew's modifiers warn that Sinew is missing, from Blender 4.3 on. For saved files alone, as the
-    nodes cost time in each frame."""
+    nodes cost time in each frame. They must not be there already."""
     if not hasattr(bpy.types, "GeometryNodeWarning"):
         return
     for group in _groups_of_points():
-        _remove_warning(group)
         last = _last_link(group)
         # An artist may have taken the group apart.
         if last is None:

@@ -19,7 +19,7 @@ inline void PrintTo(const MethodInfo& method, std::ostream* stream) { *stream <<
 
 namespace test {
 
-/// Whether tests take many times longer than usual, with a sanitizer or emulated: then those of minutes are skipped.
+/// Whether tests run many times slower than usual, with a sanitizer or an emulator. Those of minutes are then skipped.
 #ifdef SINEW_RUNS_SLOWLY
 inline constexpr bool kRunsSlowly = true;
 #else
