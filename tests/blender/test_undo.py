@@ -249,11 +249,22 @@ def _of_modifier(name):
     modifier = obj.modifiers["Armature"]
     own = modifier.use_deform_preserve_volume
     properties.of(obj).enabled = False
+    assert modifier.show_viewport
+    assert not stack.sinew_modifier(obj).show_viewport
     modifier.use_deform_preserve_volume = preserve_volume
     found = scenes.final_points(obj)
     modifier.use_deform_preserve_volume = own
     properties.of(obj).enabled = True
     return found
+
+
+def _meshes():
+    """Every mesh of the file but Sinew's own, as stored."""
+    return {
+        obj.name: scenes.rest_points(obj)
+        for obj in bpy.data.objects
+        if obj.type == "MESH" and not properties.is_helper(obj)
+    }
 
 
 def _shapes(read=lambda name: scenes.final_points(bpy.data.objects[name])):
@@ -300,18 +311,21 @@ def test_shapes_after_undo_and_redo(route, edit, tmp_path):
     routes.force(route)
     _opened_again(tmp_path, edit)
     near = scenes.TOLERANCE * scenes.diagonal(bpy.data.objects["Arm"])
-    before = _shapes()
+    before, meshes_before = _shapes(), _meshes()
     edit(bpy.data.objects["Arm"])
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="edited")
-    after = _shapes()
+    after, meshes_after = _shapes(), _meshes()
     for _time in range(2):
         bpy.ops.ed.undo()
         _assert_same(_shapes(), before)
+        _assert_same(_meshes(), meshes_before, 0.0)
         bpy.ops.ed.redo()
         _assert_same(_shapes(), after)
+        _assert_same(_meshes(), meshes_after, 0.0)
     bpy.ops.ed.undo()
     _assert_same(_shapes(), _shapes(_of_modifier), near)
+    _assert_same(_meshes(), meshes_before, 0.0)
     bpy.context.scene.frame_set(4)
     _assert_same(_shapes(), _shapes(_of_modifier), near)
 
