@@ -142,6 +142,30 @@ def test_degenerate_points_are_flagged(case, dtype, method):
 
 
 @SOLVERS
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_lines_in_any_direction_are_no_mirror_images(dtype, method):
+    """The determinant of their covariance is a rounding error of either sign."""
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        source = rng.normal(size=(rng.integers(2, 12), 1)) * rng.normal(size=3)
+        source += rng.normal(size=3) * rng.choice([0, 1, 10])
+        target = rigid(rng).apply(source)
+        result = fit.rigid(source.astype(dtype), target.astype(dtype), method=method)
+        assert not result.is_mirrored, seed
+        assert not result.is_defined, seed
+
+
+@SOLVERS
+def test_mirrored_rods_are_mirror_images(method):
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        source = rng.normal(size=(9, 3)) * [1, 2e-3, 1e-3]
+        target = rigid(rng).apply(source * [1, -1, 1])
+        assert fit.rigid(source, target, method=method).is_mirrored, seed
+        assert not fit.rigid(source, rigid(rng).apply(source), method=method).is_mirrored, seed
+
+
+@SOLVERS
 def test_no_weight_gives_the_identity_and_weights_of_0_leave_points_out(method):
     rng = np.random.default_rng(5)
     source, target, weights = random_pairs(rng, 1, noise=0)

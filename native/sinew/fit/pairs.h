@@ -173,7 +173,10 @@ template <class T>
     // The smallest singular value with its sign, from its sum and its product with the second.
     const Mat3<double> aligned = glm::transpose(to_mat3(fit.rotation)) * m.covariance;
     const double first = aligned[0][0] + aligned[1][1] + aligned[2][2] - gap;
-    const double product = first > 0.0 ? glm::determinant(m.covariance) / first : 0.0;
+    double product = first > 0.0 ? glm::determinant(m.covariance) / first : 0.0;
+    // Of points on a line the determinant is a rounding error, and the root below would make it large.
+    const double rounding = 8.0 * std::numeric_limits<double>::epsilon() * std::pow(m.size, 3);
+    if (product < 0.0) product = std::min(product + rounding / first, 0.0);
     const double root = std::sqrt(std::max(gap * gap - 4.0 * product, 0.0));
     const double last = gap + root > 0.0 ? 2.0 * product / (gap + root) : 0.0;
     const double first_order = 8.0 * std::numeric_limits<T>::epsilon() * m.size;
