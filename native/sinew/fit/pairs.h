@@ -174,7 +174,7 @@ template <class T>
     const Mat3<double> aligned = glm::transpose(to_mat3(fit.rotation)) * m.covariance;
     const double first = aligned[0][0] + aligned[1][1] + aligned[2][2] - gap;
     double product = first > 0.0 ? glm::determinant(m.covariance) / first : 0.0;
-    // Of points on a line the determinant is a rounding error, and the root below would make it large.
+    // For points on a line the determinant is only a rounding error, which the root below would make large.
     const double rounding = 8.0 * std::numeric_limits<double>::epsilon() * std::pow(m.size, 3);
     if (product < 0.0) product = std::min(product + rounding / first, 0.0);
     const double root = std::sqrt(std::max(gap * gap - 4.0 * product, 0.0));
