@@ -40,7 +40,7 @@ def arm_file(tmp_path):
 @pytest.mark.once
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
-    # tests/python/test_documented.py checks that README names all of them.
+    # tests/python/test_documented.py checks that docs/command-line.md names all of them.
     _parser, commands = make_parser()
     assert "check" in commands
     for command in commands:

@@ -2204,7 +2204,7 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
         bpy.context.scene.frame_set(number)
         if what in ("move", "weights") and when == "frame_change_post":
             # Changes by another handler are visible at the next event after the update, and weights where
-            # there is an upstream modifier (README).
+            # there is an upstream modifier (docs/guide.md).
             w.this_frame()
     if act in handlers:
         handlers.remove(act)

@@ -85,6 +85,7 @@ def test_there_are_commands():
     assert {command.document for command in COMMANDS} >= {
         "README.md",
         "CONTRIBUTING.md",
+        "command-line.md",
         "batch.md",
         "bake.md",
     }
@@ -114,7 +115,7 @@ def test_every_subcommand_is_documented():
     said = {
         command.words[1]
         for command in WHOLE
-        if command.words[0] == "sinew" and command.document == "README.md"
+        if command.words[0] == "sinew" and command.document == "command-line.md"
     }
     assert said == set(modules)
 

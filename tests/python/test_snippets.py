@@ -18,8 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 # (document, language of the block) -> their number, and the test that runs them as written.
 # test_documented.py covers commands in indented blocks.
 SNIPPETS = {
-    ("README.md", "python"): (1, "tests/python/test_readme.py"),
-    ("README.md", "cpp"): (1, "tests/native/consumer/test.cmake"),
+    ("docs/library.md", "python"): (1, "tests/python/test_readme.py"),
+    ("docs/library.md", "cpp"): (1, "tests/native/consumer/test.cmake"),
     ("docs/batch.md", "toml"): (1, "tests/python/test_documented.py"),
     ("docs/batch.md", "yaml"): (1, "tests/blender/test_cluster.py"),
     ("docs/engines.md", "json"): (1, "tests/python/test_snippets.py"),

@@ -31,11 +31,11 @@ if(GLM)
   file(COPY ${built} DESTINATION "${build}/native/sinew")
 endif()
 
-file(READ "${SOURCE}/README.md" readme)
-if(NOT readme MATCHES "```cpp\n([^`]+)```")
-  message(FATAL_ERROR "README.md has no C++ program")
+file(READ "${SOURCE}/docs/library.md" library)
+if(NOT library MATCHES "```cpp\n([^`]+)```")
+  message(FATAL_ERROR "docs/library.md has no C++ program")
 endif()
-file(WRITE "${folder}/build/readme.cpp" "${CMAKE_MATCH_1}")
+file(WRITE "${folder}/build/library.cpp" "${CMAKE_MATCH_1}")
 run(${CMAKE_COMMAND} --install "${build}" --prefix "${folder}/installed")
 
 # Versions that are compatible for CMake must be compatible for the linker.
@@ -52,6 +52,6 @@ run(${CMAKE_COMMAND} -S "${SOURCE}/tests/native/consumer" -B "${folder}/build" -
   "-DCMAKE_PREFIX_PATH=${folder}/installed" "-DSINEW_INCLUDE=${headers}"
   "-DCMAKE_CXX_FLAGS=${FLAGS}")
 run(${CMAKE_COMMAND} --build "${folder}/build")
-foreach(program readme calls_plain calls_aligned)
+foreach(program library calls_plain calls_aligned)
   run("${folder}/build/${program}")
 endforeach()
