@@ -28,7 +28,7 @@ SNIPPETS = {
     ("docs/render-tests.md", "text"): (1, "tests/blender/test_compare.py"),
     ("docs/render-tests.md", "python"): (1, "tests/blender/test_compare.py"),
 }
-NOT_RUN = {("CONTRIBUTING.md", ""): "a drawing of a frame"}
+NOT_RUN = {("docs/architecture.md", ""): "a drawing of a frame"}
 
 # Pictures of docs/ -> the program that makes them, which contains their names or a prefix of them.
 PICTURES = {
