@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import atexit
+import logging
 import sys
 
 import bpy
@@ -131,8 +132,15 @@ def _end() -> None:
     4.5."""
     global _has_ended
     # If Blender has unregistered it, its types are gone by now.
-    if _registered:
-        unregister()
+    try:
+        if _registered:
+            unregister()
+    except Exception:
+        # What is still registered crashes Blender, so the handlers, at least, go.
+        logging.getLogger("sinew").exception("Sinew did not end as it should")
+        for functions in map(bpy.app.handlers.__getattribute__, dir(bpy.app.handlers)):
+            if isinstance(functions, list):
+                functions[:] = [each for each in functions if not each.__module__.startswith(__package__)]
     _has_ended = True
     # Blender 4.2 keeps a reference to each registered property group class, which keeps the names of its
     # module. Blender as a module ends when `bpy` is freed, and crashes if it never is.

@@ -167,7 +167,8 @@ def _remove_warning(group: bpy.types.NodeTree) -> None:
 
 def _last_link(group: bpy.types.NodeTree) -> bpy.types.NodeLink | None:
     """Returns the link that leads to the group's output."""
-    outputs = (node.inputs["Geometry"] for node in group.nodes if node.type == "GROUP_OUTPUT")
+    # An artist may have renamed the socket, or removed it.
+    outputs = (node.inputs[0] for node in group.nodes if node.type == "GROUP_OUTPUT" and len(node.inputs))
     return next((link for output in outputs for link in output.links), None)
 
 

@@ -20,13 +20,21 @@ BLENDER = "blender"
 
 
 def method_label(name: str) -> str:
-    return "Armature modifier" if name == BLENDER else METHODS[name].label
+    if name == BLENDER:
+        return "Armature modifier"
+    return METHODS[name].label if name in METHODS else "a method of a newer Sinew"
 
 
 def method_description(name: str) -> str:
     return (
         "What Blender's modifier does, as its options say" if name == BLENDER else METHODS[name].description
     )
+
+
+def has_known_methods(settings: SinewSettings) -> bool:
+    """Whether this Sinew has all methods that the settings name: a file of a newer one can name others, which
+    Blender reads as empty."""
+    return bool(settings.method) and all(each.method for each in settings.replaced_modifiers)
 
 
 @dataclass

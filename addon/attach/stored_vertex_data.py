@@ -7,6 +7,8 @@ It is a property of the mesh, not an attribute: downstream modifiers would inter
 
 from __future__ import annotations
 
+import hashlib
+import logging
 from collections.abc import Mapping
 
 import bpy
@@ -14,26 +16,31 @@ import numpy as np
 
 NAME = "sinew_vertex_data"
 
+log = logging.getLogger("sinew")
+
 
 class SinewVertexData(bpy.types.PropertyGroup):
-    """Bytes of float32 [vertices, n] by their key, "KEY n"."""
+    """Bytes of float32 [vertices, n] by their key, "KEY n HASH", with a hash of the bytes."""
 
 
 def read(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
-    """Returns float32 [vertices, n] by its key; copies."""
+    """Returns float32 [vertices, n] by its key; copies. Leaves out what is damaged."""
     if not mesh.is_property_set(NAME):
         return {}
     found = {}
     for name, content in getattr(mesh, NAME).items():
-        key, _space, width = name.partition(" ")
-        if (
-            isinstance(content, bytes)
-            and width.isdigit()
-            and int(width)
-            and len(content) % (4 * int(width)) == 0
-        ):
+        key, width, digest = (*name.split(" "), "", "")[:3]
+        if isinstance(content, bytes) and digest == _digest(content) and width.isdecimal():
             found[key] = np.frombuffer(content, dtype=np.float32).reshape(-1, int(width))
+        else:
+            log.warning(
+                "%s: what a method had stored in this mesh is damaged; it is computed anew", mesh.name
+            )
     return found
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
 def write(mesh: bpy.types.Mesh, made: Mapping[str, np.ndarray]) -> None:
@@ -44,12 +51,15 @@ def write(mesh: bpy.types.Mesh, made: Mapping[str, np.ndarray]) -> None:
         remove(mesh)
         return
     group = getattr(mesh, NAME)
-    names = {f"{key} {array.shape[1]}": array for key, array in made.items()}
-    for name in set(group.keys()) - set(names):
+    wanted = {}
+    for key, array in made.items():
+        content = np.ascontiguousarray(array, dtype=np.float32).tobytes()
+        wanted[f"{key} {array.shape[1]} {_digest(content)}"] = content
+    for name in set(group.keys()) - set(wanted):
         del group[name]
-    for name, array in names.items():
-        if name not in group:
-            group[name] = np.ascontiguousarray(array, dtype=np.float32).tobytes()
+    for name, content in wanted.items():
+        if group.get(name) != content:
+            group[name] = content
 
 
 def remove(mesh: bpy.types.Mesh) -> None:

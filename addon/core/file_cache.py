@@ -96,7 +96,10 @@ def _unpack(content: bytes) -> np.ndarray | None:
     payload = content[start:]
     if content[:start] != MAGIC + _digest(payload):
         return None
-    return np.lib.format.read_array(io.BytesIO(payload), allow_pickle=False)
+    try:
+        return np.lib.format.read_array(io.BytesIO(payload), allow_pickle=False)
+    except ValueError:
+        return None
 
 
 def _digest(payload: bytes) -> bytes:

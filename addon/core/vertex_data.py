@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -21,6 +22,8 @@ from .rig import Weighting
 from .spaces import transformed
 
 METHODS = {method.name: method for method in sinew.methods()}
+
+log = logging.getLogger("sinew")
 
 
 @dataclass(frozen=True)
@@ -277,20 +280,42 @@ class VertexData:
         found = self._stored.get(entry.key)
         if found is None:
             found = precomputations.find(entry.key)
-        if found is not None and self._fits(method, found):
+        if found is not None and _fits(METHODS[method], found, self.points, influences):
             self._put(entry, found)
+        elif found is not None:
+            log.warning("The stored %s of a mesh are damaged; they are computed anew", provider.what)
         return entry.make
-
-    def _fits(self, method: str, found: np.ndarray) -> bool:
-        info = METHODS[method]
-        rows = len(found) if info.keeps_moments else len(self.points)
-        if found.shape != (rows, info.vertex_floats) or found.dtype != np.float32:
-            return False
-        return bool(np.isfinite(found).all())
 
     def _put(self, entry: _Entry, made: np.ndarray) -> None:
         entry.made, entry.is_outdated = made, False
         self.version = next(_versions)
+
+
+def _fits(method: sinew.Method, found: np.ndarray, points: np.ndarray, influences: Influences) -> bool:
+    """Whether stored data can be that of the mesh: centres and first moments are means of the rest points."""
+    rows = len(found) if method.keeps_moments else len(points)
+    if found.shape != (rows, method.vertex_floats) or found.dtype != np.float32 or not len(found):
+        return found.shape == (0, method.vertex_floats) and len(points) == 0
+    lowest, highest = points.min(axis=0), points.max(axis=0)
+    diagonal = float(np.linalg.norm(highest - lowest))
+    margin = 1e-3 * diagonal + 1e-6 * float(np.abs(points).max())
+    weights, means, squares = np.ones((rows, 1)), found[:, :3], found[:, 3:]
+    if method.keeps_moments:
+        vertices, bones, weights = found[:, 0], found[:, 1], found[:, 2:3]
+        means, squares = found[:, 3:6], found[:, 6:]
+        is_sound = bool(
+            np.array_equal(vertices, np.floor(vertices))
+            and np.isin(bones, influences.bones).all()
+            and (np.diff(vertices) >= 0).all()
+            and 0 <= vertices[0] <= vertices[-1] < len(points)
+            and ((weights > 0) & (weights <= 1.001)).all()
+            and np.isin(np.flatnonzero(np.diff(influences.offsets)), vertices).all()
+        )
+        if not is_sound:
+            return False
+    # Comparisons with values that are not finite are false.
+    are_inside = (means >= weights * lowest - margin) & (means <= weights * highest + margin)
+    return bool(are_inside.all() and (np.abs(squares) <= diagonal**2 + margin).all())
 
 
 def _values_of(method: str, values: Mapping[str, Value]) -> dict[str, float]:

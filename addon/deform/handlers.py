@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections.abc import Callable
 
 import bpy
@@ -17,6 +18,8 @@ from ..io.animation_paths import animated_paths
 from . import events, originals, precompute_watch, precomputing, session
 from .changes import Changes, names_of_changed_meshes
 from .session import current
+
+log = logging.getLogger("sinew")
 
 # --- Evaluations and changes of frame
 
@@ -309,11 +312,21 @@ def on_save(*_args: object) -> None:
     """From here to on_saved() Sinew changes nothing in the file, even if Blender evaluates it, as for its
     thumbnail."""
     with reaction() as may_react:
-        if may_react and not current.is_idle:
+        if may_react and not current.is_idle and not _is_saved_as_it_is():
             # So that the artist's last changes are seen separately from those made for saving.
             bpy.context.evaluated_depsgraph_get()
-            session.prepare_for_save()
+            # First, so that whatever happens, on_saved() reverses it.
             current.is_saving = True
+            session.prepare_for_save()
+
+
+def _is_saved_as_it_is() -> bool:
+    """Whether a render's thread reads the file meanwhile, so that nothing may be prepared. With Sinew, the
+    saved file is complete, as an autosave is."""
+    if not is_rendering_in_window():
+        return False
+    log.warning("Saved during a render: save again after it, for Blenders without Sinew")
+    return True
 
 
 @persistent
@@ -330,9 +343,9 @@ def begin_export() -> None:
     with reaction() as may_react:
         if may_react and not (current.is_idle or current.is_saving):
             bpy.context.evaluated_depsgraph_get()
+            current.is_saving = True
             session.prepare_for_save()
             note.remove()
-            current.is_saving = True
             if not bpy.app.background:
                 # An exporter that fails does not announce its end.
                 bpy.app.timers.register(end_export, first_interval=0.0)

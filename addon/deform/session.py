@@ -272,33 +272,45 @@ def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 
 def prepare_for_save() -> None:
-    """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has."""
+    """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has.
+    Raises nothing: what fails is logged, and the rest of the file is prepared."""
     current.gate.restore()
     objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
-    current.on_before_saving = set()
+    # Known before anything can fail, so that resume_after_save() reverses all of it.
+    current.on_before_saving = {obj.session_uid for obj in objects if properties.of(obj).replaces_modifiers}
     with updates_suspended():
         for obj in objects:
-            try:
-                if attach.prepare_for_save(obj):
-                    current.on_before_saving.add(obj.session_uid)
+            with _logging_failure(f"{obj.name}: a Blender without Sinew will not show it posed"):
+                attach.prepare_for_save(obj)
                 overrides.store(obj)
-            except Exception as error:
-                # The other objects are in the same file.
-                log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
-        precomputing.store_in_meshes([(obj, state_of(obj)) for obj in objects])
-        note.write([obj for obj in objects if properties.of(obj).has_nearest_volume])
+        with _logging_failure("What the methods need is not in the file, and is computed again"):
+            precomputing.store_in_meshes([(obj, state_of(obj)) for obj in objects])
+        with _logging_failure("The file does not say that it uses Sinew"):
+            note.write([obj for obj in objects if properties.of(obj).has_nearest_volume])
+
+
+@contextlib.contextmanager
+def _logging_failure(consequence: str) -> Iterator[None]:
+    """Logs an error instead of passing it on: what is next to be saved is in the same file."""
+    try:
+        yield
+    except Exception as error:
+        log.error("%s: %s: %s", consequence, type(error).__name__, error, exc_info=error)
 
 
 def resume_after_save(context: bpy.types.Context) -> None:
-    """Reverses prepare_for_save()."""
-    note.remove()
+    """Reverses prepare_for_save(). Raises nothing of its own."""
+    with _logging_failure("The file still says that Sinew is missing"):
+        note.remove()
     with updates_suspended():
         for obj in filter(properties.has_sinew, bpy.data.objects):
             _expect_mesh_update(obj)
-            if obj.is_editable:
+            if not obj.is_editable:
+                continue
+            with _logging_failure(f"{obj.name}: not as before it was saved; press Rebind"):
                 attach.restore_volume(obj)
-            if obj.is_editable and stack.sinew_modifier(obj) is not None:
-                attach.switch(obj, on=obj.session_uid in current.on_before_saving)
+                if stack.sinew_modifier(obj) is not None:
+                    attach.switch(obj, on=obj.session_uid in current.on_before_saving)
     refresh(context)
 
 
@@ -440,6 +452,8 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
     try:
         if _follow_removal(obj, changes):
             return
+        if _is_refused(obj):
+            return
         if not properties.of(obj).enabled:
             _update_switched_off(obj, changes)
         else:
@@ -453,6 +467,24 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
         current.objects = None
     except Exception as error:
         _switch_off(obj, properties.of(obj), error)
+
+
+def _is_refused(obj: bpy.types.Object) -> bool:
+    """Whether its method is one that this Sinew does not know. Its Armature modifiers then deform it, and its
+    settings stay in the file as a newer Sinew left them."""
+    settings = properties.of(obj)
+    reason = "its method is of a newer Sinew; update Sinew, or choose another method"
+    if properties.has_known_methods(settings):
+        if reason in settings.error:
+            settings.error = ""
+        return False
+    error = f"{obj.name}: {reason}"
+    if settings.error != error and obj.is_editable and not is_rendering_in_window():
+        current.skinned.pop(obj.session_uid, None)
+        attach.switch(obj, on=False)
+        settings.error = error
+        log.error("%s", error)
+    return True
 
 
 def _update_switched_off(obj: bpy.types.Object, changes: Changes) -> None:

@@ -14,6 +14,7 @@ import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path, PurePath
+from typing import Any
 
 from ..core.errors import SinewError, WrongUse
 from ..core.lock import try_lock
@@ -124,6 +125,11 @@ class Journal:
                 for leftover in folder.glob(pattern):
                     leftover.unlink(missing_ok=True)
 
+    def _is_behind_link(self, path: Any) -> bool:
+        """Whether a folder on the way from `out` to a path of a record is a link, which can lead outside."""
+        folders = (self.out / folder for folder in PurePath(path).parents)
+        return any(folder != self.out and folder.is_symlink() for folder in folders)
+
     def _read(self) -> dict[str, dict]:
         self._file.seek(0)
         content = self._file.read()
@@ -136,23 +142,35 @@ class Journal:
             # ignored, and its file is processed again.
             with suppress(ValueError):
                 record = json.loads(line)
-                if _is_sound(record):
+                if _is_sound(record) and not any(map(self._is_behind_link, _paths(record))):
                     latest[record["file"]] = record
         return latest
 
 
 def _is_sound(record: object) -> bool:
-    """Whether a line has the form of a record and names no file outside of the journal's folder."""
+    """Whether a line has the form of a record, names no file outside of the journal's folder, and renames
+    only what a batch has written."""
     if not isinstance(record, dict):
         return False
-    beside, unfinished = record.get("beside", []), record.get("unfinished", MARK)
+    beside, unfinished = record.get("beside", []), record.get("unfinished", f".{UNFINISHED}")
     if not isinstance(beside, list) or not all(isinstance(one, list) and len(one) == 3 for one in beside):
         return False
     if not isinstance(unfinished, str) or PurePath(unfinished).name != unfinished:
         return False
-    return all(
-        _is_inside(path) for path in (record.get("file"), *(path for one in beside for path in one[:2]))
-    )
+    if not all(map(_is_inside, _paths(record))):
+        return False
+    return all(_is_unfinished(name) for name in (unfinished, *(one[0] for one in beside)))
+
+
+def _paths(record: dict) -> list[Any]:
+    """Returns all paths of a record below the journal's folder."""
+    return [record.get("file"), *(path for one in record.get("beside", ()) for path in one[:2])]
+
+
+def _is_unfinished(path: str) -> bool:
+    """Whether the path is one under which a batch writes before it renames."""
+    name = PurePath(path).name
+    return name.startswith(".") and MARK in name
 
 
 def is_complete(record: dict) -> bool:

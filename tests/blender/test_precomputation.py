@@ -443,6 +443,64 @@ def test_data_of_another_mesh_is_not_taken(gate, tmp_path):
     assert gate.count == 2
 
 
+def _of_another_file(mesh, harm):
+    """Replaces what the mesh has stored, with hashes that are right."""
+    damaged = {key: harm(array.copy()) for key, array in stored_vertex_data.read(mesh).items()}
+    stored_vertex_data.write(mesh, damaged)
+
+
+def _on_disk(mesh, harm):
+    group = getattr(mesh, stored_vertex_data.NAME)
+    for name, content in list(group.items()):
+        group[name] = harm(np.frombuffer(content, np.float32).copy()).tobytes()
+
+
+def _multiply_all(array):
+    array *= np.float32(1e30)
+    return array
+
+
+def _clear_a_part(array):
+    array[: len(array) // 2] = 0
+    return array
+
+
+def _end_early(array):
+    return array[: len(array) // 2]
+
+
+@pytest.mark.parametrize(
+    ("method", "store", "harm"),
+    [
+        *[
+            ("ddm", _of_another_file, each)
+            for each in (np.zeros_like, _multiply_all, _clear_a_part, _end_early)
+        ],
+        ("cor", _of_another_file, _multiply_all),
+        ("cor", _on_disk, np.zeros_like),
+        ("ddm", _on_disk, _end_early),
+    ],
+)
+def test_damaged_data_is_computed_anew(method, store, harm, tmp_path, caplog):
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, method)
+    bpy.context.scene.frame_set(FRAME)
+    expected = scenes.final_points(obj)
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    session.forget()
+    mesh = bpy.data.objects["Arm"].data
+    assert stored_vertex_data.read(mesh)
+    store(mesh, harm)
+    forget_made()
+    obj.sinew.method = "dq"
+    obj.sinew.method = method
+    bpy.context.scene.frame_set(FRAME)
+    assert np.array_equal(scenes.final_points(obj), expected)
+    assert "computed anew" in caplog.text
+    assert obj.sinew.enabled
+
+
 def test_reskin_puts_it_into_the_file(gate, tmp_path):
     scenes.make_arm(bones=3)
     path = tmp_path / "plain.blend"

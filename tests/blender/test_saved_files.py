@@ -137,6 +137,47 @@ def test_a_group_that_was_taken_apart_is_saved(tmp_path):
     assert not obj.modifiers["Armature"].show_viewport
 
 
+def _unknown_method(obj):
+    """As a newer Sinew would store it."""
+    if bpy.app.version >= (5, 0):
+        obj.sinew.bl_system_properties_get()["method"] = 99
+    else:
+        obj.sinew["method"] = 99
+    obj.update_tag()
+    bpy.context.view_layer.update()
+
+
+def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
+    newer, _armature = scenes.make_arm(name="Newer")
+    expected = scenes.shapes(newer, FRAMES)
+    scenes.add_sinew(newer, "dq")
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    _unknown_method(newer)
+    # What names the node group's sockets must not rely on what an artist may rename.
+    for item in stack.sinew_modifier(obj).node_group.interface.items_tree:
+        if item.in_out == "OUTPUT":
+            item.name = "Renamed"
+    session.refresh(bpy.context)
+    path = tmp_path / "saved.blend"
+    save(path)
+    assert not obj.modifiers["Armature"].show_viewport
+    assert "newer Sinew" in properties.of(newer).error
+    assert np.array_equal(scenes.shapes(newer, FRAMES), expected)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert properties.of(bpy.data.objects["Newer"]).enabled
+    assert properties.of(bpy.data.objects["Newer"]).method == ""
+    assert not bpy.data.objects["Arm"].modifiers["Armature"].show_viewport
+    # A script that ends with this file.
+    script = (
+        f"import bpy, sinew_addon; sinew_addon.register(); bpy.ops.wm.open_mainfile(filepath={str(path)!r})"
+    )
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+    properties.of(bpy.data.objects["Newer"]).method = "lbs"
+    assert properties.of(bpy.data.objects["Newer"]).error == ""
+    assert not bpy.data.objects["Newer"].modifiers["Armature"].show_viewport
+
+
 def test_between_the_handlers_of_saving_nothing_of_the_file_changes(tmp_path):
     """A thumbnail evaluates the scene at that time: so does this handler, in background as in a window."""
     obj, armature = scenes.make_arm()

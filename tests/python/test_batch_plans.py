@@ -362,6 +362,35 @@ def test_a_run_killed_before_the_name_is_finished_by_the_next(tmp_path):
         assert not journal.matches(target, journal.latest["a.blend"])
 
 
+@pytest.mark.parametrize(
+    "harm",
+    [
+        {"file": "link/a.blend"},
+        {"unfinished": "mine.blend"},
+        {"beside": [["mine.blend", "b.abc", None]]},
+        {"beside": [[".1.unfinished.abc", "link/b.abc", None]]},
+        {"beside": [["link/.1.unfinished.abc", "b.abc", None]]},
+    ],
+)
+def test_a_journal_moves_only_unfinished_files_of_its_folder(tmp_path, harm):
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    for folder in (out, elsewhere):
+        folder.mkdir()
+        for name in (".1.unfinished.blend", ".1.unfinished.abc", "mine.blend"):
+            (folder / name).write_bytes(b"a copy")
+    (out / "link").symlink_to(elsewhere, target_is_directory=True)
+    before = sorted(tmp_path.rglob("*")) + sorted(elsewhere.iterdir())
+    record = {"file": "a.blend", "unfinished": ".1.unfinished.blend", "written": None} | harm
+    # Each names what is there, so that its stamp is right.
+    linked = out / record["file"]
+    record["written"] = stamp(linked.with_name(record["unfinished"]))
+    record["beside"] = [[a, b, stamp(out / a)] for a, b, _none in record.get("beside", [])]
+    (out / NAME).write_text(json.dumps(record) + "\n")
+    with Journal(out) as journal:
+        journal.recover()
+    assert sorted(p for p in tmp_path.rglob("*") if p.name != NAME) + sorted(elsewhere.iterdir()) == before
+
+
 def test_what_has_no_record_is_cleared_away(tmp_path):
     saved(tmp_path)
     (tmp_path / ".2.unfinished.blend@").write_bytes(b"Blender's own")

@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_python_program_deforms(capsys):
-    program = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "library.md").read_text(encoding="utf-8"), re.DOTALL).group(1)
+    page = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
+    program = re.search(r"```python\n(.*?)```", page, re.DOTALL).group(1)
     names = {}
     exec(program, names)
     points = names["deformer"].deform(names["bones"])
