@@ -74,12 +74,6 @@ def check_can_add(obj: bpy.types.Object) -> None:
         )
     if obj.mode == "EDIT":
         raise SinewError(f"{obj.name} is in edit mode; leave it first")
-    blocking = [m.name for m in stack.downstream(obj) if m.type in stack.NEED_ORIGINAL]
-    if blocking:
-        raise SinewError(
-            f"{obj.name}: Blender allows no node group before its modifier {blocking[0]}, so Sinew can not "
-            f"deform it; apply or delete {blocking[0]}, or leave the mesh to its Armature modifier"
-        )
     upstream_proxy.check(obj)
 
 
@@ -95,11 +89,7 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
         return
     check_can_add(obj)
     with updates_suspended():
-        try:
-            _add(obj, method)
-        except Exception as error:
-            _take_off(obj)
-            raise SinewError(f"{obj.name}: Sinew can not be added: {error}") from error
+        _add(obj, method)
 
 
 def _add(obj: bpy.types.Object, method: str | None) -> None:
@@ -113,7 +103,8 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
     nodes.show_in_editmode = False
     _show(nodes, False, False)
     # Not to the end of the stack, where the artist may have pinned other modifiers.
-    _position_modifier(obj)
+    modifiers = list(obj.modifiers)
+    obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[0]))
     if active is not None:
         obj.modifiers.active = active
     settings.had_animation = obj.animation_data is not None
@@ -384,7 +375,7 @@ def _position_modifier(obj: bpy.types.Object) -> None:
     on at the same time, as it sets each vertex to its point regardless of the modifiers before it."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
-    if keeps_modifiers_on(obj) or stack.visibility_is_animated(obj) or stack.chained_to(obj):
+    if keeps_modifiers_on(obj) or stack.visibility_is_animated(obj) or _is_chained_to_parent(obj):
         if own != last + 1:
             obj.modifiers.move(own, last if own < last else last + 1)
     elif own + 1 != first:
@@ -398,8 +389,14 @@ def keep_out_of_chain(obj: bpy.types.Object) -> None:
     if nodes is None or not run:
         return
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
-    if first < own < last or (own < first and stack.chained_to(obj)):
+    if first < own < last or (own < first and _is_chained_to_parent(obj)):
         obj.modifiers.move(own, last)
+
+
+def _is_chained_to_parent(obj: bpy.types.Object) -> bool:
+    """Whether the first Armature modifier is a Multi Modifier, and the parent deforms, too."""
+    first = armature_modifier(obj)
+    return first is not None and first.use_multi_modifier and stack.parent_deforms(obj)
 
 
 def keeps_modifiers_on(obj: bpy.types.Object) -> bool:

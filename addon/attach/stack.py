@@ -12,13 +12,6 @@ from . import node_group, properties
 # These change no positions, topology or weights, so they may be before the Armature modifier.
 HARMLESS_UPSTREAM = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
 
-# Besides Armature modifiers, those whose input a Multi Modifier directly behind them is mixed with (seen on
-# 4.2 to 5.2).
-MIXED_WITH = {"LATTICE", "MESH_DEFORM"}
-
-# Blender allows no modifier that makes a new mesh, as a node group does, before these.
-NEED_ORIGINAL = {"MULTIRES", "SOFT_BODY"}
-
 # In the paint modes Blender leaves out modifiers that do not say which vertex of the mesh each of their
 # vertices comes from (measured on 4.2 and 5.2).
 LEFT_OUT_IN_PAINT = {
@@ -137,18 +130,6 @@ def downstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     run, own = armature_modifiers(obj), sinew_modifier(obj)
     behind = list(obj.modifiers)[_index(obj, run[-1]) + 1 :] if run else []
     return [modifier for modifier in behind if modifier != own]
-
-
-def chained_to(obj: bpy.types.Object) -> str:
-    """Returns what deforms the mesh directly before the first Armature modifier, where that is a Multi
-    Modifier: Blender mixes it with the input of this. Empty for nothing."""
-    first = armature_modifier(obj)
-    if first is None or not first.use_multi_modifier:
-        return ""
-    ahead = upstream(obj)
-    if not ahead:
-        return "its parent (parent type Armature)" if parent_deforms(obj) else ""
-    return ahead[-1].name if ahead[-1].type in MIXED_WITH and can_be_on(obj, ahead[-1]) else ""
 
 
 def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:

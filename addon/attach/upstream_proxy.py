@@ -59,11 +59,11 @@ def check_not_needed(obj: bpy.types.Object, why: str) -> None:
 
 def check(obj: bpy.types.Object) -> None:
     """Raises SinewError where the upstream modifiers cannot be evaluated separately."""
-    chained_to = stack.chained_to(obj)
-    if chained_to:
+    first = stack.armature_modifier(obj)
+    if first is not None and first.use_multi_modifier and stack.parent_deforms(obj):
         raise SinewError(
-            f"{obj.name}: its first Armature modifier is a Multi Modifier, which Blender mixes with what "
-            f"{chained_to} gets; switch Multi Modifier off, or put another modifier between"
+            f"{obj.name}: its first Armature modifier is a Multi Modifier, and its parent deforms it as well "
+            "(parent type Armature); switch Multi Modifier off, or parent it by type Object"
         )
     for modifier in stack.upstream_changes(obj):
         if modifier.type in SIMULATIONS:
@@ -135,23 +135,12 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)
-    _deform_without_parent(copy)
     # So that it follows the object, whatever moves that.
     for constraint in list(copy.constraints):
         copy.constraints.remove(constraint)
     copy.constraints.new("COPY_TRANSFORMS").target = obj
     _keep_animation_of_modifiers(copy)
     return copy
-
-
-def _deform_without_parent(copy: bpy.types.Object) -> None:
-    """Exporters find objects by their parents, also those in no scene. So the copy has none, and a parent
-    that deforms becomes an Armature modifier, as Blender itself evaluates it."""
-    if stack.parent_deforms(copy):
-        modifier = copy.modifiers.new("Parent", "ARMATURE")
-        modifier.object, modifier.use_bone_envelopes = copy.parent, True
-        copy.modifiers.move(len(copy.modifiers) - 1, 0)
-    copy.parent = None
 
 
 def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
