@@ -307,7 +307,11 @@ class SkinStage:
 
 @dataclass
 class SkinStageFrame:
-    """Everything that the deformation by a skin stage depends on in one frame: see Frame."""
+    """Everything that the deformation by a skin stage depends on in one frame: see Frame.
+
+    model_from_bones  given where a scale is 0: as in Blender, all vertices are then at the origin of armature
+                      space before the bones move them
+    """
 
     method: str
     pose: np.ndarray
@@ -315,6 +319,7 @@ class SkinStageFrame:
     scale_rule: str = BLENDER_4.name
     mix: str = ""
     parameters: dict[str, Value] = field(default_factory=dict)
+    model_from_bones: np.ndarray | None = None
 
 
 class SkinStack:
@@ -428,8 +433,10 @@ class SkinStack:
         """active: the numbers of the skin stages that have a frame, at least one."""
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
-        last = self.skin_stages[active[-1]]
-        self._end = last.binding if last.mask is None else None
+        last, last_frame = self.skin_stages[active[-1]], frames[active[-1]]
+        assert last_frame is not None
+        is_whole = last.mask is None and last_frame.model_from_bones is None
+        self._end = last.binding if is_whole else None
         for number in active:
             skin_stage, frame = self.skin_stages[number], frames[number]
             assert frame is not None
@@ -438,7 +445,11 @@ class SkinStack:
                 if not self.skin_stages[behind].multi or behind in starts:
                     break
                 starts[behind] = result
-            start = starts.get(number, result)
+            start, back = starts.get(number, result), frame.model_from_bones
+            if back is not None:
+                result = start = np.zeros_like(result)
+                before = self._frames[number] if number < len(self._frames) else None
+                changed |= before is None or not are_equal(back, before.model_from_bones)
             is_end = skin_stage.binding is self._end
             own = (frame.scale_rule, frame.mix, frame.parameters)
             changed |= skin_stage.binding.deform(
@@ -451,5 +462,7 @@ class SkinStack:
                 # A copy, as the next skin stage compares its input with the last one: the array must not be
                 # overwritten.
                 result = skin_stage.binding.points.copy()
+            if back is not None:
+                result = transformed(result, back).astype(np.float32)
         self._points = result
         return changed

@@ -32,8 +32,6 @@ def deform(
     # Binding is not part of a frame's time: it happens once.
     started, before = time.perf_counter(), skinned.shown.rest_points
     differs = shape(obj, skinned, depsgraph)
-    if differs is None:
-        return
     shown = skinned.shown
     if changes.frame:
         is_reshaped = before is not None and shown.rest_points is not before
@@ -55,12 +53,8 @@ def _store(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
     point_store.write(obj, points, skinned.bound.source.points, normals)
 
 
-def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool | None:
-    """Computes the skin stack's points for this evaluation.
-
-    Returns whether they differ from the last ones; None where their inputs are unknown, and the last points
-    stay.
-    """
+def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Computes the skin stack's points for this evaluation. Returns whether they differ from the last ones."""
     replaced_modifiers = properties.of(obj).replaced_modifiers
     armatures = [each.armature and each.armature.evaluated_get(depsgraph) for each in replaced_modifiers]
     evaluated = obj.evaluated_get(depsgraph)
@@ -71,8 +65,6 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
         settings = properties.of(obj)
     modifiers = list(zip(settings.replaced_modifiers, armatures, strict=False))
     frames = pose.read(evaluated, settings, modifiers, skinned, depsgraph.mode)
-    if frames is None or not pose.is_finite(frames):
-        return None
     shown = skinned.shown
     shown.frames = frames
     shown.rest_points = source.rest_points(obj, skinned.bound.source, depsgraph)

@@ -99,16 +99,10 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     rest_points = source.evaluated_points(evaluated, mesh, bound.source)
     if rest_points is None:
         return "what modifiers in front make of its mesh changed"
-    shown = skinned.shown
-    if frames is None:
-        # The last shape stays.
-        last = bound.skin_stack.points
-        out[:] = rest_points if last is None else last
-    else:
-        values = pose.stage_values(settings)
-        bound.skin_stack.deform(rest_points, frames, out, values)
-        shown.frames, shown.rest_points, shown.stage_values = frames, rest_points, values
-        shown.number += 1
+    shown, values = skinned.shown, pose.stage_values(settings)
+    bound.skin_stack.deform(rest_points, frames, out, values)
+    shown.frames, shown.rest_points, shown.stage_values = frames, rest_points, values
+    shown.number += 1
     if len(normals):
         bound.write_normals(out, rest_points, skinned.plan.normals, normals)
     if skinned.plan.in_buffer:

@@ -11,8 +11,10 @@ import numpy as np
 from ..attach import attach, properties, stage_settings
 from ..core import parameters
 from ..core.errors import SinewError
+from ..core.rig import Bones
 from ..core.scale_rule import BLENDER_4
 from ..core.session import NO_STAGES, SkinStageFrame
+from ..core.spaces import SAME_SPACE
 from ..core.stages import ORDER, StageValues
 from ..io import armature_io
 from .bound import Bound
@@ -31,8 +33,8 @@ def read(
     modifiers: Modifiers,
     skinned: SkinnedObject,
     mode: str,
-) -> Frames | None:
-    """Returns None where the pose is unknown, and the last shape stays.
+) -> Frames:
+    """What Blender can not compute with, Sinew leaves at rest: bones and transforms that are not finite.
 
     settings   the object's, evaluated
     modifiers  evaluated
@@ -54,11 +56,13 @@ def read(
         if armature is None or armature.data.is_editmode or not _takes_part(flags, mode):
             frames.append(None)
             continue
-        space = armature_io.bones_from_model(evaluated, armature)
+        space, back = armature_io.bones_from_model(evaluated, armature), None
         if space is None:
-            # An armature can be scaled to zero for a moment.
-            return None
-        pose = armature_io.read_pose(armature, stage.binding.bones)
+            space, back = SAME_SPACE, armature_io.model_from_bones(evaluated, armature)
+            if not np.isfinite(back).all():
+                frames.append(None)
+                continue
+        pose = _finite(armature_io.read_pose(armature, stage.binding.bones), stage.binding.bones)
         own = method if not frames else properties.method_of_modifier(method, replaced.method, is_first=False)
         is_mixed = stage.binding.mix_weights is not None and own == method
         mix = settings.mixed_method if is_mixed else ""
@@ -69,8 +73,16 @@ def read(
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
         values = _parameters(evaluated, settings, own, mix)
-        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values))
+        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values, back))
     return frames
+
+
+def _finite(pose: np.ndarray, bones: Bones) -> np.ndarray:
+    """Returns the pose with bones at rest where theirs is not finite."""
+    if np.isfinite(pose).all():
+        return pose
+    is_finite = np.isfinite(pose).all(axis=(1, 2), keepdims=True)
+    return np.where(is_finite, pose, bones.rest)
 
 
 def of_modifiers(obj: bpy.types.Object, frames: Frames) -> Frames:
@@ -96,9 +108,9 @@ def _parameters(
     return values
 
 
-def lacks_data(bound: Bound, frames: Frames | None) -> bool:
+def lacks_data(bound: Bound, frames: Frames) -> bool:
     """Whether one of the methods needed vertex data that it does not have."""
-    for stage, frame in zip(bound.skin_stack.skin_stages, frames or (), strict=False):
+    for stage, frame in zip(bound.skin_stack.skin_stages, frames, strict=False):
         data = stage.binding.vertex_data
         if data is not None and data.missed and frame is not None and not all(map(data.has, data.missed)):
             return True
@@ -121,10 +133,6 @@ def stage_values(settings: properties.SinewSettings) -> StageValues:
             if value == "":
                 raise SinewError(f"{name}.{parameter}: its driver gives a number that stands for no choice")
     return values
-
-
-def is_finite(frames: Frames) -> bool:
-    return all(np.isfinite(frame.pose).all() for frame in frames if frame is not None)
 
 
 def _takes_part(flags: properties.SinewReplacedModifier | bpy.types.Modifier, mode: str) -> bool:

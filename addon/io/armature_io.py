@@ -7,10 +7,14 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..core.envelopes import Envelopes
 from ..core.rig import Bones
 from ..core.spaces import SAME_SPACE
+
+# Before, a mesh object with a scale of 0 had no inverse, and Blender moved all its vertices to its origin.
+_MESH_HAS_INVERSE = bpy.app.version >= (5, 0)
 
 
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
@@ -144,15 +148,30 @@ def _read_joints(
 def bones_from_model(
     evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object
 ) -> np.ndarray | None:
-    """Returns float64 [4, 4], from the mesh object's space to armature space; None where the armature's scale
-    is 0."""
+    """Returns float64 [4, 4], from the mesh object's space to armature space; None where there is none, as a
+    scale is 0 or a value is not finite."""
     mesh_world, armature_world = evaluated_mesh.matrix_world, evaluated_armature.matrix_world
+    if not armature_world.determinant():
+        return None
     if mesh_world == armature_world:
         return SAME_SPACE
-    try:
-        armature_from_world = np.linalg.inv(np.array(armature_world, dtype=np.float64))
-        space = armature_from_world @ np.array(mesh_world, dtype=np.float64)
-        np.linalg.inv(space)
-    except np.linalg.LinAlgError:
+    if mesh_world.determinant():
+        space = np.linalg.inv(_read(armature_world)) @ _read(mesh_world)
+    elif _MESH_HAS_INVERSE:
+        space = np.linalg.inv(model_from_bones(evaluated_mesh, evaluated_armature))
+    else:
         return None
     return space if np.isfinite(space).all() else None
+
+
+def model_from_bones(evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object) -> np.ndarray:
+    """Returns float64 [4, 4], from armature space to the mesh object's, as Blender has it where a scale is
+    0."""
+    mesh_world, armature_world = evaluated_mesh.matrix_world, _read(evaluated_armature.matrix_world)
+    if not (mesh_world.determinant() or _MESH_HAS_INVERSE):
+        return np.zeros((4, 4))
+    return _read(mesh_world.inverted_safe()) @ armature_world
+
+
+def _read(matrix: Matrix) -> np.ndarray:
+    return np.array(matrix, dtype=np.float64)
