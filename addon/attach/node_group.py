@@ -7,6 +7,8 @@ nodes for them.
 
 from __future__ import annotations
 
+import zlib
+
 import bpy
 
 from ..io import mesh_io
@@ -23,6 +25,8 @@ NORMALS = "Normals"
 IN_RENDERS = "Normals in Renders"
 # An input that no node reads; pose_driver puts its driver there.
 POSE = "Pose"
+# A custom property on the group: what it was made of, by which a group that was taken apart is recognised.
+_MADE_OF = "sinew_made_of"
 # What a group says to those who open the file without Sinew.
 MISSING = (
     "The extension Sinew deforms this mesh, and is not there. Install it, or leave this modifier off: the "
@@ -52,7 +56,9 @@ def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
     """
     group = find(kind + _WITH_NORMALS[normals])
     if group is None:
-        return _make_for_attribute(normals) if kind == ATTRIBUTE else _make_for_buffer(normals)
+        made = _make_for_attribute(normals) if kind == ATTRIBUTE else _make_for_buffer(normals)
+        note_structure(made)
+        return made
     # One that was appended has it from its file.
     _remove_warning(group)
     return group
@@ -62,6 +68,38 @@ def is_sinew(modifier: bpy.types.Modifier) -> bool:
     return (
         modifier.type == "NODES" and modifier.node_group is not None and bool(modifier.node_group.get(MARK))
     )
+
+
+def note_structure(group: bpy.types.NodeTree) -> None:
+    """Called when a group is complete."""
+    group[_MADE_OF] = _structure(group)
+
+
+def taken_apart() -> list[bpy.types.NodeTree]:
+    """Returns the groups in which somebody changed nodes, links or sockets since: they no longer set points."""
+    own = [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and _WARNING not in g.nodes]
+    return [group for group in own if group.get(_MADE_OF) not in (None, _structure(group))]
+
+
+def _structure(group: bpy.types.NodeTree) -> str:
+    nodes = sorted(
+        (node.name, node.bl_idname, node.mute, getattr(node, "node_tree", group) is None)
+        for node in group.nodes
+        if node.type != "FRAME"
+    )
+    links = sorted(
+        (
+            *(link.from_node.name, link.from_socket.identifier),
+            *(link.to_node.name, link.to_socket.identifier, link.is_muted),
+        )
+        for link in group.links
+    )
+    sockets = [
+        (item.identifier, item.in_out, item.socket_type)
+        for item in group.interface.items_tree
+        if item.item_type == "SOCKET"
+    ]
+    return f"{zlib.crc32(repr((nodes, links, sockets)).encode()):08x}"
 
 
 def remove_unused() -> None:

@@ -73,8 +73,9 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
         variables += [_Variable(obj, OBJECT_REQUEST_PATH), _Variable(obj.data, MESH_REQUEST_PATH)]
     curve = _find(obj)
     if curve is not None:
-        # Blender does not evaluate a driver again that failed once, as while its modifier had no node group.
-        is_valid = curve.is_valid and curve.driver.is_valid
+        # Blender does not evaluate a driver that is muted, or that failed once, as while its modifier had no
+        # node group.
+        is_valid = curve.is_valid and curve.driver.is_valid and not curve.mute
         if curve.data_path == path and is_valid and _reads(curve.driver, variables):
             return
         _take_off(obj, curve)

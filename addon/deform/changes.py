@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
+from ..attach import node_group
 from ..core.rig import Bones
 from .originals import Find
 
@@ -23,6 +24,7 @@ class Changes:
                 only follow their shape keys' animation
     armatures   armatures whose bones may differ
     edited      the `objects` themselves, unless a change of frame touched them
+    node_groups one of Sinew's node groups was touched
     structure   objects may have been added, removed or hidden
     frame       this is a change of frame
     complete    everything not listed is as it was at the last update; otherwise anything may have changed
@@ -39,6 +41,7 @@ class Changes:
     meshes: set[int] = field(default_factory=set)
     armatures: set[int] = field(default_factory=set)
     edited: list[bpy.types.Object] = field(default_factory=list)
+    node_groups: bool = False
     structure: bool = False
     frame: bool = False
     complete: bool = False
@@ -83,6 +86,8 @@ class Changes:
             what = update.id
             if isinstance(what, bpy.types.Scene | bpy.types.Collection):
                 changes.structure = True
+            elif isinstance(what, bpy.types.NodeTree):
+                changes.node_groups |= bool(what.get(node_group.MARK))
             elif isinstance(what, bpy.types.Object | bpy.types.Mesh | bpy.types.Key | bpy.types.Armature):
                 found = original(what)
                 if found is None:
@@ -117,6 +122,7 @@ class Changes:
         self.meshes |= other.meshes
         self.armatures |= other.armatures
         self.edited += other.edited
+        self.node_groups |= other.node_groups
         self.structure |= other.structure
         self.complete &= other.complete
         self.lost |= other.lost

@@ -109,14 +109,18 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 
 
 def _begin_evaluation() -> None:
+    is_renamed = False
     for obj, state in current.pairs:
         evaluation = state.evaluation
         evaluation.mesh, evaluation.is_event_known, evaluation.was_tagged = 0, True, False
         try:
             state.is_only_user = state.mesh_users == obj.data.users
+            is_renamed |= state.name != obj.name
         except ReferenceError:
             # The object was deleted since the list was made.
             state.is_only_user = False
+    if is_renamed:
+        session.name_requests()
 
 
 def _end_event() -> None:

@@ -10,11 +10,24 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import bpy
+import numpy as np
 
-from ..attach import attach, normals, note, orphans, overrides, point_store, properties, references, stack
+from ..attach import (
+    attach,
+    node_group,
+    normals,
+    note,
+    orphans,
+    overrides,
+    point_store,
+    properties,
+    references,
+    stack,
+)
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
+from ..io.animation_paths import animated_paths
 from . import after_update, apply_plan, events, precomputing, undo
 from .bound import uid
 from .changes import GONE, Changes
@@ -36,7 +49,7 @@ class Session:
     make all of them invalid. Loading forgets everything, undo everything that undo.py does not keep.
 
     objects           the objects that have Sinew; None where they have to be found again
-    object_count      how many objects the file had then
+    objects_seen      what objects_now() was then
     skinned           what is known of those that are on, by session_uid
     pairs             these objects, each with what is known of it
     depsgraph         the address of the depsgraph last seen
@@ -55,7 +68,7 @@ class Session:
     """
 
     objects: list[bpy.types.Object] | None = None
-    object_count: int = 0
+    objects_seen: tuple[int, int] = (0, 0)
     skinned: dict[int, SkinnedObject] = field(default_factory=dict)
     pairs: Pairs = field(default_factory=list)
     depsgraph: int = 0
@@ -75,7 +88,15 @@ class Session:
     @property
     def is_idle(self) -> bool:
         """No object has Sinew, and no object has been added since that was found."""
-        return self.objects == [] and self.object_count == len(bpy.data.objects)
+        return self.objects == [] and self.objects_seen == objects_now()
+
+
+def objects_now() -> tuple[int, int]:
+    """How many objects the file has, and the highest session_uid among them. Blender counts these up, so both
+    are the same only where no object was added or removed."""
+    uids = np.zeros(len(bpy.data.objects), dtype=np.int32)
+    bpy.data.objects.foreach_get("session_uid", uids)
+    return len(uids), int(uids.max(initial=0))
 
 
 current = Session()
@@ -119,7 +140,17 @@ def adopt_after_step() -> None:
 
 def _set_pairs(pairs: Pairs) -> None:
     current.pairs = pairs
-    requests.set_objects({obj.name: state for obj, state in pairs})
+    name_requests()
+
+
+def name_requests() -> None:
+    """Names the objects for their requests as they are called now, before an evaluation."""
+    by_name = {}
+    for obj, state in current.pairs:
+        # The object may have been deleted since the list was made.
+        with contextlib.suppress(ReferenceError):
+            by_name[obj.name] = state
+    requests.set_objects(by_name)
 
 
 def state_of(obj: bpy.types.Object) -> SkinnedObject | None:
@@ -186,7 +217,9 @@ def refresh(context: bpy.types.Context) -> None:
         current.objects = None
         for state in current.skinned.values():
             state.needs_apply = True
-        depsgraph = context.evaluated_depsgraph_get()
+        with updates_suspended():
+            # Its event is noted, and handled below.
+            depsgraph = context.evaluated_depsgraph_get()
         update_all(depsgraph, Changes())
         unsubscribe_from_frames()
         # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
@@ -330,6 +363,7 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         if current.is_after_step:
             _drop_unknown(depsgraph, changes)
         read_later = _drop_expected(changes)
+        _remove_groups_taken_apart(changes)
         _adopt_copied_modifiers(changes)
         _note_readers(changes)
         for obj in objects_with_sinew(changes):
@@ -377,11 +411,11 @@ def needs_first_evaluations() -> bool:
 
 def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
     """Returns the objects that have Sinew. Searches again where objects may have been added or removed."""
-    if current.objects is None or changes.structure or len(bpy.data.objects) != current.object_count:
+    if current.objects is None or changes.structure or current.objects_seen != objects_now():
         current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
         if not is_rendering_in_window():
             orphans.remove()
-        current.object_count = len(bpy.data.objects)
+        current.objects_seen = objects_now()
         notify(subscribers.objects_changed, current.objects)
         point_store.unshare(current.objects)
         uids = {obj.session_uid for obj in current.objects}
@@ -409,6 +443,8 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     ):
         return False
     # Objects that use their Armature modifiers do not need the list, which takes long to make.
+    if depsgraph.id_type_updated("NODETREE") and node_group.taken_apart():
+        return False
     meshes = set() if current.all_use_builtin else Changes.meshes_in(depsgraph, original)
     if meshes and GONE in meshes:
         return False
@@ -474,7 +510,8 @@ def _is_refused(obj: bpy.types.Object) -> bool:
     settings stay in the file as a newer Sinew left them."""
     settings = properties.of(obj)
     reason = "its method is of a newer Sinew; update Sinew, or choose another method"
-    if properties.has_known_methods(settings):
+    # A driver that gives a number without a method has a sentence of its own.
+    if properties.has_known_methods(settings) or "sinew.method" in animated_paths(obj):
         if reason in settings.error:
             settings.error = ""
         return False
@@ -539,6 +576,14 @@ def _switch_off(obj: bpy.types.Object, settings: properties.SinewSettings, error
     else:
         settings.error = f"{obj.name}: {type(error).__name__}: {error}; press Rebind, or Remove"
         log.error("%s", settings.error, exc_info=error)
+
+
+def _remove_groups_taken_apart(changes: Changes) -> None:
+    """Removes node groups that were changed: their objects then get new ones, or an error where that happens
+    again and again."""
+    for group in node_group.taken_apart() if changes.node_groups and not is_rendering_in_window() else ():
+        log.warning("The node group %s is Sinew's own: it was changed, and is made again", group.name)
+        bpy.data.node_groups.remove(group)
 
 
 def _adopt_copied_modifiers(changes: Changes) -> None:

@@ -76,7 +76,10 @@ class Evaluation:
     def fail(self, error: Exception) -> None:
         if isinstance(error, SinewError):
             self.user_error = error
-        self.skip_reason = self.failure = f"{type(error).__name__}: {error}"
+        self.note_failure(f"{type(error).__name__}: {error}")
+
+    def note_failure(self, failure: str) -> None:
+        self.skip_reason = self.failure = failure
         self.failures += 1
 
     def succeed(self, mesh: bpy.types.Mesh) -> None:

@@ -19,6 +19,8 @@ from .skinned_object import SkinnedObject
 MAX_GROUP_LOSSES = 2
 # How often in a row Sinew may fail to deform a mesh within Blender's evaluation and still try again there.
 MAX_FAILURES_IN_A_ROW = 1
+# The failure where Blender never asks.
+NOT_REQUESTED = "Blender did not request the points"
 
 
 def update(
@@ -37,6 +39,8 @@ def update(
     if _is_in_armature_modifier_mode(obj):
         apply_plan.apply(obj, apply_plan.plan_of(obj))
         return None
+    if skinned is not None and _lacks_points(obj, skinned, depsgraph, changes):
+        skinned.evaluation.note_failure(NOT_REQUESTED)
     inspect = skinned is None or _needs_inspection(obj, skinned, depsgraph, changes)
     if not inspect and _has_shape(obj, skinned, depsgraph, changes):
         skinned.dirtied_by_frames = False
@@ -79,6 +83,25 @@ def update(
         skinned.shown.frames = None
     skinned.bound.source.known_key_values = skinned.bound.source.key_values
     return skinned
+
+
+def _lacks_points(
+    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """Whether Blender evaluated another pose without requesting the points, as where the driver is muted."""
+    evaluation = skinned.evaluation
+    if not skinned.plan.is_in_depsgraph or skinned.needs_apply or evaluation.mesh or evaluation.skip_reason:
+        return False
+    is_known = skinned.mode == obj.mode and not skinned.needs_recheck and skinned.is_as_noted(obj)
+    is_hidden = depsgraph.mode == "VIEWPORT" and not obj.visible_get(view_layer=depsgraph.view_layer)
+    if not is_known or is_hidden or not obj.evaluated_get(depsgraph).is_evaluated:
+        return False
+    if not source.is_ready(obj, depsgraph) or _have_bones_changed(obj, skinned, depsgraph, changes):
+        return False
+    if source.has_changed(obj, skinned.bound.source, depsgraph, changes, touched=True):
+        return False
+    with skinned.lock:
+        return skinned.shown.frames is not None and after_update.shape(obj, skinned, depsgraph)
 
 
 def _have_bones_changed(

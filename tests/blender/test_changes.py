@@ -11,8 +11,10 @@ import routes
 import scenes
 import sinew_addon
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import apply_plan, evaluate, safe_mode, session
+from sinew_addon.deform import apply_plan, evaluate, safe_mode, session, update
+from sinew_addon.deform.plan import State
 from sinew_addon.io import animation_paths, mesh_io
+from sinew_addon.ui import state_text
 from test_editing import assert_follows
 
 
@@ -237,17 +239,93 @@ def test_a_deleted_attribute_is_written_again():
     assert np.array_equal(scenes.final_points(obj), expected)
 
 
-@pytest.mark.parametrize("safe", [False, True])
-def test_a_deleted_node_group_is_made_again(monkeypatch, safe):
-    monkeypatch.setattr(safe_mode, "_forced", safe)
+def _mute_drivers(obj: bpy.types.Object) -> None:
+    for driver in obj.animation_data.drivers:
+        driver.mute = True
+
+
+@pytest.mark.parametrize(
+    "take",
+    [
+        lambda obj: bpy.data.node_groups.remove(obj.modifiers["Sinew"].node_group),
+        lambda obj: obj.modifiers["Sinew"].node_group.nodes.clear(),
+        lambda obj: obj.modifiers["Sinew"].node_group.links.clear(),
+        lambda obj: obj.modifiers["Sinew"].node_group.interface.clear(),
+        _mute_drivers,
+    ],
+    ids=["group", "nodes", "links", "interface", "driver"],
+)
+@pytest.mark.usefixtures("by_each_route")
+def test_what_is_taken_of_sinews_is_made_again(take):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(11)
-    expected = scenes.final_points(obj)
-    bpy.data.node_groups.remove(obj.modifiers["Sinew"].node_group)
+    expected = scenes.shapes(obj, [6, 11])
+    take(obj)
     bpy.context.view_layer.update()
-    assert np.array_equal(scenes.final_points(obj), expected)
+    assert np.array_equal(scenes.final_points(obj), expected[1])
+    take(obj)
+    assert np.array_equal(scenes.shapes(obj, [6, 11]), expected)
     assert not properties.of(obj).error
+
+
+def test_points_that_blender_never_requests_are_counted_and_come_after_the_update(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    expected = scenes.shapes(obj, [3, 6, 11])
+    monkeypatch.setattr(session.requests, "mesh_requested", lambda _mesh: None)
+    monkeypatch.setattr(properties.listeners, "mesh_requested", lambda _mesh: None)
+    scenes.shapes(obj, [1, 2])
+    assert np.array_equal(scenes.shapes(obj, [3, 6, 11]), expected)
+    state = session.state_of(obj)
+    assert state.plan.state is State.AFTER_UPDATE
+    assert update.NOT_REQUESTED in state.plan.reason
+    assert any(update.NOT_REQUESTED in each for each in state_text.problems_of(obj))
+
+
+@pytest.mark.usefixtures("by_each_route")
+def test_a_character_takes_the_place_of_two_other_objects(tmp_path):
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    expected = scenes.shapes(obj, [11])
+    path = str(tmp_path / "arm.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    names = [obj.name, armature.name]
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    others = [bpy.data.objects.new("Empty", None) for _number in range(2)]
+    for other in others:
+        bpy.context.scene.collection.objects.link(other)
+    bpy.context.view_layer.update()
+    for other in others:
+        bpy.data.objects.remove(other)
+    with bpy.data.libraries.load(path) as (_source, target):
+        target.objects = names
+    for appended in target.objects:
+        bpy.context.scene.collection.objects.link(appended)
+    assert np.array_equal(scenes.shapes(target.objects[0], [11]), expected)
+
+
+@pytest.mark.usefixtures("by_each_route")
+def test_two_objects_swap_their_names():
+    obj, armature = scenes.make_arm()
+    other, other_armature = scenes.make_arm(name="Other")
+    bpy.data.objects.remove(other_armature)
+    other.modifiers["Armature"].object = armature
+    other.vertex_groups[1].add(list(range(80, 200)), 0.2, "REPLACE")
+    for each in (obj, other):
+        scenes.add_sinew(each, "dq")
+    expected = [scenes.shapes(each, [11]) for each in (obj, other)]
+    bpy.context.scene.frame_set(5)
+    obj.name, other.name, obj.name = "Third", "Arm", "Other"
+    seen = []
+    monitor = bpy.app.handlers.frame_change_post
+    monitor.insert(0, lambda *_args: seen.append(scenes.final_points(obj)))
+    try:
+        bpy.context.scene.frame_set(11)
+    finally:
+        monitor.pop(0)
+    for each, shape in zip((obj, other), expected, strict=True):
+        assert np.array_equal(scenes.final_points(each), shape[0])
+    assert safe_mode.is_on() or np.array_equal(seen[0], expected[0][0])
 
 
 def test_one_user_of_a_shared_mesh_in_edit_mode():

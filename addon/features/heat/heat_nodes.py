@@ -110,6 +110,7 @@ def _make() -> bpy.types.NodeTree:
     link(place.outputs["Geometry"], store.inputs["Geometry"])
     link(store.outputs["Geometry"], paint.inputs["Geometry"])
     link(paint.outputs["Geometry"], result.inputs["Geometry"])
+    node_group.note_structure(group)
     return group
 
 

@@ -17,6 +17,7 @@ from bpy.app.handlers import persistent
 
 from ...core.inbetween import BLENDER
 from ...deform import events, originals
+from ...deform.session import objects_now
 from ...io import actions, pose_io
 from . import inbetween, keyed_poses
 
@@ -54,20 +55,20 @@ class Session:
 
     players: dict[int, Player] | None = None
     stamps: list[tuple[bpy.types.Object, tuple]] = field(default_factory=list)
-    object_count: int = 0
+    objects_seen: tuple[int, int] = (0, 0)
     errors: dict[int, str] = field(default_factory=dict)
     updating: bool = False
 
     @property
     def idle(self) -> bool:
         """Nothing is on, and no object has been added since that was found."""
-        return self.players == {} and not self.stamps and self.object_count == len(bpy.data.objects)
+        return self.players == {} and not self.stamps and self.objects_seen == objects_now()
 
     @property
     def outdated(self) -> bool:
         return (
             self.players is None
-            or self.object_count != len(bpy.data.objects)
+            or self.objects_seen != objects_now()
             or any(_stamp(armature) != stamp for armature, stamp in self.stamps)
         )
 
@@ -144,7 +145,7 @@ def _settle() -> None:
             session.players[uid].left, session.players[uid].keyed = left[key], None
         if key in wanted or inbetween.is_on(armature):
             session.stamps.append((armature, _stamp(armature)))
-    session.object_count = len(bpy.data.objects)
+    session.objects_seen = objects_now()
 
 
 def _release(keep: set[tuple[int, int]] = frozenset()) -> None:

@@ -417,6 +417,7 @@ TEXTS = {
     "{text}, after Blender's evaluation: {reason}": "{text}, nach Blenders Auswertung: {reason}",
     "Blender computes normals: {reason}": "Blender berechnet die Normalen: {reason}",
     "{names}: warnings, see Meshes": "{names}: Warnungen, siehe Maschen",
+    "Blender did not request the points": "Blender hat die Punkte nicht angefordert",
     "{count} times not deformed within Blender's evaluation; last: {failure}": (
         "{count} mal nicht in Blenders Auswertung verformt; zuletzt: {failure}"
     ),
