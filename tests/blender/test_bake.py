@@ -98,6 +98,7 @@ def test_a_blend_file_plays_the_same_elsewhere(arm, tmp_path, kind, method):
     assert names == ({"arm.blend"} if kind == "shape-keys" else {"arm.blend", f"Arm.{kind}"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["shape-keys", "mdd", "pc2"])
 def test_chosen_frames_and_straight_lines_between(arm, tmp_path, kind):
     obj, path = arm
@@ -130,6 +131,7 @@ def test_exports_are_the_final_meshes(arm, tmp_path, kind):
     assert scenes.worst(points, expected) <= TOLERANCE * scenes.diagonal(obj)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mdd", "pc2"])
 def test_caches_follow_what_stands_in_front_and_behind(arm, tmp_path, kind):
     obj, path = arm
@@ -228,6 +230,7 @@ def locked_folder(tmp_path):
         yield folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mdd", "alembic", "usd", "gltf"])
 def test_room_is_looked_for_first(arm, small_disk, kind):
     _obj, path = arm
@@ -291,6 +294,7 @@ def test_a_parent_that_deforms_does_not_deform_twice(arm, tmp_path):
     assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["human.blend", "CesiumMan.glb"])
 @pytest.mark.parametrize("kind", ["mdd", "usd"])
 def test_real_rigs(real_rig, tmp_path, name, kind):
@@ -368,6 +372,7 @@ def test_a_folder_that_can_not_be_written(arm, locked_folder, kind):
     assert "can not be written" in refused.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_strip", [False, True])
 @pytest.mark.parametrize("kind", ["mdd", "usd"])
 def test_keyed_visibility(arm, tmp_path, kind, in_strip):
@@ -392,6 +397,7 @@ def test_keyed_visibility(arm, tmp_path, kind, in_strip):
     assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mdd", "alembic"])
 def test_a_library_override(arm, tmp_path, kind):
     _obj, path = arm
@@ -450,6 +456,7 @@ def world_shapes(objects, frames):
     return [np.stack(found[name]) for name in sorted(found)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stretched", [False, True])
 @pytest.mark.parametrize("kind", EXACT)
 def test_several_moving_objects(arm, tmp_path, kind, stretched):
@@ -488,6 +495,7 @@ def test_several_moving_objects(arm, tmp_path, kind, stretched):
         assert scenes.worst(points, expected) <= 3e-6 * scenes.diagonal(first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", core.EXPORTS)
 def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
     """A hat on a bone and a feather on the hat; not objects parented to the armature itself, nor hidden
@@ -520,6 +528,7 @@ def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
         assert scenes.worst(points, wanted[:, nearest]) <= 3e-6 * scenes.diagonal(obj)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", EXACT)
 def test_frames_before_zero(arm, tmp_path, kind):
     obj, path = arm
@@ -583,6 +592,7 @@ def textured(folder, colours):
     return path
 
 
+@pytest.mark.slow
 def test_textures_of_one_name_do_not_meet(tmp_path):
     """In USD, whose exporter has one folder for all."""
     red, green, blue = (1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1)
@@ -677,6 +687,7 @@ def test_what_is_in_another_scene_is_named(arm, tmp_path):
     assert [p.name for p in (out / "arm_cache").iterdir()] == ["Arm.mdd"]
 
 
+@pytest.mark.slow
 def test_wrong_use(arm, tmp_path):
     _obj, path = arm
     run_sinew("bake", path, "--method", METHOD, "--to", "fbx", "--out", tmp_path / "o", status=2)
@@ -694,6 +705,7 @@ def test_wrong_use(arm, tmp_path):
 LONG = {kind: 3000 for kind in core.KINDS} | {"gltf": 200}
 
 
+@pytest.mark.slow
 @program.needs_interrupts
 @pytest.mark.parametrize("kind", core.KINDS)
 def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
@@ -715,6 +727,7 @@ def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
     assert not [p for p in out.rglob("*") if p.is_file()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["alembic", "usd", "gltf"])
 def test_an_export_shows_its_frames(arm, tmp_path, kind):
     pty = pytest.importorskip("pty", reason="no terminals here")

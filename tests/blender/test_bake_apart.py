@@ -45,6 +45,7 @@ def shape_of_scene():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_same_as_in_this_blender(arm, tmp_path, kind):
     """With unsaved data: a pose, an object's position, another scene with its own view layer."""
@@ -80,6 +81,7 @@ def test_the_same_as_in_this_blender(arm, tmp_path, kind):
     assert len(here[names.pop()]) == len(FRAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("when", ["starting", "exporting"])
 def test_stopped_nothing_is_left(arm, tmp_path, kind, when):
@@ -143,6 +145,7 @@ def test_painted_textures_are_saved_first(arm, tmp_path):
     assert bake_to(path.parent, "usd", apart=True) == {"FINISHED"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [True, False])
 def test_simulations_keep_their_caches_on_disk(arm, tmp_path, links, monkeypatch):
     """Without its cache, a cloth is simulated again, here with another gravity. On Windows few users may

@@ -100,6 +100,7 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
     assert [bone.name for bone in bpy.data.armatures["Arm Rig"].bones] == list(bones)
 
 
+@pytest.mark.slow
 def test_helper_bones_that_scale_play_to_the_stated_error(arm, tmp_path):
     """Under a bone that is itself scaled."""
     obj, path = arm
@@ -126,6 +127,7 @@ def pose_anew(rig):
             bone.keyframe_insert("rotation_euler", frame=frame)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "share"), [(METHOD, 0.25), ("cor", 0.35)])
 @pytest.mark.parametrize("scaled", [False, True])
 def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, scaled, method, share):
@@ -162,6 +164,7 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
     assert found[file] < 0.5 * found[keyed]
 
 
+@pytest.mark.slow
 @pytest.mark.once
 @pytest.mark.parametrize(("method", "share"), [(METHOD, 0.15), ("cor", 0.25)])
 def test_a_character_in_frames_that_it_was_not_baked_from(real_rig, tmp_path, method, share):
@@ -267,6 +270,7 @@ def skinned_by_gltf(glb, frames, rate):
     return points
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "method"), [("keys", METHOD), ("scaled-keys", METHOD), ("pose", METHOD), ("pose", "cor")]
 )
@@ -289,6 +293,7 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     assert scenes.worst(played[0], played[-1]) > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
     """For a glTF of human.blend: equals a Blender without Sinew, and Sinew's shape up to the reported
@@ -411,6 +416,7 @@ __import__("os")._exit(0)
 """
 
 
+@pytest.mark.slow
 def test_fbx_plays_to_the_stated_error_once_it_is_imported(arm, tmp_path):
     obj, path = arm
     scenes.add_sinew(obj, METHOD)

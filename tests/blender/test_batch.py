@@ -209,6 +209,7 @@ def make_heroes(folder: Path) -> None:
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
 
 
+@pytest.mark.slow
 def test_bakes_of_a_job_file(tmp_path):
     """Bakes by file and object, next to the copies; in the journal and the report like those."""
     make_heroes(tmp_path / "in")
@@ -268,6 +269,7 @@ def test_bakes_of_a_job_file(tmp_path):
     assert (out / "hero.usdc").read_bytes() != b"an artist's own"
 
 
+@pytest.mark.slow
 def test_a_bake_that_fails_leaves_nothing(tmp_path):
     make_heroes(tmp_path / "in")
     bpy.data.objects["Body"].modifiers.new("Mirror", "MIRROR")
@@ -289,6 +291,7 @@ def test_a_bake_that_fails_leaves_nothing(tmp_path):
     assert "hero.baked.blend: is for the bake of" in refused.stderr
 
 
+@pytest.mark.slow
 def test_report_has_pictures_of_the_worst_frame(tmp_path):
     from PIL import Image
 
@@ -343,6 +346,7 @@ def test_report_has_pictures_of_the_worst_frame(tmp_path):
     assert "Armature, linear blend → dq" in page.text
 
 
+@pytest.mark.slow
 def test_a_file_does_not_depend_on_those_before_it(tmp_path):
     """A Blender that has processed other files gives the same result as a fresh one."""
     folder = tmp_path / "in"
@@ -398,6 +402,7 @@ def test_resume_does_only_what_is_missing_or_changed(tmp_path):
     assert driven_points(out / paths[0].name)["Arm method"] == "lbs"
 
 
+@pytest.mark.slow
 @newest_only
 def test_hang_crash_and_greed_fail_alone(tmp_path):
     scenes.write_slow_file(tmp_path / "in" / "a endless.blend", 500, 100_000_000)
@@ -454,6 +459,7 @@ def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
     assert counts[1] < counts[0]
 
 
+@pytest.mark.slow
 @newest_only
 @needs_interrupts
 def test_ctrl_c_stops_cleanly(tmp_path):
@@ -474,6 +480,7 @@ def test_ctrl_c_stops_cleanly(tmp_path):
     assert len(journal_of(tmp_path / "out")) == 4
 
 
+@pytest.mark.slow
 def test_full_disk(tmp_path):
     """Simulated by a limit on the size of files: a write fails halfway with an error."""
     resource = pytest.importorskip("resource", reason="this system has no such limit")
@@ -562,6 +569,7 @@ def test_libraries_of_libraries_are_found(tmp_path):
     assert paths == {str(base), str(middle)}
 
 
+@pytest.mark.slow
 @newest_only
 def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
     folder = tmp_path / "in"
@@ -620,6 +628,7 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
         )
 
 
+@pytest.mark.slow
 @newest_only
 def test_killed_at_random(tmp_path):
     """Kills the batch itself each time, and before that, half of the time, one of its Blenders."""
@@ -648,6 +657,7 @@ def test_killed_at_random(tmp_path):
     check_each_once(out, paths)
 
 
+@pytest.mark.slow
 @newest_only
 def test_killed_at_random_on_a_cluster(tmp_path):
     """Kills the batch, a worker with its current process, or a Blender."""

@@ -503,6 +503,7 @@ def test_the_command_writes_a_copy(walking, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_the_command_measures(walking):
     def measured(*options):
         command = ("blend", walking, "--actions", "WALK", "RUN", "--measure", "--json", *options)
@@ -523,6 +524,7 @@ def test_the_command_measures(walking):
     assert apart["measures"][2]["sliding"] > 2.0 * blend["sliding"]
 
 
+@pytest.mark.slow
 def test_the_command_says_what_is_wrong(walking, tmp_path):
     out = ["--out", tmp_path / "out.blend"]
     both = ["--actions", "WALK", "RUN"]

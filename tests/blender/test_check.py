@@ -79,6 +79,7 @@ def test_what_is_switched_off_needs_no_sinew(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_inbetweens_need_sinew(tmp_path):
     _obj, armature = scenes.make_arm()
     armature.sinew_inbetween = "sclerp"
@@ -109,6 +110,7 @@ def without_settings(obj, armature):
     return "has the modifier Sinew of Sinew without its settings"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", [simulated, without_armature, without_armature_modifier, without_settings])
 def test_what_sinew_can_not_drive(harm, tmp_path):
     obj, armature = scenes.make_arm()
@@ -119,6 +121,7 @@ def test_what_sinew_can_not_drive(harm, tmp_path):
     assert all(problem.startswith("Arm") for problem in report["problems"])
 
 
+@pytest.mark.slow
 def test_an_armature_modifier_that_was_left_off(tmp_path):
     """The state of a file that lost Sinew's settings: object and modifier are otherwise complete."""
     obj, _armature = scenes.make_arm()
@@ -165,6 +168,7 @@ def test_linked_without_an_override(tmp_path):
     assert any("hero.blend is missing" in note for note in report["notes"])
 
 
+@pytest.mark.slow
 def test_what_can_not_be_read_does_not_stop_the_others(tmp_path):
     scenes.make_arm()
     save(tmp_path / "a.blend")

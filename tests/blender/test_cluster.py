@@ -117,6 +117,7 @@ def assert_done(out: Path) -> None:
     assert properties.of(bpy.data.objects["Arm"]).method == "dq"
 
 
+@pytest.mark.slow
 def test_as_documented_it_listens_on_this_machine_alone(rig, tmp_path):
     with cluster(tmp_path, "127.0.0.1", {}) as (address, processes):
         done = run_sinew(*arguments(rig, tmp_path / "out", address))
@@ -127,6 +128,7 @@ def test_as_documented_it_listens_on_this_machine_alone(rig, tmp_path):
     assert_done(tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_one_that_is_open_to_others_is_named(rig, tmp_path):
     port = str(free_port())
     pages = ("--dashboard-address", "127.0.0.1:0")
@@ -163,6 +165,7 @@ def certificates(tmp_path_factory):
     return config
 
 
+@pytest.mark.slow
 def test_tls_as_documented(rig, tmp_path, certificates):
     with_config = {"DASK_CONFIG": str(certificates)}
     with cluster(tmp_path, "10.0.0.5", {}, with_config) as (address, processes):
@@ -209,6 +212,7 @@ def machines(*hosts: str):
                 subprocess.run(["ip", *words], capture_output=True, check=False)
 
 
+@pytest.mark.slow
 def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
     """The documented lines as they are, over a network: a scheduler, two workers, and the machine that
     starts the batch."""
@@ -241,12 +245,14 @@ def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
     assert {"tls://10.0.0.6", "tls://10.0.0.7"} <= set(re.findall(r"tls://10\.0\.0\.[67]", log))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["tls://127.0.0.1:1", "http://127.0.0.1:1", "nonsense", "tcp://[::1"])
 def test_what_is_no_scheduler(address, rig, tmp_path):
     failed = run_sinew(*arguments(rig, tmp_path / "out", address), status=1)
     assert [line for line in failed.stderr.splitlines() if line.startswith(f"sinew: {address}: ")]
 
 
+@pytest.mark.slow
 def test_the_addresses_of_a_scheduler_file_are_taken(rig, tmp_path):
     """In the form in which users copy them from dask's own output."""
     file = tmp_path / "scheduler.json"

@@ -37,6 +37,7 @@ def arm_file(tmp_path):
     return path, expected
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
@@ -129,6 +130,7 @@ def test_points(arm_file, tmp_path):
         assert points["frames"].tolist() == [1, 3, 4, 5, 6.5]
 
 
+@pytest.mark.slow
 def test_parameters_are_set_by_name(tmp_path):
     """Mixes like two Armature modifiers, in points, copies, bakes and pages."""
     obj, _armature = scenes.make_arm()
@@ -153,6 +155,7 @@ def test_parameters_are_set_by_name(tmp_path):
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_mix.FRAMES), expected) <= 1e-5
 
 
+@pytest.mark.slow
 def test_a_stage_is_set_by_name(tmp_path):
     """Smooths like Corrective Smooth, in points, copies and bakes."""
     obj = test_delta_mush.make_rough_arm()
@@ -174,6 +177,7 @@ def test_a_stage_is_set_by_name(tmp_path):
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_delta_mush.FRAMES), expected) <= 1e-5
 
 
+@pytest.mark.slow
 def test_limit_bulge_is_set_by_name(tmp_path):
     """Equals the reference, in points, job files, copies and bakes."""
     obj, before = test_bulge_limit.bent_arm()
@@ -193,6 +197,7 @@ def test_limit_bulge_is_set_by_name(tmp_path):
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], [11])[0], expected) <= 3e-5
 
 
+@pytest.mark.slow
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("given", "status", "sentence"),
@@ -260,6 +265,7 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
         assert sum(name in line for line in result.stderr.splitlines()) == 1, result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_bad_input_is_one_sentence(arm_file, tmp_path):
     path, _expected = arm_file
@@ -322,6 +328,7 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
     assert not out.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "cycles"])
 def test_compare_draws_a_sheet(tmp_path, engine):
     from PIL import Image
@@ -353,6 +360,7 @@ def test_compare_draws_a_sheet(tmp_path, engine):
     assert np.abs(columns[1] - columns[2]).mean() > 3.0, "the methods look the same"
 
 
+@pytest.mark.slow
 @program.needs_interrupts
 @pytest.mark.parametrize("round", range(4))
 def test_ctrl_c_stops_what_goes_through_frames(arm_file, tmp_path, round):
@@ -418,6 +426,7 @@ def keyed_file(tmp_path):
     return path, expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("live", [False, True], ids=["baked", "live"])
 def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path, live):
     path, expected = keyed_file
@@ -435,6 +444,7 @@ def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path, live):
     assert "--overwrite" in run_sinew("inbetween", path, *options, status=1).stderr
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
     path, _expected = keyed_file

@@ -95,6 +95,7 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
     assert "<img" not in (tmp_path / "arm.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     """Also a mesh that its parent deforms, without a modifier."""
     first, _armature = scenes.make_arm()
@@ -125,6 +126,7 @@ def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     assert ((tmp_path / "two.html").read_text(encoding="utf-8").count("<img") > 2) == NEWEST
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_frames_below_zero(tmp_path):
     scenes.make_arm()
@@ -182,6 +184,7 @@ def opaque_pixels(path):
     return pixels[pixels[:, :, 3] == 255][:, :3]
 
 
+@pytest.mark.slow
 @newest_only
 def test_a_page_holds_its_pictures_and_a_video(tmp_path):
     path = REPOSITORY / "blend_files" / "wrist.blend"
@@ -235,6 +238,7 @@ def test_a_video_shows_one_picture_after_the_other(tmp_path):
         np.testing.assert_allclose(shown, colour, atol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_golden_pictures_keep_their_parameters(tmp_path):
     scenes.make_arm()
@@ -336,6 +340,7 @@ def run_pytest(folder, *options):
     )
 
 
+@pytest.mark.slow
 @newest_only
 def test_the_pytest_fixture(tmp_path):
     scenes.make_arm()
@@ -352,6 +357,7 @@ def test_the_pytest_fixture(tmp_path):
     assert "0011.difference.png" in result.stdout
 
 
+@pytest.mark.slow
 @newest_only
 def test_the_example_of_a_repository_of_rigs(tmp_path):
     page = (REPOSITORY / "docs" / "render-tests.md").read_text(encoding="utf-8")

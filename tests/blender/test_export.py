@@ -291,6 +291,7 @@ def test_command(tmp_path, capfd):
     assert scenes.worst(got, expected[:, nearest]) <= 1e-5 * np.linalg.norm(np.ptp(expected[0], axis=0))
 
 
+@pytest.mark.slow
 def test_the_example_of_the_documentation(tmp_path, monkeypatch, capfd):
     text = (REPOSITORY / "docs" / "engines.md").read_text(encoding="utf-8")
     example = text[text.index("### An example") :]

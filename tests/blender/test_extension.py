@@ -293,6 +293,7 @@ def photographed(package, tmp_path, real_rig):
     return run
 
 
+@pytest.mark.slow
 def test_the_panel_in_a_window(photographed):
     """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
     facts = photographed("docs/photograph_panel.py", "panel.png", "inbetween.png")
@@ -301,6 +302,7 @@ def test_the_panel_in_a_window(photographed):
     assert facts["moved in between"] > 1e-3 * facts["diagonal"]
 
 
+@pytest.mark.slow
 def test_blending_actions_in_a_window(photographed):
     """In steps, between which the window is drawn: Esc restores everything, and Ctrl+Z undoes a blend."""
     options = ["--enable-event-simulate"]
@@ -312,6 +314,7 @@ def test_blending_actions_in_a_window(photographed):
     assert facts["ended"]["frame"] == before["frame"]
 
 
+@pytest.mark.slow
 def test_inverse_kinematics_live_in_a_window(photographed):
     """Plays, moves a target, undoes that, renders beside the window, saves and reopens."""
     options = ["--enable-event-simulate"]
@@ -324,6 +327,7 @@ def test_inverse_kinematics_live_in_a_window(photographed):
     assert facts["muted"]
 
 
+@pytest.mark.slow
 def test_sculpt_mode_in_a_window(photographed):
     facts = photographed("docs/photograph_sculpt.py", "sculpt.png")
     assert facts["linear"] > 1e-3 * facts["diagonal"]
@@ -332,6 +336,7 @@ def test_sculpt_mode_in_a_window(photographed):
     assert facts["volume"] == [True, False]
 
 
+@pytest.mark.slow
 def test_a_comparison_in_a_window(photographed):
     """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
     facts = photographed("docs/photograph_comparison.py", "comparison.png")
@@ -345,17 +350,20 @@ def test_a_comparison_in_a_window(photographed):
     assert facts["left"] == []
 
 
+@pytest.mark.slow
 def test_heat_map_and_diagnostics_in_a_window(photographed):
     """Goes through frames in steps, between which the window is drawn; then the scene has its old frame."""
     facts = photographed("docs/photograph_heat.py", "heat-map.png", "diagnostics.png")
     assert facts == {"scan": ["RUNNING_MODAL"], "frame after the scan": 16, "played": True, "mode": "EDIT"}
 
 
+@pytest.mark.slow
 def test_the_errors_of_a_bake_in_a_window(photographed):
     facts = photographed("docs/photograph_bake.py", "bake-error.webp")
     assert facts == {"color types": ["MATERIAL", "VERTEX", "VERTEX", "MATERIAL"]}
 
 
+@pytest.mark.slow
 def test_bakes_in_a_window(photographed):
     """With the dialog: Esc in the middle of each restores everything, and Ctrl+Z undoes one that is
     finished."""

@@ -180,6 +180,7 @@ def test_the_job_type_offers_what_there_is():
         assert f"`{key}`" in manual, key
 
 
+@pytest.mark.slow
 def test_two_files_are_checked_and_reskinned(two_files, farm_blender, tmp_path):
     listed = files_of(job_type(), two_files)
     assert listed.splitlines() == ["hero [1].blend", "shots/hero [1].blend"]
@@ -214,6 +215,7 @@ def test_two_files_are_checked_and_reskinned(two_files, farm_blender, tmp_path):
     assert {path: path.stat().st_mtime_ns for path in copies} == written
 
 
+@pytest.mark.slow
 def test_a_file_with_a_problem_is_not_reskinned(two_files, tmp_path):
     (two_files / "hero [1].blend").write_bytes(b"BLENDER and then nothing")
     job = {"folder": str(two_files), "files": files_of(job_type(), two_files), "program": "package"}

@@ -611,6 +611,7 @@ def test_blurred_pictures_are_the_same(shading, tmp_path):
     assert_same_pictures(obj, tmp_path, shading is custom)
 
 
+@pytest.mark.slow
 @needs_support
 @pytest.mark.once
 def test_pictures_of_eevee_are_the_same(route, tmp_path):

@@ -963,6 +963,7 @@ def test_bake_says_why_not():
         bpy.ops.sinew.bake_inbetweens()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PATHS)
 def test_a_real_character(real_rig, path, tmp_path):
     files.open_file(real_rig("human.blend"))

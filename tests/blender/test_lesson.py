@@ -63,6 +63,7 @@ def test_names_in_quotes_are_those_of_the_panel():
     assert quoted <= known
 
 
+@pytest.mark.slow
 def test_what_the_page_says_holds(opened):
     scene = bpy.context.scene
     assert scene.frame_current == 16

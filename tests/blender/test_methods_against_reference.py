@@ -76,6 +76,7 @@ def route(request):
     routes.release()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("name", "frame"), [("wrist", 20), ("shoulder", 25), ("tentacle", 30)])
 def test_own_rigs(method, name, frame, route):

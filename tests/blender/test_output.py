@@ -102,6 +102,7 @@ def all_in(folder: Path) -> list[str]:
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_every_command_that_writes_is_tested_here():
     commands = re.findall(r"^    ([a-z]+)\b", run_sinew("--help").stdout, re.MULTILINE)
@@ -154,6 +155,7 @@ def test_a_read_only_disk(writer, inputs, tmp_path, capsys):
         assert "Read-only file system" in complaint_here(arguments_of(writer, inputs, place), capsys)
 
 
+@pytest.mark.slow
 @oldest_and_newest
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_full_disk(writer, inputs, tmp_path):
@@ -169,6 +171,7 @@ def test_a_full_disk(writer, inputs, tmp_path):
         assert [path.name for path in left if "unfinished" in path.name or not path.stat().st_size] == []
 
 
+@pytest.mark.slow
 @oldest_and_newest
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_write_that_stops_half_way(writer, inputs, tmp_path):
@@ -236,6 +239,7 @@ def test_standard_output_on_a_full_disk(arguments, inputs):
     assert "Exception ignored" not in errors
 
 
+@pytest.mark.slow
 @pytest.mark.once
 @pytest.mark.parametrize(
     "arguments",
@@ -340,6 +344,7 @@ def test_two_objects_of_one_name(tmp_path):
         assert arrays["Arm [library.blend]"].shape == (2, 30, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a{b}#1.blend", "{blend_name}.blend", "##.blend"])
 def test_names_that_blender_would_fill_in(name, inputs, tmp_path):
     """Blender replaces # by the frame, and from 5.0 on {…}, in the paths of what it renders."""
@@ -355,6 +360,7 @@ def test_names_that_blender_would_fill_in(name, inputs, tmp_path):
     assert all_in(tmp_path) == sorted([name, out.name, *(f"{out.name}/{path}" for path in all_in(out))])
 
 
+@pytest.mark.slow
 def test_no_two_frames_have_one_picture(inputs, tmp_path):
     out = tmp_path / "out"
     run_sinew(
@@ -364,6 +370,7 @@ def test_no_two_frames_have_one_picture(inputs, tmp_path):
     assert len(list(out.glob("*.png"))) == 5
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
     picture = tmp_path / "0006.png"
@@ -421,6 +428,7 @@ def test_scratch_folders_of_killed_runs_go(tmp_path, inputs):
             process.communicate()
 
 
+@pytest.mark.slow
 @pytest.mark.once
 def test_a_batch_clears_away_after_one_that_was_killed(tmp_path, inputs):
     temporary = tmp_path / "tmp"

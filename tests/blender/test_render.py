@@ -164,6 +164,7 @@ def eevee(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     moving_parent(obj, armature)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "motion blur"])
 @pytest.mark.parametrize(
     "set_up",

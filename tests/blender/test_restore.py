@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 
 import bpy
+import pytest
 import scenes
 import whole_file
 from conftest import REPOSITORY
@@ -148,6 +149,7 @@ def test_everything_comes_back(tmp_path):
         assert whole_file.differences(before, content(tmp_path / "restored" / path.name)) == [], path.name
 
 
+@pytest.mark.slow
 def test_a_real_character_comes_back(real_rig, tmp_path):
     """With an upstream modifier, and as a child that its armature deforms."""
     files.open_file(real_rig("human.blend"), load_ui=True)

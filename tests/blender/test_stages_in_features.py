@@ -88,6 +88,7 @@ def measured(obj: bpy.types.Object, frame: int, shape: np.ndarray) -> Measured:
     return found
 
 
+@pytest.mark.slow
 def test_compare_measures_the_shapes_with_it(arm, stage, tmp_path):
     obj, path = arm
     _without, shapes = with_stage(obj, stage)
@@ -183,6 +184,7 @@ def assert_copy_shows(obj: bpy.types.Object, shapes: np.ndarray) -> None:
         assert scenes.worst(found, expected) < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["shape-keys", "mdd"])
 def test_a_bake_plays_it_elsewhere(arm, stage, kind, tmp_path):
     obj, path = arm
@@ -200,6 +202,7 @@ def test_the_bake_operator_takes_what_is_set(arm, stage):
     assert scenes.worst(scenes.shapes(obj, FRAMES), shapes) <= test_bake.TOLERANCE * scenes.diagonal(obj)
 
 
+@pytest.mark.slow
 def test_points_and_job_files_take_it(arm, stage, tmp_path):
     obj, path = arm
     _without, shapes = with_stage(obj, stage)
@@ -222,6 +225,7 @@ def test_points_and_job_files_take_it(arm, stage, tmp_path):
     assert properties.of(copy).method == "dq"
 
 
+@pytest.mark.slow
 def test_pictures_differ_where_it_does(arm, stage, tmp_path):
     """--against renders with the settings of the golden pictures, unless others are given."""
     _obj, path = arm

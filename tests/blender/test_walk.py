@@ -33,6 +33,7 @@ def test_every_operation_is_chosen():
     assert walk.make_steps(3, 50, weights) == walk.make_steps(3, 50, weights)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("planted", "kind"),
     [

@@ -24,6 +24,8 @@ OPTIONS = ("--enable-event-simulate", "--python-exit-code", "3")
 FIRST = ("files", "undo", "windows", "modes", "modifiers", "libraries")
 SECOND = ("objects", "exports", "renders", "hostile", "addon", "quit")
 AGAIN = ("again",)
+# What `./dev test` runs; `./dev test --all` runs every group.
+QUICK = ("files", "undo", "modes", "modifiers")
 
 
 @dataclass
@@ -38,7 +40,8 @@ class Results:
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory) -> Results:
+def results(request, tmp_path_factory) -> Results:
+    """Of the groups that chosen tests are about."""
     program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
     if not program:
         pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
@@ -53,12 +56,20 @@ def results(tmp_path_factory) -> Results:
         for script in SCRIPTS:
             shutil.copy(script, folder)
 
+    items = [item for item in request.session.items if item.path == request.path]
+    chosen = {item.callspec.params["group"] for item in items}
+
     def first() -> None:
-        _run(program, folders[0], FIRST, found)
+        if groups := tuple(group for group in FIRST if group in chosen):
+            _run(program, folders[0], groups, found)
 
     def second() -> None:
-        _run(program, folders[1], SECOND, found)
-        _run(program, folders[1], AGAIN, found)
+        # It is restarted with what its last group saves.
+        groups = SECOND if chosen & {*AGAIN} else tuple(group for group in SECOND if group in chosen)
+        if groups:
+            _run(program, folders[1], groups, found)
+        if chosen & {*AGAIN}:
+            _run(program, folders[1], AGAIN, found)
 
     with ThreadPoolExecutor(2) as both:
         for future in [both.submit(first), both.submit(second)]:
@@ -126,37 +137,27 @@ def _of(group: str, faults: dict[str, list[str]]) -> dict[str, list[str]]:
 
 # Errors of another add-on, and of Blender itself.
 PRINTING = ("hostile: others_throw", "files: save_where_it_can_not_be", "modifiers: save_as_shape_key")
-GROUPS = pytest.mark.parametrize("group", FIRST + SECOND + AGAIN)
 
 
-@GROUPS
+def _groups(*left_out: str) -> pytest.MarkDecorator:
+    chosen = [group for group in FIRST + SECOND + AGAIN if group not in left_out]
+    marked = [group if group in QUICK else pytest.param(group, marks=pytest.mark.slow) for group in chosen]
+    return pytest.mark.parametrize("group", marked)
+
+
+@_groups()
 def test_shows_the_right_shapes(results, group):
     assert _of(group, results.shown) == {}
     assert group not in results.ended, results.ended[group]
     assert [step for step in results.steps if step.startswith(f"{group}:")]
 
 
-@pytest.mark.parametrize(
-    "group",
-    [
-        "files",
-        "undo",
-        "windows",
-        "modes",
-        "modifiers",
-        "objects",
-        "exports",
-        "hostile",
-        "renders",
-        "quit",
-        "again",
-    ],
-)
+@_groups("libraries", "addon")
 def test_saves_what_works_without_sinew(results, group):
     assert _of(group, results.saved) == {}
 
 
-@GROUPS
+@_groups()
 def test_prints_no_errors(results, group):
     printed = _of(group, results.printed)
     assert {step: lines for step, lines in printed.items() if step not in PRINTING} == {}

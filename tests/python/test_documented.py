@@ -242,6 +242,7 @@ def run(line: str, folder: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", RUN_HERE, ids=lambda command: f"{command.document}: {' '.join(command.words)}"
 )

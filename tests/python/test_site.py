@@ -64,6 +64,7 @@ def site(checkout, tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("document", "text", "complaint"),
     [
