@@ -146,7 +146,7 @@ def _bake(
     source, target = outcome.job.source, outcome.job.target
     if target.exists() and not args.overwrite:
         raise SinewError(f"{target}: is there already; use --overwrite to replace it")
-    files.open_file(source)
+    outcome.notes += files.open_file(source)
     scene = bpy.context.scene
     meshes = attach.deformed_meshes(list(scene.objects))
     if not meshes:

@@ -139,7 +139,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..io import clips, files
 
     out = _target(args)
-    files.open_file(args.file, importers=clips.IMPORTERS)
+    console.note_on(args.file, files.open_file(args.file, importers=clips.IMPORTERS))
     armature = _armature(args)
     chosen = _actions(args, armature)
     weights = _weights(args, len(chosen))

@@ -134,7 +134,7 @@ def _compare(
     from ..features.pages import illustrate, measure, render
     from ..io import files
 
-    files.open_file(path)
+    console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
     frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
     evaluate.set_frame(scene, frames[0])

@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from ..core import interrupt
@@ -52,6 +53,11 @@ class Console:
             # A note that cannot be printed is no reason to stop.
             with suppress(OSError):
                 print(_shown(text), file=self.err, flush=True)
+
+    def note_on(self, path: Path, sentences: Iterable[str]) -> None:
+        """Prints what a user should know about a file."""
+        for sentence in sentences:
+            self.note(f"{path}: {sentence}")
 
     def complain(self, text: object) -> None:
         """Prints one sentence about a failure on standard error."""

@@ -52,7 +52,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     names = [method.name for method in sinew.methods()]
     if args.method is not None and args.method not in names:
         raise WrongUse(f"method: expected one of {', '.join(names)}, got {args.method!r}")
-    files.open_file(args.file)
+    console.note_on(args.file, files.open_file(args.file))
     scene = bpy.context.scene
     meshes = attach.deformed_meshes(list(scene.objects))
     left_out: list[str] = []

@@ -111,7 +111,7 @@ def _solve(
 
     if args.out is not None and job.target.exists() and not args.overwrite:
         raise SinewError(f"{job.target}: is there already; use --overwrite to replace it")
-    files.open_file(job.source)
+    outcome.notes += files.open_file(job.source)
     scene = bpy.context.scene
     armatures = [obj for obj in scene.objects if obj.type == "ARMATURE" and args.armature in (None, obj.name)]
     if not armatures:

@@ -54,7 +54,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 class Inbetweened(Outcome):
     armatures: int = 0
     bones: int = 0
-    notes: list[str] = field(default_factory=list)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -68,8 +67,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for job in console.progress(jobs, len(jobs), "Making in-betweens"):
         outcome = _inbetween(job, args)
         outcome.complain(console)
-        for note in outcome.notes:
-            console.note(f"{job.source}: {note}")
         outcomes.append(outcome)
     console.table(
         ("file", "armatures", "bones", "result"),
@@ -92,7 +89,7 @@ def _inbetween(job: Job, args: argparse.Namespace) -> Inbetweened:
     try:
         if job.target.exists() and not args.overwrite:
             raise SinewError(f"{job.target}: is there already; use --overwrite to replace it")
-        files.open_file(job.source)
+        outcome.notes += files.open_file(job.source)
         armatures = [
             obj
             for obj in bpy.data.objects

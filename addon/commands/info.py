@@ -20,11 +20,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
+    from ..io import files
+
     failed = False
     reports = []
     for path in args.files:
         try:
-            report = {"file": str(path), "meshes": describe_file(path), "left_to_blender": left_to_blender()}
+            console.note_on(path, files.open_file(path))
+            meshes = describe_file(path)
+            report = {"file": str(path), "meshes": meshes, "left_to_blender": left_to_blender()}
         except SinewError as error:
             failed = True
             report = {"file": str(path), "error": str(error)}
@@ -40,14 +44,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def describe_file(path: Path) -> list[dict[str, object]]:
-    """Returns a dictionary for each mesh that an armature deforms, in any scene of the file."""
+    """Returns a dictionary for each mesh that an armature deforms, in any scene of the open file."""
     import bpy
 
     from ..attach import attach
     from ..deform import survey
-    from ..io import files
 
-    files.open_file(path)
     meshes = []
     for obj in attach.deformed_meshes(list(bpy.data.objects)):
         armature = attach.armature_of(obj)

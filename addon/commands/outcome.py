@@ -15,11 +15,13 @@ class Outcome:
 
     left_out  a sentence for each object that was not changed
     error     why nothing was written
+    notes     what else a user should know
     """
 
     job: Job
     left_out: list[str] = field(default_factory=list)
     error: str | None = None
+    notes: list[str] = field(default_factory=list)
 
     @property
     def failed(self) -> bool:
@@ -39,3 +41,4 @@ class Outcome:
             console.complain(self.error)
         for reason in self.left_out:
             console.complain(f"{self.job.source}: left as it was: {reason}")
+        console.note_on(self.job.source, self.notes)

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     frames = parse_frames(args.frames)
     evaluate.check_methods([args.method])
     evaluate.set_parameters(args.set)
-    files.open_file(args.file)
+    console.note_on(args.file, files.open_file(args.file))
     try:
         meshes = evaluate.deformed_meshes(bpy.context.scene, args.object)
     except SinewError as error:

@@ -128,7 +128,7 @@ def _draw(
 
     size = args.size or (golden.size if golden else 640)
     render.check_size(size)
-    files.open_file(args.file)
+    console.note_on(args.file, files.open_file(args.file))
     scene = bpy.context.scene
     evaluate.set_frame(scene, frames[0])
     meshes, left_out = evaluate.deformable_meshes(scene, args.file, [method], args.object)

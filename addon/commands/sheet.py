@@ -35,7 +35,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     if len(frames) != 1:
         raise WrongUse(f"frame: expected one frame, got {args.frames!r}")
     (path,), (frame,) = args.files, frames
-    files.open_file(path)
+    console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
     evaluate.set_frame(scene, frame)
     meshes, left_out = evaluate.deformable_meshes(scene, path, methods, args.object)

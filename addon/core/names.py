@@ -7,7 +7,11 @@ import re
 from fnmatch import fnmatchcase
 
 # Path separators and drives, characters that file names cannot have, and text that unquote() would change.
-_NOT_IN_FILE_NAMES = re.compile(r"[/\\\x00-\x1f\x7f]|^\.+$|(?<=^[A-Za-z]):|%(?=[0-9A-Fa-f]{2})")
+_NOT_IN_FILE_NAMES = re.compile(r"[/\\\x00-\x1f\x7f]|^\.+$|[. ]$|(?<=^[A-Za-z]):|%(?=[0-9A-Fa-f]{2})")
+# Devices of Windows, whatever follows a dot.
+_DEVICE = re.compile(
+    r"(CON|PRN|AUX|NUL|CONIN\$|CONOUT\$|(COM|LPT)[0-9\u00b9\u00b2\u00b3]) *(\.|$)", re.IGNORECASE
+)
 
 
 def fits(name: str, pattern: str) -> bool:
@@ -16,6 +20,7 @@ def fits(name: str, pattern: str) -> bool:
 
 
 def as_file_name(name: str) -> str:
-    """Converts any name to a file name: "a/b" becomes "a%2Fb", most names are unchanged. The inverse is
-    urllib.parse.unquote."""
-    return _NOT_IN_FILE_NAMES.sub(lambda found: "".join(f"%{ord(char):02X}" for char in found[0]), name)
+    """Converts any name to a file name of every system: "a/b" becomes "a%2Fb", most names are unchanged. The
+    inverse is urllib.parse.unquote."""
+    name = _NOT_IN_FILE_NAMES.sub(lambda found: "".join(f"%{ord(char):02X}" for char in found[0]), name)
+    return f"%{ord(name[0]):02X}{name[1:]}" if _DEVICE.match(name) else name

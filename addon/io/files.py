@@ -15,6 +15,7 @@ import numpy as np
 
 from ..core.errors import SinewError
 from ..core.output import remove, writing
+from . import read_only
 
 IMPORTERS = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
@@ -43,9 +44,12 @@ def open_file(
     load_ui: bool = False,
     scripts: bool = False,
     importers: Mapping[str, Callable[[str], object]] = IMPORTERS,
-) -> None:
+) -> list[str]:
     """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene, which gets the frame
-    range of its animation.
+    range of its animation. All objects leave the modes that they were saved in, but for Pose Mode, and
+    evaluations write no files (read_only.py).
+
+    Returns a sentence for each object that is not as in the file.
 
     load_ui    also loads the file's windows and workspaces, for a copy that keeps them
     scripts    whether scripts in the file run
@@ -56,19 +60,38 @@ def open_file(
     check_readable(path, (".blend", *importers))
     try:
         importer = importers.get(path.suffix.lower())
-        if importer is None:
-            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=scripts)
-        else:
-            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-            importer(str(path))
-            _use_frames_of_animation()
+        with read_only.opening() as sentences:
+            if importer is None:
+                bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=scripts)
+            else:
+                bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+                importer(str(path))
+                _use_frames_of_animation()
     except RuntimeError as error:
-        # Blender repeats the file name, up to twice.
-        reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ,")
+        # Blender repeats the file name, up to twice, before the reason or behind it.
+        before, _path, behind = telling_line(error).rpartition(str(path))
+        reason = behind.strip("'\": ,") or before.strip("'\": ,")
         if reason == "not a blend file":
             # It begins like a .blend, and older Blenders report nothing else for files of newer ones.
             reason += f", or of a Blender newer than {bpy.app.version_string}"
         raise SinewError(f"{path}: Blender can not read it: {reason}") from None
+    return [*_leave_modes(), *sentences]
+
+
+def _leave_modes() -> list[str]:
+    """Returns a sentence for each object that left a mode. Blender opens files with the modes of the visible
+    scene and view layer alone. Pose Mode changes nothing that is evaluated."""
+    sentences = []
+    for obj in bpy.data.objects:
+        if obj.mode not in ("OBJECT", "POSE"):
+            mode = obj.bl_rna.properties["mode"].enum_items[obj.mode].name
+            sentences.append(f"{obj.name}: saved in {mode}, and used as in Object Mode")
+    for obj in bpy.data.objects:
+        # One call can be for several objects.
+        if obj.mode not in ("OBJECT", "POSE"):
+            with bpy.context.temp_override(object=obj, active_object=obj):
+                bpy.ops.object.mode_set(mode="OBJECT")
+    return sentences
 
 
 def _use_frames_of_animation() -> None:

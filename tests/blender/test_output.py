@@ -293,6 +293,9 @@ NAMES = [
     "100%2F",
     "Häschen 50%",
     "\x1b[2J",
+    "con.x",
+    "LPT¹",
+    "Arm. ",
 ]
 
 
@@ -321,6 +324,7 @@ def test_names_can_be_had_back():
 
     for name in NAMES:
         assert unquote(as_file_name(name)) == name
+    assert [as_file_name(name) for name in ("CON", "com1", "Console")] == ["%43ON", "%63om1", "Console"]
 
 
 def test_two_objects_of_one_name(tmp_path):

@@ -18,6 +18,7 @@ from ...attach import attach, stack, upstream_proxy
 from ...core import bake
 from ...core.errors import SinewError
 from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
+from ...core.names import as_file_name
 from ...deform import evaluate, session
 from ...io import files
 from ...io.animation_paths import curves_of
@@ -267,7 +268,7 @@ def _mute(obj: bpy.types.Object, start: str) -> bool:
 
 def _file_name(obj: bpy.types.Object, taken: set[str]) -> str:
     """Returns a name for an object's file, different for each object."""
-    start = name = bpy.path.clean_name(obj.name)
+    start = name = as_file_name(bpy.path.clean_name(obj.name))
     number = 1
     while name.lower() in taken:
         number += 1

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core.names import as_file_name
 from ...core.output import remove, write_whole
 from ...io import files
 
@@ -59,7 +60,7 @@ class Textures:
 
     def _write(self, image: bpy.types.Image) -> Path:
         name = Path(bpy.path.basename(image.filepath) or image.name)
-        stem, suffix = bpy.path.clean_name(name.stem), name.suffix
+        stem, suffix = as_file_name(bpy.path.clean_name(name.stem)), name.suffix
         if image.packed_file is None or not suffix:
             suffix = ".png"
         path, number = self.folder / f"{stem}{suffix}", 1

@@ -23,6 +23,7 @@ from ...core.opengl import default_engine
 from ...core.output import write_whole
 from ...core.scratch import scratch_folder
 from ...core.views import View, camera_axes
+from ...io import read_only
 from ...io.files import telling_line
 
 CLAY = (0.72, 0.66, 0.6)
@@ -213,6 +214,7 @@ def _prepare_output(scene: bpy.types.Scene) -> None:
 
 
 def _prepare_png(scene: bpy.types.Scene) -> None:
+    read_only.prepare_render()
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"

@@ -29,7 +29,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     report("opening it")
     # In its saved state, before Sinew reacts to what it finds.
     with updates_suspended():
-        files.open_file(Path(task["source"]))
+        notes = files.open_file(Path(task["source"]))
     report("trying it")
     # The originals of library overrides are in the file as well, linked, and do not matter.
     overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
@@ -46,7 +46,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
     problems += [reason for reason in map(inbetween_handlers.problem_of, armatures) if reason is not None]
     problems += _not_deformable(skinned)
-    notes = [f"{name} is switched off: its Armature modifier deforms it" for name in off]
+    notes += [f"{name} is switched off: its Armature modifier deforms it" for name in off]
     notes += [
         f"library {library.filepath} is missing: whether Sinew deforms what it links is not known"
         for library in bpy.data.libraries

@@ -60,8 +60,8 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
     source, settings = Path(task["source"]), task["settings"]
     clock = _Clock(report)
     with clock.doing("opening"):
-        files.open_file(source, load_ui=True)
-    notes = _notes_on_file()
+        notes = files.open_file(source, load_ui=True)
+    notes += _notes_on_file()
     with clock.doing("deforming"):
         skinned, left_out = _use_sinew(_meant(settings, source), settings)
     if not skinned:
@@ -100,8 +100,8 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
     source, settings = Path(task["source"]), task["settings"]
     clock = _Clock(report)
     with clock.doing("opening"):
-        files.open_file(source, load_ui=True)
-    notes = _notes_on_file()
+        notes = files.open_file(source, load_ui=True)
+    notes += _notes_on_file()
     with clock.doing("restoring"):
         comparison.end(bpy.context)
         skinned = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and _is_meant(obj, settings)]
