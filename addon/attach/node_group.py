@@ -76,7 +76,7 @@ def note_structure(group: bpy.types.NodeTree) -> None:
 
 
 def taken_apart() -> list[bpy.types.NodeTree]:
-    """Returns the groups in which somebody changed nodes, links or sockets since: they no longer set points."""
+    """Returns the groups in which somebody changed nodes, links or sockets: they no longer set points."""
     own = [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and _WARNING not in g.nodes]
     return [group for group in own if group.get(_MADE_OF) not in (None, _structure(group))]
 

@@ -54,7 +54,7 @@ def _store(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
 
 
 def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool:
-    """Computes the skin stack's points for this evaluation. Returns whether they differ from the last ones."""
+    """Computes the skin stack's points for this evaluation. Returns whether they differ from the last."""
     replaced_modifiers = properties.of(obj).replaced_modifiers
     armatures = [each.armature and each.armature.evaluated_get(depsgraph) for each in replaced_modifiers]
     evaluated = obj.evaluated_get(depsgraph)

@@ -39,8 +39,6 @@ def update(
     if _is_in_armature_modifier_mode(obj):
         apply_plan.apply(obj, apply_plan.plan_of(obj))
         return None
-    if skinned is not None and _lacks_points(obj, skinned, depsgraph, changes):
-        skinned.evaluation.note_failure(NOT_REQUESTED)
     inspect = skinned is None or _needs_inspection(obj, skinned, depsgraph, changes)
     if not inspect and _has_shape(obj, skinned, depsgraph, changes):
         skinned.dirtied_by_frames = False
@@ -161,6 +159,8 @@ def _needs_inspection(
     obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> bool:
     """Whether the object itself may have changed, or could not be deformed as planned."""
+    if _lacks_points(obj, skinned, depsgraph, changes):
+        skinned.evaluation.note_failure(NOT_REQUESTED)
     is_skipped = bool(skinned.evaluation.skip_reason)
     if is_skipped:
         skinned.evaluation.failures_in_a_row += 1

@@ -365,7 +365,7 @@ def test_an_object_without_size_is_as_blender_shows_it(rendered_points, which):
     wanted = shapes(scaled)
     scenes.add_sinew(obj, "lbs")
     for got, its in zip(shapes(scaled), wanted, strict=True):
-        # From 5.0 on a mesh has points far away, so that its scale of 0 brings them back: rounding decides where.
+        # From 5.0 on a mesh has points far away, that its scale of 0 brings back: rounding decides where.
         size = max(scenes.diagonal(obj), float(np.abs(its).max()))
         assert which == "both" or scenes.worst(got, its) <= scenes.TOLERANCE * size
     for method in properties.METHODS:
