@@ -67,7 +67,7 @@ def blender_status(program: str, limit: float) -> BlenderStatus:
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
             # A separate session, so that _end() ends everything that it has started, such as a Blender
             # started by a script.
             start_new_session=True,
@@ -75,7 +75,7 @@ def blender_status(program: str, limit: float) -> BlenderStatus:
     except OSError as error:
         raise SinewError(f"--blender {program}: can not be started: {error.strerror or error}") from None
     try:
-        output, _nothing = process.communicate(timeout=limit or None)
+        output, errors = process.communicate(timeout=limit or None)
     except subprocess.TimeoutExpired:
         raise SinewError(f"--blender {program}: no answer after {limit:g} s") from None
     finally:
@@ -88,8 +88,10 @@ def blender_status(program: str, limit: float) -> BlenderStatus:
     how = f"status {process.returncode}"
     with contextlib.suppress(ValueError):
         how = signal.Signals(-process.returncode).name
+    said = (errors.strip() or output.strip()).decode("utf-8", errors="replace").splitlines()[-1:]
+    last_words = f": {said[0].strip()[:200]}" if said else ""
     raise SinewError(
-        f"--blender {program}: ended ({how}) without an answer; is it a Blender of 4.2 or newer?"
+        f"--blender {program}: ended ({how}) without an answer{last_words}; is it a Blender of 4.2 or newer?"
     )
 
 
