@@ -7,6 +7,8 @@ instead, and Sinew's modifier is off, so that a Blender without Sinew can play i
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import bpy
 
 from ..core.errors import SinewError
@@ -24,6 +26,10 @@ from . import (
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
+
+
+# Blender permits no modifier that does more than deform in front of these.
+_NEED_ORIGINAL_MESH = {"MULTIRES", "SOFT_BODY"}
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -74,7 +80,19 @@ def check_can_add(obj: bpy.types.Object) -> None:
         )
     if obj.mode == "EDIT":
         raise SinewError(f"{obj.name} is in edit mode; leave it first")
+    check_stack(obj)
+
+
+def check_stack(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
+    """Raises SinewError where an object's other modifiers, without types of `left_out`, do not permit
+    Sinew's."""
     upstream_proxy.check(obj)
+    for modifier in stack.downstream(obj):
+        if modifier.type in _NEED_ORIGINAL_MESH.difference(left_out):
+            raise SinewError(
+                f"{obj.name}: Blender permits only modifiers that just deform in front of {modifier.name}, so "
+                "Sinew's can not be there; move it in front of the Armature modifier, or apply or remove it"
+            )
 
 
 def add(obj: bpy.types.Object, method: str | None = None) -> None:
@@ -93,8 +111,31 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
 
 
 def _add(obj: bpy.types.Object, method: str | None) -> None:
+    active, before = obj.modifiers.active, {modifier.name for modifier in obj.modifiers}
+    try:
+        _replace_modifiers(obj, method)
+    except Exception as error:
+        parent_type = properties.of(obj).parent_type
+        properties.clear(obj)
+        for modifier in [m for m in obj.modifiers if m.name not in before]:
+            obj.modifiers.remove(modifier)
+        if parent_type:
+            obj.parent_type = parent_type
+        if not isinstance(error, RuntimeError):
+            raise
+        # Blender refuses an operation with such an error, and gives the reason.
+        raise SinewError(f"{obj.name}: Sinew can not be added to its modifiers: {_reason(error)}") from error
+    finally:
+        if active is not None:
+            obj.modifiers.active = active
+
+
+def _reason(error: RuntimeError) -> str:
+    return str(error).strip().removeprefix("Error: ")
+
+
+def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
     settings = properties.of(obj)
-    active = obj.modifiers.active
     if armature_modifier(obj) is None:
         _make_modifier_of_parent(obj)
     run = stack.armature_modifiers(obj)
@@ -104,9 +145,7 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
     _show(nodes, False, False)
     # Not to the end of the stack, where the artist may have pinned other modifiers.
     modifiers = list(obj.modifiers)
-    obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[0]))
-    if active is not None:
-        obj.modifiers.active = active
+    obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[-1]) + 1)
     settings.had_animation = obj.animation_data is not None
     settings.method = method or method_of(run[0])
     properties.make_groups(settings)
@@ -349,7 +388,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
     Armature modifier keeps its method; one that no longer follows the first without a gap deforms by itself
     again."""
     settings = properties.of(obj)
-    _position_modifier(obj)
+    position_modifier(obj)
     kept = settings.replaced_modifiers
     names = [replaced.name for _modifier, replaced in replaced_modifiers(obj)]
     if [replaced.name for replaced in kept] == names:
@@ -370,33 +409,16 @@ def follow_stack(obj: bpy.types.Object) -> None:
             kept[name].method = methods[name]
 
 
-def _position_modifier(obj: bpy.types.Object) -> None:
-    """Moves Sinew's modifier before the Armature modifiers that it replaces; or behind them where they can be
-    on at the same time, as it sets each vertex to its point regardless of the modifiers before it."""
-    run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
-    own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
-    if keeps_modifiers_on(obj) or stack.visibility_is_animated(obj) or _is_chained_to_parent(obj):
-        if own != last + 1:
-            obj.modifiers.move(own, last if own < last else last + 1)
-    elif own + 1 != first:
-        obj.modifiers.move(own, first if own > first else first - 1)
-
-
-def keep_out_of_chain(obj: bpy.types.Object) -> None:
-    """Moves Sinew's modifier out of the Armature modifiers while these deform: Blender does not chain Multi
-    Modifiers across another modifier, even one that is off."""
+def position_modifier(obj: bpy.types.Object) -> None:
+    """Moves Sinew's modifier behind the Armature modifiers that it replaces: it sets each vertex to its point
+    regardless of the modifiers before it. In front of them or between them, even one that is off would
+    decide what a Multi Modifier mixes with."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     if nodes is None or not run:
         return
-    own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
-    if first < own < last or (own < first and _is_chained_to_parent(obj)):
-        obj.modifiers.move(own, last)
-
-
-def _is_chained_to_parent(obj: bpy.types.Object) -> bool:
-    """Whether the first Armature modifier is a Multi Modifier, and the parent deforms, too."""
-    first = armature_modifier(obj)
-    return first is not None and first.use_multi_modifier and stack.parent_deforms(obj)
+    own, last = modifiers.index(nodes), modifiers.index(run[-1])
+    if own != last + 1:
+        obj.modifiers.move(own, last if own < last else last + 1)
 
 
 def keeps_modifiers_on(obj: bpy.types.Object) -> bool:

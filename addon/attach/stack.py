@@ -128,7 +128,9 @@ def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 def downstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Returns the modifiers behind those that Sinew replaces, or would replace, without Sinew's own."""
     run, own = armature_modifiers(obj), sinew_modifier(obj)
-    behind = list(obj.modifiers)[_index(obj, run[-1]) + 1 :] if run else []
+    if not run and not parent_deforms(obj):
+        return []
+    behind = list(obj.modifiers)[_index(obj, run[-1]) + 1 :] if run else obj.modifiers
     return [modifier for modifier in behind if modifier != own]
 
 

@@ -15,6 +15,9 @@ from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths
 from . import properties, references, stack
 
+# A Multi Modifier directly behind one of these mixes with what it got, not with what it made.
+_MIXED_BY_MULTI_MODIFIERS = {"LATTICE", "MESH_DEFORM"}
+
 # A copy would run its own simulation, with its own cache.
 SIMULATIONS = {
     "CLOTH",
@@ -65,7 +68,15 @@ def check(obj: bpy.types.Object) -> None:
             f"{obj.name}: its first Armature modifier is a Multi Modifier, and its parent deforms it as well "
             "(parent type Armature); switch Multi Modifier off, or parent it by type Object"
         )
-    for modifier in stack.upstream_changes(obj):
+    changes = stack.upstream_changes(obj)
+    if first is not None and first.use_multi_modifier and changes:
+        ahead = list(obj.modifiers)[list(obj.modifiers).index(first) - 1]
+        if ahead == changes[-1] and ahead.type in _MIXED_BY_MULTI_MODIFIERS:
+            raise SinewError(
+                f"{obj.name}: {first.name} is a Multi Modifier directly behind {ahead.name}, so Blender mixes "
+                "with the shape before that; switch Multi Modifier off, or put another modifier between them"
+            )
+    for modifier in changes:
         if modifier.type in SIMULATIONS:
             raise SinewError(
                 f"{obj.name}: modifier {modifier.name} in front of {stack.armature_modifier(obj).name} is a "
@@ -129,7 +140,7 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
-    copy.name = f"{obj.name} Sinew front"
+    copy.name = f"{obj.name} Sinew upstream"
     properties.clear(copy)
     properties.of(copy).helper, properties.of(copy).token = True, uuid.uuid4().hex
     wanted = {m.name for m in stack.upstream(obj)}
@@ -140,7 +151,17 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
         copy.constraints.remove(constraint)
     copy.constraints.new("COPY_TRANSFORMS").target = obj
     _keep_animation_of_modifiers(copy)
+    _clear_parent(copy)
     return copy
+
+
+def _clear_parent(copy: bpy.types.Object) -> None:
+    """Exporters also write children that are in no scene. A parent that deforms becomes a modifier."""
+    if stack.parent_deforms(copy):
+        modifier = copy.modifiers.new("Parent", "ARMATURE")
+        copy.modifiers.move(len(copy.modifiers) - 1, 0)
+        modifier.object, modifier.use_bone_envelopes = copy.parent, True
+    copy.parent = None
 
 
 def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:

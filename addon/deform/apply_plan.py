@@ -70,7 +70,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
     """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
     if wanted.uses_builtin:
         attach.switch(obj, on=False)
-        attach.keep_out_of_chain(obj)
+        attach.position_modifier(obj)
         attach.adopt_pointers(obj)
         if wanted.state is State.OFF:
             point_store.remove_point_attributes(obj)

@@ -535,7 +535,7 @@ def _update_switched_off(obj: bpy.types.Object, changes: Changes) -> None:
         # It was switched off while a window rendered.
         apply_plan.apply(obj, apply_plan.plan_of(obj))
     elif _is_named(obj, changes):
-        attach.keep_out_of_chain(obj)
+        attach.position_modifier(obj)
 
 
 def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:

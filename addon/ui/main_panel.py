@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import bpy
 
-from ..attach import attach, properties, stage_settings
+from ..attach import attach, behind_nodes, properties, stage_settings
 from ..deform import session
 from . import character, operators, precomputing, state_text
 from .presets import SINEW_PT_method_presets
@@ -44,7 +44,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
         column = layout.column()
         column.enabled = not waits
         _draw_title(column, context, meshes)
-        _draw_add(column, meshes)
+        _draw_add(column, context, meshes)
         skinned = character.find_meshes(context)
         lead = character.lead(context)
         if lead is not None:
@@ -63,7 +63,9 @@ def _draw_title(
     layout.label(text=text, icon=icon, translate=False)
 
 
-def _draw_add(layout: bpy.types.UILayout, meshes: list[bpy.types.Object]) -> None:
+def _draw_add(
+    layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]
+) -> None:
     count = sum(not properties.has_sinew(obj) for obj in meshes)
     if not count:
         return
@@ -73,6 +75,9 @@ def _draw_add(layout: bpy.types.UILayout, meshes: list[bpy.types.Object]) -> Non
         text = counted(count, "Add Sinew to {count} Mesh", "Add Sinew to {count} Meshes")
     row.operator("sinew.add", text=text, icon="MOD_ARMATURE")
     row.operator_menu_enum("sinew.add", "method", text="", icon="DOWNARROW_HLT")
+    for obj in meshes:
+        for sentence in () if properties.has_sinew(obj) else behind_nodes.warnings(obj):
+            draw_text(layout, context, sentence, icon="ERROR")
 
 
 def _draw_character(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import attach, hooks, properties
+from ..attach import attach, behind_nodes, properties
 from ..deform import session, small_meshes
 from ..deform.plan import ARMATURE_MODIFIER_MODES, ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
@@ -69,8 +69,8 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
             )
         )
     found += state.bound.facts.warnings
-    # A Hook may have been added since.
-    return [*found, *(sentence for sentence in hooks.warnings(obj) if sentence not in found)]
+    # Such a modifier may have been added since.
+    return [*found, *(sentence for sentence in behind_nodes.warnings(obj) if sentence not in found)]
 
 
 def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:

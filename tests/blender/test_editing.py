@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import scenes
 import snapshot
-from sinew_addon.attach import attach, point_store, properties
-from sinew_addon.deform import safe_mode, session
+from sinew_addon.attach import attach, behind_nodes, point_store, properties
+from sinew_addon.core.errors import SinewError
+from sinew_addon.deform import safe_mode, session, survey
 from sinew_addon.io import armature_io
+from sinew_addon.ui import state_text
 
 
 def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)) -> None:
@@ -509,6 +511,57 @@ def test_hooks_behind_take_a_vertex_group(has_group):
     is_equal = scenes.worst(scenes.final_points(obj), expected) <= 1e-5
     assert is_equal == has_group
     assert ("this Hook" in warnings) != has_group
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
+    """A sculpted character; Blender refuses also what Sinew does not know to be refused."""
+    if not is_known:
+        monkeypatch.setattr(attach, "_NEED_ORIGINAL_MESH", frozenset())
+    other, armature = scenes.make_arm()
+    obj = other.copy()
+    obj.data = other.data.copy()
+    bpy.context.scene.collection.objects.link(obj)
+    obj.modifiers.clear()
+    obj.parent, obj.parent_type = armature, "ARMATURE"
+    bpy.context.view_layer.objects.active = obj
+    obj.modifiers.new("Multires", "MULTIRES")
+    bpy.ops.object.multires_subdivide(modifier="Multires")
+    bpy.context.scene.frame_set(6)
+    expected, before = scenes.final_points(obj), snapshot.of_object(obj)
+    with pytest.raises(SinewError, match="Multires" if is_known else "original data"):
+        attach.add(obj, "lbs")
+    bpy.context.view_layer.update()
+    assert snapshot.of_object(obj) == before
+    assert np.array_equal(scenes.final_points(obj), expected)
+    obj.select_set(True)
+    assert bpy.ops.sinew.add() == {"FINISHED"}
+    assert properties.has_sinew(other) and not properties.has_sinew(obj)
+    assert snapshot.of_object(obj) == before
+
+
+@pytest.mark.parametrize("in_front", [False, True])
+@pytest.mark.parametrize("kind", ["hair", "hair on vertices", "cloth", "cloth with a rest shape"])
+def test_what_acts_otherwise_behind_sinew_is_warned_of(kind, in_front):
+    """Before it is added, too; not where a modifier in front does more than deform, as without Sinew."""
+    obj, _armature = scenes.make_arm()
+    if in_front:
+        obj.modifiers.new("Mirror", "MIRROR")
+        obj.modifiers.move(1, 0)
+    if kind.startswith("cloth"):
+        modifier = obj.modifiers.new("Behind", "CLOTH")
+        if kind != "cloth":
+            obj.shape_key_add(name="Basis")
+            modifier.settings.rest_shape_key = obj.shape_key_add(name="Rest")
+    else:
+        particles = obj.modifiers.new("Behind", "PARTICLE_SYSTEM").particle_system.settings
+        particles.type, particles.emit_from = "HAIR", "FACE" if kind == "hair" else "VERT"
+    is_warned = not in_front and kind in ("hair", "cloth with a rest shape")
+    before = behind_nodes.warnings(obj)
+    scenes.add_sinew(obj)
+    assert [bool(sentences) for sentences in (before, behind_nodes.warnings(obj))] == [is_warned, is_warned]
+    assert (before == [s for s in state_text.problems_of(obj) if "behind Sinew's" in s]) or not is_warned
+    assert is_warned == ("behind Sinew's" in " ".join(survey.describe_in_file(obj).warnings))
 
 
 def test_remove_while_off_keeps_what_the_artist_switched():

@@ -37,6 +37,12 @@ def put(obj, name, ahead_of):
     bpy.context.view_layer.update()
 
 
+def swap(obj, over_sinew):
+    """Moves the first of two Armature modifiers behind the other, or behind Sinew's as well."""
+    obj.modifiers.move(0, 2 if over_sinew else 1)
+    bpy.context.view_layer.update()
+
+
 def check(obj, expected):
     got = scenes.shapes(obj, FRAMES)
     assert properties.of(obj).error == ""
@@ -56,11 +62,11 @@ def test_chained_modifiers_in_another_order(monkeypatch, is_used, volume, over_s
     put(obj, "Armature", "Second")
     scenes.add_sinew(obj)
     check(obj, before)
-    put(obj, "Second", "Sinew" if over_sinew else "Armature")
+    swap(obj, over_sinew)
     check(obj, swapped)
-    assert names(obj) == ["Sinew", "Second", "Armature"]
+    assert names(obj) == ["Second", "Armature", "Sinew"]
     assert [replaced.name for replaced in properties.of(obj).replaced_modifiers] == ["Second", "Armature"]
-    put(obj, "Armature", "Sinew" if over_sinew else "Second")
+    swap(obj, over_sinew)
     check(obj, before)
     attach.remove(obj)
     session.refresh(bpy.context)
@@ -217,7 +223,7 @@ def test_moved_and_renamed_before_anybody_sees_it(on):
     obj.modifiers.new("Cast", "CAST").factor = 0.2
     scenes.add_sinew(obj)
     properties.of(obj).enabled = on
-    obj.modifiers.move(names(obj).index("Cast"), 1)
+    obj.modifiers.move(names(obj).index("Cast"), 0)
     obj.modifiers["Armature"].name = "Third"
     obj.modifiers["Second"].name = "Armature"
     bpy.context.view_layer.update()

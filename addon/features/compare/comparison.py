@@ -107,7 +107,7 @@ def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Obje
             if obj.data.is_editmode:
                 raise SinewError(f"{obj.name} is in edit mode; leave it first")
             if attach.armature_of(obj) is not None:
-                upstream_proxy.check(obj)
+                attach.check_stack(obj, LEFT_OUT)
             taken.append(obj)
         except SinewError as error:
             problems.append(str(error))

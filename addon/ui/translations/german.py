@@ -474,6 +474,17 @@ TEXTS = {
         "{name}: Hinter Sinews Modifikator bewegt Blender andere Punkte als die, die diesem Haken "
         "zugewiesen sind; gib ihm eine Punktgruppe"
     ),
+    "{name}: behind Sinew's modifier, Blender puts these particles and hairs elsewhere on the mesh; "
+    "emit them from vertices, from another mesh, or leave this mesh to its Armature modifier": (
+        "{name}: Hinter Sinews Modifikator setzt Blender diese Partikel und Haare an andere Stellen der "
+        "Masche; lass sie von Punkten oder von einer anderen Masche ausgehen, oder überlass diese Masche "
+        "ihrem Skelett-Modifikator"
+    ),
+    "{name}: behind Sinew's modifier, Blender does not use the Rest Shape Key of this Cloth as it "
+    "should; leave this mesh to its Armature modifier": (
+        "{name}: Hinter Sinews Modifikator benutzt Blender den Ruheformschlüssel dieses Stoffs nicht, wie "
+        "es sollte; überlass diese Masche ihrem Skelett-Modifikator"
+    ),
     "Armature modifiers apart from the first stay Blender's: {names}; move them right behind it to "
     "have Sinew deform by them": (
         "Skelett-Modifikatoren abseits des ersten bleiben bei Blender: {names}; rücke sie direkt hinter "
