@@ -377,7 +377,7 @@ def test_bakes_in_a_window(photographed):
         assert "baked/.human.unfinished.blend" in stopped[kind]["files meanwhile"], kind
         assert stopped[kind]["blenders meanwhile"] == 1, kind
         assert f"baked/human{EXPORTS[kind]}" in ended[kind]["files"], kind
-        assert ended[kind]["modifiers"] == ["NODES", "ARMATURE"], kind
+        assert ended[kind]["modifiers"] == ["ARMATURE", "NODES"], kind
     assert not any(one["not undone"] for one in ended.values()), ended
     assert (ended["shape-keys"]["keys"], ended["shape-keys"]["modifiers"]) == (True, ["ARMATURE"])
     assert ended["mdd"]["modifiers"] == ["MESH_CACHE", "ARMATURE"]

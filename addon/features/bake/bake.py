@@ -98,8 +98,8 @@ class Cache:
 
     def place(self) -> None:
         obj = self.obj
-        place = list(obj.modifiers).index(stack.sinew_modifier(obj))
-        shown = [(m.show_viewport, m.show_render) for m in obj.modifiers][place]
+        place, nodes = list(obj.modifiers).index(stack.armature_modifier(obj)), stack.sinew_modifier(obj)
+        shown = nodes.show_viewport, nodes.show_render
         _take_off(obj)
         modifier = obj.modifiers.new("Sinew Cache", "MESH_CACHE")
         obj.modifiers.move(len(obj.modifiers) - 1, place)
