@@ -90,8 +90,8 @@ def check_stack(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
     for modifier in stack.downstream(obj):
         if modifier.type in _NEED_ORIGINAL_MESH.difference(left_out):
             raise SinewError(
-                f"{obj.name}: Blender permits only modifiers that just deform in front of {modifier.name}, so "
-                "Sinew's can not be there; move it in front of the Armature modifier, or apply or remove it"
+                f"{obj.name}: in front of {modifier.name} Blender permits only modifiers that just deform, "
+                "so not Sinew's; move it in front of the Armature modifier, or apply or remove it"
             )
 
 

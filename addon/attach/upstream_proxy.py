@@ -73,8 +73,8 @@ def check(obj: bpy.types.Object) -> None:
         ahead = list(obj.modifiers)[list(obj.modifiers).index(first) - 1]
         if ahead == changes[-1] and ahead.type in _MIXED_BY_MULTI_MODIFIERS:
             raise SinewError(
-                f"{obj.name}: {first.name} is a Multi Modifier directly behind {ahead.name}, so Blender mixes "
-                "with the shape before that; switch Multi Modifier off, or put another modifier between them"
+                f"{obj.name}: {first.name} is a Multi Modifier directly behind {ahead.name}, so it mixes with "
+                "the shape before that; switch Multi Modifier off, or put another modifier between them"
             )
     for modifier in changes:
         if modifier.type in SIMULATIONS:
@@ -156,12 +156,14 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def _clear_parent(copy: bpy.types.Object) -> None:
-    """Exporters also write children that are in no scene. A parent that deforms becomes a modifier."""
+    """Exporters also write children that are in no scene. An armature that deforms becomes a modifier; a
+    lattice that does so stays the parent."""
     if stack.parent_deforms(copy):
         modifier = copy.modifiers.new("Parent", "ARMATURE")
         copy.modifiers.move(len(copy.modifiers) - 1, 0)
         modifier.object, modifier.use_bone_envelopes = copy.parent, True
-    copy.parent = None
+    if copy.parent_type != "LATTICE":
+        copy.parent = None
 
 
 def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:

@@ -63,9 +63,7 @@ def _draw_title(
     layout.label(text=text, icon=icon, translate=False)
 
 
-def _draw_add(
-    layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]
-) -> None:
+def _draw_add(layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]) -> None:
     count = sum(not properties.has_sinew(obj) for obj in meshes)
     if not count:
         return
