@@ -27,7 +27,6 @@ from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
 
-
 # Blender permits no modifier that does more than deform in front of these.
 _NEED_ORIGINAL_MESH = {"MULTIRES", "SOFT_BODY"}
 

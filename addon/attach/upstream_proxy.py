@@ -73,8 +73,8 @@ def check(obj: bpy.types.Object) -> None:
         ahead = list(obj.modifiers)[list(obj.modifiers).index(first) - 1]
         if ahead == changes[-1] and ahead.type in _MIXED_BY_MULTI_MODIFIERS:
             raise SinewError(
-                f"{obj.name}: {first.name} is a Multi Modifier directly behind {ahead.name}, so it mixes with "
-                "the shape before that; switch Multi Modifier off, or put another modifier between them"
+                f"{obj.name}: {first.name} is a Multi Modifier directly behind {ahead.name}, so it mixes "
+                "with the shape before that; switch Multi Modifier off, or put another modifier between them"
             )
     for modifier in changes:
         if modifier.type in SIMULATIONS:

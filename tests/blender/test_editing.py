@@ -536,7 +536,7 @@ def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
     assert np.array_equal(scenes.final_points(obj), expected)
     obj.select_set(True)
     assert bpy.ops.sinew.add() == {"FINISHED"}
-    assert properties.has_sinew(other) and not properties.has_sinew(obj)
+    assert [properties.has_sinew(each) for each in (other, obj)] == [True, False]
     assert snapshot.of_object(obj) == before
 
 
