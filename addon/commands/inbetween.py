@@ -5,7 +5,7 @@ Sinew."""
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..core.errors import SinewError, WrongUse
 from ..jobs.inputs import Job, plan_jobs

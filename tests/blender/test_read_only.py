@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import scenes
 from program import run_sinew
-
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import evaluate
 from sinew_addon.io import files
@@ -142,7 +141,9 @@ def test_caches_in_a_copy_are_the_artist_s(written, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "copy.blend"))
     soft = bpy.data.objects["soft"].modifiers[0]
     assert (soft.point_cache.is_baked, soft.point_cache.use_disk_cache) == (False, True)
-    assert bpy.data.objects["fluid"].modifiers[0].domain_settings.cache_directory == str(file.parent / "fluid")
+    assert bpy.data.objects["fluid"].modifiers[0].domain_settings.cache_directory == str(
+        file.parent / "fluid"
+    )
 
 
 def test_the_reason_why_a_file_can_not_be_read(tmp_path):
