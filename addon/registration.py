@@ -25,6 +25,7 @@ def register() -> None:
         return
     from .attach import properties, stored_vertex_data
     from .deform import exporters, handlers
+    from .features.action_copy import feature as action_copy
     from .features.bake import feature as bake
     from .features.blend import feature as blend
     from .features.compare import feature as compare
@@ -56,7 +57,7 @@ def register() -> None:
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
         *(character_operators, presets, lesson, menus, main_panel, meshes_panel),
-        *(suggest, inbetween, blend, ik, bake, corrective, compare, heat, diagnose, gltf),
+        *(suggest, action_copy, inbetween, blend, ik, bake, corrective, compare, heat, diagnose, gltf),
     ):
         _register_classes(owner.CLASSES)
     translations.register()
@@ -68,11 +69,9 @@ def register() -> None:
     manual.register()
     modifier_panel.register()
     precomputing.register()
-    # Its handlers come first: they set poses before these are used to deform.
-    inbetween.register()
     handlers.register()
     exporters.register()
-    for feature in (suggest, blend, ik, bake, compare, heat, diagnose, gltf):
+    for feature in (suggest, action_copy, blend, bake, compare, heat, diagnose, gltf):
         feature.register()
     handlers.adopt_open_file()
     atexit.unregister(_end)
@@ -86,14 +85,13 @@ def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
         from .attach import note, properties, stored_vertex_data
         from .deform import exporters, handlers, session
+        from .features.action_copy import feature as action_copy
         from .features.bake import feature as bake
         from .features.blend import feature as blend
         from .features.compare import feature as compare
         from .features.diagnose import feature as diagnose
         from .features.gltf import feature as gltf
         from .features.heat import feature as heat
-        from .features.ik import feature as ik
-        from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
         from .ui import (
             character,
@@ -108,12 +106,11 @@ def unregister() -> None:
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
         note.remove()
-        for feature in (gltf, diagnose, heat, compare, bake, ik, blend, suggest):
+        for feature in (gltf, diagnose, heat, compare, bake, blend, action_copy, suggest):
             feature.unregister()
         shown_colours.unregister()
         exporters.unregister()
         handlers.unregister()
-        inbetween.unregister()
         modifier_panel.unregister()
         manual.unregister()
         menus.unregister()

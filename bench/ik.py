@@ -17,7 +17,6 @@ import numpy as np
 import sinew
 import sinew_addon
 from sinew_addon.core import ik as core
-from sinew_addon.features.ik import ik_live
 from sinew_addon.io import ik_io
 
 matplotlib.use("svg")
@@ -180,83 +179,6 @@ def animated(bones: int, kind: str) -> dict:
     }
 
 
-def live_frames(bones: int, chains: int, seconds: float) -> dict:
-    """{way: microseconds of a frame of an animation, and of an update after a target was moved}, in
-    processor time, alternately without a solver, with Blender's constraints, and with Sinew live."""
-    armature, targets = make_chains(bones, "free", chains)
-    for number, frame in enumerate((1, 9, 17, 24)):
-        place_targets(targets, bones, np.random.default_rng(number))
-        for target in targets:
-            target.keyframe_insert("location", frame=frame)
-    scene = bpy.context.scene
-    names = [pair for tree in ik_io.read_trees(armature) for pair in tree.constraints]
-    by_hand = bpy.data.objects.new("By hand", None)
-    scene.collection.objects.link(by_hand)
-    targets[0].parent = by_hand
-
-    def frame() -> float:
-        scene.frame_set(1)
-        began = time.process_time()
-        for number in range(2, 25):
-            scene.frame_set(number)
-        return (time.process_time() - began) / 23
-
-    def moved() -> float:
-        by_hand.location.x = 0.0
-        bpy.context.view_layer.update()
-        began = time.process_time()
-        for number in range(20):
-            by_hand.location.x = 0.01 * number
-            bpy.context.view_layer.update()
-        return (time.process_time() - began) / 20
-
-    ways: dict = {
-        "no solver": (
-            lambda: ik_io.set_muted(armature, names, True),
-            lambda: ik_io.set_muted(armature, names, False),
-        ),
-        "Blender": (lambda: None, lambda: None),
-        "Sinew, live": (lambda: ik_live.switch_on(armature), lambda: ik_live.switch_off(armature)),
-    }
-    taken: dict = {way: {"frame": [], "moved": []} for way in ways}
-    end = time.perf_counter() + seconds
-    while time.perf_counter() < end or len(taken["Blender"]["frame"]) < 5:
-        for way, (begin, finish) in ways.items():
-            begin()
-            frame()
-            taken[way]["frame"].append(frame())
-            taken[way]["moved"].append(moved())
-            finish()
-    return {
-        way: {
-            name: {
-                "least": min(turns) * 1e6,
-                "median": float(np.median(turns)) * 1e6,
-                "quartiles": (np.percentile(turns, [25, 75]) * 1e6).tolist(),
-                "turns": len(turns),
-            }
-            for name, turns in of.items()
-        }
-        for way, of in taken.items()
-    }
-
-
-def measure_live(seconds: float) -> dict:
-    print("\nmicroseconds of a frame, and of an update after a target was moved: least, median (quartiles)")
-    found = {}
-    for bones in BONES:
-        for chains in (1, 4):
-            key = f"{bones} x {chains}"
-            found[key] = live_frames(bones, chains, seconds)
-            for way, of in found[key].items():
-                texts = []
-                for name, m in of.items():
-                    low, high = m["quartiles"]
-                    texts.append(f"{name} {m['least']:.0f}, {m['median']:.0f} ({low:.0f} to {high:.0f})")
-                print(f"{key:12}{way:14}", *texts, flush=True)
-    return found
-
-
 def draw(spreads: dict, motions: dict) -> None:
     figure, (first, second, third) = plt.subplots(1, 3, figsize=(12.6, 3.6), layout="constrained")
     styles = dict(zip(SOLVERS, (("#ee6677", "^"), ("#4477aa", "o"), ("#ccbb44", "s")), strict=True))
@@ -294,16 +216,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="shorter runs, no picture")
     parser.add_argument("--name", default="ik", help="of the file in bench/results")
-    parser.add_argument("--live", action="store_true", help="only frames in Blender, live")
     arguments = parser.parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
     sinew_addon.register()
     facts = common.machine() | {"blender": bpy.app.version_string}
     common.heading("inverse kinematics", facts)
-    live = measure_live(0.5 if arguments.quick else 3.0)
-    if arguments.live:
-        common.write(f"{arguments.name}-live", machine=facts, live=live)
-        _end()
     spreads, motions = {}, {}
     columns = (
         "bones",
@@ -332,7 +249,7 @@ def main() -> None:
     for key, of in motions.items():
         texts = (f"{name}: {m['acceleration']:.4f} {max(m['errors']):.1e}  " for name, m in of.items())
         print(f"{key:12}", *texts)
-    common.write(arguments.name, machine=facts, microseconds=spreads, animated=motions, live=live)
+    common.write(arguments.name, machine=facts, microseconds=spreads, animated=motions)
     if not arguments.quick:
         draw(spreads, motions)
     _end()

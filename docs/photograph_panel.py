@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Installs Sinew's zip in a Blender with a window, works its panel on human.blend and photographs it, then its
-panel of in-betweens.
+"""Installs Sinew's zip in a Blender with a window, works its panel on human.blend and photographs it.
 
-blender --factory-startup human.blend --python docs/photograph_panel.py -- sinew-VERSION.zip panel.png inbetween.png [de_DE]
+blender --factory-startup human.blend --python docs/photograph_panel.py -- sinew-VERSION.zip panel.png [de_DE]
 
 The language of Blender's interface may be given; without it, it is English.
-"""  # noqa: E501
+"""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import window
 
-ZIP, PICTURE, INBETWEEN, *LANGUAGE = window.arguments()
+ZIP, PICTURE, *LANGUAGE = window.arguments()
 FRAME = 16
 
 
@@ -54,21 +53,6 @@ def speak(language: str) -> None:
     view.use_translate_interface = view.use_translate_tooltips = view.use_translate_reports = True
 
 
-def turn_to_inbetweens() -> float:
-    """How far the method takes a bone's end from where Blender's curves have it, between two keyed poses."""
-    rig = bpy.data.objects["Human"].sinew.armature
-    # One that was drawn before stays folded: by another name it is new.
-    panel = bpy.types.SINEW_PT_inbetweens
-    bpy.utils.unregister_class(panel)
-    panel.bl_idname, panel.bl_options = "SINEW_PT_inbetweens_open", set()
-    bpy.utils.register_class(panel)
-    bpy.context.scene.frame_set(FRAME // 2)
-    before = [bone.tail.copy() for bone in rig.pose.bones]
-    rig.sinew_inbetween = "sclerp"
-    bpy.context.view_layer.update()
-    return max((bone.tail - old).length for bone, old in zip(rig.pose.bones, before, strict=True))
-
-
 def steps():
     if LANGUAGE:
         speak(LANGUAGE[0].name)
@@ -90,11 +74,7 @@ def steps():
     bpy.context.scene.frame_set(FRAME)
     yield
     window.photograph(PICTURE)
-    facts["moved in between"] = turn_to_inbetweens()
-    yield
-    yield
     print("FACTS " + json.dumps(facts), flush=True)
-    window.photograph(INBETWEEN)
 
 
 window.run(steps())

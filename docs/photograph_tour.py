@@ -34,7 +34,7 @@ HEADERS = {
     name: (850, 97 + 28 * number)
     for number, name in enumerate(
         (
-            *("Sinew", "Suggest", "In-betweens", "Blend Actions", "Inverse Kinematics"),
+            *("Sinew", "Suggest", "Blend Actions"),
             *("Compare", "Heat Map", "Diagnostics"),
         )
     )

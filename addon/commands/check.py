@@ -96,18 +96,17 @@ def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], 
 
 
 def _report(path: Path, outcome: dict, status: BlenderStatus | None) -> dict:
-    meshes, inbetweens = outcome.get("meshes", []), outcome.get("inbetweens", [])
+    meshes = outcome.get("meshes", [])
     problems = list(outcome.get("problems", []))
     if "error" in outcome:
         problems.append(outcome["error"].removeprefix(f"{path.absolute()}: "))
-    needs_sinew = bool(meshes or inbetweens)
+    needs_sinew = bool(meshes)
     if needs_sinew and status is not None:
         problems = [*_missing(status), *problems]
     return {
         "file": str(path),
         "needs_sinew": needs_sinew,
         "meshes": meshes,
-        "inbetweens": inbetweens,
         "problems": problems,
         "notes": outcome.get("notes", []),
     }
@@ -136,11 +135,6 @@ def line_of(report: dict) -> str:
 
 
 def _deformed(report: dict) -> str:
-    meshes, armatures = report["meshes"], report["inbetweens"]
-    parts = []
-    if meshes:
-        methods = ", ".join(sorted({mesh["method"] for mesh in meshes}))
-        parts.append(f"Sinew deforms {len(meshes)} mesh{'' if len(meshes) == 1 else 'es'} by {methods}")
-    if armatures:
-        parts.append(f"Sinew poses {', '.join(armatures)} between keys")
-    return ", ".join(parts)
+    meshes = report["meshes"]
+    methods = ", ".join(sorted({mesh["method"] for mesh in meshes}))
+    return f"Sinew deforms {len(meshes)} mesh{'' if len(meshes) == 1 else 'es'} by {methods}"

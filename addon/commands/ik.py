@@ -105,7 +105,7 @@ def _solve(
     import bpy
     import sinew
 
-    from ..features.ik import ik_bake, ik_compare, ik_live
+    from ..features.ik import ik_bake, ik_compare
     from ..io import files, ik_io
     from ..ui import stepped
 
@@ -121,7 +121,7 @@ def _solve(
     rows: list[tuple[str, ...]] = []
     reasons = []
     for armature in armatures:
-        with ik_live.suspended(armature), stepped.kept_frame(scene, [armature]):
+        with stepped.kept_frame(scene, [armature]):
             try:
                 trees = ik_io.read_trees(armature, args.bone)
             except SinewError as error:

@@ -18,10 +18,9 @@ Writes a copy of each file in which every armature with keyed poses moves betwee
 instead of by the F-curves of single channels. Inputs are never written to. A folder stands for all .blend
 files below it.
 
-The in-betweens are baked: plain keys in a new action, beside the old one, that any Blender plays. With --live
-the copy keeps its action and has the choice only, for a Blender with Sinew, where keys can still be edited.
-Constraints and drivers act after the in-betweens, as always. NLA strips, actions of several layers, and bones
-whose curves have modifiers other than Cycles are left to Blender."""
+The in-betweens are plain keys in a copy of the action, that any Blender plays; the action itself stays in the
+file. Constraints and drivers act after the in-betweens, as always. Actions that are mixed with NLA strips or
+have several layers, and bones whose curves have modifiers other than Cycles, keep their curves."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
@@ -46,7 +45,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         metavar="FRAMES",
         help="from one baked key to the next (default: 1)",
     )
-    parser.add_argument("--live", action="store_true", help="keep the action, do not bake: for Sinew to play")
     return parser
 
 
@@ -81,7 +79,7 @@ def _inbetween(job: Job, args: argparse.Namespace) -> Inbetweened:
     import bpy
 
     from ..core import inbetween as core
-    from ..features.inbetween import inbetween, inbetween_bake, inbetween_handlers
+    from ..features.inbetween import inbetween_bake
     from ..io import actions, files
 
     outcome = Inbetweened(job)
@@ -93,25 +91,22 @@ def _inbetween(job: Job, args: argparse.Namespace) -> Inbetweened:
         armatures = [
             obj
             for obj in bpy.data.objects
-            if obj.type == "ARMATURE" and obj.is_editable and actions.bone_curves(*inbetween.action_of(obj))
+            if obj.type == "ARMATURE" and obj.is_editable and actions.bone_curves(*actions.playing(obj))
         ]
         if not armatures:
             raise SinewError(f"{job.source}: no armature plays an action with keyed bones; nothing written")
+        settings = inbetween_bake.Settings(args.method, path, args.step)
         for armature in armatures:
-            armature.sinew_inbetween_path = path
-            armature.sinew_inbetween = args.method
-        for armature in armatures:
-            player, reason = inbetween_handlers.player_of(armature), inbetween_handlers.problem_of(armature)
-            if player is None or not player.bones:
-                outcome.left_out.append(reason or f"{armature.name}: no bone that Sinew can play")
-                armature.sinew_inbetween = core.BLENDER
+            found: list[inbetween_bake.Baked] = []
+            try:
+                for _share in inbetween_bake.steps(armature, settings, found):
+                    pass
+            except SinewError as error:
+                outcome.left_out.append(str(error))
                 continue
-            outcome.notes += [f"{bone} {why}: left to Blender" for bone, why in sorted(player.left.items())]
             outcome.armatures += 1
-            outcome.bones += player.bones
-            if not args.live:
-                far = inbetween_bake.bake(armature, args.step).far
-                outcome.notes += [f"{bone} {core.TOO_FAR[path]}" for bone in sorted(far)]
+            outcome.bones += found[0].bones
+            outcome.notes += found[0].notes(path)
         if not outcome.armatures:
             raise SinewError(f"{job.source}: {outcome.left_out.pop()}; nothing written")
         files.save_copy(job.source, job.target)

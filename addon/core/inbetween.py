@@ -14,9 +14,6 @@ import numpy as np
 import sinew
 from sinew import affine, interpolate, quat_vec, spline
 
-# The alternative to METHODS: the action's own curves.
-BLENDER = "blender"
-
 # Between two keys, or on a spline through four.
 STRAIGHT, SPLINE = "straight", "spline"
 

@@ -20,12 +20,11 @@ _LISTS = (
     (bpy.types.Mesh, "meshes"),
     (bpy.types.Key, "shape_keys"),
     (bpy.types.Armature, "armatures"),
-    (bpy.types.Action, "actions"),
 )
 
 
 def finder(event: str, function: Callable) -> Find:
-    """Returns a function that finds the original of an evaluated object, mesh, shape key, armature or action,
+    """Returns a function that finds the original of an evaluated object, mesh, shape key or armature,
     for use in `function`, which Blender calls at the event. The function returns None where another add-on's
     function may have deleted or renamed the original."""
     return _by_name if events.others_precede(event, function) else _at_once

@@ -1,15 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The F-curves of an action that move bones: finding them, reading their keys, and holding them.
-
-A slot of an action is held while Sinew plays its bones: their curves are muted, so that Blender leaves those
-channels alone, and everything else in the action plays on. What the artist had muted is stored in the action
-(SinewActionHold), so that undo and copies include it.
-"""
+"""The F-curves of an action that move bones: finding them, and reading their keys."""
 
 from __future__ import annotations
 
 import functools
-import json
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -30,21 +24,6 @@ _BONE_PATH = re.compile(rf'pose\.bones\["(.*)"\]\.({"|".join(COLUMNS)})')
 REPEATING = {"REPEAT", "REPEAT_OFFSET"}
 
 
-class SinewActionHold(bpy.types.PropertyGroup):
-    """A slot of an action whose bones Sinew plays; its name is the slot's handle, or 0 where there are no
-    slots."""
-
-    muted: bpy.props.StringProperty(description="The curves that the artist had muted")
-
-    def muted_by_artist(self) -> set[tuple[str, int]]:
-        return {(path, index) for path, index in json.loads(self.muted or "[]")}
-
-    def set_muted_by_artist(self, curves: set[tuple[str, int]]) -> None:
-        text = json.dumps(sorted(curves)) if curves else ""
-        if self.muted != text:
-            self.muted = text
-
-
 class Channel(NamedTuple):
     """What a curve moves: a property of a bone, and its column in the bone's row of channels."""
 
@@ -60,6 +39,16 @@ def slot_of(player: bpy.types.AnimData | bpy.types.NlaStrip) -> bpy.types.bpy_st
 
 def handle_of(slot: bpy.types.bpy_struct | None) -> int:
     return slot.handle if slot is not None else 0
+
+
+def playing(
+    obj: bpy.types.Object,
+) -> tuple[bpy.types.Action | None, bpy.types.bpy_struct | None]:
+    """Returns the action that an object plays, and its slot."""
+    animation = obj.animation_data
+    if animation is None or animation.action is None:
+        return None, None
+    return animation.action, slot_of(animation)
 
 
 def curve_lists(
@@ -151,15 +140,12 @@ def bone_curves(
 
 
 def unmuted_curves(
-    action: bpy.types.Action, slot: bpy.types.bpy_struct | None
+    action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
 ) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
-    """Returns the curves that move bones, by bone, without those that the artist has muted; curves that Sinew
-    plays are included."""
-    record = action.sinew_holds.get(str(handle_of(slot)))
-    muted = record.muted_by_artist() if record is not None else None
+    """Returns the curves that move bones, by bone, without muted ones."""
     found = {}
     for bone, pairs in bone_curves(action, slot).items():
-        pairs = [(c, each) for c, each in pairs if not (c.mute if muted is None else key_of(c) in muted)]
+        pairs = [pair for pair in pairs if not pair[0].mute]
         if pairs:
             found[bone] = pairs
     return found
@@ -236,75 +222,6 @@ def reason_against(curves: Sequence[bpy.types.FCurve]) -> str | None:
     return None
 
 
-def hold(
-    action: bpy.types.Action, slot: bpy.types.bpy_struct | None, rotations: dict[str, str]
-) -> dict[str, str]:
-    """Mutes the curves of bones that Sinew can play. Called again, it includes curves added since.
-
-    rotations  each bone's rotation property that is in use, by the bone's name
-
-    Returns the bones that are left to Blender, each with the reason.
-    """
-    name = str(handle_of(slot))
-    record = action.sinew_holds.get(name)
-    known = record is not None
-    if record is None:
-        record = action.sinew_holds.add()
-        record.name = name
-    muted = record.muted_by_artist()
-    left = {}
-    for bone, pairs in bone_curves(action, slot).items():
-        for curve, _channel in pairs:
-            if not known and curve.mute:
-                muted.add(key_of(curve))
-            elif known and not curve.mute:
-                muted.discard(key_of(curve))
-        playing = [
-            curve
-            for curve, channel in pairs
-            if key_of(curve) not in muted and plays(channel, rotations.get(bone))
-        ]
-        reason = reason_against(playing)
-        if reason is not None:
-            left[bone] = reason
-            playing = []
-        for curve, _channel in pairs:
-            _set_mute(curve, curve in playing or key_of(curve) in muted)
-    record.set_muted_by_artist(muted)
-    return left
-
-
-def release(action: bpy.types.Action, handle: int) -> None:
-    """Restores the curves of a held slot as the artist had them."""
-    index = action.sinew_holds.find(str(handle))
-    if index < 0:
-        return
-    muted = action.sinew_holds[index].muted_by_artist()
-    slot = next((s for s in getattr(action, "slots", ()) if s.handle == handle), None)
-    for pairs in bone_curves(action, slot).values():
-        for curve, _channel in pairs:
-            _set_mute(curve, key_of(curve) in muted)
-    action.sinew_holds.remove(index)
-    if not action.sinew_holds:
-        action.property_unset("sinew_holds")
-
-
-def held_curves(
-    action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
-) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
-    """Returns the curves that Sinew plays, by bone; empty where the slot is not held."""
-    record = action.sinew_holds.get(str(handle_of(slot))) if action is not None else None
-    if record is None:
-        return {}
-    muted = record.muted_by_artist()
-    held = {}
-    for bone, pairs in bone_curves(action, slot).items():
-        pairs = [pair for pair in pairs if pair[0].mute and key_of(pair[0]) not in muted]
-        if pairs:
-            held[bone] = pairs
-    return held
-
-
 def key_of(curve: bpy.types.FCurve) -> tuple[str, int]:
     return curve.data_path, curve.array_index
 
@@ -313,9 +230,3 @@ def plays(channel: Channel, rotation: str | None) -> bool:
     """Whether the channel has an effect where `rotation` is its bone's rotation property: not a rotation of
     another mode, nor a channel of a missing bone."""
     return rotation is not None and channel.property in ("location", "scale", rotation)
-
-
-def _set_mute(curve: bpy.types.FCurve, mute: bool) -> None:
-    # Every assignment makes Blender evaluate the action again.
-    if curve.mute != mute:
-        curve.mute = mute

@@ -3,11 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from operator import attrgetter
-from types import MappingProxyType
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -17,28 +14,18 @@ from sinew.ik import Effector
 from ..core.errors import SinewError
 from ..core.ik import Posed, Tree
 
-# The name of the constraints that give bones the pose that Sinew solves live.
-FOLLOWS = "Sinew IK"
 
-
-def read_trees(
-    armature: bpy.types.Object,
-    only: Collection[str] | None = None,
-    live: Mapping[str, str] = MappingProxyType({}),
-) -> list[Tree]:
+def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) -> list[Tree]:
     """Returns the trees of bones that the IK constraints of an armature object pull, those nearest to the
     root first. Constraints whose chains begin at the same bone pull one tree, as in Blender.
 
     only  trees that contain one of these bones; None: all
-    live  by bone, the constraint that counts although it is muted
 
     Raises SinewError where a constraint needs what Sinew does not support, and where there is no tree.
     """
     chains: dict[str, list[tuple[bpy.types.PoseBone, bpy.types.Constraint]]] = {}
     for bone in armature.pose.bones:
-        constraint = bone.constraints.get(live[bone.name]) if bone.name in live else None
-        if constraint is None:
-            constraint = _active(bone)
+        constraint = _active(bone)
         if constraint is not None:
             chains.setdefault(_chain(bone, constraint)[0].name, []).append((bone, constraint))
     trees = [_tree(armature, pairs) for pairs in chains.values()]
@@ -53,47 +40,6 @@ def read_trees(
     for tree in trees:
         _check(armature, tree)
     return sorted(trees, key=lambda tree: len(armature.pose.bones[tree.bones[0]].parent_recursive))
-
-
-def follows(constraint: bpy.types.Constraint) -> bool:
-    """Whether the constraint gives a bone the pose that Sinew solves live."""
-    return constraint.type == "COPY_TRANSFORMS" and constraint.name == FOLLOWS
-
-
-def settings_of(armature: bpy.types.Object, tree: Tree) -> tuple:
-    """Returns everything that is read once of a tree's bones and constraints, to be compared; empty where any
-    of it is gone."""
-    found: list[object] = []
-    bones = armature.pose.bones
-    for name in tree.bones:
-        bone = bones.get(name)
-        if bone is None:
-            return ()
-        rest = bone.bone
-        found += (rest.matrix_local.copy(), rest.length, bone.parent.name if bone.parent else "")
-        found += _rest_settings(rest)
-        found += _bone_settings(bone)
-    for name, constraint_name in tree.constraints:
-        constraint = bones[name].constraints.get(constraint_name) if name in bones else None
-        if constraint is None:
-            return ()
-        for target in (constraint.target, constraint.pole_target):
-            found.append(target.name if target is not None else "")
-        found += _constraint_settings(constraint)
-    return tuple(found)
-
-
-_rest_settings = attrgetter("use_inherit_rotation", "inherit_scale", "use_local_location")
-_bone_settings = attrgetter(
-    "ik_stretch",
-    *(f"lock_ik_{axis}" for axis in "xyz"),
-    *(f"use_ik_limit_{axis}" for axis in "xyz"),
-    *(f"ik_{bound}_{axis}" for bound in ("min", "max", "stiffness") for axis in "xyz"),
-)
-_constraint_settings = attrgetter(
-    *("type", "subtarget", "pole_subtarget", "pole_angle", "chain_count"),
-    *("use_tail", "use_location", "use_rotation", "use_stretch", "weight", "orient_weight"),
-)
 
 
 def constraints_of(armature: bpy.types.Object, tree: Tree) -> list[bpy.types.Constraint]:
@@ -125,25 +71,26 @@ def read_posed(armature: bpy.types.Object, tree: Tree) -> Posed:
     cannot be read."""
     graph = bpy.context.evaluated_depsgraph_get()
     evaluated = armature.evaluated_get(graph)
-    matrices = [evaluated.pose.bones[name].matrix for name in tree.bones]
-    wanted = read_wanted(evaluated, tree, lambda target: target.evaluated_get(graph))
-    return _posed(evaluated, tree, matrices, wanted)
-
-
-def read_unsolved(evaluated: bpy.types.Object, tree: Tree) -> Posed:
-    """Reads the same from an evaluated armature within Blender's evaluation, before the tree's bones are
-    posed: from their channels, without constraints. The tree's parent and the targets are evaluated."""
-    matrices: list[Matrix] = []
-    for name, parent in zip(tree.bones, tree.parents.tolist(), strict=True):
-        bone = evaluated.pose.bones[name]
-        above = {}
-        if bone.parent is not None:
-            above = {
-                "parent_matrix": matrices[parent] if parent >= 0 else bone.parent.matrix,
-                "parent_matrix_local": bone.parent.bone.matrix_local,
-            }
-        matrices.append(bone.bone.convert_local_to_pose(bone.matrix_basis, bone.bone.matrix_local, **above))
-    return _posed(evaluated, tree, matrices, read_wanted(evaluated, tree))
+    from_world = evaluated.matrix_world.inverted_safe()
+    goals, poles, influences = [], [], []
+    for bone, name in tree.constraints:
+        constraint = evaluated.pose.bones[bone].constraints[name]
+        target = constraint.target.evaluated_get(graph)
+        goals.append(_target(evaluated, from_world, target, constraint.subtarget))
+        pole = Vector((0.0, 0.0, 0.0))
+        if constraint.pole_target is not None:
+            target = constraint.pole_target.evaluated_get(graph)
+            pole = _target(evaluated, from_world, target, constraint.pole_subtarget).translation
+        poles.append(pole)
+        influences.append(constraint.influence)
+    parent = evaluated.pose.bones[tree.bones[0]].parent
+    return Posed(
+        np.array([evaluated.pose.bones[name].matrix for name in tree.bones]),
+        np.array(parent.matrix) if parent is not None else np.eye(4),
+        np.array(goals),
+        np.array(poles),
+        np.array(influences),
+    )
 
 
 def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.ndarray) -> np.ndarray:
@@ -158,51 +105,6 @@ def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.
         basis = rest.convert_local_to_pose(Matrix(matrix), rest.matrix_local, invert=True, **above)
         result[number] = basis.to_quaternion()
     return result
-
-
-class Wanted(NamedTuple):
-    """The targets of a tree's constraints, in armature space: matrices, points, and influences."""
-
-    goals: list[Matrix]
-    poles: list[Vector]
-    influences: list[float]
-
-
-def read_wanted(
-    evaluated: bpy.types.Object,
-    tree: Tree,
-    evaluated_of: Callable[[bpy.types.Object], bpy.types.Object] = lambda target: target,
-) -> Wanted:
-    """Raises SinewError where a target cannot be read.
-
-    evaluated_of  finds the evaluated target of a constraint; within Blender's evaluation targets are
-                  evaluated
-    """
-    from_world = evaluated.matrix_world.inverted_safe()
-    wanted = Wanted([], [], [])
-    for bone, name in tree.constraints:
-        constraint = evaluated.pose.bones[bone].constraints[name]
-        target = evaluated_of(constraint.target)
-        wanted.goals.append(_target(evaluated, from_world, target, constraint.subtarget))
-        pole = Vector((0.0, 0.0, 0.0))
-        if constraint.pole_target is not None:
-            target = evaluated_of(constraint.pole_target)
-            pole = _target(evaluated, from_world, target, constraint.pole_subtarget).translation
-        wanted.poles.append(pole)
-        wanted.influences.append(constraint.influence)
-    return wanted
-
-
-def _posed(evaluated: bpy.types.Object, tree: Tree, matrices: list[Matrix], wanted: Wanted) -> Posed:
-    """matrices: of the tree's bones."""
-    parent = evaluated.pose.bones[tree.bones[0]].parent
-    return Posed(
-        np.array(matrices),
-        np.array(parent.matrix) if parent is not None else np.eye(4),
-        np.array(wanted.goals),
-        np.array(wanted.poles),
-        np.array(wanted.influences),
-    )
 
 
 def _active(bone: bpy.types.PoseBone) -> bpy.types.Constraint | None:
@@ -287,7 +189,7 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
     own = set(tree.constraints)
     for name in tree.bones:
         for constraint in armature.pose.bones[name].constraints:
-            acts = not constraint.mute and constraint.influence > 0.0 and not follows(constraint)
+            acts = not constraint.mute and constraint.influence > 0.0
             if acts and (name, constraint.name) not in own and constraint.type != "IK":
                 raise SinewError(
                     f"{armature.name}: {name} has the constraint {constraint.name} besides, which keys can "

@@ -114,12 +114,11 @@ class SINEW_MT_animation(_Submenu, bpy.types.Menu):
     bl_label = "Animation"
     bl_description = "In-betweens, blends of actions and inverse kinematics"
     entries = (
-        Entry("sinew.bake_inbetweens"),
+        Entry("sinew.bake_inbetweens", "Bake In-betweens\u2026"),
         Entry("sinew.blend_actions"),
         Entry("sinew.blend_import_clip", "Add Clip to the Blend\u2026"),
-        Entry("sinew.live_ik", "Live Sinew IK"),
-        *_over("sinew.bake_ik", "Bake Sinew IK"),
-        Entry("sinew.remove_ik"),
+        Entry("sinew.bake_ik", "Bake Sinew IK\u2026"),
+        Entry("sinew.original_action"),
     )
 
 

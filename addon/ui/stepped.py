@@ -116,6 +116,32 @@ class Stepped:
             area.tag_redraw()
 
 
+class Asking(Stepped):
+    """A base class: asks for the settings in a dialog first."""
+
+    in_steps: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not self.in_steps:
+            self.asked = True
+            return context.window_manager.invoke_props_dialog(self)
+        return super().invoke(context, event)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        # The dialog itself has nothing to end.
+        if self.in_steps:
+            super().cancel(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if getattr(self, "asked", False):
+            # The operator of a dialog cannot run in steps itself.
+            name = type(self).__name__.removeprefix("SINEW_OT_")
+            values = self.as_keywords(ignore=("in_steps",))
+            getattr(bpy.ops.sinew, name)("INVOKE_DEFAULT", in_steps=True, **values)
+            return {"CANCELLED"}
+        return super().execute(context)
+
+
 def frames_over(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object], over: str) -> list[int]:
     """Returns the frames of one of OVER. Raises SinewError where there is no action."""
     if over == "SCENE":

@@ -79,16 +79,6 @@ def test_what_is_switched_off_needs_no_sinew(tmp_path):
     )
 
 
-@pytest.mark.slow
-def test_inbetweens_need_sinew(tmp_path):
-    _obj, armature = scenes.make_arm()
-    armature.sinew_inbetween = "sclerp"
-    report = check(save(tmp_path / "a.blend"))["a.blend"]
-    assert (report["needs_sinew"], report["inbetweens"], report["problems"]) == (True, ["Arm Rig"], [])
-    armature.animation_data.nla_tracks.new().strips.new("Walk", 1, armature.animation_data.action)
-    assert "plays NLA strips" in check(save(tmp_path / "b.blend"), status=1)["b.blend"]["problems"][0]
-
-
 def simulated(obj, armature):
     modifier = obj.modifiers.new("Cloth", "CLOTH")
     obj.modifiers.move(len(obj.modifiers) - 1, 0)

@@ -22,6 +22,8 @@ from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.attach import attach, properties
 from sinew_addon.cli import make_parser
+from sinew_addon.features.action_copy import action_copy
+from sinew_addon.features.inbetween import inbetween_bake
 from sinew_addon.io import files
 
 METHODS = [method.name for method in sinew.methods()]
@@ -415,32 +417,32 @@ def keyed_file(tmp_path):
     armatures = [scenes.make_arm(bones=3, name=name)[1] for name in ("Left", "Right")]
     frames = list(range(1, 12))
     blender = bones_of(armatures[0], frames)
+    expected = []
     for armature in armatures:
-        armature.sinew_inbetween_path, armature.sinew_inbetween = "spline", "sclerp"
-    expected = [bones_of(armature, frames) for armature in armatures]
+        for _share in inbetween_bake.steps(armature, inbetween_bake.Settings("sclerp", "spline"), []):
+            pass
+        expected.append(bones_of(armature, frames))
+        action_copy.restore(armature)
     assert np.abs(expected[0] - blender).max() > 0.01
-    for armature in armatures:
-        armature.sinew_inbetween = "blender"
     path = tmp_path / "keyed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path, expected
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("live", [False, True], ids=["baked", "live"])
-def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path, live):
+def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path):
     path, expected = keyed_file
     before = path.read_bytes()
     options = ["--method", "sclerp", "--spline", "--out", tmp_path / "out"]
-    result = run_sinew("inbetween", path, *options, *(["--live"] if live else []))
+    result = run_sinew("inbetween", path, *options)
     assert "1 of 1 files" in result.stdout
     assert path.read_bytes() == before
     files.open_file(tmp_path / "out" / "keyed.blend")
     for name, bones in zip(("Left Rig", "Right Rig"), expected, strict=True):
         armature = bpy.data.objects[name]
-        assert armature.sinew_inbetween == ("sclerp" if live else "blender")
+        assert action_copy.is_on(armature)
         assert np.abs(bones_of(armature, list(range(1, 12))) - bones).max() < 1e-5
-    assert len(bpy.data.actions) == (2 if live else 4), "the keyed actions stay in the file"
+    assert len(bpy.data.actions) == 4, "the keyed actions stay in the file"
     assert "--overwrite" in run_sinew("inbetween", path, *options, status=1).stderr
 
 
@@ -449,7 +451,7 @@ def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path, live):
 def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
     path, _expected = keyed_file
     left, right = bpy.data.objects["Left Rig"], bpy.data.objects["Right Rig"]
-    right.animation_data.nla_tracks.new().strips.new("Walk", 1, right.animation_data.action)
+    right.animation_data.action_blend_type = "ADD"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "strips.blend"))
     left.animation_data_clear()
     right.animation_data_clear()
@@ -460,7 +462,7 @@ def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
         ([path, "--method", "dlb", "--step", "0", *out], "step", 2),
         ([path, "--method", "dlb", "--out", path.parent], "replace an input", 2),
         ([tmp_path / "still.blend", "--method", "dlb", *out], "keyed bones", 1),
-        ([tmp_path / "strips.blend", "--method", "dlb", *out], "NLA strips (Walk)", 1),
+        ([tmp_path / "strips.blend", "--method", "dlb", *out], "mixed with NLA strips", 1),
     ]
     for arguments, sentence, status in cases:
         result = run_sinew("inbetween", *arguments, status=status)

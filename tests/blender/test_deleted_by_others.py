@@ -90,10 +90,9 @@ print("at its end")
     [
         (DELETE,),
         ('scenes.add_sinew(obj, "dq")', DELETE, COMPARE),
-        ('armature.sinew_inbetween = "sclerp"', DELETE),
         ('scenes.add_sinew(obj, "dq")', RENAME, COMPARE),
     ],
-    ids=["nothing of Sinew", "beside a skinned mesh", "beside in-betweens", "a skinned mesh renamed"],
+    ids=["nothing of Sinew", "beside a skinned mesh", "a skinned mesh renamed"],
 )
 def test_others_delete_before_sinew_is_called(parts, event, tmp_path):
     script = tmp_path / "script.py"

@@ -296,10 +296,9 @@ def photographed(package, tmp_path, real_rig):
 @pytest.mark.slow
 def test_the_panel_in_a_window(photographed):
     """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
-    facts = photographed("docs/photograph_panel.py", "panel.png", "inbetween.png")
+    facts = photographed("docs/photograph_panel.py", "panel.png")
     assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
     assert facts["error"] == ""
-    assert facts["moved in between"] > 1e-3 * facts["diagonal"]
 
 
 @pytest.mark.slow
@@ -312,19 +311,6 @@ def test_blending_actions_in_a_window(photographed):
     assert before == after == facts["undone"]
     assert facts["ended"]["plays"] == "Blend STRAIN LATE"
     assert facts["ended"]["frame"] == before["frame"]
-
-
-@pytest.mark.slow
-def test_inverse_kinematics_live_in_a_window(photographed):
-    """Plays, moves a target, undoes that, renders beside the window, saves and reopens."""
-    options = ["--enable-event-simulate"]
-    facts = photographed("docs/photograph_ik.py", "ik-panel.png", "ik-render.png", options=options)
-    # The figure's chains have lengths of about 0.5.
-    assert facts["blender"] > 2e-6
-    for when in ("live", "played", "moved", "undone", "rendered", "saved", "opened"):
-        assert facts[when] < 2e-6, when
-    assert facts["frames"] > 5
-    assert facts["muted"]
 
 
 @pytest.mark.slow

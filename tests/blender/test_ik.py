@@ -13,6 +13,7 @@ import sinew
 from mathutils import Matrix, Vector
 from sinew_addon import cli
 from sinew_addon.core.errors import SinewError
+from sinew_addon.features.action_copy import action_copy
 from sinew_addon.features.ik import ik_bake, ik_compare
 from sinew_addon.io import files, ik_io
 
@@ -108,13 +109,13 @@ def test_a_pole_decides_two_bones_as_in_blender(method, mode):
     before = poses(arm, names)
     bake(method)
     assert constraint.mute
-    assert ik_bake.is_baked(arm)
+    assert action_copy.is_on(arm)
     # Blender stops at steps of a thousandth; the solution is unique here.
     np.testing.assert_allclose(poses(arm, names), before, atol=5e-3)
     np.testing.assert_allclose(tails(arm, "arm.1"), places(target), atol=1e-5)
-    assert bpy.ops.sinew.remove_ik() == {"FINISHED"}
+    assert bpy.ops.sinew.original_action() == {"FINISHED"}
     assert not constraint.mute
-    assert not ik_bake.is_baked(arm)
+    assert not action_copy.is_on(arm)
     np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
     assert arm.animation_data is None or arm.animation_data.action is None
 
@@ -134,7 +135,7 @@ def test_keys_of_the_action_come_back_and_those_of_others_stay():
     assert arm.animation_data.action != action
     np.testing.assert_allclose(tails(arm, "arm.2"), places(target), atol=1e-5)
     np.testing.assert_allclose(poses(arm, ["base"]), before[:, :1], atol=1e-6)
-    bpy.ops.sinew.remove_ik()
+    bpy.ops.sinew.original_action()
     assert arm.animation_data.action == action
     assert not constraint.mute
     np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
@@ -231,7 +232,7 @@ def test_stopped_it_leaves_all_as_it_was():
     running.close()
     assert not constraint.mute
     assert arm.animation_data.action == action
-    assert not ik_bake.is_baked(arm)
+    assert not action_copy.is_on(arm)
     assert len(bpy.data.actions) == count
     assert found == []
     np.testing.assert_allclose(poses(arm, ["arm.0", "arm.2"]), before, atol=1e-6)
@@ -252,7 +253,7 @@ def test_a_second_bake_keeps_what_was_there_first():
     assert upper.mute
     np.testing.assert_allclose(tails(arm, "arm.1"), places(bpy.data.objects["Low"]), atol=1e-5)
     assert len(bpy.data.actions) == 4
-    bpy.ops.sinew.remove_ik()
+    bpy.ops.sinew.original_action()
     assert arm.animation_data.action == action
     assert len(bpy.data.actions) == 3
     np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
@@ -268,7 +269,7 @@ def test_undo_takes_it_back():
     bpy.ops.ed.undo_push(message="baked")
     bpy.ops.ed.undo()
     arm = bpy.data.objects["Arm"]
-    assert not ik_bake.is_baked(arm)
+    assert not action_copy.is_on(arm)
     assert not arm.pose.bones["arm.1"].constraints[0].mute
     np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1"]), before, atol=1e-6)
 
@@ -337,8 +338,8 @@ def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
     frames = range(3, 21)
     np.testing.assert_allclose(tails(arm, "arm.2", frames), places(target, frames), atol=1e-5)
     # The file contains what the bake replaced.
-    assert ik_bake.is_baked(arm)
-    ik_bake.restore(arm)
+    assert action_copy.is_on(arm)
+    action_copy.restore(arm)
     assert arm.animation_data.action.name == "Walk"
     assert not arm.pose.bones["arm.2"].constraints[0].mute
     assert cli.main(["ik", str(source)]) == 2

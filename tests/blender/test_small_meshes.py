@@ -13,7 +13,6 @@ from sinew_addon.attach import attach, normals, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
 from sinew_addon.deform import events, handlers, session, small_meshes
 from sinew_addon.features.heat import live
-from sinew_addon.features.inbetween import inbetween_handlers
 
 FRAMES = [1, 6, 11]
 
@@ -226,7 +225,6 @@ def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, be
 def test_blender_calls_at_frames_only_for_what_sinew_has_to_do(arm, tmp_path):
     obj, _armature = arm
     ours = [
-        (bpy.app.handlers.frame_change_pre, inbetween_handlers.on_frame_change),
         (bpy.app.handlers.frame_change_pre, handlers.before_frame_change),
         (bpy.app.handlers.frame_change_post, handlers.on_frame_change),
     ]
@@ -236,28 +234,24 @@ def test_blender_calls_at_frames_only_for_what_sinew_has_to_do(arm, tmp_path):
 
     # Blender 4.2 does not notify about what comes from other files.
     told = events.IMPORTS_ARE_ANNOUNCED
-    assert heard() == [not told, False, True]
+    assert heard() == [False, True]
     properties.of(obj).method = "qv"
-    assert heard() == [not told, True, True]
+    assert heard() == [True, True]
     of_qv = scenes.shapes(obj, FRAMES)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.view_layer.update()
-    assert heard() == [not told, False, not told]
+    assert heard() == [False, not told]
     with bpy.data.libraries.load(str(tmp_path / "arm.blend")) as (_, to):
         to.objects = ["Arm", "Arm Rig"]
-    assert heard() == [True, told, True]
+    assert heard() == [told, True]
     for appended in to.objects:
         bpy.context.scene.collection.objects.link(appended)
-    obj, armature = to.objects
+    obj = to.objects[0]
     assert scenes.worst(scenes.shapes(obj, FRAMES), of_qv) <= 1e-5 * scenes.diagonal(obj)
     properties.of(obj).method = "lbs"
     bpy.context.view_layer.update()
-    assert heard() == [not told, False, True]
-    armature.sinew_inbetween = "sclerp"
-    assert heard() == [True, False, True]
-    armature.sinew_inbetween = "blender"
-    assert heard() == [not told, False, True]
+    assert heard() == [False, True]
 
 
 def test_weights_that_a_script_changed_between_frames_are_in_the_numbers(arm):

@@ -272,7 +272,7 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
         sinew.send(what="start")
         blender.send(what="start")
         outcome.fault = compare(outcome, -1, sinew.receive(), blender.receive(), blender)
-        claims, poses = {}, {}
+        claims = {}
         is_ahead = False
         for at, step in enumerate(steps):
             if outcome.fault is not None:
@@ -288,11 +288,9 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
                 **request_of(step),
                 claims_before=claims,
                 claims_after=ours["claims"],
-                poses_before=poses,
-                poses_after=ours["poses"],
             )
             theirs = blender.receive()
-            claims, poses = ours["claims"], ours["poses"]
+            claims = ours["claims"]
             outcome.said.append(f"{step.operation}: {ours['said']}")
             outcome.copies_follow &= step.operation in FOLLOWED
             outcome.copies_follow |= step.operation == "compare" and ours["outcome"] == "done"
@@ -327,7 +325,7 @@ def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) 
     if fault is not None:
         return fault
     outcome.unanswered += ours["unanswered"]
-    skipped = {*ours["skipped"], *theirs["skipped"], *theirs["follows"]}
+    skipped = {*ours["skipped"], *theirs["skipped"]}
     return (
         compare_shapes(outcome, at, ours, theirs, skipped)
         or compare_renders(outcome, at, ours, theirs, skipped)
@@ -382,8 +380,6 @@ def compare_files(at: int, ours: dict, theirs: dict) -> Fault | None:
 def compare_shapes(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str]) -> Fault | None:
     for name, (points, matrix) in ours["shapes"].items():
         other_points, other_matrix = theirs["shapes"][name]
-        if name in theirs["moved"]:
-            continue
         if not np.allclose(matrix, other_matrix, atol=1e-5):
             return Fault("place", f"{name} is elsewhere", at)
         if name not in skipped:
@@ -424,7 +420,6 @@ def compare_copies(
     if not ours.get("copies") or not outcome.copies_follow:
         return None
     wanted = [key for key in ours["copies"] if key[0] not in skipped or key[0] in theirs["shapes"]]
-    wanted = [key for key in wanted if key[0] not in theirs["follows"]]
     blender.send(what="shapes by", copies=wanted)
     for key, other in blender.receive().items():
         points, other = ours["copies"][key].astype(np.float64), other.astype(np.float64)
@@ -443,7 +438,6 @@ def compare_saved(outcome: Outcome, at: int, saved: dict, ours: dict, theirs: di
     """The differences between a file that Sinew's side saved, opened without Sinew, and the other side."""
     if "shapes" not in ours:
         return None
-    # With live inverse kinematics, the file plays with Blender's constraints.
     skipped = {*ours["skipped"], *theirs["skipped"]}
     for name, (other, _matrix) in theirs["shapes"].items():
         if name in skipped:

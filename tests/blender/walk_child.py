@@ -66,15 +66,13 @@ class Child:
         self.walker.expect_rendered = self.expect_rendered
         bpy.utils.register_class(make_engine(self.walker, self.points_of))
         self.claims: dict = {}
-        # On Sinew's side, with live inverse kinematics: the bones of all armatures in that evaluation.
-        self.poses: dict = {}
         self.wrong: list[str] = []
         walk_operations.make_library(self.walker)
 
     # --- Requests
 
     def start(self, _request: dict) -> dict:
-        self.claims, self.poses, self.wrong = {}, {}, []
+        self.claims, self.wrong = {}, []
         self.side.set_safe(False)
         self.side.compute_beside(False)
         self.operations.start(self.walker)
@@ -89,7 +87,6 @@ class Child:
         self.claims = request.get("claims_before") or {}
         self.wrong = []
         if not self.side.is_sinew:
-            self.poses = request["poses_before"]
             # The objects that an operation can choose depend on it.
             self.side.adopt(self.claims)
         numbers = random.Random(seed)
@@ -97,9 +94,7 @@ class Child:
         self.walker.rendered, self.walker.rendered_by_library = {}, {}
         outcome, said = "done", None
         try:
-            # Operations that would store a pose that differs between the sides.
-            if not (self.poses and name in self.operations.NOT_WHILE_LIVE):
-                said = operation.act(self.walker, numbers)
+            said = operation.act(self.walker, numbers)
             if said is None:
                 outcome = "nothing"
         except Exception as error:
@@ -112,7 +107,7 @@ class Child:
                 self.walker.push_undo()
         self.claims = request.get("claims_after") or {}
         if not self.side.is_sinew:
-            self.wrong, self.poses = [], request["poses_after"]
+            self.wrong = []
         result = {"outcome": outcome, "said": said, **self.look(request["check"])}
         result["rendered"] = self.walker.rendered
         result["rendered by library"] = self.walker.rendered_by_library
@@ -155,8 +150,7 @@ class Child:
         if not check:
             if not self.side.is_sinew:
                 return {}
-            self.poses = self.side.live_poses(None)
-            return {"claims": self.side.claims(), "poses": self.poses}
+            return {"claims": self.side.claims()}
         found: dict = {}
         if not self.side.is_sinew:
             self.wrong += self.side.bring_in_line(self.claims)
@@ -169,29 +163,21 @@ class Child:
         found["state"] = self.state()
         if self.side.is_sinew:
             found["claims"] = self.side.claims()
-            found["poses"] = self.poses = self.side.live_poses(depsgraph)
             found["copies"] = self.copies(depsgraph)
             found["unanswered"] = self.side.records.unanswered
             self.side.records.unanswered = 0
         else:
             found["wrong"] = self.wrong
-            live = {name for name, (is_live, _bones) in self.poses.items() if is_live}
-            follows, moved = self.sides.what_follows(live)
-            found["follows"] = [obj.name_full for obj in (*follows, *moved)]
-            found["moved"] = [obj.name_full for obj in moved]
-            found["expected"] = self.all_expected(follows)
+            found["expected"] = self.all_expected()
         return found
 
-    def all_expected(self, follows) -> dict:
-        """Points of visible objects whose shape Blender can not compute.
-
-        follows  those that follow what is solved live
-        """
+    def all_expected(self) -> dict:
+        """Points of visible objects whose shape Blender can not compute."""
         found = {}
         for obj in self.bpy.context.view_layer.objects:
             if obj.type != "MESH" or not obj.visible_get():
                 continue
-            if obj in follows or self.side.has_other_shape(obj):
+            if self.side.has_other_shape(obj):
                 points = self.expected(obj)
                 if points is not None:
                     found[obj.name_full] = points
@@ -249,7 +235,7 @@ class Child:
         return side.has_other_shape(obj) or self.has_other_scale(obj)
 
     def expect_rendered(self, name: str, obj, depsgraph) -> None:
-        if not self.side.is_sinew and self.side.has_other_shape(obj) and not self.poses:
+        if not self.side.is_sinew and self.side.has_other_shape(obj):
             points = self.expected(obj, depsgraph)
             if points is not None:
                 self.walker.rendered_by_library[name] = points
@@ -261,9 +247,8 @@ class Child:
             return None
         if claim is None or not side.is_on(obj) or obj.data.is_editmode:
             return None
-        bones = {name: bones for name, (_is_live, bones) in self.poses.items()}
         return self.shapes_of.expected(
-            obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render, bones
+            obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render
         )
 
     def has_other_scale(self, obj) -> bool:
@@ -323,10 +308,7 @@ class Child:
         found["meshes"] = sorted({obj.data.name_full for obj in there})
         of_helpers = {o.data for o in bpy.data.objects if self.side.may_react(o)}
         found["armatures"] = sorted(
-            a.name_full
-            for a in bpy.data.armatures
-            # If a follower was purged, its bones remain without a user, and are not saved.
-            if not (a.library or a in of_helpers or (a.users == 0 and "Sinew IK" in a.name))
+            a.name_full for a in bpy.data.armatures if not (a.library or a in of_helpers)
         )
         found["collections"] = [c.name for c in self.walker.collections()]
         for obj in self.walker.objects("MESH"):

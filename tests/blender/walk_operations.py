@@ -33,11 +33,6 @@ from walk_sides import (
 FRAMES = (1, 11)
 # Targets of inverse kinematics.
 TARGET = "target"
-# While it is live, poses differ between the sides, and these operations would store them.
-NOT_WHILE_LIVE = {
-    *("parent", "parent_as_artists_do", "join", "remesh", "replace_mesh", "apply_transform", "apply_pose"),
-    *("apply_modifier", "convert_to_mesh", "mend", "compare"),
-}
 # Rotations of a bone relative to another stay below 180 degrees, where dual quaternions are discontinuous.
 TURN = 0.8
 
@@ -369,7 +364,6 @@ def remove(w: Walker, r: random.Random) -> str | None:
 def remove_all(w: Walker, r: random.Random) -> str | None:
     w.object_mode()
     w.side.end_comparison()
-    w.side.end_live()
     # Includes objects outside the current view layer.
     for obj in [o for o in w.objects("MESH") if w.side.has_sinew(o) and o.library is None]:
         # An object from a library with Sinew has it again when the file is loaded.
@@ -887,21 +881,6 @@ def ik_chain(w: Walker, r: random.Random) -> str | None:
     constraint = bone.constraints.new("IK")
     constraint.target, constraint.chain_count = target, length
     return f"{bone.name} of {rig.name} follows {target.name}"
-
-
-@operation(2.5)
-def live_ik(w: Walker, r: random.Random) -> str | None:
-    """Sinew starts or stops solving an armature's chains."""
-
-    def has_chain(rig: bpy.types.Object) -> bool:
-        return rig.mode == "OBJECT" and any(
-            c.type == "IK" for bone in rig.pose.bones for c in bone.constraints
-        )
-
-    rig = w.one(r, [rig for rig in w.armatures() if has_chain(rig)])
-    if rig is None:
-        return None
-    return f"{rig.name} solved live, or no longer {w.side.switch_live(rig)}"
 
 
 @operation(2)

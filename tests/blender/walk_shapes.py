@@ -73,7 +73,6 @@ def expected(
     stages: Mapping[str, Mapping[str, Any]],
     parameters: Mapping[str, Any],
     render: bpy.types.Depsgraph | None = None,
-    poses: Mapping[str, Mapping[str, np.ndarray]] | None = None,
 ) -> np.ndarray | None:
     """float32 [vertices, 3], object space; None if this file can not compute it.
 
@@ -81,7 +80,6 @@ def expected(
     stages      the parameters of the enabled stages
     parameters  of methods, by their full names
     render      the evaluation for a render; None: that of the viewport
-    poses       matrices of bones, in armature space, of armatures that the other side poses
     """
     modifiers = list(obj.modifiers)
     places = [index for index, modifier in enumerate(modifiers) if modifier.name in run]
@@ -95,11 +93,11 @@ def expected(
         if is_moved or obj.data.shape_keys is not None:
             # A render can not be evaluated without what deforms.
             return None
-        read = _read(obj, obj.data, active, render, {})
+        read = _read(obj, obj.data, active, render)
     else:
         with _off(active):
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            read = _read(obj, obj.evaluated_get(depsgraph).data, active, depsgraph, poses or {})
+            read = _read(obj, obj.evaluated_get(depsgraph).data, active, depsgraph)
     if not active:
         return read.rest
     methods = (method, stages.get("mix", {}).get("method"))
@@ -199,7 +197,6 @@ def _read(
     mesh: bpy.types.Mesh,
     modifiers: list[bpy.types.ArmatureModifier],
     depsgraph: bpy.types.Depsgraph,
-    poses: Mapping[str, Mapping[str, np.ndarray]],
 ) -> _Read:
     groups = _groups(mesh, obj)
     return _Read(
@@ -208,7 +205,7 @@ def _read(
         _triangles(obj.data),
         _topology(mesh),
         groups,
-        [_read_armature(obj, mesh, modifier, groups, depsgraph, poses) for modifier in modifiers],
+        [_read_armature(obj, mesh, modifier, groups, depsgraph) for modifier in modifiers],
         _sdef_keys(obj.data),
     )
 
@@ -232,7 +229,6 @@ def _read_armature(
     modifier: bpy.types.ArmatureModifier,
     groups: dict[str, dict[int, float]],
     depsgraph: bpy.types.Depsgraph,
-    poses: Mapping[str, Mapping[str, np.ndarray]],
 ) -> _Armature:
     rig = modifier.object.evaluated_get(depsgraph)
     bones = modifier.object.data.bones
@@ -240,8 +236,7 @@ def _read_armature(
     mask = _weights_of(groups, modifier.vertex_group, count)
     if mask is not None and modifier.invert_vertex_group:
         mask = 1.0 - mask
-    pose = poses.get(modifier.object.name_full) or {each.name: each.matrix for each in rig.pose.bones}
-    posed = np.array([np.array(pose[bone.name]) for bone in bones]).reshape(-1, 4, 4)
+    posed = np.array([np.array(rig.pose.bones[bone.name].matrix) for bone in bones]).reshape(-1, 4, 4)
     rest = np.array([np.array(bone.matrix_local) for bone in bones]).reshape(-1, 4, 4)
     place = np.array(obj.evaluated_get(depsgraph).matrix_world)
     return _Armature(

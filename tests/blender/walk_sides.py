@@ -131,50 +131,6 @@ def animated_paths(obj: bpy.types.Object) -> set[str]:
     return {curve.data_path for curve in (*curves_of(obj), *drivers)}
 
 
-def what_follows(live: set[str]) -> tuple[set[bpy.types.Object], set[bpy.types.Object]]:
-    """Objects that follow what the other side solves live, for armatures with these names: those that
-    follow it only by Armature modifiers, and those that may have another position or shape for another
-    reason."""
-    posed = {o for o in bpy.data.objects if o.name_full in live}
-    moved: set[bpy.types.Object] = set()
-    while live:
-        before = len(posed), len(moved)
-        for obj in bpy.data.objects:
-            bones = obj.pose.bones if obj.pose is not None else ()
-            if any(_target(c) in posed | moved for bone in bones for c in bone.constraints):
-                posed.add(obj)
-            by_bone = obj.parent in posed and obj.parent_type != "OBJECT"
-            if by_bone or obj.parent in moved or any(_target(c) in posed | moved for c in obj.constraints):
-                moved.add(obj)
-            others = [m for m in obj.modifiers if m.type != "ARMATURE"]
-            armatures = [m.object for m in obj.modifiers if m.type == "ARMATURE"]
-            keys = obj.data.shape_keys if obj.type == "MESH" else None
-            if (
-                any(getattr(m, "object", None) in posed | moved for m in others)
-                or not moved.isdisjoint(armatures)
-                or not (posed | moved).isdisjoint(_drivers_targets(obj) | _drivers_targets(keys))
-            ):
-                moved.add(obj)
-        if (len(posed), len(moved)) == before:
-            break
-    follows = {
-        obj
-        for obj in bpy.data.objects
-        if any(m.type == "ARMATURE" and m.object in posed for m in obj.modifiers)
-    }
-    return follows - moved, moved
-
-
-def _target(constraint: bpy.types.Constraint) -> bpy.types.Object | None:
-    return getattr(constraint, "target", None)
-
-
-def _drivers_targets(owner: bpy.types.ID | None) -> set[bpy.types.ID | None]:
-    animation = owner.animation_data if owner is not None else None
-    drivers = [curve.driver for curve in animation.drivers] if animation is not None else []
-    return {target.id for driver in drivers for variable in driver.variables for target in variable.targets}
-
-
 def remove_curves(owner: bpy.types.ID, end: str) -> None:
     """Removes the curves whose data path ends with this."""
     action = owner.animation_data.action if owner.animation_data is not None else None
@@ -402,13 +358,6 @@ class BlenderSide:
     def set_heat(self, obj: bpy.types.Object, on: bool, quantity: str) -> None:
         self.set_option(obj, "heat", on)
 
-    def switch_live(self, rig: bpy.types.Object) -> str:
-        rig.pass_index ^= CHANGED
-        return ""
-
-    def end_live(self) -> None:
-        pass
-
     def set_safe(self, on: bool) -> None:
         pass
 
@@ -578,8 +527,7 @@ class SinewSide:
 
     def may_react(self, obj: bpy.types.Object) -> bool:
         """Whether Sinew made it for another object."""
-        is_follower = getattr(obj, "sinew_ik_is_follower", False)
-        return self._properties.is_helper(obj) or self._properties.is_copy(obj) or is_follower
+        return self._properties.is_helper(obj) or self._properties.is_copy(obj)
 
     def is_helper(self, obj: bpy.types.Object) -> bool:
         return self._properties.is_helper(obj)
@@ -809,39 +757,6 @@ class SinewSide:
         from sinew_addon.features.compare import comparison
 
         comparison.start(bpy.context, meshes, methods, np.array((1.0, 0.0, 0.0)))
-
-    def live_poses(self, depsgraph: bpy.types.Depsgraph | None) -> dict[str, tuple[bool, dict | None]]:
-        """While inverse kinematics is live anywhere: for each armature whether it is, and its bones'
-        matrices in an evaluation."""
-        from sinew_addon.features.ik import ik_live
-
-        def bones(rig: bpy.types.Object) -> dict[str, np.ndarray] | None:
-            if depsgraph is None:
-                return None
-            return {bone.name: np.array(bone.matrix) for bone in rig.evaluated_get(depsgraph).pose.bones}
-
-        rigs = [o for o in bpy.data.objects if o.type == "ARMATURE" and not self.may_react(o)]
-        live = [rig for rig in rigs if ik_live.is_live(rig) and not ik_live.problem_of(rig)]
-        return {rig.name_full: (rig in live, bones(rig)) for rig in rigs} if live else {}
-
-    def switch_live(self, rig: bpy.types.Object) -> str:
-        from sinew_addon.core.errors import SinewError
-        from sinew_addon.features.ik import ik_live
-
-        if ik_live.is_live(rig):
-            ik_live.switch_off(rig)
-            return "given back"
-        try:
-            ik_live.switch_on(rig)
-        except SinewError as refused:
-            return f"refused: {refused}"
-        return ik_live.problem_of(rig) or "live"
-
-    def end_live(self) -> None:
-        from sinew_addon.features.ik import ik_live
-
-        for rig in [o for o in bpy.data.objects if o.type == "ARMATURE" and ik_live.is_live(o)]:
-            ik_live.switch_off(rig)
 
     def end_comparison(self) -> None:
         from sinew_addon.features.compare import comparison

@@ -287,8 +287,6 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
     animation = rig.animation_data
     if animation is not None and animation.use_tweak_mode:
         raise SinewError(f"{rig.name}: a strip of its NLA is being edited; leave tweak mode first")
-    if animation is not None and animation.action is not None and animation.action.sinew_holds:
-        raise SinewError(f"{rig.name}: Sinew makes its in-betweens; bake these first")
     if rig.name not in bpy.context.view_layer.objects:
         raise SinewError(f"{rig.name}: is not in this view layer, where bones could be added")
     return rig

@@ -21,7 +21,7 @@ from . import bake, bake_apart, bake_bones
 WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
 
 
-class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
+class SINEW_OT_bake(OnSinewObjects, stepped.Asking, bpy.types.Operator):
     bl_idname = "sinew.bake"
     bl_label = "Bake"
     bl_description = "Write what Sinew deforms as data that plays without it"
@@ -96,13 +96,6 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             (POSE, "Pose", "Constraints by which they follow the pose: other animation has them, too"),
         ],
     )
-    in_steps: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if not self.in_steps:
-            self.asked = True
-            return context.window_manager.invoke_props_dialog(self)
-        return super().invoke(context, event)
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
@@ -112,31 +105,6 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             of_kind = ("folder", "overwrite")
         for name in ("kind", "frames", "step", *of_kind):
             layout.prop(self, name)
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        # The dialog itself has nothing to end.
-        if self.in_steps:
-            super().cancel(context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if getattr(self, "asked", False):
-            # The operator of a dialog cannot run in steps itself.
-            names = (
-                "kind",
-                "frames",
-                "step",
-                "folder",
-                "overwrite",
-                "motion",
-                "helpers",
-                "error",
-                "influences",
-            )
-            bpy.ops.sinew.bake(
-                "INVOKE_DEFAULT", in_steps=True, **{name: getattr(self, name) for name in names}
-            )
-            return {"CANCELLED"}
-        return super().execute(context)
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         self.started = self._start(context)

@@ -1,104 +1,115 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes in-betweens to plain keys in a separate action, which plays without Sinew."""
+"""Keys in-betweens in a copy of the action, which plays without Sinew."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
+from ...core import inbetween as core
 from ...core.errors import SinewError
-from ...core.inbetween import BLENDER, METHODS
 from ...io import actions, pose_io
-from . import inbetween, keyed_poses
+from ..action_copy import action_copy
+from . import keyed_poses
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How in-betweens are made.
+
+    method  of core.METHODS
+    path    core.STRAIGHT or core.SPLINE
+    step    frames from one key to the next
+    range   keyed poses within these frames; None: all
+    only    the bones that move by the method; None: all
+    """
+
+    method: str
+    path: str = core.STRAIGHT
+    step: int = 1
+    range: tuple[float, float] | None = None
+    only: Collection[str] | None = None
 
 
 @dataclass
 class Baked:
-    """The new action, the number of bones with new keys, and the bones of `keyed_poses.Pose.far`."""
+    """What steps() did to an armature, by bone: `bones` were keyed, `left` keep their curves for the reason
+    given, `far` are those of `keyed_poses.Pose.far`."""
 
-    action: bpy.types.Action
-    bones: int
-    far: set[str]
+    armature: bpy.types.Object
+    bones: int = 0
+    left: dict[str, str] = field(default_factory=dict)
+    far: set[str] = field(default_factory=set)
+
+    def notes(self, path: str) -> list[str]:
+        kept = [f"{bone} {reason}: it keeps its curves" for bone, reason in sorted(self.left.items())]
+        return [*kept, *(f"{bone} {core.TOO_FAR[path]}" for bone in sorted(self.far))]
 
 
-def bake(
-    armature: bpy.types.Object, step: int = 1, progress: Callable[[float], None] = lambda _part: None
-) -> Baked:
-    """Copies the action that Sinew plays on `armature`, with keys at every `step` frames between its first
-    and last key and linear interpolation, and plays the copy with Blender's curves.
+def steps(armature: bpy.types.Object, settings: Settings, found: list[Baked]) -> Iterator[float]:
+    """Has the armature play a copy of its action, in which the bones move by a method between the keyed
+    poses, with keys at every `step` frames and linear interpolation; yields the progress.
 
-    The keyed poses stay, also those between whole frames; in-betweens are keys of type Breakdown. The old
-    action stays in the file.
-
-    progress  called with the progress, 0 to 1
-
-    Raises SinewError where Sinew makes no in-betweens.
+    The keyed poses stay, also those between whole frames; in-betweens are keys of type Breakdown. If closed
+    before the end, everything is as before. Raises SinewError where there is nothing to do.
     """
-    action, slot = inbetween.action_of(armature)
-    poses = keyed_poses.read(armature)
-    if not poses.groups or not inbetween.is_on(armature):
-        raise SinewError(
-            inbetween.obstacle(armature)
-            or f"{armature.name}: Sinew makes no in-betweens here; choose a method and key some poses"
+    with action_copy.playing(armature, core.METHODS[settings.method].label):
+        poses = keyed_poses.read(armature, settings.only)
+        baked = Baked(armature, left=poses.left)
+        wanted = [_times(group, poses.curves, settings) for group in poses.groups]
+        baked.bones = sum(
+            len(group.rows) for group, times in zip(poses.groups, wanted, strict=True) if len(times)
         )
-    curves = actions.all_curves(action, slot)
-    wanted = [_times(group, curves, step) for group in poses.groups]
-    times = np.unique(np.concatenate(wanted))
-    samples, far = _sample(armature, poses, times, progress)
+        if not baked.bones:
+            reasons = [f"{bone} {reason}" for bone, reason in sorted(poses.left.items())]
+            raise SinewError(
+                f"{armature.name}: no bone has two keyed poses here; "
+                f"{reasons[0] if reasons else 'key some poses'}"
+            )
+        times = np.unique(np.concatenate(wanted))
+        samples: list[np.ndarray] = []
+        modes = np.array([bone.rotation_mode for bone in armature.pose.bones])
+        for number, time in enumerate(times):
+            pose = keyed_poses.pose_at(armature, poses, float(time), settings.method, settings.path)
+            # Rotation values close to the previous ones.
+            samples.append(pose_io.closer(pose.channels, modes, samples[-1]) if samples else pose.channels)
+            baked.far.update(pose.far)
+            yield (number + 1) / len(times)
+        for group, own_times in zip(poses.groups, wanted, strict=True):
+            values = np.array(samples)[np.searchsorted(times, own_times)]
+            for number, bone, column in zip(group.curves, group.bones, group.columns, strict=True):
+                if len(own_times):
+                    row = group.rows[bone]
+                    _write_keys(poses.curves[number], group, int(bone), own_times, values[:, row, column])
+    found.append(baked)
 
-    baked = action.copy()
-    baked.name = f"{action.name} {METHODS[armature.sinew_inbetween].label}"
-    for name in [record.name for record in baked.sinew_holds]:
-        actions.release(baked, int(name))
-    handle = actions.handle_of(slot)
-    baked_slot = next((s for s in getattr(baked, "slots", ()) if s.handle == handle), None)
-    copies = actions.all_curves(baked, baked_slot)
-    for group, own_times in zip(poses.groups, wanted, strict=True):
-        values = samples[np.searchsorted(times, own_times)]
-        for number, bone, column in zip(group.curves, group.bones, group.columns, strict=True):
-            _write_keys(copies[number], group, int(bone), own_times, values[:, group.rows[bone], column])
-    if action.is_editable:
-        action.use_fake_user = True
-    armature.animation_data.action = baked
-    if baked_slot is not None:
-        armature.animation_data.action_slot = baked_slot
-    armature.sinew_inbetween = BLENDER
-    return Baked(baked, sum(len(group.rows) for group in poses.groups), far)
+
+# Of the first and the last key: what shapes the curve on the other side.
+_OUTER = (
+    ("handle_left",),
+    ("handle_right", "interpolation", "easing", "amplitude", "back", "period"),
+)
 
 
-def _times(group: keyed_poses.Group, curves: Sequence[bpy.types.FCurve], step: int) -> np.ndarray:
+def _times(group: keyed_poses.Group, curves: Sequence[bpy.types.FCurve], settings: Settings) -> np.ndarray:
     """Returns the times of the keys that a group's bones get, float32: the frames, and the artist's keys."""
-    first, last = group.times[0], group.times[-1]
-    frames = np.arange(np.ceil(first), np.floor(last) + 1, step)
-    # A curve with linear extrapolation takes its slope from the last two keys.
-    outside = [first - 1.0, last + 1.0] if any(_extrapolates(curves[n]) for n in group.curves) else []
-    return np.unique(np.concatenate([group.times, frames, outside]).astype(np.float32))
+    keys, outside = group.times, []
+    if settings.range is not None:
+        keys = keys[(keys >= settings.range[0]) & (keys <= settings.range[1])]
+    elif any(_extrapolates(curves[number]) for number in group.curves):
+        # A curve with linear extrapolation takes its slope from the last two keys.
+        outside = [keys[0] - 1.0, keys[-1] + 1.0]
+    if len(keys) < 2:
+        return np.empty(0, np.float32)
+    frames = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1, settings.step)
+    return np.unique(np.concatenate([keys, frames, outside]).astype(np.float32))
 
 
 def _extrapolates(curve: bpy.types.FCurve) -> bool:
     return curve.extrapolation == "LINEAR" and all(modifier.mute for modifier in curve.modifiers)
-
-
-def _sample(
-    armature: bpy.types.Object,
-    poses: keyed_poses.KeyedPoses,
-    times: np.ndarray,
-    progress: Callable[[float], None],
-) -> tuple[np.ndarray, set[str]]:
-    """float32 [times, bones, 10]: the channels at each time, with rotation values close to the previous ones;
-    and the bones that rotate too far between keys somewhere."""
-    method, path = armature.sinew_inbetween, armature.sinew_inbetween_path
-    modes = np.array([bone.rotation_mode for bone in armature.pose.bones])
-    samples, far = [], set()
-    for number, time in enumerate(times):
-        pose = keyed_poses.pose_at(armature, poses, float(time), method, path)
-        samples.append(pose_io.closer(pose.channels, modes, samples[-1]) if samples else pose.channels)
-        far.update(pose.far)
-        progress((number + 1) / len(times))
-    return np.stack(samples), far
 
 
 def _write_keys(
@@ -108,14 +119,29 @@ def _write_keys(
     chosen = inside | _extrapolates(curve)
     times, values = times[chosen], values[chosen]
     points = curve.keyframe_points
-    points.clear()
+    # The curve from and to keys that stay is as before.
+    outer = [
+        {name: _value(point, name) for name in names}
+        for names, time in zip(_OUTER, (times[0], times[-1]), strict=True)
+        for point in points
+        if point.co.x == time
+    ]
+    for point in reversed([point for point in points if times[0] <= point.co.x <= times[-1]]):
+        points.remove(point, fast=True)
+    kept = len(points)
     points.add(len(times))
-    points.foreach_set("co", np.column_stack([times, values]).astype(np.float32).ravel())
+
+    def write(name: str, size: int, new: np.ndarray) -> None:
+        dtype = np.float32 if name == "co" else np.int32
+        every = np.empty(size * len(points), dtype)
+        points.foreach_get(name, every)
+        every[size * kept :] = new.ravel()
+        points.foreach_set(name, every)
 
     def choose(name: str, where: np.ndarray, choice: str, otherwise: str) -> None:
-        numbers = np.where(where, actions.key_value(name, choice), actions.key_value(name, otherwise))
-        points.foreach_set(name, numbers.astype(np.int32))
+        write(name, 1, np.where(where, actions.key_value(name, choice), actions.key_value(name, otherwise)))
 
+    write("co", 2, np.column_stack([times, values]))
     key = np.maximum(np.searchsorted(group.times, times, side="right") - 1, 0)
     choose(
         "interpolation", group.still[key, bone] & (times >= group.times[0]), "CONSTANT", otherwise="LINEAR"
@@ -124,3 +150,16 @@ def _write_keys(
     for side in ("handle_left_type", "handle_right_type"):
         choose(side, np.ones(len(times), dtype=bool), "AUTO_CLAMPED", otherwise="AUTO_CLAMPED")
     curve.update()
+    if kept and len(outer) == 2:
+        for at, values_of_key in zip((times[0], times[-1]), outer, strict=True):
+            point = next(point for point in points if point.co.x == at)
+            # Blender adapts a handle to its opposite unless both are free.
+            point.handle_left_type = point.handle_right_type = "FREE"
+            for name, value in values_of_key.items():
+                setattr(point, name, value)
+        curve.update()
+
+
+def _value(point: bpy.types.Keyframe, name: str) -> object:
+    value = getattr(point, name)
+    return value.copy() if name.startswith("handle_") else value

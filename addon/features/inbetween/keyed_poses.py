@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from ...core import inbetween as core
 from ...io import actions, pose_io
-from . import inbetween
 
 # The number of keyed poses that are kept: those that playback uses now and soon.
 KEPT = 8
@@ -48,15 +47,19 @@ class Group:
 
 @dataclass
 class KeyedPoses:
-    """What was read of a held slot for an armature; valid until the action changes.
+    """What was read of a slot for an armature; valid until the action changes.
 
-    curves  the channel of each curve of the slot, held or not
-    bones   the armature's bones, each with its rotation property
+    curves  all of the slot
+    left    bones that keep their curves, each with the reason
     """
 
-    curves: list[tuple[str, int]]
-    bones: dict[str, str]
+    curves: list[bpy.types.FCurve]
     groups: list[Group]
+    left: dict[str, str]
+
+    @property
+    def bones(self) -> int:
+        return sum(len(group.rows) for group in self.groups)
 
 
 @dataclass
@@ -88,20 +91,26 @@ class Span:
     times: np.ndarray
 
 
-def read(armature: bpy.types.Object) -> KeyedPoses:
-    """Reads the keyed poses that Sinew plays on an armature; none where its action is not held."""
-    action, slot = inbetween.action_of(armature)
+def read(armature: bpy.types.Object, only: Collection[str] | None = None) -> KeyedPoses:
+    """Reads the keyed poses of the action that an armature plays, of all bones or only of some."""
+    action, slot = actions.playing(armature)
     rotations = pose_io.rotation_properties(armature.pose.bones)
-    everything = [actions.key_of(curve) for curve in actions.all_curves(action, slot)]
-    numbers = {key: number for number, key in enumerate(everything)}
+    everything = actions.all_curves(action, slot)
+    numbers = {actions.key_of(curve): number for number, curve in enumerate(everything)}
     rows = {name: row for row, name in enumerate(rotations)}
     found: dict[object, list[_Bone]] = {}
-    for name, pairs in actions.held_curves(action, slot).items():
+    left = {}
+    for name, pairs in actions.unmuted_curves(action, slot).items():
         pairs = [pair for pair in pairs if actions.plays(pair[1], rotations.get(name))]
-        if pairs:
-            bone = _Bone.read(armature.pose.bones[name], rows[name], pairs)
-            found.setdefault(bone.likeness, []).append(bone)
-    return KeyedPoses(everything, rotations, [_group(bones, numbers) for bones in found.values()])
+        if not pairs or (only is not None and name not in only):
+            continue
+        reason = actions.reason_against([curve for curve, _channel in pairs])
+        if reason is not None:
+            left[name] = reason
+            continue
+        bone = _Bone.read(armature.pose.bones[name], rows[name], pairs)
+        found.setdefault(bone.likeness, []).append(bone)
+    return KeyedPoses(everything, [_group(bones, numbers) for bones in found.values()], left)
 
 
 class _Bone(NamedTuple):
@@ -153,25 +162,19 @@ def _group(bones: list[_Bone], numbers: dict[tuple[str, int], int]) -> Group:
     )
 
 
-def fits(poses: KeyedPoses, armature: bpy.types.Object) -> bool:
-    """Whether the armature and its action still have the curves and bones that were read."""
-    curves = [actions.key_of(curve) for curve in actions.all_curves(*inbetween.action_of(armature))]
-    return curves == poses.curves and pose_io.rotation_properties(armature.pose.bones) == poses.bones
-
-
 def pose_at(armature: bpy.types.Object, poses: KeyedPoses, time: float, method: str, path: str) -> Pose:
     """Returns the pose at `time`; at keys, and before the first and after the last, that of Blender's curves.
 
-    poses   from read(), where fits()
-    method  of core.METHODS, or core.BLENDER
+    poses   from read()
+    method  of core.METHODS
     """
-    curves = actions.all_curves(*inbetween.action_of(armature))
+    curves = poses.curves
     channels = pose_io.read_channels(armature.pose.bones)
-    pose, names = Pose(channels), list(poses.bones)
+    pose, names = Pose(channels), armature.pose.bones.keys()
     for group in poses.groups:
         values = [curves[number].evaluate(time) for number in group.curves]
         channels[group.rows[group.bones], group.columns] = values
-        span = span_at(group, time) if method != core.BLENDER else None
+        span = span_at(group, time)
         if span is not None:
             found, is_far = _between(group, span, curves, channels[group.rows], method, path)
             channels[group.rows] = np.where(group.keyed, found, channels[group.rows])

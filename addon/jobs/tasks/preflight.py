@@ -11,20 +11,17 @@ import bpy
 
 from ...attach import attach, properties, stack, upstream_proxy
 from ...attach.updates import updates_suspended
-from ...core import inbetween as core
 from ...core.errors import SinewError
 from ...deform import evaluate
-from ...features.inbetween import inbetween_handlers
 from ...io import files
 
 
 def check(task: dict, report: Callable[..., None]) -> dict:
     """Checks the file "source" of a task.
 
-    "meshes": name and method of each mesh that Sinew deforms; "inbetweens": armatures that Sinew poses;
-    "problems": a sentence for each thing that Sinew cannot do, with what to do about it; "notes": remarks
-    that are no faults. Raises SinewError where the file cannot be read. The open file must not be used
-    afterwards.
+    "meshes": name and method of each mesh that Sinew deforms; "problems": a sentence for each thing that
+    Sinew cannot do, with what to do about it; "notes": remarks that are no faults. Raises SinewError where
+    the file cannot be read. The open file must not be used afterwards.
     """
     report("opening it")
     # In its saved state, before Sinew reacts to what it finds.
@@ -35,7 +32,6 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
     objects = [obj for obj in bpy.data.objects if obj not in overridden and not properties.is_copy(obj)]
     skinned = [obj for obj in objects if properties.has_sinew(obj)]
-    armatures = [obj for obj in objects if obj.type == "ARMATURE" and obj.sinew_inbetween != core.BLENDER]
     # Read before they are tried, which switches them on.
     meshes = [
         {"object": obj.name, "method": properties.of(obj).method}
@@ -44,7 +40,6 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     ]
     off = [obj.name for obj in skinned if not properties.of(obj).enabled]
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
-    problems += [reason for reason in map(inbetween_handlers.problem_of, armatures) if reason is not None]
     problems += _not_deformable(skinned)
     notes += [f"{name} is switched off: its Armature modifier deforms it" for name in off]
     notes += [
@@ -52,12 +47,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
         for library in bpy.data.libraries
         if _is_missing(library)
     ]
-    return {
-        "meshes": meshes,
-        "inbetweens": [armature.name for armature in armatures],
-        "problems": problems,
-        "notes": notes,
-    }
+    return {"meshes": meshes, "problems": problems, "notes": notes}
 
 
 def _not_deformable(objects: list[bpy.types.Object]) -> Iterator[str]:

@@ -584,16 +584,24 @@ TEXTS = {
         "Wie viele Dreiecke andere durchdringen, die sie in Ruhe nicht durchdringen"
     ),
     # Inverse kinematics
-    "Inverse Kinematics": "Inverse Kinematik",
-    "Live Sinew IK": "Sinew-IK live",
     "Bake Sinew IK": "Sinew-IK backen",
-    "Bake Sinew IK over the Scene's Frames": "Sinew-IK über die Einzelbilder der Szene backen",
-    "Bake Sinew IK over the Action's Frames": "Sinew-IK über die Einzelbilder der Aktion backen",
+    "Bake Sinew IK\u2026": "Sinew-IK backen\u2026",
     "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in "
-    "a copy of the action; the constraints are muted until Remove": (
+    "a copy of the action; the constraints are muted until Original Action": (
         "Die IK-Zwänge der Ketten der ausgewählten Knochen, oder alle, durch Sinew lösen und das Ergebnis in "
-        "einer Kopie der Aktion mit Schlüsselbildern versehen; bis Entfernen sind die Zwänge stumm"
+        "einer Kopie der Aktion mit Schlüsselbildern versehen; bis Ursprüngliche Aktion sind die Zwänge stumm"
     ),
+    "Original Action": "Ursprüngliche Aktion",
+    "Play the action that was there before Sinew keyed a copy, with its IK constraints; the copy goes": (
+        "Die Aktion abspielen, die vor Sinews Kopie da war, mit ihren IK-Zwängen; die Kopie verschwindet"
+    ),
+    "Sinew has keyed no copy of this armature's action": (
+        "Sinew hat keine Kopie der Aktion dieses Skeletts erstellt"
+    ),
+    "Whether it is a copy with keys of Sinew": "Ob es eine Kopie mit Schlüsselbildern von Sinew ist",
+    "The action before": "Die Aktion davor",
+    "The pose before": "Die Pose davor",
+    "The IK constraints that are muted meanwhile": "Die IK-Zwänge, die derweil stumm sind",
     "Sinew solves inverse kinematics": "Sinew löst inverse Kinematik",
     "How the rotations are found": "Wie die Drehungen gefunden werden",
     "Damped least squares": "Gedämpfte kleinste Quadrate",
@@ -608,45 +616,10 @@ TEXTS = {
     "{count} bones keyed; the tips are at most {share} of a chain's length off": (
         "{count} Knochen mit Schlüsselbildern; die Spitzen liegen höchstens {share} einer Kettenlänge daneben"
     ),
-    "Remove Sinew IK": "Sinew-IK entfernen",
-    "Give back the action and the IK constraints that were there before Live and the bake": (
-        "Die Aktion und die IK-Zwänge zurückgeben, die vor Live und dem Backen da waren"
-    ),
-    "Live": "Live",
-    "Have Sinew solve the IK constraints of the selected bones' chains, or of all, in each evaluation, "
-    "without keys; again: have Blender solve them. The constraints are muted meanwhile, and their settings "
-    "go on counting": (
-        "Sinew die IK-Zwänge der Ketten der ausgewählten Knochen, oder alle, bei jeder Auswertung ohne "
-        "Schlüsselbilder lösen lassen; noch einmal: Blender sie lösen lassen. Die Zwänge sind derweil stumm, "
-        "und ihre Einstellungen zählen weiter"
-    ),
-    "{chain}: live": "{chain}: live",
-    "The most steps or sweeps of a frame; a target in reach takes a few": (
-        "Höchstens so viele Schritte oder Durchgänge je Einzelbild; ein Ziel in Reichweite braucht wenige"
-    ),
-    "The bone's IK constraint that Sinew solves live": "Der IK-Zwang des Knochens, den Sinew live löst",
-    "Whether Sinew solves chains of it live": "Ob Sinew Ketten davon live löst",
-    "The tree's root bone": "Der Wurzelknochen des Baums",
-    "What pulls the tree": "Was am Baum zieht",
-    "Whether Sinew made it for bones that follow": "Ob Sinew es für Knochen gemacht hat, die folgen",
-    "Safe mode: Blender's own constraints play": "Sicherer Modus: Blenders eigene Zwänge wirken",
-    "Whether keys of Sinew IK play": "Ob Schlüsselbilder von Sinew-IK laufen",
-    "The action before the bake": "Die Aktion vor dem Backen",
-    "The action with the baked keys": "Die Aktion mit den gebackenen Schlüsselbildern",
-    "The IK constraints that the bake muted": "Die IK-Zwänge, die das Backen stummgeschaltet hat",
-    "The pose before the bake": "Die Pose vor dem Backen",
-    "Nothing is live or baked by Sinew IK here": "Hier ist nichts durch Sinew-IK live oder gebacken",
-    "{count} bones to {names}": "{count} Knochen bis {names}",
-    "Keys of Sinew IK play; its constraints are muted": (
-        "Schlüsselbilder von Sinew-IK laufen; ihre Zwänge sind stumm"
-    ),
     # In-betweens
-    "In-betweens": "Zwischenbilder",
     "How the bones move between the keyed poses of the action": (
         "Wie sich die Knochen zwischen den Schlüsselposen der Aktion bewegen"
     ),
-    "Blender's Curves": "Blenders Kurven",
-    "Each channel by its own curve, as without Sinew": "Jeder Kanal nach seiner eigenen Kurve wie ohne Sinew",
     "Straight rotation, even pace (recommended)": "Gerade Drehung, gleichmäßig (empfohlen)",
     "The shortest rotation at an even pace, rigid; location goes straight. QV with slerp": (
         "Die kürzeste Drehung mit gleichmäßigem Tempo, starr; die Position geht geradeaus. QV mit Slerp"
@@ -696,25 +669,16 @@ TEXTS = {
     "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace": (
         "Catmull-Rom durch vier Schlüsselposen: weich an Schlüsselbildern, im Tempo des Splines"
     ),
-    "The curves that the artist had muted": "Die Kurven, die der Künstler stummgeschaltet hatte",
     "Bake In-betweens": "Zwischenbilder backen",
-    "Write the in-betweens as plain keys into a copy of the action, which plays without Sinew; the "
-    "action itself stays in the file": (
-        "Die Zwischenbilder als gewöhnliche Schlüsselbilder in eine Kopie der Aktion schreiben, die ohne "
-        "Sinew abspielt; die Aktion selbst bleibt in der Datei"
+    "Bake In-betweens\u2026": "Zwischenbilder backen\u2026",
+    "Sinew keys in-betweens": "Sinew macht Zwischenbilder",
+    "Move the selected bones, or all, between the keyed poses of their action by another method than curves, "
+    "by plain keys in a copy of the action": (
+        "Die ausgewählten Knochen, oder alle, zwischen den Schlüsselposen ihrer Aktion nach einer anderen "
+        "Methode als Kurven bewegen, durch gewöhnliche Schlüsselbilder in einer Kopie der Aktion"
     ),
     "Step": "Schritt",
     "Frames from one baked key to the next": "Einzelbilder von einem gebackenen Schlüsselbild zum nächsten",
-    "Choose a method for the in-betweens of a selected armature": (
-        "Wähle eine Methode für die Zwischenbilder eines ausgewählten Skeletts"
-    ),
-    "Key poses of bones: Sinew moves them between the keys": (
-        "Setze Schlüsselbilder für Posen: Sinew bewegt die Knochen dazwischen"
-    ),
-    "Plays {played} of {count} bones; meanwhile their curves are muted": (
-        "Bewegt {played} von {count} Knochen; deren Kurven sind stummgeschaltet"
-    ),
-    "{bone} {reason}: Blender's curves play": "{bone} {reason}: Blenders Kurven bewegen ihn",
     "rotates by 180 degrees or more from key to key, and takes the shorter way: key in between": (
         "dreht sich zwischen zwei Schlüsselbildern um 180 Grad oder mehr und nimmt den kürzeren Weg: "
         "Setze eines dazwischen"
