@@ -39,10 +39,12 @@ int main() {
         const std::string of = std::string("/") + kKindNames[static_cast<int>(kind)];
         for (const MethodInfo& method : kMethods) {
             const Deformer deformer(scene.data_for(method), method);
-            count(std::string(method.name) + of, [&] { deformer.deform(scene.pose, {{}, 1}, scene.points); });
+            count(std::string(method.name) + of, [&] {
+                (void)deformer.deform(scene.pose, {{}, 1}, scene.points);
+            });
             for (const Variant& variant : variants_of(method)) {
                 count(variant.name + of,
-                      [&] { deformer.deform(scene.pose, variant.options(), scene.points); });
+                      [&] { (void)deformer.deform(scene.pose, variant.options(), scene.points); });
             }
         }
         count("bind" + of, [&] { const Deformer deformer(scene.data(), Dq::info); });
@@ -51,7 +53,7 @@ int main() {
     for (const MethodInfo& method : kMethods) {
         const Deformer deformer(bones.data_for(method), method);
         count(std::string(method.name) + "/bones", [&] {
-            deformer.deform(bones.pose, {{}, 1}, bones.points);
+            (void)deformer.deform(bones.pose, {{}, 1}, bones.points);
         });
     }
     return 0;

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "scenes.h"
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/bulge_limit.h"
 #include "sinew/deform/simd.h"
-#include "sinew/deform/thread_pool.h"
 #include "sinew/skinning/methods.h"
 
 namespace {
@@ -42,7 +42,7 @@ void ours(benchmark::State& state, const MethodInfo& method, const Shape& shape,
     Scene& scene = scene_of(shape);
     const Deformer& deformer = bound(shape).deformer(method);
     for (auto _ : state) {
-        deformer.deform(scene.pose, {{}, threads}, scene.points);
+        (void)deformer.deform(scene.pose, {{}, threads}, scene.points);
         benchmark::ClobberMemory();
     }
 }
@@ -56,10 +56,10 @@ void bulge_limit(benchmark::State& state, const Shape& shape) {
         segments.push_back({{0, 0, z}, {0, 0, z + 1}});
     }
     const BulgeLimit limit({scene.data(), segments});
-    bound(shape).deformer(Dq::info).deform(scene.pose, {{}, 1}, scene.points);
+    (void)bound(shape).deformer(Dq::info).deform(scene.pose, {{}, 1}, scene.points);
     for (Vec3<float>& point : scene.points) point *= 1.01f;
     for (auto _ : state) {
-        limit.apply(scene.points, scene.pose, {BulgeForm::continuous, 1e-12f, 1});
+        (void)limit.apply(scene.points, scene.pose, {BulgeForm::continuous, 1e-12f, 1});
         benchmark::ClobberMemory();
     }
 }
@@ -130,7 +130,7 @@ void register_all() {
                         const Deformer& deformer = bound(shape).deformer(Method::info);
                         Scene& own = scene_of(shape);
                         for (auto _ : s) {
-                            deformer.deform(own.pose, variant.options(), own.points);
+                            (void)deformer.deform(own.pose, variant.options(), own.points);
                             benchmark::ClobberMemory();
                         }
                     });

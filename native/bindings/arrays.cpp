@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "sinew/deform/deformer.h"
-#include "sinew/deform/thread_pool.h"
 
 namespace sinew::bindings {
 namespace {
@@ -199,22 +198,28 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
     return array;
 }
 
-std::size_t checked_threads(const py::object& threads) {
-    if (threads.is_none()) return 0;
-    const char* const wanted = "None or an integer, 0 or more";
-    // Accepts numpy's integers, too.
-    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(threads.ptr()));
+std::size_t checked_integer(const py::handle& value, const char* argument, const std::string& wanted,
+                            std::size_t most) {
+    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(value.ptr()));
     if (!number) {
         PyErr_Clear();
-        fail("threads", wanted, describe(threads));
+        fail(argument, wanted, describe(value));
     }
     int overflow = 0;
     const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
+    // No integer is too many threads.
+    if (overflow > 0 && most == kAnyLength) return most;
     // Python refuses to convert the longest integers to text.
-    if (overflow < 0) fail("threads", wanted, "a negative one");
-    if (overflow == 0 && count < 0) fail("threads", wanted, std::to_string(count));
-    if (overflow == 0 && count == 0) return hardware_threads();
-    return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
+    if (overflow != 0) fail(argument, wanted, overflow < 0 ? "a negative one" : "one far beyond");
+    if (count < 0 || static_cast<unsigned long long>(count) > most) {
+        fail(argument, wanted, std::to_string(count));
+    }
+    return static_cast<std::size_t>(count);
+}
+
+std::size_t checked_threads(const py::object& threads) {
+    if (threads.is_none()) return 0;
+    return checked_integer(threads, "threads", "None or an integer, 0 or more", kAnyLength);
 }
 
 /// The item `index` of a pickled state, which must have `size` items.

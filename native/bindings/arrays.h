@@ -104,7 +104,11 @@ py::array_t<float> array_of(std::span<const Vec3<float>> points);
 /// An array of points to write to; a new one if `out` is None.
 py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count);
 
-/// 0, which stands for as many as useful, if `threads` is None.
+/// An integer from 0 to `most`, also one of numpy's.
+std::size_t checked_integer(const py::handle& value, const char* argument, const std::string& wanted,
+                            std::size_t most);
+
+/// At most so many threads; None or 0: as many as useful.
 std::size_t checked_threads(const py::object& threads);
 
 /// The item `index` of a pickled state, which must have `size` items.

@@ -13,8 +13,6 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 16'384;  // about 30 microseconds
-
 const Parameter& parameter_of(std::string_view id) {
     for (const Parameter& parameter : BulgeLimitStage::kParameters) {
         if (parameter.id == id) return parameter;
@@ -27,10 +25,10 @@ Affine<float> checked_space(const py::object& bones_from_model) {
                                       : checked_affine(bones_from_model, "bones_from_model");
 }
 
-BulgeLimit make(const py::object& rest_points, const py::object& influence_offsets,
-                const py::object& influence_bones, const py::object& influence_weights,
-                const py::object& heads, const py::object& tails, const py::object& bones_from_model,
-                const py::object& weights, bool is_normalised) {
+Timed<BulgeLimit> make(const py::object& rest_points, const py::object& influence_offsets,
+                       const py::object& influence_bones, const py::object& influence_weights,
+                       const py::object& heads, const py::object& tails, const py::object& bones_from_model,
+                       const py::object& weights, bool is_normalised) {
     const auto points = checked_points(rest_points, "rest_points");
     const auto offsets = checked<std::int32_t>(influence_offsets, "influence_offsets", 1,
                                                "int32 [vertices + 1]", kMaxVertices + 1);
@@ -63,24 +61,25 @@ BulgeLimit make(const py::object& rest_points, const py::object& influence_offse
     return BulgeLimit(data);
 }
 
-BulgeLimit make_from_weights(const py::object& rest_points, const py::object& influence_offsets,
-                             const py::object& influence_bones, const py::object& influence_weights,
-                             const py::object& heads, const py::object& tails,
-                             const py::object& bones_from_model, const py::object& weights) {
+Timed<BulgeLimit> make_from_weights(const py::object& rest_points, const py::object& influence_offsets,
+                                    const py::object& influence_bones, const py::object& influence_weights,
+                                    const py::object& heads, const py::object& tails,
+                                    const py::object& bones_from_model, const py::object& weights) {
     return make(rest_points, influence_offsets, influence_bones, influence_weights, heads, tails,
                 bones_from_model, weights, false);
 }
 
-void set_rest_points(BulgeLimit& limit, const py::object& rest_points, const py::object& bones_from_model) {
+void set_rest_points(Timed<BulgeLimit>& limit, const py::object& rest_points,
+                     const py::object& bones_from_model) {
     const auto points = checked_points(rest_points, "rest_points");
     const Affine<float> space = checked_space(bones_from_model);
     // May have to wait for another thread that applies it.
     without_gil([&] { limit.set_rest_points(as_points(points), space); });
 }
 
-py::array_t<float> apply(const BulgeLimit& limit, const py::object& points, const py::object& bone_transforms,
-                         const py::object& out, const py::object& strength, const py::object& form,
-                         const py::object& threads) {
+py::array_t<float> apply(const Timed<BulgeLimit>& limit, const py::object& points,
+                         const py::object& bone_transforms, const py::object& out, const py::object& strength,
+                         const py::object& form, const py::object& threads) {
     const std::size_t count = limit.vertex_count();
     const auto given = checked_points(points, "points");
     if (static_cast<std::size_t>(given.shape(0)) != count) {
@@ -99,17 +98,16 @@ py::array_t<float> apply(const BulgeLimit& limit, const py::object& points, cons
     options.threads = checked_threads(threads);
     py::array_t<float> result = checked_out(out, count);
     float* const to = result.mutable_data();
-    const auto run = [&] {
+    limit.call([&] {
         std::memmove(to, given.data(), static_cast<std::size_t>(given.nbytes()));
-        limit.apply({reinterpret_cast<Vec3<float>*>(to), count}, bones, options);
-    };
-    count > kVerticesUnderLock ? without_gil(run) : run();
+        static_cast<void>(limit.apply({reinterpret_cast<Vec3<float>*>(to), count}, bones, options));
+    });
     return result;
 }
 
 // --- Pickles: the constructor's arguments, with normalised weights.
 
-py::tuple state_of(const BulgeLimit& limit) {
+py::tuple state_of(const Timed<BulgeLimit>& limit) {
     const BulgeLimit::Parts parts = limit.parts();
     std::vector<Vec3<float>> heads;
     std::vector<Vec3<float>> tails;
@@ -135,7 +133,7 @@ py::tuple state_of(const BulgeLimit& limit) {
         array_of(std::span<const Vec3<float>>(tails)), space, weights);
 }
 
-BulgeLimit of_state(const py::object& state) {
+Timed<BulgeLimit> of_state(const py::object& state) {
     const auto part = [&](std::size_t index) { return part_of(state, 8, index); };
     return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6), part(7), true);
 }
@@ -143,11 +141,12 @@ BulgeLimit of_state(const py::object& state) {
 }  // namespace
 
 void bind_bulge_limit(py::module_& m) {
-    py::class_<BulgeLimit>(m, "BulgeLimit",
-                           "The stage `bulge_limit` for one mesh: moves deformed points back towards their "
-                           "bones where blending\n"
-                           "took them farther away than they are at rest (Kim, Han 2014, and a continuous "
-                           "form). Can be pickled.")
+    py::class_<Timed<BulgeLimit>>(
+        m, "BulgeLimit",
+        "The stage `bulge_limit` for one mesh: moves deformed points back towards their "
+        "bones where blending\n"
+        "took them farther away than they are at rest (Kim, Han 2014, and a continuous "
+        "form). Can be pickled.")
         .def(
             py::init(&make_from_weights), py::arg("rest_points"), py::arg("influence_offsets"),
             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("heads"), py::arg("tails"),
@@ -164,7 +163,7 @@ void bind_bulge_limit(py::module_& m) {
         .def_property_readonly("bone_count", &BulgeLimit::bone_count,
                                "One more than the highest bone index in the influences.")
         .def("__repr__",
-             [](const BulgeLimit& limit) {
+             [](const Timed<BulgeLimit>& limit) {
                  return "<sinew.BulgeLimit: " + std::to_string(limit.vertex_count()) + " vertices, " +
                         std::to_string(limit.bone_count()) + " bones>";
              })
@@ -173,30 +172,29 @@ void bind_bulge_limit(py::module_& m) {
              py::arg("bones_from_model") = py::none(),
              "Sets other rest points, float32 [vertices, 3], or another space of the bones: measures\n"
              "distances at rest again, which takes about as long as apply().")
-        .def(
-            "apply", &apply, py::arg("points"), py::arg("bone_transforms"), py::arg("out") = py::none(),
-            py::kw_only(), py::arg("strength") = 1.0, py::arg("form") = "continuous",
-            py::arg("threads") = py::none(),
-            "The limited points, float32 [vertices, 3], model space.\n\n"
-            "points: float32 [vertices, 3], deformed, model space.\n"
-            "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for "
-            "Deformer.deform().\n"
-            "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
-            "converted.\n"
-            "    May be `points`.\n"
-            "strength: how much of the bulge is removed, 0 to 1.\n"
-            "form: \"continuous\": distances to all bones of a vertex, weighted; \"kim_han\": only to the "
-            "heaviest,\n"
-            "    which tears the surface where that changes.\n"
-            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
-            "    result is the same bit for bit.\n\n"
-            "Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit "
-            "for\n"
-            "bit. A scaled bone allows a distance larger by the largest factor by which it stretches "
-            "vectors\n"
-            "perpendicular to it. Releases the GIL for large meshes. Raises ValueError that names the "
-            "argument,\n"
-            "what was expected and what was given.");
+        .def("apply", &apply, py::arg("points"), py::arg("bone_transforms"), py::arg("out") = py::none(),
+             py::kw_only(), py::arg("strength") = 1.0, py::arg("form") = "continuous",
+             py::arg("threads") = py::none(),
+             "The limited points, float32 [vertices, 3], model space.\n\n"
+             "points: float32 [vertices, 3], deformed, model space.\n"
+             "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for "
+             "Deformer.deform().\n"
+             "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
+             "converted.\n"
+             "    May be `points`.\n"
+             "strength: how much of the bulge is removed, 0 to 1.\n"
+             "form: \"continuous\": distances to all bones of a vertex, weighted; \"kim_han\": only to the "
+             "heaviest,\n"
+             "    which tears the surface where that changes.\n"
+             "threads: maximum number; None or 0: as many as useful. The\n"
+             "    result is the same bit for bit.\n\n"
+             "Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit "
+             "for\n"
+             "bit. A scaled bone allows a distance larger by the largest factor by which it stretches "
+             "vectors\n"
+             "perpendicular to it. Releases the GIL for large meshes. Raises ValueError that names the "
+             "argument,\n"
+             "what was expected and what was given.");
 }
 
 }  // namespace sinew::bindings

@@ -17,8 +17,6 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 32'768;  // about 30 microseconds
-
 std::string names_of_methods() {
     std::string names;
     for (const MethodInfo& method : kMethods) {
@@ -98,10 +96,10 @@ Binding make_binding(const py::object& rest_points, const py::object& influence_
                        .data());
 }
 
-Deformer make_deformer(const py::object& rest_points, const py::object& influence_offsets,
-                       const py::object& influence_bones, const py::object& influence_weights,
-                       const py::object& method, const py::object& rest_bones,
-                       const py::object& vertex_data) {
+Timed<Deformer> make_deformer(const py::object& rest_points, const py::object& influence_offsets,
+                              const py::object& influence_bones, const py::object& influence_weights,
+                              const py::object& method, const py::object& rest_bones,
+                              const py::object& vertex_data) {
     const MethodInfo row = checked_method(method, "method");
     return Deformer(checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights,
                                    rest_bones, vertex_data)
@@ -126,7 +124,7 @@ MixArguments checked_mix(const py::object& mix) {
 
 namespace {
 
-Deformer make_deformer_of(const Binding& binding, const py::object& method, const py::object& mix) {
+Timed<Deformer> make_deformer_of(const Binding& binding, const py::object& method, const py::object& mix) {
     const MethodInfo first = checked_method(method, "method");
     const MixArguments second = checked_mix(mix);
     return Deformer(binding, first, second.data());
@@ -179,7 +177,7 @@ Binding binding_of_state(const py::object& state) {
     return Binding(data);
 }
 
-Deformer deformer_of_state(const py::object& state) {
+Timed<Deformer> deformer_of_state(const py::object& state) {
     const BindArrays arrays = arrays_of_state(part_of(state, 3, 0));
     BindData data = arrays.data();
     data.is_normalised = true;
@@ -193,7 +191,7 @@ std::string counts_of(const auto& bound) {
            " influences, " + std::to_string(bound.bone_count()) + " bones>";
 }
 
-std::string text_of_deformer(const Deformer& deformer) {
+std::string text_of_deformer(const Timed<Deformer>& deformer) {
     std::string text = "<sinew.Deformer " + std::string(deformer.method().name);
     if (const MethodInfo* const mixed = deformer.mixed_method(); mixed != nullptr) {
         text += " mixed with " + std::string(mixed->name);
@@ -318,21 +316,20 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
 
 namespace {
 
-py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,
-                          const py::object& threads, const py::object& bones_from_model,
-                          const py::object& rest_inverses, const py::object& parameters) {
+py::array_t<float> deform(const Timed<Deformer>& deformer, const py::object& bone_transforms,
+                          const py::object& out, const py::object& threads,
+                          const py::object& bones_from_model, const py::object& rest_inverses,
+                          const py::object& parameters) {
     const DeformArguments arguments =
         checked_deform(deformer, bone_transforms, threads, bones_from_model, rest_inverses, parameters);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
                                         deformer.vertex_count());
-    const auto run = [&] { deformer.deform(arguments.bones, arguments.options, target); };
-    // With many threads waiting for the GIL, acquiring it again takes longer than deforming a small mesh.
-    deformer.vertex_count() > kVerticesUnderLock ? without_gil(run) : run();
+    deformer.call([&] { static_cast<void>(deformer.deform(arguments.bones, arguments.options, target)); });
     return points;
 }
 
-void set_rest_points(Deformer& deformer, const py::object& rest_points) {
+void set_rest_points(Timed<Deformer>& deformer, const py::object& rest_points) {
     const auto points = checked_points(rest_points, "rest_points");
     // May have to wait for another thread's deformation.
     without_gil([&] { deformer.set_rest_points(as_points(points)); });
@@ -375,9 +372,9 @@ void bind_deformer(py::module_& m) {
         .def(
             py::pickle([](const Binding& binding) { return state_of(binding.unpack()); }, &binding_of_state));
 
-    py::class_<Deformer>(m, "Deformer",
-                         "A binding and a method, ready to deform any pose.\n\n"
-                         "Can be pickled, with its current rest points and its own binding.")
+    py::class_<Timed<Deformer>>(m, "Deformer",
+                                "A binding and a method, ready to deform any pose.\n\n"
+                                "Can be pickled, with its current rest points and its own binding.")
         .def(py::init(&make_deformer_of), py::arg("binding"), py::arg("method") = "lbs",
              py::arg("mix") = py::none(),
              "binding: a Binding; not copied.\n"
@@ -390,11 +387,11 @@ void bind_deformer(py::module_& m) {
              py::arg("rest_bones") = py::none(), py::arg("vertex_data") = py::none(),
              "Constructs its own binding, from the arguments of Binding.")
         .def_property_readonly(
-            "method", [](const Deformer& deformer) { return std::string(deformer.method().name); },
+            "method", [](const Timed<Deformer>& deformer) { return std::string(deformer.method().name); },
             "The name of the method.")
         .def_property_readonly(
             "mixed_method",
-            [](const Deformer& deformer) -> std::optional<std::string> {
+            [](const Timed<Deformer>& deformer) -> std::optional<std::string> {
                 const MethodInfo* const method = deformer.mixed_method();
                 if (method == nullptr) return std::nullopt;
                 return std::string(method->name);
@@ -406,7 +403,8 @@ void bind_deformer(py::module_& m) {
         .def_property_readonly("bone_count", &Deformer::bone_count,
                                "One more than the highest bone index in the influences.")
         .def("__repr__", &text_of_deformer)
-        .def(py::pickle([](const Deformer& deformer) { return state_of(deformer); }, &deformer_of_state))
+        .def(py::pickle([](const Timed<Deformer>& deformer) { return state_of(deformer); },
+                        &deformer_of_state))
         .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
              "Sets the rest points of this deformer alone, float32 [vertices, 3], such as when shape keys\n"
              "change. Other threads may deform meanwhile: each of their results has either the old points or "
@@ -421,7 +419,7 @@ void bind_deformer(py::module_& m) {
             "read.\n"
             "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
             "converted.\n"
-            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
+            "threads: maximum number; None or 0: as many as useful. The\n"
             "    result is the same bit for bit.\n"
             "bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone "
             "transforms,\n"

@@ -14,7 +14,7 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 1024;  // about 30 microseconds
+constexpr auto kMaxIterations = static_cast<std::size_t>(DeltaMushStage::kMaxIterations);
 
 /// Settings, and the array that their weights refer to.
 struct SettingArguments {
@@ -31,22 +31,6 @@ float checked_float(const py::object& value, const char* argument) {
         fail(argument, "a number", describe(value));
     }
     return static_cast<float>(number);
-}
-
-std::size_t checked_iterations(const py::object& value) {
-    const std::string wanted =
-        "an integer from 0 to " + std::to_string(static_cast<int>(DeltaMushStage::kMaxIterations));
-    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(value.ptr()));
-    if (!number) {
-        PyErr_Clear();
-        fail("iterations", wanted, describe(value));
-    }
-    int overflow = 0;
-    const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
-    if (overflow != 0 || count < 0 || count > static_cast<long long>(DeltaMushStage::kMaxIterations)) {
-        fail("iterations", wanted, overflow != 0 ? "one far beyond" : std::to_string(count));
-    }
-    return static_cast<std::size_t>(count);
 }
 
 SmoothType checked_type(const py::object& value) {
@@ -67,7 +51,8 @@ SettingArguments checked_settings(const py::object& iterations, const py::object
                                   const py::object& factor, const py::object& smooth_type,
                                   const py::object& pin_boundary, const py::object& weights) {
     SettingArguments arguments;
-    arguments.settings.iterations = checked_iterations(iterations);
+    arguments.settings.iterations = checked_integer(
+        iterations, "iterations", "an integer from 0 to " + std::to_string(kMaxIterations), kMaxIterations);
     arguments.settings.radius = checked_float(radius, "radius");
     arguments.settings.factor = checked_float(factor, "factor");
     arguments.settings.type = checked_type(smooth_type);
@@ -80,10 +65,11 @@ SettingArguments checked_settings(const py::object& iterations, const py::object
     return arguments;
 }
 
-DeltaMush make(const py::object& rest_points, const py::object& face_offsets,
-               const py::object& corner_vertices, const py::object& edges, const py::object& iterations,
-               const py::object& radius, const py::object& factor, const py::object& smooth_type,
-               const py::object& pin_boundary, const py::object& weights) {
+Timed<DeltaMush> make(const py::object& rest_points, const py::object& face_offsets,
+                      const py::object& corner_vertices, const py::object& edges,
+                      const py::object& iterations, const py::object& radius, const py::object& factor,
+                      const py::object& smooth_type, const py::object& pin_boundary,
+                      const py::object& weights) {
     const auto points = checked_points(rest_points, "rest_points");
     const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
     const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
@@ -94,7 +80,7 @@ DeltaMush make(const py::object& rest_points, const py::object& face_offsets,
     return DeltaMush({as_span(offsets), as_span(corners), as_span(ends)}, as_points(points), with.settings);
 }
 
-void bind(DeltaMush& mush, const py::object& rest_points, const py::object& iterations,
+void bind(Timed<DeltaMush>& mush, const py::object& rest_points, const py::object& iterations,
           const py::object& radius, const py::object& factor, const py::object& smooth_type,
           const py::object& pin_boundary, const py::object& weights) {
     const auto points = checked_points(rest_points, "rest_points");
@@ -104,7 +90,7 @@ void bind(DeltaMush& mush, const py::object& rest_points, const py::object& iter
     without_gil([&] { mush.bind(as_points(points), with.settings); });
 }
 
-py::array_t<float> apply(const DeltaMush& mush, const py::object& points, const py::object& out,
+py::array_t<float> apply(const Timed<DeltaMush>& mush, const py::object& points, const py::object& out,
                          const py::object& scale, const py::object& threads) {
     const std::size_t count = mush.vertex_count();
     const auto given = checked_points(points, "points");
@@ -115,34 +101,33 @@ py::array_t<float> apply(const DeltaMush& mush, const py::object& points, const 
     const std::size_t most = checked_threads(threads);
     py::array_t<float> result = checked_out(out, count);
     float* const to = result.mutable_data();
-    const auto run = [&] {
+    mush.call([&] {
         std::memmove(to, given.data(), static_cast<std::size_t>(given.nbytes()));
-        mush.apply({reinterpret_cast<Vec3<float>*>(to), count}, details, most);
-    };
-    count > kVerticesUnderLock ? without_gil(run) : run();
+        static_cast<void>(mush.apply({reinterpret_cast<Vec3<float>*>(to), count}, details, most));
+    });
     return result;
 }
 
 // --- Pickles: the constructor's arguments.
 
-py::tuple state_of(const DeltaMush& mush) {
-    const auto [topology, rest_points, settings] = mush.parts();
+py::tuple state_of(const Timed<DeltaMush>& mush) {
+    const auto [topology, rest_points, settings, of_vertices] = mush.parts();
     const auto edges = static_cast<py::ssize_t>(topology.edges.size() / 2);
     py::object weights = py::none();
-    if (!settings.weights.empty()) weights = array_of(settings.weights);
+    if (!of_vertices.empty()) weights = array_of(std::span(of_vertices));
     return py::make_tuple(
-        array_of(rest_points), array_of(topology.face_offsets), array_of(topology.corner_vertices),
+        array_of(std::span(rest_points)), array_of(topology.face_offsets), array_of(topology.corner_vertices),
         array_of(topology.edges).reshape({edges, py::ssize_t{2}}), settings.iterations, settings.radius,
         settings.factor, std::string(DeltaMushStage::kSmoothTypes[static_cast<std::size_t>(settings.type)]),
         settings.pin_boundary, weights);
 }
 
-DeltaMush of_state(const py::object& state) {
+Timed<DeltaMush> of_state(const py::object& state) {
     const auto part = [&](std::size_t index) { return part_of(state, 10, index); };
     return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6), part(7), part(8), part(9));
 }
 
-std::string text_of(const DeltaMush& mush) {
+std::string text_of(const Timed<DeltaMush>& mush) {
     return "<sinew.DeltaMush: " + std::to_string(mush.vertex_count()) + " vertices, " +
            std::to_string(mush.iterations()) + " iterations>";
 }
@@ -152,7 +137,7 @@ std::string text_of(const DeltaMush& mush) {
 void bind_delta_mush(py::module_& m) {
     const DeltaMushSettings initial;
     const char* const type = DeltaMushStage::kSmoothTypes[0].data();
-    py::class_<DeltaMush>(
+    py::class_<Timed<DeltaMush>>(
         m, "DeltaMush",
         "The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest "
         "points\n"
@@ -194,20 +179,19 @@ void bind_delta_mush(py::module_& m) {
             "apply().\n\n"
             "Takes the arguments of the constructor and raises ValueError as it does; the object is then\n"
             "unchanged.")
-        .def(
-            "apply", &apply, py::arg("points"), py::arg("out") = py::none(), py::arg("scale") = 1.0f,
-            py::arg("threads") = py::none(),
-            "The smoothed points, float32 [vertices, 3].\n\n"
-            "points: float32 [vertices, 3], deformed, in the space of the rest points.\n"
-            "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
-            "converted.\n"
-            "    May be `points`.\n"
-            "scale: how much of the details is added back; 1: all.\n"
-            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
-            "    result is the same bit for bit.\n\n"
-            "A vertex without faces is smoothed and has no details. Releases the GIL for large meshes. "
-            "Raises\n"
-            "ValueError that names the argument, what was expected and what was given.");
+        .def("apply", &apply, py::arg("points"), py::arg("out") = py::none(), py::arg("scale") = 1.0f,
+             py::arg("threads") = py::none(),
+             "The smoothed points, float32 [vertices, 3].\n\n"
+             "points: float32 [vertices, 3], deformed, in the space of the rest points.\n"
+             "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
+             "converted.\n"
+             "    May be `points`.\n"
+             "scale: how much of the details is added back; 1: all.\n"
+             "threads: maximum number; None or 0: as many as useful. The\n"
+             "    result is the same bit for bit.\n\n"
+             "A vertex without faces is smoothed and has no details. Releases the GIL for large meshes. "
+             "Raises\n"
+             "ValueError that names the argument, what was expected and what was given.");
 }
 
 }  // namespace sinew::bindings

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <mutex>
-
 #include "interpolations.h"
 #include "module.h"
 #include "sinew/ik/solver.h"
@@ -8,13 +6,11 @@
 namespace sinew::bindings {
 namespace {
 
-/// A solver, and a lock that prevents two threads from using it at once.
 struct Solver {
     IkSolver solver;
     std::size_t bone_count;
     std::size_t effector_count;
     bool has_pole;
-    std::unique_ptr<std::mutex> mutex = std::make_unique<std::mutex>();
 };
 
 template <class T>
@@ -146,12 +142,8 @@ IkOptions checked_options(const py::object& method, const py::object& tolerance,
     if (!(options.tolerance > 0.0) || !std::isfinite(options.tolerance)) {
         fail("tolerance", positive, std::to_string(options.tolerance));
     }
-    const std::string whole = "a whole number, 0 to 1000000";
-    const double steps = checked_number(iterations, "iterations", whole);
-    if (!(steps >= 0.0) || steps > 1e6 || steps != std::floor(steps)) {
-        fail("iterations", whole, std::string(py::str(iterations)));
-    }
-    options.iterations = static_cast<int>(steps);
+    options.iterations = static_cast<int>(
+        checked_integer(iterations, "iterations", "a whole number, 0 to 1000000", 1'000'000));
     return options;
 }
 
@@ -187,7 +179,6 @@ py::object solve(Solver& self, const py::object& rest, const py::object& tips, c
     std::int32_t* const iterations_taken = taken.mutable_data();
     const py::ssize_t count = count_of(common);
     without_gil([&] {
-        const std::lock_guard guard(*self.mutex);
         std::vector<DualQuat<double>> parent_from_rest(bones);
         std::vector<DualQuat<double>> wanted(effectors);
         std::vector<Vec3<double>> offsets(effectors);
@@ -213,7 +204,8 @@ py::object solve(Solver& self, const py::object& rest, const py::object& tips, c
             if (inputs.size() > 5) read(5, i, points);
             const auto from_root = Item<DualQuat<double>>::read(inputs[4].at(i, common));
             const IkResult result =
-                self.solver.solve({from_root, parent_from_rest, offsets, wanted, points}, own, options);
+                self.solver.solve({from_root, parent_from_rest, offsets, wanted, points}, own, options)
+                    .value();
             for (std::size_t bone = 0; bone < bones; ++bone) {
                 solved.write(i * static_cast<py::ssize_t>(bones) + static_cast<py::ssize_t>(bone), own[bone]);
             }

@@ -16,8 +16,6 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kCornersUnderLock = 4096;  // about 30 microseconds
-
 // In the order of NormalDomain.
 constexpr std::string_view kDomains[] = {"vertex", "corner", "face"};
 
@@ -49,22 +47,7 @@ std::vector<std::int16_t> checked_custom(const py::object& value) {
     return result;
 }
 
-std::size_t checked_count(const py::object& value) {
-    const std::string wanted = "an integer from 0 to " + std::to_string(kMaxNormalVertices);
-    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(value.ptr()));
-    if (!number) {
-        PyErr_Clear();
-        fail("vertex_count", wanted, describe(value));
-    }
-    int overflow = 0;
-    const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
-    if (overflow != 0 || count < 0 || count > static_cast<long long>(kMaxNormalVertices)) {
-        fail("vertex_count", wanted, overflow != 0 ? "one far beyond" : std::to_string(count));
-    }
-    return static_cast<std::size_t>(count);
-}
-
-NormalDomain checked_domain(const Normals& normals, const py::object& value) {
+NormalDomain checked_domain(const Timed<Normals>& normals, const py::object& value) {
     if (value.is_none()) return normals.domain();
     const std::string wanted = "None, \"vertex\", \"corner\" or \"face\"";
     const std::string name = checked_name(value, "domain", wanted);
@@ -75,10 +58,12 @@ NormalDomain checked_domain(const Normals& normals, const py::object& value) {
 
 std::string name_of(NormalDomain domain) { return std::string(kDomains[static_cast<std::size_t>(domain)]); }
 
-Normals make(const py::object& vertex_count, const py::object& face_offsets,
-             const py::object& corner_vertices, const py::object& edges, const py::object& sharp_edges,
-             const py::object& sharp_faces, const py::object& custom_normals) {
-    const std::size_t vertices = checked_count(vertex_count);
+Timed<Normals> make(const py::object& vertex_count, const py::object& face_offsets,
+                    const py::object& corner_vertices, const py::object& edges, const py::object& sharp_edges,
+                    const py::object& sharp_faces, const py::object& custom_normals) {
+    const std::size_t vertices =
+        checked_integer(vertex_count, "vertex_count",
+                        "an integer from 0 to " + std::to_string(kMaxNormalVertices), kMaxNormalVertices);
     const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
     const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
     py::array_t<std::int32_t> ends;
@@ -93,7 +78,7 @@ Normals make(const py::object& vertex_count, const py::object& face_offsets,
                    {of_edges, of_faces, custom});
 }
 
-py::array_t<float> compute(const Normals& normals, const py::object& points, const py::object& domain,
+py::array_t<float> compute(const Timed<Normals>& normals, const py::object& points, const py::object& domain,
                            const py::object& out, const py::object& threads) {
     const std::size_t vertices = normals.count(NormalDomain::vertex);
     const auto given = checked_points(points, "points");
@@ -109,8 +94,7 @@ py::array_t<float> compute(const Normals& normals, const py::object& points, con
         fail("out", "another array than the points", "one that shares memory with them");
     }
     const std::span<Vec3<float>> to{reinterpret_cast<Vec3<float>*>(result.mutable_data()), count};
-    const auto run = [&] { normals.compute(of, as_points(given), to, most); };
-    normals.count(NormalDomain::corner) > kCornersUnderLock ? without_gil(run) : run();
+    normals.call([&] { static_cast<void>(normals.compute(of, as_points(given), to, most)); });
     return result;
 }
 
@@ -126,7 +110,7 @@ py::object custom_of(std::span<const std::int16_t> numbers) {
     return array_of(numbers).reshape({static_cast<py::ssize_t>(numbers.size() / 2), py::ssize_t{2}});
 }
 
-py::tuple state_of(const Normals& normals) {
+py::tuple state_of(const Timed<Normals>& normals) {
     const auto [topology, vertex_count, sharpness] = normals.parts();
     const auto edges = static_cast<py::ssize_t>(topology.edges.size() / 2);
     return py::make_tuple(vertex_count, array_of(topology.face_offsets), array_of(topology.corner_vertices),
@@ -134,12 +118,12 @@ py::tuple state_of(const Normals& normals) {
                           flags_of(sharpness.edges), flags_of(sharpness.faces), custom_of(sharpness.custom));
 }
 
-Normals of_state(const py::object& state) {
+Timed<Normals> of_state(const py::object& state) {
     const auto part = [&](std::size_t index) { return part_of(state, 7, index); };
     return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6));
 }
 
-std::string text_of(const Normals& normals) {
+std::string text_of(const Timed<Normals>& normals) {
     return "<sinew.Normals: " + std::to_string(normals.count(NormalDomain::vertex)) + " vertices, " +
            std::to_string(normals.count(NormalDomain::face)) + " faces, domain " + name_of(normals.domain()) +
            ">";
@@ -148,7 +132,7 @@ std::string text_of(const Normals& normals) {
 }  // namespace
 
 void bind_normals(py::module_& m) {
-    py::class_<Normals>(
+    py::class_<Timed<Normals>>(
         m, "Normals",
         "Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices\n"
         "weighted by the angles of corners, of corners by fans between sharp edges. Can be pickled.")
@@ -168,20 +152,20 @@ void bind_normals(py::module_& m) {
             "All input is copied. Raises ValueError that names the argument, what was expected and what was\n"
             "given.")
         .def_property_readonly(
-            "domain", [](const Normals& normals) { return name_of(normals.domain()); },
+            "domain", [](const Timed<Normals>& normals) { return name_of(normals.domain()); },
             "The simplest domain that describes the mesh's shading, as Blender's Mesh.normals_domain: "
             "\"face\"\n"
             "if every face is flat or every edge sharp, else \"corner\" if anything is sharp, else "
             "\"vertex\". With\n"
             "custom normals always \"corner\".")
         .def_property_readonly(
-            "vertex_count", [](const Normals& normals) { return normals.count(NormalDomain::vertex); },
+            "vertex_count", [](const Timed<Normals>& normals) { return normals.count(NormalDomain::vertex); },
             "Number of vertices.")
         .def_property_readonly(
-            "corner_count", [](const Normals& normals) { return normals.count(NormalDomain::corner); },
+            "corner_count", [](const Timed<Normals>& normals) { return normals.count(NormalDomain::corner); },
             "Number of corners of faces.")
         .def_property_readonly(
-            "face_count", [](const Normals& normals) { return normals.count(NormalDomain::face); },
+            "face_count", [](const Timed<Normals>& normals) { return normals.count(NormalDomain::face); },
             "Number of faces.")
         .def("__repr__", &text_of)
         .def(py::pickle(&state_of, &of_state))
@@ -194,7 +178,7 @@ void bind_normals(py::module_& m) {
             "domain.\n"
             "out: if given, written and returned: float32, C-contiguous, aligned; never converted. Must not\n"
             "    overlap the points.\n"
-            "threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The\n"
+            "threads: maximum number; None or 0: as many as useful. The\n"
             "    result is the same bit for bit.\n\n"
             "For a face without area the normal is (0, 0, 1); for a vertex without faces, the direction of "
             "its\n"

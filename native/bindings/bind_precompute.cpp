@@ -2,7 +2,6 @@
 #include <pybind11/numpy.h>
 
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -18,7 +17,7 @@ namespace sinew::bindings {
 namespace {
 
 /// Calls `run` with options that report to `progress`, a callable or None. Releases the GIL except during these
-/// calls.
+/// calls, for which only this thread waits: the work is done by others.
 template <class Run>
 auto precompute(const py::object& progress, PrecomputeOptions options, const Run& run) {
     if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0) {
@@ -51,17 +50,6 @@ auto precompute(const py::object& progress, PrecomputeOptions options, const Run
     }
 }
 
-std::size_t thread_count(const py::object& threads) {
-    if (threads.is_none()) return 0;
-    if (!py::isinstance<py::int_>(threads)) fail("threads", "None or 1 or more", describe(threads));
-    int overflow = 0;
-    const long long count = PyLong_AsLongLongAndOverflow(threads.ptr(), &overflow);
-    if (overflow < 0 || (overflow == 0 && count < 1)) {
-        fail("threads", "None or 1 or more", py::str(threads).cast<std::string>());
-    }
-    return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
-}
-
 /// The mesh argument of a precomputation.
 struct Mesh {
     py::array_t<float> points;
@@ -90,7 +78,7 @@ struct Mesh {
 
 PrecomputeOptions options_of(bool exact, const py::object& threads) {
     PrecomputeOptions options;
-    options.threads = thread_count(threads);
+    options.threads = checked_threads(threads);
     options.exact = exact;
     return options;
 }
@@ -147,7 +135,8 @@ void bind_precompute(py::module_& m) {
         "triangles: int32 [triangles, 3], vertices.\n"
         "exact: compute by the definition itself, which is slow; otherwise triangles of similar weights are\n"
         "summed.\n"
-        "threads: maximum number; None: as many as useful. The result is the same bit for bit.\n"
+        "threads: maximum number; None or 0: as many as useful. The result is the same bit for bit. They "
+        "give\n    way to all other threads.\n"
         "progress: None, or a callable that is called on this thread with the completed share, 0 to 1. If "
         "it\n"
         "    returns False, the work is cancelled and the result is None. An exception that it raises is "

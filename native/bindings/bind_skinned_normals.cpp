@@ -10,16 +10,14 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kFramesUnderLock = 4096;  // about 30 microseconds
-
 /// Vectors [n, 3]; none if `value` is None.
 py::array_t<float> checked_vectors(const py::object& value, const char* argument) {
     if (value.is_none()) return checked_out(py::none(), 0);
     return checked_points(value, argument);
 }
 
-SkinnedNormals make(const Binding& binding, const py::object& normals, const py::object& tangents,
-                    const py::object& vertices, const py::object& method, const py::object& mix) {
+Timed<SkinnedNormals> make(const Binding& binding, const py::object& normals, const py::object& tangents,
+                           const py::object& vertices, const py::object& method, const py::object& mix) {
     const auto rest_normals = checked_points(normals, "normals");
     const auto rest_tangents = checked_vectors(tangents, "tangents");
     py::array_t<std::int32_t> of_frames;
@@ -35,9 +33,9 @@ std::span<Vec3<float>> writable(py::array_t<float>& points) {
     return {reinterpret_cast<Vec3<float>*>(points.mutable_data()), static_cast<std::size_t>(points.shape(0))};
 }
 
-py::tuple deform(const SkinnedNormals& skinned, const py::object& bone_transforms, const py::object& threads,
-                 const py::object& bones_from_model, const py::object& rest_inverses,
-                 const py::object& parameters) {
+py::tuple deform(const Timed<SkinnedNormals>& skinned, const py::object& bone_transforms,
+                 const py::object& threads, const py::object& bones_from_model,
+                 const py::object& rest_inverses, const py::object& parameters) {
     const DeformArguments arguments = checked_deform(skinned.deformer(), bone_transforms, threads,
                                                      bones_from_model, rest_inverses, parameters);
     const std::size_t frames = skinned.frame_count();
@@ -45,15 +43,15 @@ py::tuple deform(const SkinnedNormals& skinned, const py::object& bone_transform
     auto normals = checked_out(py::none(), frames);
     auto tangents = checked_out(py::none(), skinned.has_tangents() ? frames : 0);
     const auto to_points = writable(points), to_normals = writable(normals), to_tangents = writable(tangents);
-    const auto run = [&] {
-        skinned.deform(arguments.bones, arguments.options, to_points, to_normals, to_tangents);
-    };
-    frames > kFramesUnderLock ? without_gil(run) : run();
+    skinned.call([&] {
+        static_cast<void>(
+            skinned.deform(arguments.bones, arguments.options, to_points, to_normals, to_tangents));
+    });
     if (!skinned.has_tangents()) return py::make_tuple(points, normals, py::none());
     return py::make_tuple(points, normals, tangents);
 }
 
-py::array_t<float> deform_normals(const SkinnedNormals& skinned, const py::object& bone_transforms,
+py::array_t<float> deform_normals(const Timed<SkinnedNormals>& skinned, const py::object& bone_transforms,
                                   const py::object& posed_points, const py::object& out,
                                   const py::object& threads, const py::object& bones_from_model,
                                   const py::object& rest_inverses, const py::object& parameters) {
@@ -71,12 +69,12 @@ py::array_t<float> deform_normals(const SkinnedNormals& skinned, const py::objec
     }
     const auto from = as_points(points);
     const auto to = writable(normals);
-    const auto run = [&] { skinned.deform_normals(arguments.bones, arguments.options, from, to); };
-    skinned.frame_count() > kFramesUnderLock ? without_gil(run) : run();
+    skinned.call(
+        [&] { static_cast<void>(skinned.deform_normals(arguments.bones, arguments.options, from, to)); });
     return normals;
 }
 
-std::string text_of(const SkinnedNormals& skinned) {
+std::string text_of(const Timed<SkinnedNormals>& skinned) {
     return "<sinew.SkinnedNormals: " + std::to_string(skinned.frame_count()) + " of " +
            std::to_string(skinned.deformer().vertex_count()) + " vertices, method " +
            std::string(skinned.deformer().method().name) + ">";
@@ -85,12 +83,13 @@ std::string text_of(const SkinnedNormals& skinned) {
 }  // namespace
 
 void bind_skinned_normals(py::module_& m) {
-    py::class_<SkinnedNormals>(m, "SkinnedNormals",
-                               "Normals and tangents that move with the skin, as in engines: each is "
-                               "transformed by the blend of its\n"
-                               "vertex, normals by the inverse transpose. The effect of weights that change "
-                               "from vertex to vertex is\n"
-                               "not included.")
+    py::class_<Timed<SkinnedNormals>>(
+        m, "SkinnedNormals",
+        "Normals and tangents that move with the skin, as in engines: each is "
+        "transformed by the blend of its\n"
+        "vertex, normals by the inverse transpose. The effect of weights that change "
+        "from vertex to vertex is\n"
+        "not included.")
         .def(py::init(&make), py::arg("binding"), py::arg("normals"), py::arg("tangents") = py::none(),
              py::arg("vertices") = py::none(), py::arg("method") = "lbs", py::arg("mix") = py::none(),
              "binding: a Binding; not copied.\n"

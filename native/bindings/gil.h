@@ -3,6 +3,10 @@
 
 #include <pybind11/pybind11.h>
 
+#include <atomic>
+#include <chrono>
+#include <utility>
+
 namespace sinew::bindings {
 
 /// Acquires the GIL that PyEval_SaveThread() released. Never returns if Python ends meanwhile: Python then ends
@@ -21,5 +25,30 @@ void without_gil(const Work& work) {
     }
     take_gil_back(state);
 }
+
+/// An object whose calls release the GIL only if they take long enough: with many threads waiting for it, acquiring
+/// it again takes longer than a short call. What a call takes depends on the method, the mesh, its settings and the
+/// machine, so the call before tells.
+template <class Object>
+struct Timed : Object {
+    Timed(Object&& object) noexcept
+        : Object(std::move(object)) {}  // implicit, so that functions return either
+    Timed(Timed&& other) noexcept : Object(std::move(other)) {}
+
+    /// Calls work(), which must neither throw nor touch Python's objects.
+    template <class Work>
+    void call(const Work& work) const {
+        constexpr std::chrono::nanoseconds kLongestUnderLock{30'000};
+        const auto timed = [&] {
+            const auto start = std::chrono::steady_clock::now();
+            work();
+            last_.store(std::chrono::steady_clock::now() - start, std::memory_order_relaxed);
+        };
+        last_.load(std::memory_order_relaxed) > kLongestUnderLock ? without_gil(timed) : timed();
+    }
+
+private:
+    mutable std::atomic<std::chrono::nanoseconds> last_{std::chrono::nanoseconds::max()};
+};
 
 }  // namespace sinew::bindings

@@ -125,7 +125,7 @@ TEST(Centres, progress_rises_on_the_calling_thread) {
                   },
                   false});
     EXPECT_EQ(threads, std::set{std::this_thread::get_id()});
-    ASSERT_GT(shares.size(), 4u);
+    ASSERT_GE(shares.size(), 2u);
     EXPECT_TRUE(std::ranges::is_sorted(shares));
     EXPECT_EQ(shares.front(), 0.0);
     EXPECT_EQ(shares.back(), 1.0);

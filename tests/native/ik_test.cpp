@@ -73,8 +73,8 @@ Solved solve(const Rig& rig, const std::vector<IkEffector>& effectors,
     for (const IkEffector& effector : effectors) {
         tips.emplace_back(0.0, rig.lengths[static_cast<std::size_t>(effector.bone)], 0.0);
     }
-    const IkResult result = solver.solve({root, rig.rest, tips, goals, poles}, rotations, options);
-    return {result, rotations};
+    const auto result = solver.solve({root, rig.rest, tips, goals, poles}, rotations, options);
+    return {result.value(), rotations};
 }
 
 IkEffector last(const Rig& rig) { return {.bone = static_cast<std::int32_t>(rig.parents.size()) - 1}; }
@@ -423,6 +423,21 @@ TEST(Ik, wrong_arguments_are_named) {
     limits[1][2] = {.stiffness = 1.0};
     EXPECT_NE(message(limits, {{.bone = 1}}).find("stiffness"), std::string::npos);
     EXPECT_EQ(message({}, {{.bone = 1}}), "");
+}
+
+TEST(IkSolver, solves_nothing_where_sizes_do_not_fit) {
+    const Rig rig = Rig::chain({1.0, 1.0});
+    const IkSolver solver(Skeleton(rig.parents), rig.limits, std::vector{last(rig)});
+    const std::vector<Vec3<double>> tips{{0.0, 1.0, 0.0}};
+    const std::vector<DualQuat<double>> goals(1);
+    std::vector<Quat<double>> rotations(2, Quat<double>(1.0, 0.0, 0.0, 0.0));
+    EXPECT_TRUE(solver.solve({{}, rig.rest, tips, goals, {}}, rotations));
+    const auto start = rotations;
+    EXPECT_FALSE(solver.solve({{}, std::span(rig.rest).first(1), tips, goals, {}}, rotations));
+    EXPECT_FALSE(solver.solve({{}, rig.rest, {}, goals, {}}, rotations));
+    EXPECT_FALSE(solver.solve({{}, rig.rest, tips, {}, {}}, rotations));
+    EXPECT_FALSE(solver.solve({{}, rig.rest, tips, goals, {}}, std::span(rotations).first(1)));
+    EXPECT_EQ(rotations, start);
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 // A library that a host loads and unloads; see unload_test.cpp.
 #include <vector>
 
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/deformer.h"
-#include "sinew/deform/thread_pool.h"
 
 extern "C" __attribute__((visibility("default"))) int work_on_threads(int threads) {
     const std::size_t count = 100'000;
@@ -15,7 +15,7 @@ extern "C" __attribute__((visibility("default"))) int work_on_threads(int thread
     std::vector<sinew::Affine<float>> pose(1);
     pose[0].translation = {1.0f, 1.0f, 1.0f};
     std::vector<sinew::Vec3<float>> points(count);
-    deformer.deform(pose, {{}, static_cast<std::size_t>(threads)}, points);
+    static_cast<void>(deformer.deform(pose, {{}, static_cast<std::size_t>(threads)}, points));
     return points.front() == sinew::Vec3<float>(2.0f, 3.0f, 4.0f) && points.back() == points.front() ? 1 : 0;
 }
 

@@ -110,7 +110,7 @@ TEST(Counting, sees_what_there_is) {
 #endif
 }
 
-// From the first frame on, on any thread, and on threads that were not started by the library.
+// From the first frame on, and on threads that were not started by the library.
 TEST(Frames, allocate_nothing_and_lock_nothing) {
     // Sets of all sizes, some scaled bones, and more blocks than one chunk of a thread's work.
     Scene scene = random_scene(1, 20000, 1.0);
@@ -124,8 +124,8 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     const auto frames = [&](std::vector<Vec3<float>>& points) {
         for (Deformer& deformer : deformers) {
             for (const std::size_t threads : {1, 4, 0}) {
-                deformer.deform(scene.posed_from_rest, {{}, threads}, points);
-                deformer.deform(scene.posed_from_rest, {bones_from_model, threads}, points);
+                EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {{}, threads}, points));
+                EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {bones_from_model, threads}, points));
             }
             deformer.set_rest_points(other_rest_points);
         }
@@ -154,7 +154,8 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
         });
     }
     for (std::thread& thread : threads) thread.join();
-    EXPECT_EQ(in_frames, 0);
+    // A deformer allocates palettes once for each thread that uses it beside others. Each thread counts all.
+    EXPECT_LE(in_frames, 5 * 4 * 3 * static_cast<int>(deformers.size()));
 }
 
 /// A square of quads.
@@ -186,7 +187,7 @@ TEST(DeltaMush, allocates_nothing_once_it_is_bound) {
     Sheet mesh = sheet();
     const DeltaMush mush(mesh.topology(), mesh.points, {});
     const int allocations_before = allocations;
-    for (const std::size_t threads : {1, 4, 0}) mush.apply(mesh.points, 1.0f, threads);
+    for (const std::size_t threads : {1, 4, 0}) EXPECT_TRUE(mush.apply(mesh.points, 1.0f, threads));
     EXPECT_EQ(allocations, allocations_before);
 }
 
@@ -198,7 +199,8 @@ TEST(Normals, allocate_nothing_once_they_are_made) {
     for (const NormalDomain domain : {NormalDomain::vertex, NormalDomain::corner, NormalDomain::face}) {
         std::vector<Vec3<float>> result(normals.count(domain));
         const int allocations_before = allocations;
-        for (const std::size_t threads : {1, 4, 0}) normals.compute(domain, mesh.points, result, threads);
+        for (const std::size_t threads : {1, 4, 0})
+            EXPECT_TRUE(normals.compute(domain, mesh.points, result, threads));
         EXPECT_EQ(allocations, allocations_before);
         EXPECT_GT(result.back().z, 0.1f);
     }
@@ -213,7 +215,7 @@ TEST(SkinnedNormals, allocate_nothing_once_they_are_made) {
     for (const std::size_t threads : {1, 4, 0}) {
         DeformOptions options;
         options.threads = threads;
-        skinned.deform(scene.posed_from_rest, options, points, moved, tangents);
+        EXPECT_TRUE(skinned.deform(scene.posed_from_rest, options, points, moved, tangents));
     }
     EXPECT_EQ(allocations, allocations_before);
     EXPECT_NE(moved.front(), normals.front());
@@ -228,9 +230,9 @@ TEST(Bindings, are_packed_once) {
     deformers.reserve(kMethodCount);
     const std::size_t alone = bytes;
     for (const MethodInfo& method : kMethods) deformers.emplace_back(binding, method);
-    // Each further deformer only has room for bones, for as many threads as may deform at once; most of it for
-    // one method's bones of each set. Together this must be less than one mesh.
-    EXPECT_LT(bytes - alone, of_binding);
+    // Each further deformer only has room for the bones of one thread, most of it for one method's bones of each
+    // set. Together this must be far less than one mesh.
+    EXPECT_LT(bytes - alone, of_binding / 8);
 }
 
 // Bones' numbers are not sizes: memory must not grow with them.
@@ -265,7 +267,7 @@ TEST(InverseKinematics, allocates_nothing_and_locks_nothing) {
         for (int i = 0; i < 20; ++i) {
             const std::array goals{
                 to_dual_quat(QuatVec<double>{{1, 0, 0, 0}, {0.1 * i, 2.0 - 0.2 * i, 0.0}})};
-            solver.solve({{}, rest, tips, goals, {}}, rotations, {.method = method});
+            EXPECT_TRUE(solver.solve({{}, rest, tips, goals, {}}, rotations, {.method = method}));
         }
     }
     EXPECT_EQ(allocations, before);

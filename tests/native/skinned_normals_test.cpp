@@ -47,7 +47,8 @@ Result deformed(const SkinnedNormals& skinned, const Scene& scene, std::size_t t
                   std::vector<Vec3<float>>(skinned.has_tangents() ? skinned.frame_count() : 0)};
     DeformOptions options;
     options.threads = threads;
-    skinned.deform(scene.posed_from_rest, options, result.points, result.normals, result.tangents);
+    EXPECT_TRUE(
+        skinned.deform(scene.posed_from_rest, options, result.points, result.normals, result.tangents));
     return result;
 }
 
@@ -62,7 +63,7 @@ TEST_P(SkinnedByMethod, points_are_the_deformers) {
     const Frames frames = random_frames(scene.rest_points.size());
     const auto result = deformed(SkinnedNormals(binding, GetParam(), frames.rest()), scene);
     std::vector<Vec3<float>> expected(scene.rest_points.size());
-    Deformer(binding, GetParam()).deform(scene.posed_from_rest, {}, expected);
+    EXPECT_TRUE(Deformer(binding, GetParam()).deform(scene.posed_from_rest, {}, expected));
     EXPECT_TRUE(std::ranges::equal(result.points, expected, same_bits<float>));
 }
 
@@ -89,7 +90,9 @@ TEST_P(SkinnedByMethod, threads_change_no_bit) {
         DeformOptions options;
         options.threads = threads;
         std::vector<Vec3<float>> alone(expected.normals.size());
-        skinned.deform_normals(scene.posed_from_rest, options, expected.points, alone);
+        EXPECT_TRUE(skinned.deform_normals(scene.posed_from_rest, options, expected.points, alone));
+        EXPECT_FALSE(
+            skinned.deform_normals(scene.posed_from_rest, options, alone, std::span(alone).first(1)));
         EXPECT_TRUE(std::ranges::equal(alone, expected.normals, same_bits<float>));
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/deform/thread_pool.h"
+#include "sinew/base/thread_pool.h"
 
 #include <gtest/gtest.h>
 

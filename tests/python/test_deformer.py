@@ -565,26 +565,6 @@ def test_gil_is_released(method):
     assert moved
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_deforms_in_a_forked_child():
-    rig = random_rig(51, vertices=20000, most_influences=4)
-    deformer = rig.deformer("dq")
-    expected = deformer.deform(rig.transforms, threads=4)
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            import signal
-
-            signal.alarm(60)  # a child that waits for its parent's threads must fail, not hang
-            code = int(not np.array_equal(deformer.deform(rig.transforms, threads=4), expected))
-        finally:
-            os._exit(code)
-    _, status = os.waitpid(child, 0)
-    assert os.waitstatus_to_exitcode(status) == 0
-
-
 @every_method
 @pytest.mark.parametrize("other", METHODS)
 def test_mix_is_each_vertex_share_of_two_methods(method, other):
@@ -766,11 +746,23 @@ def test_set_rest_points_beside_deform_tears_nothing(method):
     assert torn == []
 
 
+# What a child calls while the parent's threads are inside the same call, and what comes before it.
+CALLS = {
+    "Deformer": "lambda: (deformer.set_rest_points(rest), deformer.deform(bones, threads=3))[1]",
+    "DeltaMush": "lambda: (mush.bind(rest, iterations=20), mush.apply(rest, threads=3))[1]",
+    "Normals": "lambda: normals.compute(rest, threads=3)",
+    "SkinnedNormals": "lambda: skinned.deform(bones, threads=3)[1]",
+    "BulgeLimit": "lambda: (limit.set_rest_points(rest), limit.apply(rest, bones, threads=3))[1]",
+    "IkSolver": "lambda: solver.solve(chains, [[0, 1, 0]], [[1, 0, 0, 0, 0, 3, 4, 0]], iterations=3).rotations",
+}
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
-def test_a_child_forked_while_others_deform_goes_on(tmp_path):
-    """The child has none of the threads that deform here, and must not wait for them."""
+@pytest.mark.parametrize("name", CALLS)
+def test_a_child_forked_while_others_call_goes_on(tmp_path, name):
+    """The child has none of the threads that are inside calls here, and must not wait for them."""
     program = tmp_path / "fork.py"
-    program.write_text(FORKING)
+    program.write_text(FORKING.replace("CALL", CALLS[name]))
     done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout.strip()) == (0, "children: 20"), done.stderr
 
@@ -778,24 +770,37 @@ def test_a_child_forked_while_others_deform_goes_on(tmp_path):
 FORKING = """
 import os, signal, threading
 import numpy as np, sinew
-count = 200_000
-rest = np.ones((count, 3), np.float32)
-offsets = np.arange(count + 1, dtype=np.int32)
-deformer = sinew.Deformer(rest, offsets, np.zeros(count, np.int32), np.ones(count, np.float32), "dq")
+side = 300
+count = side * side
+rest = np.array([(i % side, i // side, i % 3) for i in range(count)], np.float32)
+corner = np.arange(count).reshape(side, side)
+quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], -1).reshape(-1, 4)
+edges = [np.stack(ends, -1).reshape(-1, 2) for ends in
+         ((corner[:, :-1], corner[:, 1:]), (corner[:-1], corner[1:]))]
+faces = np.arange(0, quads.size + 1, 4), quads.ravel(), np.concatenate(edges)
+skin = rest, np.arange(count + 1), np.zeros(count, np.int32), np.ones(count, np.float32)
 bones = np.eye(4, dtype=np.float32)[None]
+deformer = sinew.Deformer(*skin, "dq")
+mush = sinew.DeltaMush(rest, *faces, iterations=20)
+normals = sinew.Normals(count, *faces)
+skinned = sinew.SkinnedNormals(sinew.Binding(*skin), np.tile(np.float32([0, 0, 1]), (count, 1)))
+limit = sinew.BulgeLimit(*skin, [[0, 0, 0]], [[0, 1, 0]])
+solver = sinew.ik.Solver([-1, *range(59)], [sinew.ik.Effector(59)])
+chains = np.tile([1.0, 0, 0, 0, 0, 0, 0.5, 0], (500, 60, 1))
+call = CALL
+expected = call()
 done = threading.Event()
-def deform():
+def work():
     while not done.is_set():
-        deformer.deform(bones)
-threads = [threading.Thread(target=deform) for _ in range(3)]
+        call()
+threads = [threading.Thread(target=work) for _ in range(3)]
 for thread in threads: thread.start()
 ended = 0
 for _ in range(20):
     child = os.fork()
     if child == 0:
         signal.alarm(30)
-        deformer.set_rest_points(2 * rest)
-        os._exit(0 if (deformer.deform(bones) == 2).all() else 1)
+        os._exit(0 if np.array_equal(call(), expected) else 1)
     ended += os.waitpid(child, 0)[1] == 0
 done.set()
 for thread in threads: thread.join()

@@ -12,14 +12,14 @@ LIBRARY = ROOT / "native" / "sinew"
 
 # Folder of native/sinew: the folders whose headers it may include.
 MAY_INCLUDE = {
+    "base": {"base"},
     "transform": {"transform"},
     "interpolate": {"transform", "interpolate"},
     "fit": {"transform", "interpolate", "fit"},
-    "skeleton": {"transform", "interpolate", "skeleton"},
+    "skeleton": {"base", "transform", "interpolate", "skeleton"},
     "skinning": {"transform", "interpolate", "skeleton", "skinning"},
-    "deform": {"transform", "interpolate", "skeleton", "skinning", "deform"},
-    "motion": {"transform", "interpolate", "skeleton", "motion"},
-    "ik": {"transform", "interpolate", "skeleton", "ik"},
+    "deform": {"base", "transform", "interpolate", "skeleton", "skinning", "deform"},
+    "ik": {"base", "transform", "interpolate", "skeleton", "ik"},
 }
 
 # The rooms of addon/, lowest first: a file may import from its own room and from those before it. Files

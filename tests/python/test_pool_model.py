@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A model of the thread pool (native/sinew/deform/thread_pool.cpp): tries every order in which its threads
+"""A model of the thread pool (native/sinew/base/thread_pool.cpp): tries every order in which its threads
 can take their steps, for a caller that runs a few jobs and ends the threads in between.
 
 It answers whether a wake-up can be lost, so that a thread sleeps forever. It can not with a wait that

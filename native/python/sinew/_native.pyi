@@ -140,7 +140,8 @@ def centres_of_rotation(
     triangles: int32 [triangles, 3], vertices.
     exact: compute by the definition itself, which is slow; otherwise triangles of similar weights are
     summed.
-    threads: maximum number; None: as many as useful. The result is the same bit for bit.
+    threads: maximum number; None or 0: as many as useful. The result is the same bit for bit. They give
+        way to all other threads.
     progress: None, or a callable that is called on this thread with the completed share, 0 to 1. If it
         returns False, the work is cancelled and the result is None. An exception that it raises is passed
         on.
@@ -350,7 +351,7 @@ class Deformer:
 
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
         out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never converted.
-        threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The
+        threads: maximum number; None or 0: as many as useful. The
             result is the same bit for bit.
         bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone transforms,
             in which the bones are blended; the result is mapped back. None: the same space.
@@ -419,7 +420,7 @@ class BulgeLimit:
         strength: how much of the bulge is removed, 0 to 1.
         form: "continuous": distances to all bones of a vertex, weighted; "kim_han": only to the heaviest,
             which tears the surface where that changes.
-        threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The
+        threads: maximum number; None or 0: as many as useful. The
             result is the same bit for bit.
 
         Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for
@@ -501,7 +502,7 @@ class DeltaMush:
         out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never converted.
             May be `points`.
         scale: how much of the details is added back; 1: all.
-        threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The
+        threads: maximum number; None or 0: as many as useful. The
             result is the same bit for bit.
 
         A vertex without faces is smoothed and has no details. Releases the GIL for large meshes. Raises
@@ -565,7 +566,7 @@ class Normals:
         domain: "vertex", "corner" or "face": what each normal belongs to; None: the mesh's domain.
         out: if given, written and returned: float32, C-contiguous, aligned; never converted. Must not
             overlap the points.
-        threads: maximum number, any integer: 0 for all of the machine's; None: as many as useful. The
+        threads: maximum number; None or 0: as many as useful. The
             result is the same bit for bit.
 
         For a face without area the normal is (0, 0, 1); for a vertex without faces, the direction of its

@@ -7,10 +7,11 @@
 #include <string>
 #include <utility>
 
+#include "sinew/base/fork_safe.h"
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/bulge_kernel.h"
 #include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/packed_mesh.h"
-#include "sinew/deform/thread_pool.h"
 #include "sinew/transform/convert.h"
 #include "sinew/transform/split_scale.h"
 
@@ -89,7 +90,7 @@ struct BulgeLimit::State {
     Float4 to_bones[kDisplacementRows];
     Float4 to_model[kDisplacementRows];
     mutable std::vector<BulgeBone> bones;  // scratch for one call
-    mutable std::mutex mutex;
+    mutable ForkSafeMutex mutex;
 };
 
 BulgeLimit::State::State(const BulgeLimitData& data) {
@@ -142,9 +143,8 @@ void BulgeLimit::State::measure(std::span<const Vec3<float>> rest_points, const 
     }
     std::vector<Vec3<float>> points(rest_points.begin(), rest_points.end());
     const BulgeFrame all = frame(points);
-    const std::size_t threads = std::min(hardware_threads(), 1 + vertex_count / kVerticesWorthAThread);
     parallel_for(
-        mesh.blocks.size(), threads,
+        mesh.blocks.size(), useful_threads(0, vertex_count, kVerticesWorthAThread),
         [&all](std::size_t begin, std::size_t end) { bulge_kernel().measure(all, begin, end); },
         kBlocksOfAChunk);
 }
@@ -169,10 +169,10 @@ void BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
 std::size_t BulgeLimit::vertex_count() const noexcept { return state_->vertex_count; }
 std::size_t BulgeLimit::bone_count() const noexcept { return state_->bone_count; }
 
-void BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                        const BulgeLimitOptions& options) const noexcept {
     const State& state = *state_;
-    if (points.size() != state.vertex_count) return;
+    if (points.size() != state.vertex_count) return false;
     const std::scoped_lock lock(state.mutex);
     bool is_stretched = false;
     for (std::size_t i = 0; i < state.bones.size(); ++i) {
@@ -194,13 +194,11 @@ void BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
     work.frame.form = options.form;
     work.frame.is_stretched = is_stretched;
     work.frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);
-    const std::size_t threads = options.threads > 0
-                                    ? options.threads
-                                    : std::min(hardware_threads(), 1 + points.size() / kVerticesWorthAThread);
     parallel_for(
-        state.mesh.blocks.size(), threads,
+        state.mesh.blocks.size(), useful_threads(options.threads, points.size(), kVerticesWorthAThread),
         [&work](std::size_t begin, std::size_t end) { work.kernel.limit(work.frame, begin, end); },
         kBlocksOfAChunk);
+    return true;
 }
 
 BulgeLimit::Parts BulgeLimit::parts() const {

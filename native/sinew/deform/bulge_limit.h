@@ -24,7 +24,7 @@ struct BulgeLimitData {
 struct BulgeLimitOptions {
     BulgeForm form = BulgeForm::continuous;
     float strength = 1.0f;    // clamped to 0 to 1; NaN: 1
-    std::size_t threads = 0;  // 0: as many as useful
+    std::size_t threads = 0;  // at most; 0: as many as useful
 };
 
 /// The stage `bulge_limit` (skinning/bulge_limit.h) for one mesh, applied after Deformer::deform(). A constructed
@@ -52,13 +52,14 @@ public:
 
     /// Limits the points in place.
     ///
-    /// points           [vertices] deformed, model space; if the size is wrong, nothing is written
+    /// points           [vertices] deformed, model space
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
     ///
     /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. The
-    /// result does not depend on the number of threads.
-    void apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
-               const BulgeLimitOptions& options = {}) const noexcept;
+    /// result does not depend on the number of threads. Returns false, and writes nothing, if the number of points is
+    /// wrong.
+    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+                             const BulgeLimitOptions& options = {}) const noexcept;
 
     /// The data that the object was constructed from. An object made of it gives the same bits.
     struct Parts {

@@ -10,8 +10,7 @@
 #include <unordered_map>
 
 #include "sinew/deform/check_bind_data.h"
-#include "sinew/deform/progress_reporter.h"
-#include "sinew/deform/thread_pool.h"
+#include "sinew/deform/precompute.h"
 
 namespace sinew {
 namespace {
@@ -25,7 +24,7 @@ constexpr double kCellsOfOne = 64.0;
 constexpr std::size_t kStrip = 8;
 
 constexpr std::size_t kTrianglesBetweenReports = 4096;
-constexpr std::size_t kVerticesOfAChunk = 256;
+constexpr std::size_t kVerticesOfAChunk = 64;
 
 /// Merges the influences of a vertex, so that each bone occurs once.
 void merge(std::span<const Influence<float>> influences, std::vector<Influence<double>>& merged) {
@@ -326,20 +325,15 @@ Vec3<double> mean_of(std::span<const Vec3<float>> points) {
 }
 
 template <class T>
-bool find_centres(const BindData& data, const NormalisedInfluences& influences, const Collector& collector,
-                  std::size_t threads, ProgressReporter& reporter, std::span<Vec3<float>> centres) {
+std::vector<Vec3<float>> find_centres(const BindData& data, const NormalisedInfluences& influences,
+                                      const Collector& collector, Job& job) {
+    std::vector<Vec3<float>> centres(data.rest_points.size());
     const Vec3<double> origin = mean_of(data.rest_points);
     const PairSums<T> sums(collector.cells(), collector.pairs().count(), origin);
     std::atomic<std::size_t> done{0};
-    const auto find = [&](std::size_t begin, std::size_t end) {
+    job.for_each(centres.size(), kVerticesOfAChunk, [&](std::size_t begin, std::size_t end) {
         std::vector<Influence<double>> of_vertex;
         for (std::size_t vertex = begin; vertex < end; ++vertex) {
-            if ((vertex - begin) % kVerticesOfAChunk == 0) {
-                const auto share = static_cast<double>(done.load(std::memory_order_relaxed)) /
-                                   static_cast<double>(centres.size());
-                if (!reporter.go_on(0.5 + 0.5 * share)) return;
-            }
-            done.fetch_add(1, std::memory_order_relaxed);
             const std::span all(influences.influences);
             merge(all.subspan(influences.offsets[vertex],
                               influences.offsets[vertex + 1] - influences.offsets[vertex]),
@@ -356,9 +350,10 @@ bool find_centres(const BindData& data, const NormalisedInfluences& influences, 
             }
             centres[vertex] = mass > 0.0 ? Vec3<float>(origin + moment / mass) : data.rest_points[vertex];
         }
-    };
-    parallel_for(centres.size(), threads > 0 ? threads : hardware_threads(), find, kVerticesOfAChunk);
-    return reporter.go_on(1.0);
+        const std::size_t all = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
+        job.go_on(0.5 + 0.5 * static_cast<double>(all) / static_cast<double>(centres.size()));
+    });
+    return centres;
 }
 
 }  // namespace
@@ -368,31 +363,28 @@ std::optional<std::vector<Vec3<float>>> centres_of_rotation(const BindData& data
                                                             const PrecomputeOptions& options) {
     check(data);
     check_triangles(triangles, data.rest_points.size());
-    const NormalisedInfluences influences = normalised_influences(data);
-    ProgressReporter reporter(options);
-    Collector collector(options.exact);
-    for (std::size_t i = 0; i < triangles.size(); i += 3) {
-        if (i / 3 % kTrianglesBetweenReports == 0 &&
-            !reporter.go_on(0.5 * static_cast<double>(i) / static_cast<double>(triangles.size()))) {
-            return std::nullopt;
+    return precompute<std::vector<Vec3<float>>>(options, [&](Job& job) -> std::vector<Vec3<float>> {
+        const NormalisedInfluences influences = normalised_influences(data);
+        Collector collector(options.exact);
+        for (std::size_t i = 0; i < triangles.size(); i += 3) {
+            if (i / 3 % kTrianglesBetweenReports == 0 &&
+                !job.go_on(0.5 * static_cast<double>(i) / static_cast<double>(triangles.size()))) {
+                return {};
+            }
+            std::array<Vec3<double>, 3> points;
+            std::array<std::span<const Influence<float>>, 3> of_corners;
+            for (std::size_t corner = 0; corner < 3; ++corner) {
+                const auto vertex = static_cast<std::size_t>(triangles[i + corner]);
+                points[corner] = Vec3<double>(data.rest_points[vertex]);
+                of_corners[corner] = std::span(influences.influences)
+                                         .subspan(influences.offsets[vertex], influences.offsets[vertex + 1] -
+                                                                                  influences.offsets[vertex]);
+            }
+            collector.add(points, of_corners);
         }
-        std::array<Vec3<double>, 3> points;
-        std::array<std::span<const Influence<float>>, 3> of_corners;
-        for (std::size_t corner = 0; corner < 3; ++corner) {
-            const auto vertex = static_cast<std::size_t>(triangles[i + corner]);
-            points[corner] = Vec3<double>(data.rest_points[vertex]);
-            of_corners[corner] = std::span(influences.influences)
-                                     .subspan(influences.offsets[vertex],
-                                              influences.offsets[vertex + 1] - influences.offsets[vertex]);
-        }
-        collector.add(points, of_corners);
-    }
-    std::vector<Vec3<float>> centres(data.rest_points.size());
-    const bool whole =
-        options.exact ? find_centres<double>(data, influences, collector, options.threads, reporter, centres)
-                      : find_centres<float>(data, influences, collector, options.threads, reporter, centres);
-    if (!whole) return std::nullopt;
-    return centres;
+        return options.exact ? find_centres<double>(data, influences, collector, job)
+                             : find_centres<float>(data, influences, collector, job);
+    });
 }
 
 }  // namespace sinew

@@ -2,7 +2,7 @@
 #include "sinew/deform/check_bind_data.h"
 
 #include <cmath>
-#include <stdexcept>
+#include <string>
 
 namespace sinew {
 namespace {
@@ -20,10 +20,6 @@ void check_limit(const std::string& argument, const std::string& of, std::size_t
 }
 
 }  // namespace
-
-void fail(const std::string& argument, const std::string& wanted, const std::string& got) {
-    throw std::invalid_argument(argument + ": expected " + wanted + ", got " + got);
-}
 
 void check_points(std::span<const Vec3<float>> points) {
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {

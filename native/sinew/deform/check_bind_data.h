@@ -2,24 +2,20 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <vector>
 
+#include "sinew/base/fail.h"
 #include "sinew/deform/deformer.h"
 #include "sinew/deform/packed_mesh.h"
 #include "sinew/skinning/influence.h"
 
 namespace sinew {
 
-/// Throws std::invalid_argument "`argument`: expected `wanted`, got `got`".
-[[noreturn]] void fail(const std::string& argument, const std::string& wanted, const std::string& got);
-
 /// Throws if a point is not finite.
 void check_points(std::span<const Vec3<float>> points);
 
 /// Throws if there are some but fewer than `bone_count` rest bones, or if one is not finite.
 ///
-/// bone_count  one more than the highest bone index in the influences
 /// bone_count  one more than the highest bone index in the influences
 void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
 

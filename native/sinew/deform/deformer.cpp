@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/bone_moments.h"
 #include "sinew/deform/bone_sets.h"
 #include "sinew/deform/check_bind_data.h"
@@ -15,7 +16,6 @@
 #include "sinew/deform/mixed_blocks.h"
 #include "sinew/deform/packed_mesh.h"
 #include "sinew/deform/palette_store.h"
-#include "sinew/deform/thread_pool.h"
 #include "sinew/transform/convert.h"
 #include "sinew/transform/split_scale.h"
 
@@ -288,10 +288,10 @@ void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
     pack_points(mesh, rest_points, state_->own_rest_points);
 }
 
-void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                       std::span<Vec3<float>> points) const noexcept {
     const Binding::Packed& packed = *state_->packed;
-    if (points.size() != packed.vertex_count) return;
+    if (points.size() != packed.vertex_count) return false;
     const PaletteStore::Reading reading(state_->palettes);
     const Bones bones{packed.mesh.used_bones, packed.stretched_bones,   posed_from_rest,
                       packed.rest_bones,      options.bones_from_model, &state_->sets};
@@ -334,12 +334,9 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
                           parameters[k].data(),
                           points.data()};
     }
-    const std::size_t threads = options.threads > 0
-                                    ? options.threads
-                                    : std::min(hardware_threads(), 1 + points.size() / kVerticesWorthAThread);
     // A single reference: with a larger capture std::function would allocate.
     parallel_for(
-        packed.mesh.blocks.size(), threads,
+        packed.mesh.blocks.size(), useful_threads(options.threads, points.size(), kVerticesWorthAThread),
         [&work](std::size_t begin, std::size_t end) {
             if (work.state.mix) {
                 deform_mixed_blocks(work.state.kernels, work.frames, *work.state.mix, begin, end);
@@ -348,6 +345,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
             }
         },
         kBlocksOfAChunk);
+    return true;
 }
 
 }  // namespace sinew

@@ -73,7 +73,7 @@ struct DeformOptions {
     /// Maps model space to the space of `posed_from_rest` and the rest bones, in which the bones are blended; the
     /// result is mapped back. Invertible.
     Affine<float> bones_from_model{};
-    /// 0: as many as useful.
+    /// At most; 0: as many as useful. Everything that takes a number of threads takes it so.
     std::size_t threads = 0;
     /// [at most MethodInfo::parameters] values of the method's parameters, made valid by valid_value(). Missing
     /// ones have their defaults.
@@ -111,9 +111,10 @@ struct MixData {
     std::span<const float> weights;  // [vertices] clamped to 0 to 1; not NaN; copied
 };
 
-/// A binding and a method, ready to deform any pose. A constructed object is valid; deform() can not fail and
-/// does not allocate. Any number of threads may use one Deformer at once; if more than 16 deform at the same
-/// time, some wait. A moved-from object can only be assigned to or destroyed.
+/// A binding and a method, ready to deform any pose. A constructed object is valid; deform() can not fail, and
+/// allocates only when more threads than ever before deform at once. Any number of threads may use one Deformer at
+/// once; if more than 16 deform at the same time, some wait. A child that is forked meanwhile can go on with it, but
+/// has to set rest points again that were being set. A moved-from object can only be assigned to or destroyed.
 class SINEW_EXPORT Deformer {
 public:
     /// Throws std::invalid_argument as Binding does, and for a method that is not in the list of methods, a
@@ -150,12 +151,12 @@ public:
     /// Writes the deformed points, model space.
     ///
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
-    /// points           [vertices]; if the size is wrong, nothing is written
+    /// points           [vertices]
     ///
     /// A vertex without influences, or with only weights of 0, stays at rest. The result does not depend on the
-    /// number of threads.
-    void deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                std::span<Vec3<float>> points) const noexcept;
+    /// number of threads. Returns false, and writes nothing, if the number of points is wrong.
+    [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+                              std::span<Vec3<float>> points) const noexcept;
 
 private:
     struct State;

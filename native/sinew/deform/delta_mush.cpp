@@ -8,9 +8,10 @@
 #include <string>
 #include <utility>
 
+#include "sinew/base/fork_safe.h"
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/mush_mesh.h"
-#include "sinew/deform/thread_pool.h"
 #include "sinew/skinning/delta_mush.h"
 
 namespace sinew {
@@ -120,30 +121,35 @@ struct DeltaMush::State {
 
     void bind(std::span<const Vec3<float>> points, const DeltaMushSettings& with);
 
+    /// What bind() sets.
+    struct Bound {
+        std::vector<Vec3<float>> rest_points;
+        std::vector<float> weights;
+        DeltaMushSettings settings;
+        std::size_t iterations;
+        std::vector<float> factors;        // as in MushFrame, with room for one more vector
+        bool is_uniform;                   // as in MushFrame
+        std::vector<MushDetails> details;  // indexed by MushBlock::first_detail
+    };
+
     /// Smooths smoothed[0]. Returns the index of the result in `smoothed`.
-    std::size_t smooth(const MushKernel& kernel, std::size_t threads) const noexcept;
+    std::size_t smooth(const Bound& of, const MushKernel& kernel, std::size_t threads) const noexcept;
 
     [[nodiscard]] std::size_t threads_for(std::size_t threads) const noexcept {
-        if (threads > 0) return threads;
-        return std::min(hardware_threads(), 1 + mesh.vertices.size() / kVerticesWorthAThread);
+        return useful_threads(threads, mesh.vertices.size(), kVerticesWorthAThread);
     }
 
     // The data given to the constructor.
     std::vector<std::int32_t> face_offsets;
     std::vector<std::int32_t> corner_vertices;
     std::vector<std::int32_t> edges;
-    std::vector<Vec3<float>> rest_points;
-    std::vector<float> weights;
-    DeltaMushSettings settings;
 
     MushMesh mesh;
-    std::size_t iterations = 0;
-    std::vector<float> factors;        // as in MushFrame, with room for one more vector
-    bool is_uniform = true;            // as in MushFrame
-    std::vector<MushDetails> details;  // indexed by MushBlock::first_detail
+    std::unique_ptr<const Bound>
+        bound;  // one pointer: a child that is forked during bind() has all or nothing of it
 
     // Scratch for one call at a time. Elements beyond the vertices stay 0.
-    mutable std::mutex mutex;
+    mutable ForkSafeMutex mutex;
     std::vector<Float4> kept;
     mutable std::vector<Float4> smoothed[2];
 };
@@ -151,38 +157,36 @@ struct DeltaMush::State {
 void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMushSettings& with) {
     check(points, with, mesh.vertices.size());
     Amount amount = amount_of(mesh, points, with);
-    std::vector<Vec3<float>> own_points(points.begin(), points.end());
-    std::vector<float> own_weights(with.weights.begin(), with.weights.end());
-    std::vector<MushDetails> own_details(mesh.detail_count);
-    for (float& weight : own_weights) weight = std::clamp(weight, 0.0f, 1.0f);
+    amount.factors.resize(mesh.vertices.size() + kLanes);
+    auto made =
+        std::make_unique<Bound>(Bound{{points.begin(), points.end()},
+                                      {with.weights.begin(), with.weights.end()},
+                                      with,
+                                      amount.iterations,
+                                      std::move(amount.factors),
+                                      with.weights.empty() && !with.pin_boundary && with.radius == 0.0f,
+                                      std::vector<MushDetails>(mesh.detail_count)});
+    made->settings.weights = {};
+    for (float& weight : made->weights) weight = std::clamp(weight, 0.0f, 1.0f);
     const float by_type = with.type == SmoothType::length_weighted ? 2.0f : 1.0f;
     for (const MushRun& run : mesh.runs) {
         for (std::size_t i = run.begin; i < run.end && run.valence > 0; ++i) {
-            const float weight = own_weights.empty() ? 1.0f : own_weights[mesh.vertices[i]];
+            const float weight = made->weights.empty() ? 1.0f : made->weights[mesh.vertices[i]];
             const bool is_pinned = with.pin_boundary && mesh.on_boundary[i] != 0;
-            amount.factors[i] *= is_pinned ? 0.0f : by_type * weight / static_cast<float>(run.valence);
+            made->factors[i] *= is_pinned ? 0.0f : by_type * weight / static_cast<float>(run.valence);
         }
     }
 
-    amount.factors.resize(mesh.vertices.size() + kLanes);
-
     const std::scoped_lock lock(mutex);
-    iterations = amount.iterations;
-    factors = std::move(amount.factors);
-    is_uniform = own_weights.empty() && !with.pin_boundary && with.radius == 0.0f;
-    details = std::move(own_details);
-    rest_points = std::move(own_points);
-    weights = std::move(own_weights);
-    settings = with;
-    settings.weights = weights;
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-        kept[i] = smoothed[0][i] = float4_of(rest_points[mesh.vertices[i]]);
+        kept[i] = smoothed[0][i] = float4_of(made->rest_points[mesh.vertices[i]]);
     }
     // Uses the kernels that smooth each frame, so that the rest pose is reproduced.
     const MushKernel kernel = mush_kernel();
-    const std::size_t result = smooth(kernel, threads_for(0));
+    const std::size_t result = smooth(*made, kernel, threads_for(0));
     const MushFrame frame{&mesh, smoothed[result].data(), nullptr, nullptr, false, nullptr, 0.0f, nullptr};
-    kernel.take_details(frame, kept.data(), details.data(), 0, mesh.chunk_count());
+    kernel.take_details(frame, kept.data(), made->details.data(), 0, mesh.chunk_count());
+    bound = std::move(made);
 }
 
 /// Runs several iterations over the mesh together. An iteration on a chunk reads what the previous iteration
@@ -258,26 +262,27 @@ private:
     std::size_t most_;
 };
 
-std::size_t DeltaMush::State::smooth(const MushKernel& kernel, std::size_t threads) const noexcept {
+std::size_t DeltaMush::State::smooth(const Bound& of, const MushKernel& kernel,
+                                     std::size_t threads) const noexcept {
     if (mesh.vertices.empty()) return 0;
     const auto smooth_chunk =
-        settings.type == SmoothType::length_weighted ? kernel.smooth_by_length : kernel.smooth;
+        of.settings.type == SmoothType::length_weighted ? kernel.smooth_by_length : kernel.smooth;
     const Iterations together(mesh, threads);
-    for (std::size_t first = 0; first < iterations; first += together.most()) {
-        together.run(std::min(together.most(), iterations - first), [&](std::size_t i, std::size_t chunk) {
+    for (std::size_t first = 0; first < of.iterations; first += together.most()) {
+        together.run(std::min(together.most(), of.iterations - first), [&](std::size_t i, std::size_t chunk) {
             const std::size_t from = (first + i) % 2;
             const MushFrame frame{&mesh,
                                   smoothed[from].data(),
                                   smoothed[1 - from].data(),
-                                  factors.data(),
-                                  is_uniform,
+                                  of.factors.data(),
+                                  of.is_uniform,
                                   nullptr,
                                   0.0f,
                                   nullptr};
             smooth_chunk(frame, chunk, chunk + 1);
         });
     }
-    return iterations % 2;
+    return of.iterations % 2;
 }
 
 DeltaMush::DeltaMush(const MeshTopology& topology, std::span<const Vec3<float>> rest_points,
@@ -295,17 +300,24 @@ void DeltaMush::bind(std::span<const Vec3<float>> rest_points, const DeltaMushSe
 }
 
 std::size_t DeltaMush::vertex_count() const noexcept { return state_->mesh.vertices.size(); }
-std::size_t DeltaMush::iterations() const noexcept { return state_->iterations; }
-
-DeltaMush::Parts DeltaMush::parts() const noexcept {
-    const State& state = *state_;
-    return {{state.face_offsets, state.corner_vertices, state.edges}, state.rest_points, state.settings};
+std::size_t DeltaMush::iterations() const noexcept {
+    const std::scoped_lock lock(state_->mutex);
+    return state_->bound->iterations;
 }
 
-void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
+DeltaMush::Parts DeltaMush::parts() const {
+    const State& state = *state_;
+    const std::scoped_lock lock(state.mutex);
+    return {{state.face_offsets, state.corner_vertices, state.edges},
+            state.bound->rest_points,
+            state.bound->settings,
+            state.bound->weights};
+}
+
+bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
     const State& state = *state_;
     const MushMesh& mesh = state.mesh;
-    if (points.size() != mesh.vertices.size()) return;
+    if (points.size() != mesh.vertices.size()) return false;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
     const MushKernel kernel = mush_kernel();
@@ -313,8 +325,9 @@ void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
         const State& state;
         const MushKernel& kernel;
         MushFrame frame;
-    } work{
-        state, kernel, {&mesh, nullptr, nullptr, nullptr, false, state.details.data(), scale, points.data()}};
+    } work{state,
+           kernel,
+           {&mesh, nullptr, nullptr, nullptr, false, state.bound->details.data(), scale, points.data()}};
     parallel_for(
         mesh.chunk_count(), threads,
         [&work](std::size_t begin, std::size_t end) {
@@ -330,10 +343,11 @@ void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
             }
         },
         1);
-    work.frame.from = state.smoothed[state.smooth(kernel, threads)].data();
+    work.frame.from = state.smoothed[state.smooth(*state.bound, kernel, threads)].data();
     parallel_for(
         mesh.chunk_count(), threads,
         [&work](std::size_t begin, std::size_t end) { work.kernel.finish(work.frame, begin, end); }, 1);
+    return true;
 }
 
 }  // namespace sinew

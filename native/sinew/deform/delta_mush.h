@@ -71,22 +71,24 @@ public:
 
     /// Smooths the points in place and adds their details back.
     ///
-    /// points   [vertices] in the space of the rest points; if the size is wrong, nothing is written
+    /// points   [vertices] in the space of the rest points
     /// scale    how much of the details is added back; 1: all
-    /// threads  0: as many as useful
+    /// threads  at most; 0: as many as useful
     ///
     /// A vertex without faces is smoothed and has no details. The result does not depend on the number of
-    /// threads.
-    void apply(std::span<Vec3<float>> points, float scale = 1.0f, std::size_t threads = 0) const noexcept;
+    /// threads. Returns false, and writes nothing, if the number of points is wrong.
+    [[nodiscard]] bool apply(std::span<Vec3<float>> points, float scale = 1.0f,
+                             std::size_t threads = 0) const noexcept;
 
-    /// The data that the object was constructed from. Spans are valid until bind() or until the object is
+    /// The data that the object was constructed from, or that bind() set. The topology is valid until the object is
     /// destroyed.
     struct Parts {
         MeshTopology topology;
-        std::span<const Vec3<float>> rest_points;
-        DeltaMushSettings settings;
+        std::vector<Vec3<float>> rest_points;
+        DeltaMushSettings settings;  // without weights
+        std::vector<float> weights;
     };
-    [[nodiscard]] Parts parts() const noexcept;
+    [[nodiscard]] Parts parts() const;
 
 private:
     struct State;

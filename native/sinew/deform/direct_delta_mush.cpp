@@ -11,8 +11,7 @@
 
 #include "sinew/deform/block_factor.h"
 #include "sinew/deform/check_bind_data.h"
-#include "sinew/deform/progress_reporter.h"
-#include "sinew/deform/thread_pool.h"
+#include "sinew/deform/precompute.h"
 
 namespace sinew {
 namespace {
@@ -296,28 +295,14 @@ void add_rows(std::uint32_t vertex, const Vec3<double>& point,
     }
 }
 
-}  // namespace
-
-std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
-                                                    std::span<const std::int32_t> triangles, double radius,
-                                                    const PrecomputeOptions& options) {
-    check(data);
+std::vector<float> find_moments(const BindData& data, std::span<const std::int32_t> triangles, double radius,
+                                bool exact, Job& job) {
     const std::size_t vertex_count = data.rest_points.size();
-    check_triangles(triangles, vertex_count);
-    if (!(radius >= 0.0) || !std::isfinite(radius)) {
-        fail("radius", "a number of 0 or more", std::to_string(radius));
-    }
-    if (vertex_count > kMaxMomentVertices) {
-        fail("rest_points", "at most " + std::to_string(kMaxMomentVertices) + " points",
-             std::to_string(vertex_count));
-    }
-    ProgressReporter reporter(options);
-    if (!reporter.go_on(0.0)) return std::nullopt;
     const NormalisedInfluences influences = normalised_influences(data);
     const WeightsByBone by_bone = weights_by_bone(influences);
     const Smoothing smoothing = smoothing_of(data.rest_points, triangles, radius);
     const Solver solver(smoothing.step);
-    if (!reporter.go_on(kShareOfFactor)) return std::nullopt;
+    if (!job.go_on(kShareOfFactor)) return {};
 
     // Relative to the mesh's middle, so that a mesh far from the origin loses no digits.
     std::vector<Vec3<double>> points(data.rest_points.begin(), data.rest_points.end());
@@ -337,31 +322,28 @@ std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
     std::vector<std::vector<Found>> found(bones.size());
     const std::size_t groups = (bones.size() + kGroups - 1) / kGroups;
     std::atomic<std::size_t> done{0};
-    const double least = options.exact ? kLeastExact : kLeastMoment;
+    const double least = exact ? kLeastExact : kLeastMoment;
     const auto go_on = [&] {
         const auto share =
             static_cast<double>(done.load(std::memory_order_relaxed)) / static_cast<double>(kSteps * groups);
-        return reporter.go_on(kShareOfFactor + (1.0 - kShareOfFactor) * share);
+        return job.go_on(kShareOfFactor + (1.0 - kShareOfFactor) * share);
     };
-    parallel_for(
-        groups, options.threads > 0 ? options.threads : hardware_threads(),
-        [&](std::size_t begin, std::size_t end) {
-            BoneSmoother smoother(solver, smoothing.mass, points);
-            for (std::size_t group = begin; group < end; ++group) {
-                const std::size_t first = kGroups * group;
-                const std::size_t count = std::min(kGroups, bones.size() - first);
-                smoother.find(
-                    std::span(weights).subspan(first, count), least,
-                    [&] {
-                        const bool goes_on = go_on();
-                        done.fetch_add(1, std::memory_order_relaxed);
-                        return goes_on;
-                    },
-                    std::span(found).subspan(first, count));
-            }
-        },
-        1);
-    if (!go_on()) return std::nullopt;
+    job.for_each(groups, 1, [&](std::size_t begin, std::size_t end) {
+        BoneSmoother smoother(solver, smoothing.mass, points);
+        for (std::size_t group = begin; group < end; ++group) {
+            const std::size_t first = kGroups * group;
+            const std::size_t count = std::min(kGroups, bones.size() - first);
+            smoother.find(
+                std::span(weights).subspan(first, count), least,
+                [&] {
+                    const bool goes_on = go_on();
+                    done.fetch_add(1, std::memory_order_relaxed);
+                    return goes_on;
+                },
+                std::span(found).subspan(first, count));
+        }
+    });
+    if (!go_on()) return {};
 
     std::size_t row_count = 0;
     for (const std::vector<Found>& of_bone : found) row_count += of_bone.size();
@@ -379,7 +361,26 @@ std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
         if (of_vertex.empty()) continue;
         add_rows(vertex, Vec3<double>(data.rest_points[vertex]), of_vertex, kLeastExtentOfMesh * size, rows);
     }
-    return reporter.go_on(1.0) ? std::optional(std::move(rows)) : std::nullopt;
+    return rows;
+}
+
+}  // namespace
+
+std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
+                                                    std::span<const std::int32_t> triangles, double radius,
+                                                    const PrecomputeOptions& options) {
+    check(data);
+    const std::size_t vertex_count = data.rest_points.size();
+    check_triangles(triangles, vertex_count);
+    if (!(radius >= 0.0) || !std::isfinite(radius)) {
+        fail("radius", "a number of 0 or more", std::to_string(radius));
+    }
+    if (vertex_count > kMaxMomentVertices) {
+        fail("rest_points", "at most " + std::to_string(kMaxMomentVertices) + " points",
+             std::to_string(vertex_count));
+    }
+    return precompute<std::vector<float>>(
+        options, [&](Job& job) { return find_moments(data, triangles, radius, options.exact, job); });
 }
 
 }  // namespace sinew

@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "sinew/base/fork_safe.h"
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/normal_mesh.h"
-#include "sinew/deform/thread_pool.h"
 #include "sinew/deform/topology.h"
 
 namespace sinew {
@@ -95,8 +96,7 @@ struct Normals::State {
     }
 
     [[nodiscard]] std::size_t threads_for(std::size_t threads) const noexcept {
-        if (threads > 0) return threads;
-        return std::min(hardware_threads(), 1 + corner_vertices.size() / kCornersWorthAThread);
+        return useful_threads(threads, corner_vertices.size(), kCornersWorthAThread);
     }
 
     /// Writes to each element of `to` the normal that `sources` names.
@@ -115,7 +115,7 @@ struct Normals::State {
     NormalMesh mesh;
 
     // Scratch for one call at a time.
-    mutable std::mutex mutex;
+    mutable ForkSafeMutex mutex;
     mutable std::vector<Float4> normals;  // indexed as NormalMesh::corner_sources
 };
 
@@ -161,10 +161,10 @@ Normals::Parts Normals::parts() const noexcept {
             {state.sharp_edges, state.sharp_faces, state.custom}};
 }
 
-void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
+bool Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
                       std::span<Vec3<float>> normals, std::size_t threads) const noexcept {
     const State& state = *state_;
-    if (points.size() != count(NormalDomain::vertex) || normals.size() != count(domain)) return;
+    if (points.size() != count(NormalDomain::vertex) || normals.size() != count(domain)) return false;
     const NormalMesh& mesh = state.mesh;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
@@ -188,17 +188,15 @@ void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
         run(is_of_vertices ? kernel.sum : kernel.sum_groups, frame, frame.groups->size(), threads,
             kGroupsOfChunk);
     }
-    switch (domain) {
-        case NormalDomain::vertex: return;
-        case NormalDomain::face: return state.write(normals, mesh.face_sources.data(), all, threads);
-        case NormalDomain::corner: break;
-    }
+    if (domain == NormalDomain::face) state.write(normals, mesh.face_sources.data(), all, threads);
+    if (domain != NormalDomain::corner) return true;
     run(kernel.customise, frame, mesh.fan_blocks.size(), threads, kBlocksOfChunk);
     if (mesh.corner_sources.empty()) {
         state.write(normals, state.corner_vertices.data(), frame.group_normals, threads);
     } else {
         state.write(normals, mesh.corner_sources.data(), all, threads);
     }
+    return true;
 }
 
 }  // namespace sinew

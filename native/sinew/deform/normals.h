@@ -85,13 +85,13 @@ public:
     ///
     /// domain   of the result; any, independently of domain()
     /// points   [vertices]
-    /// normals  [count(domain)] must not overlap `points`; if this or `points` has the wrong size, nothing is
-    ///          written
-    /// threads  0: as many as useful
+    /// normals  [count(domain)] must not overlap `points`
+    /// threads  at most; 0: as many as useful
     ///
-    /// The result depends neither on the number of threads nor on the instruction set.
-    void compute(NormalDomain domain, std::span<const Vec3<float>> points, std::span<Vec3<float>> normals,
-                 std::size_t threads = 0) const noexcept;
+    /// The result depends neither on the number of threads nor on the instruction set. Returns false, and writes
+    /// nothing, if a size is wrong.
+    [[nodiscard]] bool compute(NormalDomain domain, std::span<const Vec3<float>> points,
+                               std::span<Vec3<float>> normals, std::size_t threads = 0) const noexcept;
 
     /// The data that the object was constructed from. Spans are valid until the object is destroyed.
     struct Parts {

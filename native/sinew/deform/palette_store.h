@@ -1,31 +1,35 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 
+#include "sinew/base/fork_safe.h"
 #include "sinew/deform/kernels.h"
 
 namespace sinew {
 
-/// Palettes for each thread that deforms a mesh, allocated with the mesh, so that a frame does not allocate. Also
-/// a readers-writer lock for the mesh: many threads may deform, or one may change the rest points.
+/// Palettes for each thread that deforms a mesh. Also a readers-writer lock for the mesh: many threads may deform,
+/// or one may change the rest points.
 ///
-/// A thread waits only while kMax others deform this very mesh, or while its rest points are being written.
+/// The first thread's palettes are allocated with the mesh, those of another when more threads than ever before
+/// deform at once. A thread waits only while kMax others deform this very mesh, while its rest points are being
+/// written, or where the system has no memory for further palettes.
 class PaletteStore {
 public:
     static constexpr std::uint32_t kMax = 16;
     static constexpr std::size_t kMaxKernels = 2;
 
-    /// Allocates the palettes.
-    ///
     /// kernels  one or two, all used by each thread
     /// bones    number of bones that the mesh uses
     /// entries  number of entries in its BoneSets; 0 if no kernel needs sets
     PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries);
+    ~PaletteStore();
+    PaletteStore(const PaletteStore&) = delete;
+    PaletteStore& operator=(const PaletteStore&) = delete;
 
     /// Holds palettes for the caller, and the mesh for reading, while this object lives.
     class Reading {
@@ -37,7 +41,7 @@ public:
 
         /// The palette for the kernel with this index.
         [[nodiscard]] Palette& palette(std::size_t kernel) const noexcept {
-            return store_.palettes_[kernel][index_];
+            return store_.palette(kernel, index_);
         }
 
     private:
@@ -58,27 +62,21 @@ public:
     };
 
 private:
+    struct Palettes;
+
     std::uint32_t start_reading() noexcept;
     void end_reading(std::uint32_t index) noexcept;
     void start_writing() noexcept;
     void end_writing() noexcept;
-    template <class Next>
-    std::uint32_t change(const Next& next) noexcept;
+    /// Makes the palettes of the thread that has this bit. Returns false without memory.
+    bool make(std::uint32_t index) noexcept;
+    [[nodiscard]] Palette& palette(std::size_t kernel, std::uint32_t index) noexcept;
 
-    /// The memory of one kernel's palettes.
-    struct Memory {
-        std::unique_ptr<Float4[]> float4s;
-        std::unique_ptr<float[]> sizes;
-        std::unique_ptr<std::uint8_t[]> may_be_plain;
-        std::unique_ptr<std::int32_t[]> scaled;
-        std::unique_ptr<std::uint8_t[]> has_scale;
-        std::unique_ptr<std::byte[]> set_bones;
-    };
-
-    Memory memory_[kMaxKernels];
-    Palette palettes_[kMaxKernels][kMax];
-    // a bit for each palette in use, one for a writer, and above them forks()
-    std::atomic<std::uint32_t> state_{0};
+    std::array<const Kernel*, kMaxKernels> kernels_{};
+    std::size_t bones_;
+    std::size_t entries_;
+    std::array<std::atomic<Palettes*>, kMax> palettes_{};
+    ForkSafeBits<kMax + 1> state_;  // a bit for each of the palettes in use, and one for a writer
 };
 
 }  // namespace sinew

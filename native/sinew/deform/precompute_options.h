@@ -8,7 +8,7 @@ namespace sinew {
 
 /// How a precomputation runs. All precomputations take this.
 struct PrecomputeOptions {
-    /// 0: as many as useful.
+    /// At most; 0: as many as useful.
     std::size_t threads = 0;
     /// Called from time to time, only on the calling thread, with the completed share, 0 to 1. If it returns
     /// false, the precomputation is cancelled. An exception that it throws is passed on.

@@ -8,9 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "sinew/base/fork_safe.h"
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/skinned_normal_kernel.h"
-#include "sinew/deform/thread_pool.h"
 
 namespace sinew {
 namespace {
@@ -69,10 +70,6 @@ Vec3<float> unit(const Vec3<float>& v) {
     return squared > kShortest && std::isfinite(squared) ? v / std::sqrt(squared) : Vec3<float>(0.0f);
 }
 
-std::size_t threads_for(std::size_t wanted, std::size_t count) noexcept {
-    return wanted > 0 ? wanted : std::min(hardware_threads(), 1 + count / kFramesWorthAThread);
-}
-
 }  // namespace
 
 struct SkinnedNormals::State {
@@ -100,7 +97,7 @@ struct SkinnedNormals::State {
     void move_steps(std::span<const Affine<float>> posed_from_rest,
                     const DeformOptions& options) const noexcept {
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            deformers[1 + axis].deform(posed_from_rest, options, moved[axis]);
+            static_cast<void>(deformers[1 + axis].deform(posed_from_rest, options, moved[axis]));
         }
     }
 
@@ -121,7 +118,7 @@ struct SkinnedNormals::State {
             const auto part = [&frame, function](std::size_t begin, std::size_t end) {
                 function(frame, begin, end);
             };
-            parallel_for(count, threads_for(threads, count), part);
+            parallel_for(count, useful_threads(threads, count, kFramesWorthAThread), part);
         };
         if (vertices.empty()) return compute(kernel.of_vertices, to.size());
         compute(kernel.cofactors, points.size());
@@ -149,7 +146,7 @@ struct SkinnedNormals::State {
     std::vector<std::int32_t> vertices;
 
     // Scratch for one call at a time.
-    mutable std::mutex mutex;
+    mutable ForkSafeMutex mutex;
     mutable std::array<std::vector<Vec3<float>>, 3> moved;
     mutable std::array<std::vector<Float4>, 3> cofactors;
 };
@@ -168,18 +165,18 @@ std::size_t SkinnedNormals::frame_count() const noexcept { return state_->normal
 bool SkinnedNormals::has_tangents() const noexcept { return !state_->tangents.empty(); }
 const Deformer& SkinnedNormals::deformer() const noexcept { return state_->deformers[0]; }
 
-void SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                             std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
                             std::span<Vec3<float>> tangents) const noexcept {
     const State& state = *state_;
     const std::size_t most_tangents = state.tangents.size();
-    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return;
-    if (!tangents.empty() && tangents.size() != most_tangents) return;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
+    if (!tangents.empty() && tangents.size() != most_tangents) return false;
     const std::scoped_lock lock(state.mutex);
-    state.deformers[0].deform(posed_from_rest, options, points);
+    static_cast<void>(state.deformers[0].deform(posed_from_rest, options, points));
     state.move_steps(posed_from_rest, options);
     state.move_normals(points, normals, options.threads);
-    if (tangents.empty()) return;
+    if (tangents.empty()) return true;
     // A single reference: with a larger capture std::function would allocate.
     struct Work {
         const State& state;
@@ -189,17 +186,20 @@ void SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, cons
     const auto part = [&work](std::size_t begin, std::size_t end) {
         work.state.move_tangents(work.points, work.tangents, begin, end);
     };
-    parallel_for(tangents.size(), threads_for(options.threads, tangents.size()), part);
+    parallel_for(tangents.size(), useful_threads(options.threads, tangents.size(), kFramesWorthAThread),
+                 part);
+    return true;
 }
 
-void SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
+bool SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
                                     const DeformOptions& options, std::span<const Vec3<float>> points,
                                     std::span<Vec3<float>> normals) const noexcept {
     const State& state = *state_;
-    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
     const std::scoped_lock lock(state.mutex);
     state.move_steps(posed_from_rest, options);
     state.move_normals(points, normals, options.threads);
+    return true;
 }
 
 }  // namespace sinew

@@ -35,9 +35,6 @@ struct RestFrames {
 ///
 /// A constructed object is valid; deforming can not fail and does not allocate. Concurrent calls on one object
 /// wait for each other. A moved-from object can only be assigned to or destroyed.
-///
-/// Once constructed it is valid, and deforming can not fail and allocates nothing. Calls of one object wait for each
-/// other. One that was moved from can only be assigned to or destroyed.
 class SINEW_EXPORT SkinnedNormals {
 public:
     /// Throws std::invalid_argument as Deformer does, and, naming the field, for: a number of frames other than
@@ -60,22 +57,24 @@ public:
     /// posed_from_rest  [bones, at least deformer().bone_count()] finite; missing bones stay at rest
     /// points           [vertices]
     /// normals          [frames]
-    /// tangents         [frames], or empty; empty if there are none at rest. If any size is wrong, nothing is
-    ///                  written
+    /// tangents         [frames], or empty; empty if there are none at rest
     ///
     /// A vertex without influences keeps its normals and tangents. The result does not depend on the number of
-    /// threads.
-    void deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
-                std::span<Vec3<float>> tangents = {}) const noexcept;
+    /// threads. Returns false, and writes nothing, if a size is wrong.
+    [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+                              std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
+                              std::span<Vec3<float>> tangents = {}) const noexcept;
 
     /// Writes the same normals if the points for the same pose and options are known. This saves a quarter of the
     /// time.
     ///
-    /// points   [vertices] as written by deform() or by the Deformer; if the size is wrong, nothing is written
+    /// points   [vertices] as written by deform() or by the Deformer
     /// normals  [frames]
-    void deform_normals(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                        std::span<const Vec3<float>> points, std::span<Vec3<float>> normals) const noexcept;
+    ///
+    /// Returns false, and writes nothing, if a size is wrong.
+    [[nodiscard]] bool deform_normals(std::span<const Affine<float>> posed_from_rest,
+                                      const DeformOptions& options, std::span<const Vec3<float>> points,
+                                      std::span<Vec3<float>> normals) const noexcept;
 
 private:
     struct State;

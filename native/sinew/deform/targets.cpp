@@ -3,10 +3,10 @@
 
 #include <atomic>
 #include <iterator>
-#include <stdexcept>
 #include <string>
 
 #include "hwy/highway.h"
+#include "sinew/base/fail.h"
 #include "sinew/deform/kernels.h"
 #include "sinew/deform/simd.h"
 #include "sinew/deform/x86_support.h"
@@ -74,8 +74,7 @@ void use_simd_target(std::string_view name) {
             return;
         }
     }
-    throw std::invalid_argument("simd target: expected one of simd_targets(), got '" + std::string(name) +
-                                "'");
+    fail("simd target", "one of simd_targets()", std::string("'").append(name).append("'"));
 }
 
 }  // namespace sinew

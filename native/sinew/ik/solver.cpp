@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sinew/ik/solver.h"
 
-#include <cassert>
 #include <limits>
-#include <stdexcept>
+#include <mutex>
 #include <string>
 
+#include "sinew/base/fail.h"
 #include "sinew/ik/state.h"
 
 namespace sinew {
@@ -17,14 +17,13 @@ void check(const BoneLimits& limits, std::size_t bone) {
         const bool is_range =
             limit.min <= 0.0 && limit.max >= 0.0 && limit.min >= -kHalfTurn && limit.max <= kHalfTurn;
         if (limit.is_limited && !is_range) {
-            throw std::invalid_argument("limits: expected -pi <= min <= 0 <= max <= pi, got " +
-                                        std::to_string(limit.min) + " and " + std::to_string(limit.max) +
-                                        " for bone " + std::to_string(bone));
+            fail("limits", "-pi <= min <= 0 <= max <= pi",
+                 std::to_string(limit.min) + " and " + std::to_string(limit.max) + " for bone " +
+                     std::to_string(bone));
         }
         if (!(limit.stiffness >= 0.0 && limit.stiffness < 1.0)) {
-            throw std::invalid_argument("stiffness: expected 0 to below 1, got " +
-                                        std::to_string(limit.stiffness) + " for bone " +
-                                        std::to_string(bone));
+            fail("stiffness", "0 to below 1",
+                 std::to_string(limit.stiffness) + " for bone " + std::to_string(bone));
         }
     }
 }
@@ -32,18 +31,16 @@ void check(const BoneLimits& limits, std::size_t bone) {
 void check(const IkEffector& effector, std::size_t index, std::size_t bone_count) {
     const std::string where = " for effector " + std::to_string(index);
     if (effector.bone < 0 || static_cast<std::size_t>(effector.bone) >= bone_count) {
-        throw std::invalid_argument("effectors: expected the index of one of " + std::to_string(bone_count) +
-                                    " bones, got " + std::to_string(effector.bone) + where);
+        fail("effectors", "the index of one of " + std::to_string(bone_count) + " bones",
+             std::to_string(effector.bone) + where);
     }
     for (const double weight : {effector.position_weight, effector.rotation_weight}) {
         if (!(weight >= 0.0) || !std::isfinite(weight)) {
-            throw std::invalid_argument("weights: expected finite ones not below 0, got " +
-                                        std::to_string(weight) + where);
+            fail("weights", "finite ones not below 0", std::to_string(weight) + where);
         }
     }
     if (!std::isfinite(effector.pole_angle)) {
-        throw std::invalid_argument("pole_angle: expected a finite one, got " +
-                                    std::to_string(effector.pole_angle) + where);
+        fail("pole_angle", "a finite one", std::to_string(effector.pole_angle) + where);
     }
 }
 
@@ -145,10 +142,9 @@ IkSolver::State::State(const Skeleton& skeleton, std::span<const BoneLimits> lim
                        std::span<const IkEffector> effectors) {
     const std::size_t bone_count = skeleton.bone_count();
     if (!limits.empty() && limits.size() != bone_count) {
-        throw std::invalid_argument("limits: expected those of " + std::to_string(bone_count) +
-                                    " bones, got " + std::to_string(limits.size()));
+        fail("limits", "those of " + std::to_string(bone_count) + " bones", std::to_string(limits.size()));
     }
-    if (effectors.empty()) throw std::invalid_argument("effectors: expected at least one, got none");
+    if (effectors.empty()) fail("effectors", "at least one", "none");
     for (std::size_t i = 0; i < bone_count; ++i) {
         const BoneLimits own = limits.empty() ? BoneLimits{} : limits[i];
         check(own, i);
@@ -385,13 +381,15 @@ IkSolver& IkSolver::operator=(IkSolver&& other) noexcept = default;
 std::size_t IkSolver::bone_count() const noexcept { return state_->bones.size(); }
 std::size_t IkSolver::effector_count() const noexcept { return state_->tips.size(); }
 
-IkResult IkSolver::solve(const IkProblem& problem, std::span<Quat<double>> rotations,
-                         const IkOptions& options) noexcept {
+std::optional<IkResult> IkSolver::solve(const IkProblem& problem, std::span<Quat<double>> rotations,
+                                        const IkOptions& options) const noexcept {
     State& state = *state_;
-    assert(problem.parent_from_rest.size() == state.bones.size());
-    assert(problem.tips.size() == state.tips.size() && problem.goals.size() == state.tips.size());
-    assert(!state.has_pole || !problem.poles.empty());
-    assert(rotations.size() == state.bones.size());
+    if (problem.parent_from_rest.size() != bone_count() || problem.tips.size() != effector_count() ||
+        problem.goals.size() != effector_count() || (state.has_pole && problem.poles.empty()) ||
+        rotations.size() != bone_count()) {
+        return std::nullopt;
+    }
+    const std::scoped_lock lock(state.mutex);
     const auto run = [&] {
         return options.method == IkMethod::damped_least_squares ? state.solve_by_least_squares(options)
                                                                 : state.solve_by_descent(options);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -82,8 +83,8 @@ struct IkResult {
 ///
 /// Each solve starts from the given rotations and depends on nothing else, so the same input gives the same bits.
 /// The signs of quaternions do not matter. A rigid motion of root, goals and poles does not change the result.
-/// Computed in double, with lengths divided by that of the longest chain. Does not allocate after construction. A
-/// solver must be used by one thread at a time.
+/// Computed in double, with lengths divided by that of the longest chain. Does not allocate after construction.
+/// Concurrent calls on one solver wait for each other.
 ///
 /// Input without a solution, or with several:
 /// - If a chain with one effector whose rotation does not count can not reach its goal, the goal is first moved
@@ -119,8 +120,10 @@ public:
 
     /// rotations  [bones] each bone's rotation relative to its rest, unit: the start, then the solution with w >=
     ///            0. Start rotations beyond the limits are brought within
-    IkResult solve(const IkProblem& problem, std::span<Quat<double>> rotations,
-                   const IkOptions& options = {}) noexcept;
+    ///
+    /// Returns nullopt, and writes nothing, if a size is wrong.
+    [[nodiscard]] std::optional<IkResult> solve(const IkProblem& problem, std::span<Quat<double>> rotations,
+                                                const IkOptions& options = {}) const noexcept;
 
 private:
     struct State;

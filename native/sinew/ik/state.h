@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "sinew/base/fork_safe.h"
 #include "sinew/ik/solver.h"
 #include "sinew/transform/twist.h"
 
@@ -77,6 +78,7 @@ struct IkSolver::State {
     State(const Skeleton& skeleton, std::span<const BoneLimits> limits,
           std::span<const IkEffector> effectors);
 
+    ForkSafeMutex mutex;  ///< as all that follows is scratch of one solve
     std::vector<IkBone> bones;
     std::vector<IkTip> tips;
     std::vector<IkAxis> axes;

@@ -12,7 +12,7 @@
 #include "sinew/deform/normals.h"
 #include "sinew/deform/simd.h"
 #include "sinew/deform/skinned_normals.h"
-#include "sinew/deform/thread_pool.h"
+#include "sinew/base/thread_pool.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/transform/make.h"
@@ -35,7 +35,7 @@ void deform() {
     for (const sinew::MethodInfo& method : sinew::kMethods) {
         sinew::Deformer deformer({rest, offsets, bones, weights}, method);
         std::vector<sinew::Vec3<float>> points(rest.size());
-        deformer.deform(pose, {}, points);
+        expect(deformer.deform(pose, {}, points), "sizes fit");
         expect(points[0] == sinew::Vec3<float>(11, 20, 30), "the first point is moved by its bone");
         expect(points[1] == sinew::Vec3<float>(100, 202, 300), "the second point is moved by its bone");
         expect(points[2] == sinew::Vec3<float>(100, 200, 303), "the third point is moved by its bone");
@@ -50,7 +50,7 @@ void deform() {
     const std::vector<float> shares{0.0f, 0.5f, 1.0f};
     const sinew::Deformer mixed(binding, sinew::Lbs::info, sinew::MixData{sinew::Dq::info, shares});
     std::vector<sinew::Vec3<float>> points(rest.size());
-    mixed.deform(pose, {}, points);
+    expect(mixed.deform(pose, {}, points), "sizes fit");
     expect(points[1] == sinew::Vec3<float>(100, 202, 300), "both methods move the second point alike");
     expect(mixed.mixed_method()->name == "dq", "a mix says what it adds");
 }
@@ -60,7 +60,7 @@ void smooth() {
     const std::vector<std::int32_t> face_offsets{0, 3}, corners{0, 1, 2}, edges{0, 1, 1, 2, 2, 0};
     const sinew::DeltaMush mush({face_offsets, corners, edges}, rest, {});
     std::vector<sinew::Vec3<float>> points = rest;
-    mush.apply(points);
+    expect(mush.apply(points), "sizes fit");
     expect(mush.vertex_count() == 3 && mush.iterations() == 5, "a DeltaMush says what it was made of");
     for (std::size_t v = 0; v < rest.size(); ++v)
         expect(glm::length(points[v] - rest[v]) < 1e-6f, "delta mush gives the rest shape its details back");
@@ -71,7 +71,7 @@ void compute_normals() {
     const std::vector<std::int32_t> face_offsets{0, 3}, corners{0, 1, 2};
     const sinew::Normals normals({face_offsets, corners, {}}, points.size());
     std::vector<sinew::Vec3<float>> result(normals.count(sinew::NormalDomain::vertex));
-    normals.compute(normals.domain(), points, result);
+    expect(normals.compute(normals.domain(), points, result), "sizes fit");
     expect(normals.domain() == sinew::NormalDomain::vertex, "Normals say that nothing is sharp");
     for (const auto& normal : result) expect(normal == sinew::Vec3<float>(0, 0, 1), "a flat face's normal");
 }
@@ -85,7 +85,7 @@ void move_normals() {
     const sinew::Binding binding({rest, offsets, bones, weights});
     const sinew::SkinnedNormals skinned(binding, sinew::Lbs::info, {normals});
     std::vector<sinew::Vec3<float>> points(1), moved(1);
-    skinned.deform(pose, {}, points, moved);
+    expect(skinned.deform(pose, {}, points, moved), "sizes fit");
     expect(skinned.frame_count() == 1 && !skinned.has_tangents() && skinned.deformer().vertex_count() == 1,
            "SkinnedNormals say what they were made of");
     expect(glm::length(moved[0] - sinew::Vec3<float>(1, 0, 0)) < 1e-5f, "a normal turns with its bone");
@@ -98,7 +98,7 @@ void limit_bulges() {
     const std::vector<sinew::BoneSegment<float>> segments{{{-1, 0, 0}, {0, 0, 0}}, {{0, 0, 0}, {1, 0, 0}}};
     const sinew::BulgeLimit limit({{rest, offsets, bones, weights}, segments});
     std::vector<sinew::Vec3<float>> points{{0, 3, 0}};
-    limit.apply(points, std::vector<sinew::Affine<float>>(2));
+    expect(limit.apply(points, std::vector<sinew::Affine<float>>(2)), "sizes fit");
     expect(glm::length(points[0] - rest[0]) < 1e-5f, "a vertex is no further from its bones than at rest");
 }
 

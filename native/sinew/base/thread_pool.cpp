@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/deform/thread_pool.h"
+#include "sinew/base/thread_pool.h"
 
 #include <algorithm>
 #include <array>
@@ -21,7 +21,7 @@
 #include <immintrin.h>
 #endif
 
-#include "sinew/deform/forks.h"
+#include "sinew/base/forks.h"
 
 // Without a futex, as under mingw, this libstdc++'s std::atomic::wait compares the value before it locks the
 // mutex that it sleeps under, and can miss a wake-up (tests/python/test_pool_model.py; docs/install.md).
@@ -289,7 +289,8 @@ std::size_t hardware_threads() noexcept {
 void parallel_for(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
     if (count == 0) return;
     chunk = std::clamp<std::size_t>(chunk, 1, count);
-    const std::size_t useful = std::min({threads, (count - 1) / chunk + 1, kMaxThreads});
+    const std::size_t useful =
+        std::min({useful_threads(threads, count - 1, chunk), (count - 1) / chunk + 1, kMaxThreads});
     if (useful <= 1) return work(0, count);
     pool.run(count, useful, work, chunk);
 }

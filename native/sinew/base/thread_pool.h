@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 
@@ -11,8 +12,16 @@ namespace sinew {
 /// The number of threads that this machine runs at once; at least 1.
 [[nodiscard]] SINEW_EXPORT std::size_t hardware_threads() noexcept;
 
-/// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), on up to `threads` threads
-/// including the caller, and returns when all are done. Only one call at a time uses the pool; a call made
+/// `threads` as every function of the library takes it: at most this many; 0: as many as useful, which is one for
+/// each `worth_a_thread` of `count`, and no more than the machine runs at once.
+[[nodiscard]] inline std::size_t useful_threads(std::size_t threads, std::size_t count,
+                                                std::size_t worth_a_thread) noexcept {
+    return threads > 0 ? threads : std::min(hardware_threads(), 1 + count / worth_a_thread);
+}
+
+/// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), on at most `threads` threads
+/// including the caller, and returns when all are done. 0 threads: one for each chunk, as far as the machine has
+/// them. Only one call at a time uses the pool; a call made
 /// meanwhile runs on its caller's thread alone.
 ///
 /// If work throws on any thread, the first exception is rethrown here once no thread is working any more; some
