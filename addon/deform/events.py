@@ -56,7 +56,7 @@ def others_precede(event: str, function: Callable) -> bool:
 
 
 def _is_ours(function: Callable) -> bool:
-    return (getattr(function, "__module__", None) or "").startswith(_OURS)
+    return f"{getattr(function, '__module__', None)}.".startswith(f"{_OURS}.")
 
 
 def subscribe(event: str, function: Callable) -> None:

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+import sinew_addon
 from conftest import KeepingEngine
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.attach.updates import reaction, updates_suspended
@@ -48,6 +49,8 @@ def neighbour() -> Iterator[Callable]:
         def call(*_args: object) -> None:
             function()
 
+        # Its name begins as Sinew's does.
+        call.__module__ = f"{sinew_addon.__name__}_tools"
         functions = getattr(bpy.app.handlers, event)
         functions.append(call)
         added.append(lambda: functions.remove(call) if call in functions else None)
