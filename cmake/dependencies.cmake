@@ -14,7 +14,7 @@ if(NOT TARGET glm::glm)
 endif()
 
 # Highway's headers alone: Debian has its library as a shared one only, which a wheel can not count on, and
-# kernels.cpp chooses among the instruction sets itself.
+# targets.cpp chooses among the instruction sets itself.
 add_library(hwy_headers INTERFACE)
 find_path(HWY_INCLUDE_DIR hwy/foreach_target.h)
 if(NOT HWY_INCLUDE_DIR)

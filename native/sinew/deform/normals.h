@@ -32,29 +32,19 @@ struct Sharpness {
 ///
 ///   face    by Newell's method; (0, 0, 1) for a face without area (squared doubled area at most 1e-35)
 ///   vertex  the normalised sum of the normals of its faces, each weighted by the angle of the face's corner
-///           there, which
-///           is computed by Blender's polynomial for acos; 0 where they cancel. Without faces: the direction of
-///           its point
+///           there, which is computed by Blender's polynomial for acos; 0 where they cancel. Without faces: the
+///           direction of its point
 ///   corner  the same sum over the corners of its fan; the face's normal if it is a fan by itself. A fan is a set
-///           of
-///           corners of a vertex whose faces meet there at smooth edges. An edge is smooth if it is not sharp, is
-///           not an
-///           edge of a flat face, and has exactly two faces that traverse it in opposite directions. If nothing
-///           is sharp
-///           or custom, the vertex's normal
+///           of corners of a vertex whose faces meet there at smooth edges. An edge is smooth if it is not sharp,
+///           is not an edge of a flat face, and has exactly two faces that traverse it in opposite directions. If
+///           nothing is sharp or custom, the vertex's normal
 ///   custom  the normal n of the fan, tilted towards its first edge, in the plane of n and that edge, by the
-///           first
-///           number of its corners, then rotated about n by the second. Each number is the mean over the fan,
-///           rounded
-///           towards 0. 32767 tilts by the mean angle between n and the fan's edges, -32767 by 360 degrees minus
-///           that,
-///           backwards. 32767 rotates by the angle from the fan's first edge to its last, which is 360 degrees
-///           for a fan
-///           all around a vertex. Edges are numbered from a corner's following edge to its preceding one,
-///           starting at the
-///           sharp edge, or at the fan's first corner. 0 where the first or last edge is within 0.8 degrees of n
-///           or -n
-///           (absolute cosine at least 0.9999)
+///           first number of its corners, then rotated about n by the second. Each number is the mean over the
+///           fan, rounded towards 0. 32767 tilts by the mean angle between n and the fan's edges, -32767 by 360
+///           degrees minus that, backwards. 32767 rotates by the angle from the fan's first edge to its last,
+///           which is 360 degrees for a fan all around a vertex. Edges are numbered from a corner's following edge
+///           to its preceding one, starting at the sharp edge, or at the fan's first corner. 0 where the first or
+///           last edge is within 0.8 degrees of n or -n (absolute cosine at least 0.9999)
 ///
 /// Any polygons, also with less than three corners. A vertex that a face names twice has both of the corners.
 /// Points that are not finite, and faces beyond the range of floats, give finite normals, which may be 0.

@@ -10,7 +10,6 @@
 // of the sum of the moments a x b reduces the error fastest; for one tip it gives exactly the rotation to its
 // goal. A bone's rotation affects only its descendants, so going from the tips to the root the dual quaternions
 // of bones are evaluated once per sweep.
-// tips to the root the dual quaternions of bones are evaluated once a sweep.
 #include <glm/gtc/matrix_access.hpp>
 
 #include "sinew/ik/state.h"

@@ -34,11 +34,9 @@ struct IkEffector {
 /// How to find the rotations.
 ///
 ///   damped_least_squares  each free axis is a unit screw; steps solve (J J^T + l 1) y = e, with l following the
-///                         error
-///                         (Wampler 1986; Sugihara 2011)
+///                         error (Wampler 1986; Sugihara 2011)
 ///   cyclic_descent        each bone in turn, starting at the tip, rotates to bring its tips as near to their
-///                         goals as
-///                         possible (Wang, Chen 1991): cheap steps, but many of them where a chain is nearly
+///                         goals as possible (Wang, Chen 1991): cheap steps, but many of them where a chain is nearly
 ///                         straight
 enum class IkMethod : std::uint8_t { damped_least_squares, cyclic_descent };
 
