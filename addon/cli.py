@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .commands.console import Console
 
 # Batches start Blenders of their own, or prepare this one later; a report without Blender has no pictures.
-WITHOUT_BLENDER = ("methods", "check", "fit", "report", "reskin", "restore")
+WITHOUT_BLENDER = ("methods", "check", "report", "reskin", "restore")
 
 _commands: list[object] = []
 
@@ -41,7 +41,6 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
         check,
         compare,
         export,
-        fit,
         ik,
         inbetween,
         info,
@@ -67,7 +66,6 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
         "export": export,
         "compare": compare,
         "render": render,
-        "fit": fit,
         "report": report,
     }
     parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+import re
 import sys
 import time
 from collections import Counter
@@ -201,15 +202,11 @@ class _Workers:
             import psutil
 
             return psutil.virtual_memory().total // self._jobs
-        import dask.utils
-
-        try:
-            size = dask.utils.parse_bytes(text) if text else -1
-        except (ValueError, OverflowError):
-            size = -1
-        if size < 0:
+        found = re.fullmatch(r"(\d+(?:\.\d+)?) *([KMGT]?)(i?)B?", text.strip(), re.IGNORECASE)
+        if found is None:
             raise WrongUse(f"--memory: expected a size such as 4GiB, got {text!r}")
-        return size
+        power = " KMGT".index(found[2].upper() or " ")
+        return int(float(found[1]) * (1024 if found[3] else 1000) ** power)
 
 
 def _lines_given() -> Iterator[str]:

@@ -218,7 +218,10 @@ def run_in_dask(
 
     Raises SinewError where the cluster cannot be used.
     """
-    import distributed
+    try:
+        import distributed
+    except ImportError:
+        raise SinewError("--scheduler needs dask: pip install 'sinew-blender[cluster]'") from None
 
     # dask warns of load and lost connections; what matters is an error of a task, too.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -3,6 +3,7 @@
 
 import glob
 import json
+import sys
 from dataclasses import fields
 from pathlib import Path
 
@@ -14,8 +15,15 @@ from sinew_addon.jobs.job_file import ObjectRule, Settings, read_job_file
 from sinew_addon.jobs.job_schema import job_schema, markdown
 from sinew_addon.jobs.journal import NAME, Journal, stamp
 from sinew_addon.jobs.schema import rows
+from sinew_addon.jobs.workers import run_in_dask
 
 METHODS = ("lbs", "dq")
+
+
+def test_without_dask_a_scheduler_is_refused(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(SinewError, match=r"pip install 'sinew-blender\[cluster\]'"):
+        next(run_in_dask([], None, "tcp://127.0.0.1:1", print))
 
 
 @pytest.fixture
