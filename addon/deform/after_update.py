@@ -5,6 +5,7 @@ more."""
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 
 import bpy
 import numpy as np
@@ -59,9 +60,9 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
     armatures = [each.armature and each.armature.evaluated_get(depsgraph) for each in replaced_modifiers]
     evaluated = obj.evaluated_get(depsgraph)
     settings = properties.of(evaluated)
-    if [each.name for each in settings.replaced_modifiers] != [each.name for each in replaced_modifiers]:
-        # Sinew was added, or modifiers were moved, since Blender evaluated the object: animated settings are
-        # available only after the next evaluation.
+    if _own_values(settings.replaced_modifiers) != _own_values(replaced_modifiers):
+        # Sinew was added, or modifiers were moved or switched, since Blender evaluated the object: animated
+        # settings are available only after the next evaluation.
         settings = properties.of(obj)
     modifiers = list(zip(settings.replaced_modifiers, armatures, strict=False))
     frames = pose.read(evaluated, settings, modifiers, skinned, depsgraph.mode)
@@ -72,6 +73,11 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
     differs = skinned.bound.skin_stack.deform(shown.rest_points, frames, values=shown.stage_values)
     shown.number += differs
     return differs
+
+
+def _own_values(replaced_modifiers: Iterable[properties.SinewReplacedModifier]) -> list[tuple]:
+    """What Sinew itself stores about the modifiers."""
+    return [(each.name, each.show_viewport, each.show_render) for each in replaced_modifiers]
 
 
 def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> None:

@@ -10,6 +10,7 @@ import pytest
 import routes
 import scenes
 import sinew_addon
+import walk_sides
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import apply_plan, evaluate, safe_mode, session, update
 from sinew_addon.deform.plan import State
@@ -569,6 +570,19 @@ def test_keys_of_visibility_go_and_leave_the_modifier_as_they_set_it(then):
     assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
     if then != "on":
         assert not modifier.show_viewport
+
+
+@pytest.mark.usefixtures("by_each_route")
+def test_keys_of_visibility_go_where_the_modifier_is_on():
+    obj, _armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, [8], True)
+    bpy.context.scene.frame_set(1)
+    walk_sides.key(obj, 'modifiers["Armature"].show_viewport', [(1, 0.0), (8, 1.0)])
+    scenes.add_sinew(obj, "dq")
+    scenes.shapes(obj, [6, 8])
+    walk_sides.remove_curves(obj, "")
+    got = scenes.shapes(obj, [8])
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_keys_of_visibility_of_a_hidden_object_begin_with_what_the_artist_had():
