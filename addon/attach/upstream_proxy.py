@@ -170,7 +170,9 @@ def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
     animation = copy.animation_data
     if animation is None:
         return
-    for driver in [d for d in animation.drivers if not d.data_path.startswith("modifiers[")]:
+    # Not Sinew's own driver, whose modifier the copy does not have (Blender 4.2 leaves it).
+    paths = tuple(modifier.path_from_id() for modifier in copy.modifiers)
+    for driver in [d for d in animation.drivers if not d.data_path.startswith(paths)]:
         animation.drivers.remove(driver)
     if not copy.modifiers:
         copy.animation_data_clear()

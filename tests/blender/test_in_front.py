@@ -281,6 +281,8 @@ def test_a_modifier_in_front_that_comes_changes_and_goes():
         assert not properties.of(obj).error
         bpy.context.scene.frame_set(7)
         assert not properties.of(obj).error
+        proxy = properties.of(obj).upstream_proxy
+        assert proxy is None or proxy.animation_data is None or not proxy.animation_data.drivers
         shown = scenes.final_points(obj)
         properties.of(obj).enabled = False
         expected = scenes.final_points(obj)

@@ -94,6 +94,7 @@ LOOKED_AT = {*SAVED, "delete_sinew_modifier", "delete_modifier", "copy_modifiers
 # What Sinew may report about an object that it switches off.
 SENTENCES = (
     "Armature modifier was deleted",
+    "removes Sinew's node group again and again",
     "Sinew modifier was deleted",
     "its armature was deleted",
     "was deleted, or is in no collection",

@@ -680,12 +680,14 @@ def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def delete_points(w: Walker, r: random.Random) -> str | None:
+    """What Sinew made for a mesh, and makes again."""
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.mode == "OBJECT" and o.data.library is None)
-    if obj is None:
+    part = r.choice(("attribute", "attribute", "driver", "nodes", "links"))
+    if obj is None or (part != "attribute" and obj.override_library is not None):
         return None
     if w.side.is_sinew:
-        w.side.delete_part(obj, "attribute")
-    return f"delete Sinew's attributes of {obj.data.name}"
+        w.side.delete_part(obj, part)
+    return f"delete Sinew's {part} of {obj.name}"
 
 
 @operation(1)
@@ -710,7 +712,9 @@ def key_method(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def unkey_method(w: Walker, r: random.Random) -> str | None:
-    obj, name = w.mesh(r, w.side.is_method_keyed), r.choice(OF_BLENDER)
+    # A linked duplicate has the same keys, and on the other side a mark of its own.
+    obj = w.mesh(r, lambda o: w.side.is_method_keyed(o) and not w.shares_action(o))
+    name = r.choice(OF_BLENDER)
     if obj is None or not w.side.has_sinew(obj):
         return None
     w.side.unkey_method(obj, name)
@@ -1391,6 +1395,9 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
     modifier = obj.modifiers.new(w.new_name(kind.title()), kind)
     if modifier is None:
         return None
+    if kind == "TRIANGULATE":
+        # Where both diagonals of a quad are as long, rounding would choose one.
+        modifier.quad_method = "FIXED"
     _set_up(modifier, w, r, obj, rig)
     name = modifier.name
     if front and obj.override_library is None:

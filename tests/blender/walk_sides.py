@@ -448,8 +448,13 @@ class BlenderSide:
     def adopt(self, claims: dict[str, dict]) -> None:
         """Sets what Sinew itself chooses as Sinew's side reports it."""
         for obj in bpy.data.objects:
-            if obj.type == "MESH" and obj.library is None and obj.pass_index & ADOPTED:
-                self._adopt(obj, claims.get(obj.name_full))
+            claim = claims.get(obj.name_full)
+            if obj.type != "MESH" or obj.library is not None:
+                continue
+            if obj.pass_index & ADOPTED:
+                self._adopt(obj, claim)
+            elif claim is not None and claim["error"] and not claim["on"]:
+                self._set(obj, ON, False)
 
     def _adopt(self, obj: bpy.types.Object, claim: dict | None) -> list[str]:
         if obj.pass_index & ADOPTED:
@@ -787,6 +792,12 @@ class SinewSide:
         elif what == "attribute":
             for name in [a.name for a in obj.data.attributes if a.name.startswith("sinew")]:
                 obj.data.attributes.remove(obj.data.attributes[name])
+        elif what == "driver":
+            for curve in obj.animation_data.drivers if obj.animation_data is not None else ():
+                names = curve.driver.variables.keys()
+                curve.mute |= bool(names) and all(name.startswith("sinew_") for name in names)
+        elif modifier.node_group is not None:
+            getattr(modifier.node_group, what).clear()
 
     def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
         pass
