@@ -796,7 +796,7 @@ class SinewSide:
             for curve in obj.animation_data.drivers if obj.animation_data is not None else ():
                 names = curve.driver.variables.keys()
                 curve.mute |= bool(names) and all(name.startswith("sinew_") for name in names)
-        elif modifier.node_group is not None:
+        elif what in ("nodes", "links") and modifier.node_group is not None:
             getattr(modifier.node_group, what).clear()
 
     def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
