@@ -49,7 +49,7 @@ class Session:
     make all of them invalid. Loading forgets everything, undo everything that undo.py does not keep.
 
     objects           the objects that have Sinew; None where they have to be found again
-    objects_seen      what objects_now() was then
+    objects_seen      what _objects_now() was then
     skinned           what is known of those that are on, by session_uid
     pairs             these objects, each with what is known of it
     depsgraph         the address of the depsgraph last seen
@@ -88,10 +88,10 @@ class Session:
     @property
     def is_idle(self) -> bool:
         """No object has Sinew, and no object has been added since that was found."""
-        return self.objects == [] and self.objects_seen == objects_now()
+        return self.objects == [] and self.objects_seen == _objects_now()
 
 
-def objects_now() -> tuple[int, int]:
+def _objects_now() -> tuple[int, int]:
     """How many objects the file has, and the highest session_uid among them. Blender counts these up, so both
     are the same only where no object was added or removed."""
     uids = np.zeros(len(bpy.data.objects), dtype=np.int32)
@@ -411,11 +411,11 @@ def needs_first_evaluations() -> bool:
 
 def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
     """Returns the objects that have Sinew. Searches again where objects may have been added or removed."""
-    if current.objects is None or changes.structure or current.objects_seen != objects_now():
+    if current.objects is None or changes.structure or current.objects_seen != _objects_now():
         current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
         if not is_rendering_in_window():
             orphans.remove()
-        current.objects_seen = objects_now()
+        current.objects_seen = _objects_now()
         notify(subscribers.objects_changed, current.objects)
         point_store.unshare(current.objects)
         uids = {obj.session_uid for obj in current.objects}
