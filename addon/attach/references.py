@@ -29,11 +29,6 @@ def between_steps() -> Iterator[None]:
         _is_between_steps = before
 
 
-def are_between_steps() -> bool:
-    """Whether what is made now is in no undo step."""
-    return _is_between_steps
-
-
 def note(obj: bpy.types.Object) -> None:
     """Records an object that is about to get another reference."""
     if _is_between_steps:

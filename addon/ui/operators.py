@@ -68,10 +68,6 @@ def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return sorted(found, key=lambda obj: (obj != active, order[obj.name]))
 
 
-def has_targets(context: bpy.types.Context) -> bool:
-    return next(_each_target(context), None) is not None
-
-
 def sinew_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in targets(context) if properties.has_sinew(obj)]
 
