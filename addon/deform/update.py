@@ -65,6 +65,9 @@ def update(
             keep_poses_evaluated(obj, skinned, plan)
         # After Sinew's driver is added, as the driver counts as animation, too.
         skinned.note_object(obj, plan)
+        if changes.frame and depsgraph.mode == "RENDER":
+            # Applying the plan can have Blender copy the object again: what the frame has set is set again.
+            obj.update_tag(refresh={"OBJECT", "TIME"})
     skinned.plan = plan
     # A render lists everything as new with each frame. Tagging the object makes Blender (4.2 to 5.2) copy it
     # again, without what animation had set.
