@@ -16,7 +16,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 import scenes
-
 from sinew_addon.attach import properties
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.precompute import precomputations

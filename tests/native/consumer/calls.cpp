@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "sinew/base/thread_pool.h"
 #include "sinew/deform/bulge_limit.h"
 #include "sinew/deform/centres_of_rotation.h"
 #include "sinew/deform/deformer.h"
@@ -12,7 +13,6 @@
 #include "sinew/deform/normals.h"
 #include "sinew/deform/simd.h"
 #include "sinew/deform/skinned_normals.h"
-#include "sinew/base/thread_pool.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/transform/make.h"
