@@ -61,13 +61,7 @@ def update(
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
     plan = _with_data(obj, skinned, plan, depsgraph)
     if inspect or skinned.bound.is_of_another_stack(known):
-        if not plan.uses_builtin:
-            keep_poses_evaluated(obj, skinned, plan)
-        # After Sinew's driver is added, as the driver counts as animation, too.
-        skinned.note_object(obj, plan)
-        if changes.frame and depsgraph.mode == "RENDER":
-            # Applying the plan can have Blender copy the object again: what the frame has set is set again.
-            obj.update_tag(refresh={"OBJECT", "TIME"})
+        _note_applied(obj, skinned, plan, in_render_frame=changes.frame and depsgraph.mode == "RENDER")
     skinned.plan = plan
     # A render lists everything as new with each frame. Tagging the object makes Blender (4.2 to 5.2) copy it
     # again, without what animation had set.
@@ -84,6 +78,16 @@ def update(
         skinned.shown.frames = None
     skinned.bound.source.known_key_values = skinned.bound.source.key_values
     return skinned
+
+
+def _note_applied(obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan, in_render_frame: bool) -> None:
+    if not plan.uses_builtin:
+        keep_poses_evaluated(obj, skinned, plan)
+    # After Sinew's driver is added, as the driver counts as animation, too.
+    skinned.note_object(obj, plan)
+    if in_render_frame:
+        # Applying the plan can have Blender copy the object again: what the frame has set is set again.
+        obj.update_tag(refresh={"OBJECT", "TIME"})
 
 
 def _lacks_points(

@@ -753,7 +753,7 @@ CALLS = {
     "Normals": "lambda: normals.compute(rest, threads=3)",
     "SkinnedNormals": "lambda: skinned.deform(bones, threads=3)[1]",
     "BulgeLimit": "lambda: (limit.set_rest_points(rest), limit.apply(rest, bones, threads=3))[1]",
-    "IkSolver": "lambda: solver.solve(chains, [[0, 1, 0]], [[1, 0, 0, 0, 0, 3, 4, 0]], iterations=3).rotations",
+    "IkSolver": "lambda: solver.solve(chains, [[0, 1, 0]], [GOAL], iterations=3).rotations",
 }
 
 
@@ -787,6 +787,7 @@ skinned = sinew.SkinnedNormals(sinew.Binding(*skin), np.tile(np.float32([0, 0, 1
 limit = sinew.BulgeLimit(*skin, [[0, 0, 0]], [[0, 1, 0]])
 solver = sinew.ik.Solver([-1, *range(59)], [sinew.ik.Effector(59)])
 chains = np.tile([1.0, 0, 0, 0, 0, 0, 0.5, 0], (500, 60, 1))
+GOAL = [1, 0, 0, 0, 0, 3, 4, 0]
 call = CALL
 expected = call()
 done = threading.Event()
