@@ -2,7 +2,8 @@
 """Puts Sinew in the place of an object's Armature modifiers, and takes it off again.
 
 While Sinew deforms, the Armature modifiers stay in the stack, switched off. In a saved file they deform
-instead, and Sinew's modifier is off, so that a Blender without Sinew can play it.
+instead, and Sinew's modifier is off, so that a Blender without Sinew can play it. What the artist or a tool
+does to the modifiers' icons has the meaning that core/icons.py gives it.
 """
 
 from __future__ import annotations
@@ -11,9 +12,13 @@ from collections.abc import Collection
 
 import bpy
 
+from ..core import icons
 from ..core.errors import SinewError
+from ..core.icons import VIEWS, Deformer, Icons, Situation
+from ..core.phrases import phrase
 from ..io.animation_paths import animated_paths, is_animated, is_visibility_animated
 from . import (
+    baked,
     corrective_smooth,
     point_store,
     pose_driver,
@@ -152,6 +157,31 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
         replaced.armature = modifier.object
         if method is None and method_of(modifier) != settings.method:
             replaced.method = method_of(modifier)
+    if not stack.visibility_is_animated(obj):
+        _begin_with_icons(obj)
+
+
+def _begin_with_icons(obj: bpy.types.Object) -> None:
+    """Has Sinew deform where the Armature modifiers do; and in both views where they are off in both: what
+    replaces them, such as a bake, is switched off then."""
+    settings, pairs = properties.of(obj), replaced_modifiers(obj)
+    shown = {name: any(getattr(replaced, f"show_{name}") for _m, replaced in pairs) for name in VIEWS}
+    if any(shown.values()):
+        settings.hidden_viewport, settings.hidden_render = (not shown[name] for name in VIEWS)
+        return
+    for modifier, replaced in pairs:
+        replaced.was_off = replaced.show_viewport = replaced.show_render = True
+        _show(modifier, True, True)
+    baked.switch_off(obj)
+
+
+def notes(obj: bpy.types.Object) -> list[str]:
+    """Returns sentences on what Add found switched off, and on what it switched off itself."""
+    found = baked.notes(obj)
+    if any(replaced.was_off for replaced in properties.of(obj).replaced_modifiers):
+        text = "Its Armature modifier was off before Sinew; Remove switches it off again"
+        found.insert(0, phrase(text))
+    return found
 
 
 def method_of(modifier: bpy.types.ArmatureModifier) -> str:
@@ -171,11 +201,7 @@ def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
 
 def use_one_method(obj: bpy.types.Object, method: str) -> None:
     """Sets `method` for all Armature modifiers that Sinew replaces."""
-    settings = properties.of(obj)
-    for replaced in settings.replaced_modifiers:
-        if replaced.method != properties.SAME_METHOD:
-            replaced.method = properties.SAME_METHOD
-    settings.method = method
+    properties.of(obj).method = method
 
 
 def remove(obj: bpy.types.Object) -> None:
@@ -201,9 +227,14 @@ def take_off(obj: bpy.types.Object) -> None:
 
 
 def _take_off(obj: bpy.types.Object) -> None:
+    follow_icons(obj)
     switch(obj, on=False)
     restore_volume(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
+    for modifier, replaced in replaced_modifiers(obj):
+        if not replaced.visibility_is_keyed:
+            _show(modifier, *own_visibility(replaced))
+    baked.switch_on(obj)
     notify(subscribers.before_removal, obj)
     if nodes is not None:
         active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
@@ -225,26 +256,121 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 
 def switch(obj: bpy.types.Object, on: bool) -> None:
-    """On: Sinew deforms. Off: the Armature modifiers deform as they were, and Sinew's modifier is off."""
-    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    """On: Sinew deforms where the icons say so. Off: the Armature modifiers deform, and Sinew's modifier is
+    off."""
+    settings = properties.of(obj)
     if on:
         restore_volume(obj)
         adopt_pointers(obj)
-        _switch_off(obj)
-        corrective_smooth.switch(obj, on=False)
-        keyed = stack.visibility_is_animated(obj)
-        shown = [s for s in settings.replaced_modifiers if s.armature is not None]
-        viewport, render = (
-            any(getattr(s, f"show_{where}") for s in shown) for where in ("viewport", "render")
-        )
-        _show(nodes, viewport or keyed, render or keyed)
-    elif settings.replaces_modifiers:
+        _note_keyed_visibility(obj)
+        _set_icons(obj, Situation.PAINT if keeps_modifiers_on(obj) else Situation.SINEW)
+        return
+    if settings.replaces_modifiers:
         restore_builtin(obj)
-        for modifier, replaced in replaced_modifiers(obj):
-            _restore_visibility(modifier, replaced)
-        corrective_smooth.switch(obj, on=True)
-        _show(nodes, False, False)
-    properties.store(settings, "standing_in", on)
+    _set_icons(obj, Situation.BUILT_IN if settings.enabled else Situation.OFF)
+
+
+def follow_icons(obj: bpy.types.Object) -> None:
+    """Takes over what the artist or a tool did to the icons since they were set."""
+    _follow_ended_keys(obj)
+    settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
+    situation = Situation(settings.situation)
+    for name in VIEWS:
+        view = _view(obj, name)
+        before = icons.icons(view, situation, name)
+        modifiers = tuple(
+            was_on if _is_keyed(obj, modifier, replaced) else getattr(modifier, f"show_{name}")
+            for (modifier, replaced), was_on in zip(pairs, before.modifiers, strict=True)
+        )
+        is_unknown = nodes is None or is_animated(obj, nodes, f"show_{name}")
+        now = Icons(before.sinew if is_unknown else getattr(nodes, f"show_{name}"), modifiers)
+        if now == before:
+            continue
+        is_left = situation is Situation.BUILT_IN and view.deformer is Deformer.SINEW
+        if is_left and now.sinew and obj.mode not in ("EDIT", "SCULPT"):
+            # The artist wants Sinew to deform it, though it is small.
+            properties.store(settings, "leave_small", False)
+        _store(obj, name, icons.follow(view, situation, name, now))
+    # So that what was taken over is not taken for another click.
+    _set_icons(obj, situation)
+
+
+def _follow_ended_keys(obj: bpy.types.Object) -> None:
+    """Where an animation does not set an Armature modifier's icons any more, they stay as it left them."""
+    ended = [
+        (modifier, replaced)
+        for modifier, replaced in replaced_modifiers(obj)
+        if replaced.visibility_is_keyed and not is_visibility_animated(obj, modifier)
+    ]
+    if not ended:
+        return
+    for modifier, replaced in ended:
+        properties.store(replaced, "visibility_is_keyed", False)
+        for name in VIEWS:
+            properties.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
+    for name in VIEWS:
+        shown = _view(obj, name).shown
+        _store(obj, name, icons.View(shown, hidden=not any(shown)))
+    _set_icons(obj, Situation(properties.of(obj).situation))
+
+
+def show(obj: bpy.types.Object) -> None:
+    """Has Sinew deform it in both views, whatever was switched before."""
+    for name in VIEWS:
+        _store(obj, name, icons.View(_view(obj, name).shown))
+    _set_icons(obj, Situation(properties.of(obj).situation))
+
+
+def deformer(obj: bpy.types.Object, name: str) -> Deformer:
+    """Returns what deforms it in a view while Sinew is on. What animated icons do is not known."""
+    return _view(obj, name).deformer
+
+
+def deforms(obj: bpy.types.Object) -> bool:
+    """Whether Sinew deforms it in one of the views while it is on."""
+    return any(deformer(obj, name) is Deformer.SINEW for name in VIEWS)
+
+
+def do_views_differ(obj: bpy.types.Object) -> bool:
+    """Whether other Armature modifiers take part in the viewport than in renders."""
+    taking_part = {icons.taking_part(_view(obj, name).shown) for name in VIEWS}
+    return len(taking_part) > 1
+
+
+def _view(obj: bpy.types.Object, name: str) -> icons.View:
+    settings = properties.of(obj)
+    pairs = [replaced for _modifier, replaced in replaced_modifiers(obj)]
+    shown, own = (tuple(getattr(each, f"{kind}_{name}") for each in pairs) for kind in ("show", "on"))
+    return icons.View(shown, getattr(settings, f"hidden_{name}"), own)
+
+
+def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
+    pairs = replaced_modifiers(obj)
+    properties.store(properties.of(obj), f"hidden_{name}", view.hidden)
+    own = view.own or (False,) * len(pairs)
+    for (_modifier, replaced), shown, is_on in zip(pairs, view.shown, own, strict=True):
+        if getattr(replaced, f"show_{name}") != shown:
+            # The artist's own choice from now on.
+            properties.store(replaced, "was_off", False)
+        properties.store(replaced, f"show_{name}", shown)
+        properties.store(replaced, f"on_{name}", is_on)
+
+
+def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
+    settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
+    smooth = {}
+    for name in VIEWS:
+        view = _view(obj, name)
+        wanted = icons.icons(view, situation, name)
+        for (modifier, replaced), is_on in zip(pairs, wanted.modifiers, strict=True):
+            is_keyed = is_visibility_animated(obj, modifier)
+            if not (is_keyed if situation.is_by_sinew else replaced.visibility_is_keyed):
+                _show_in(modifier, name, is_on)
+        if nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
+            _show_in(nodes, name, wanted.sinew)
+        smooth[name] = not situation.is_by_sinew or view.deformer is Deformer.ARMATURE
+    corrective_smooth.switch(obj, **smooth)
+    properties.store(settings, "situation", situation.value)
 
 
 def prepare_for_save(obj: bpy.types.Object) -> bool:
@@ -254,10 +380,12 @@ def prepare_for_save(obj: bpy.types.Object) -> bool:
     was_on = settings.replaces_modifiers
     if not (was_on or settings.enabled):
         return False
+    follow_icons(obj)
     switch(obj, on=False)
     # What was set for a mode may not be the nearest.
     restore_volume(obj)
-    use_nearest_volume(obj)
+    if deforms(obj):
+        use_nearest_volume(obj)
     return was_on
 
 
@@ -309,48 +437,52 @@ def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> No
         modifier.use_deform_preserve_volume = preserve
 
 
-def _switch_off(obj: bpy.types.Object) -> None:
-    """Switches the Armature modifiers off, also those that the artist added or switched on since."""
+def _note_keyed_visibility(obj: bpy.types.Object) -> None:
+    """Notes which Armature modifiers' icons an animation sets from now on."""
+    is_first = not properties.of(obj).replaces_modifiers
     for modifier, replaced in replaced_modifiers(obj):
-        ours = ((False, False), (replaced.show_viewport, False))
-        flags = (modifier.show_viewport, modifier.show_render)
-        if not properties.of(obj).replaces_modifiers or flags not in ours or replaced.visibility_is_keyed:
-            properties.store(replaced, "show_viewport", modifier.show_viewport)
-            properties.store(replaced, "show_render", modifier.show_render)
-        # An animation would set the flags again at the next frame; until then Sinew's values would stay.
-        is_keyed = is_visibility_animated(obj, modifier)
-        if is_keyed and properties.of(obj).replaces_modifiers and not replaced.visibility_is_keyed:
+        if not is_visibility_animated(obj, modifier):
+            continue
+        if is_first or replaced.visibility_is_keyed:
+            for name in VIEWS:
+                properties.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
+        # While the object is hidden, no animation sets icons that Sinew has switched off.
+        elif obj.visible_get():
             _restore_unkeyed_visibility(obj, modifier, replaced)
-        # While the object is hidden, no animation sets flags that Sinew has switched off.
-        if not is_keyed or obj.visible_get():
-            properties.store(replaced, "visibility_is_keyed", is_keyed)
-        if not is_keyed:
-            _show(modifier, keeps_modifiers_on(obj) and replaced.show_viewport, False)
+        if obj.visible_get():
+            properties.store(replaced, "visibility_is_keyed", True)
 
 
-def _restore_visibility(
-    modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
-) -> None:
-    """Restores the flags, unless an animation sets them or has set them last: then Sinew did not change
-    them."""
-    if not replaced.visibility_is_keyed:
-        _show(modifier, replaced.show_viewport, replaced.show_render)
+def _is_keyed(
+    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
+) -> bool:
+    """Whether an animation sets its icons, or did so last, and not Sinew."""
+    return replaced.visibility_is_keyed or is_visibility_animated(obj, modifier)
+
+
+def own_visibility(replaced: properties.SinewReplacedModifier) -> tuple[bool, bool]:
+    """Returns an Armature modifier's icons without Sinew: in the viewport, and in renders."""
+    return replaced.show_viewport and not replaced.was_off, replaced.show_render and not replaced.was_off
 
 
 def _restore_unkeyed_visibility(
     obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
 ) -> None:
-    """Restores a flag that is not animated where an animation sets the other one from now on."""
-    for name in ("show_viewport", "show_render"):
-        if not is_animated(obj, modifier, name) and getattr(modifier, name) != getattr(replaced, name):
-            setattr(modifier, name, getattr(replaced, name))
+    """Restores an icon that is not animated where an animation sets the other one from now on."""
+    for name in VIEWS:
+        if not is_animated(obj, modifier, f"show_{name}"):
+            _show_in(modifier, name, getattr(replaced, f"show_{name}"))
 
 
 def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:
-    for name, value in (("show_viewport", viewport), ("show_render", render)):
-        # Setting an unchanged value makes Blender evaluate the object, too.
-        if modifier is not None and getattr(modifier, name) != value:
-            setattr(modifier, name, value)
+    _show_in(modifier, "viewport", viewport)
+    _show_in(modifier, "render", render)
+
+
+def _show_in(modifier: bpy.types.Modifier | None, name: str, value: bool) -> None:
+    # Setting an unchanged value makes Blender evaluate the object, too.
+    if modifier is not None and getattr(modifier, f"show_{name}") != value:
+        setattr(modifier, f"show_{name}", value)
 
 
 def _replaced_modifier(
@@ -362,6 +494,8 @@ def _replaced_modifier(
     if found is None:
         found = replaced_modifiers.add()
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
+        if properties.of(obj).replaces_modifiers and not is_visibility_animated(obj, modifier):
+            _show(modifier, False, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
     properties.store(found, "name", modifier.name)
     properties.store(found, "uid", modifier.persistent_uid)
@@ -387,6 +521,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
     Armature modifier keeps its method; one that no longer follows the first without a gap deforms by itself
     again."""
     settings = properties.of(obj)
+    follow_icons(obj)
     position_modifier(obj)
     kept = settings.replaced_modifiers
     names = [replaced.name for _modifier, replaced in replaced_modifiers(obj)]
@@ -397,7 +532,8 @@ def follow_stack(obj: bpy.types.Object) -> None:
         modifier = obj.modifiers.get(name)
         if settings.replaces_modifiers and modifier is not None and modifier.type == "ARMATURE":
             _restore_pointer(modifier, kept[name])
-            _restore_visibility(modifier, kept[name])
+            if not kept[name].visibility_is_keyed:
+                _show(modifier, *own_visibility(kept[name]))
         kept.remove(kept.find(name))
     for place, name in enumerate(names):
         kept.move(kept.find(name), place)

@@ -129,13 +129,12 @@ def replaced_modifier(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifi
     return next(same, None) or next((m for m in smooths if m.name == replaced.name), None)
 
 
-def switch(obj: bpy.types.Object, on: bool) -> None:
-    """On: the modifier that was taken over has its own flags. Off: it is off."""
+def switch(obj: bpy.types.Object, viewport: bool, render: bool) -> None:
+    """Gives the modifier that was taken over its own icons in these views, and switches it off in others."""
     modifier, replaced = replaced_modifier(obj), properties.of(obj).replaced_smooth
     if modifier is None:
         return
-    wanted = (replaced.show_viewport, replaced.show_render) if on else (False, False)
-    for name, value in zip(("show_viewport", "show_render"), wanted, strict=True):
+    for name, is_own in (("show_viewport", viewport), ("show_render", render)):
         # Setting an unchanged value makes Blender evaluate the object, too.
-        if getattr(modifier, name) != value:
-            setattr(modifier, name, value)
+        if getattr(modifier, name) != (is_own and getattr(replaced, name)):
+            setattr(modifier, name, not getattr(modifier, name))

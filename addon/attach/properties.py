@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import bpy
 import sinew
 
+from ..core.icons import Situation
 from ..core.scale_rule import SCALE_RULES
 from . import stage_settings
 from .method_items import method_items
@@ -55,6 +56,15 @@ listeners = Listeners()
 def _method_changed(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     if listeners.method_changed is not None:
         listeners.method_changed(settings.id_data, context)
+
+
+def _object_method_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
+    """A method that is chosen for the object goes to all of its Armature modifiers."""
+    for replaced in settings.replaced_modifiers:
+        if replaced.method != SAME_METHOD:
+            # By key: assigning to the property itself calls the listeners.
+            replaced["method"] = 0
+    _method_changed(settings, context)
 
 
 def _enabled_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
@@ -111,9 +121,17 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
-    # The Armature modifier's own flags, restored on removal.
+    # The Armature modifier's own icons, restored on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    was_off: bpy.props.BoolProperty(
+        description="It was off in both views before Sinew, and removal switches it off again",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    # The artist switched its icon on while Sinew is on, so that it deforms in Sinew's place.
+    on_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    on_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     visibility_is_keyed: bpy.props.BoolProperty(
         description="An animation has set the Armature modifier's flags, and not Sinew",
         options={"HIDDEN"},
@@ -131,7 +149,8 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
     )
     method: bpy.props.EnumProperty(
         name="Method",
-        description="How this modifier blends, where several chained Armature modifiers deform the mesh",
+        description="How this modifier blends, where several chained Armature modifiers deform the mesh. "
+        "A method that is chosen for the mesh or the character goes to all of them again",
         items=[
             (SAME_METHOD, "Same Method", "The method that is chosen for the object", 0),
             *method_items(1),
@@ -142,9 +161,9 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
     )
 
 
-class SinewReplacedSmooth(bpy.types.PropertyGroup):
-    """What Sinew stores about the Corrective Smooth that the stage delta_mush replaces, called `name`; an
-    empty name means none."""
+class SinewSwitchedOff(bpy.types.PropertyGroup):
+    """What Sinew stores about another modifier that it switched off, called `name`: the Corrective Smooth
+    that the stage delta_mush replaces, or a cache of baked shapes. An empty name means none."""
 
     uid: bpy.props.IntProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     # The modifier's own flags, restored on removal.
@@ -165,7 +184,7 @@ class SinewSettings(bpy.types.PropertyGroup):
         description="How the bones' motions are blended at each vertex",
         items=method_items(),
         default=next(iter(METHODS)),
-        update=_method_changed,
+        update=_object_method_changed,
         override=OVERRIDABLE,
     )
     scale_rule: bpy.props.EnumProperty(
@@ -177,7 +196,9 @@ class SinewSettings(bpy.types.PropertyGroup):
     )
     enabled: bpy.props.BoolProperty(
         name="On",
-        description="Deform with Sinew; off: with Blender's Armature modifier, to compare the two",
+        description="Deform with Sinew where the icon of its modifier is on. Where that of an Armature "
+        "modifier is switched on, that deforms instead; where Sinew's is switched off, nothing does. Off: "
+        "Blender's Armature modifier deforms, to compare the two",
         default=True,
         options=set(),
         update=_enabled_changed,
@@ -226,12 +247,14 @@ class SinewSettings(bpy.types.PropertyGroup):
     stand_ins: bpy.props.CollectionProperty(
         type=SinewReplacedModifier, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
-    standing_in: bpy.props.BoolProperty(
-        description="The Armature modifiers are switched off for Sinew's; not so while some of Blender's "
-        "tools need them",
+    situation: bpy.props.StringProperty(
+        description="Who deformed it when the modifiers' icons were last set (core/icons.py)",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
+    # The artist switched the icon of Sinew's modifier off.
+    hidden_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    hidden_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     is_saved: bpy.props.BoolProperty(
         description="The Armature modifiers deform by their nearest shape: in saved files, and in modes of "
         "tools that need them",
@@ -239,7 +262,10 @@ class SinewSettings(bpy.types.PropertyGroup):
         override=OVERRIDABLE,
     )
     replaced_smooth: bpy.props.PointerProperty(
-        type=SinewReplacedSmooth, options={"HIDDEN"}, override=OVERRIDABLE
+        type=SinewSwitchedOff, options={"HIDDEN"}, override=OVERRIDABLE
+    )
+    baked: bpy.props.CollectionProperty(
+        type=SinewSwitchedOff, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
     parent_type: bpy.props.StringProperty(
         description="The object's parent type before Sinew made an Armature modifier of it",
@@ -299,8 +325,8 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def replaces_modifiers(self) -> bool:
-        """Whether Sinew's modifier deforms now, and the Armature modifiers are off."""
-        return self.standing_in
+        """Whether Sinew deforms now, wherever the icons of its modifier say so."""
+        return Situation(self.situation).is_by_sinew
 
     @property
     def has_nearest_volume(self) -> bool:
@@ -431,7 +457,7 @@ def clear(obj: bpy.types.Object) -> None:
 
 
 CLASSES = (
-    *(SinewReplacedModifier, SinewReplacedSmooth),
+    *(SinewReplacedModifier, SinewSwitchedOff),
     *STAGE_GROUPS.values(),
     *METHOD_GROUPS.values(),
     SinewSettings,

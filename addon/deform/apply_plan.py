@@ -19,6 +19,7 @@ from ..attach import (
     upstream_proxy,
 )
 from ..core.errors import SinewError
+from ..core.icons import RENDER, VIEWPORT, VIEWS
 from . import safe_mode, small_meshes
 from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State, plan
 
@@ -34,10 +35,17 @@ def plan_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> Pl
     return plan(facts_of(obj, failure, waits_for))
 
 
+def plan_of_icons(obj: bpy.types.Object) -> Plan:
+    """Returns the plan as far as the object's mode and its modifiers' icons make it. Changes nothing."""
+    viewport, render = attach.deformer(obj, VIEWPORT), attach.deformer(obj, RENDER)
+    return plan(
+        ObjectFacts(is_linked=obj.library is not None, mode=obj.mode, viewport=viewport, render=render)
+    )
+
+
 def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> ObjectFacts:
-    settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
-    # While Sinew is off, the modifiers themselves have the flags that it would otherwise store.
-    flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
+    attach.follow_icons(obj)
+    settings, mesh = properties.of(obj), obj.data
     gives_normals = normals.are_given(settings)
     domain = normals.domain_of(mesh) if gives_normals else ""
     obstacle = normals.obstacle(obj) if domain else ""
@@ -54,7 +62,9 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
         is_comparison_copy=properties.is_copy(obj),
         has_heat_map=settings.heat,
         visibility_is_keyed=stack.visibility_is_animated(obj),
-        views_differ=any(each.show_viewport != each.show_render for each in flags),
+        viewport=attach.deformer(obj, VIEWPORT),
+        render=attach.deformer(obj, RENDER),
+        views_differ=attach.do_views_differ(obj),
         safe_mode=safe_mode.is_on(),
         failure=failure,
         waits_for=waits_for,
@@ -69,7 +79,9 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
 def apply(obj: bpy.types.Object, wanted: Plan) -> None:
     """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
     if wanted.uses_builtin:
-        attach.switch(obj, on=False)
+        attach.switch(obj, on=wanted.state is State.ASIDE)
+        if wanted.state is State.ASIDE:
+            attach.restore_builtin(obj)
         attach.position_modifier(obj)
         attach.adopt_pointers(obj)
         if wanted.state is State.OFF:
@@ -95,7 +107,8 @@ def _mode_of(obj: bpy.types.Object) -> str:
 def _shows_nearest_volume(obj: bpy.types.Object) -> bool:
     """Whether its mode uses the Armature modifiers, and these can give the shape that Sinew is set to, by
     Preserve Volume."""
-    return _mode_of(obj) in ARMATURE_MODIFIER_MODES and small_meshes.has_builtin_shape(obj)
+    is_used = _mode_of(obj) in ARMATURE_MODIFIER_MODES and attach.deforms(obj)
+    return is_used and small_meshes.has_builtin_shape(obj)
 
 
 def has_lost_modifier(obj: bpy.types.Object) -> bool:
@@ -149,7 +162,7 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
             modifier.object = replaced.armature
         # Where Sinew is off, or an animation sets the flags, they are the artist's own.
         if properties.of(origin).replaces_modifiers and not replaced.visibility_is_keyed:
-            modifier.show_viewport, modifier.show_render = replaced.show_viewport, replaced.show_render
+            modifier.show_viewport, modifier.show_render = attach.own_visibility(replaced)
     if origin is None or attach.armature_of(obj) is None:
         return True
     try:
@@ -162,6 +175,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         shared_settings.assign(settings, name, getattr(properties.of(origin), name))
     groups = (*shared_settings.GROUPS, "replaced_smooth")
     properties.copy_groups(properties.of(origin), settings, groups)
+    for name in VIEWS:
+        properties.store(settings, f"hidden_{name}", getattr(properties.of(origin), f"hidden_{name}"))
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
     return True

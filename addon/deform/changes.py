@@ -18,7 +18,8 @@ class Changes:
     """The data touched since the last update, by session_uid.
 
     touched     objects, meshes and shape keys that were touched in any way
-    objects     objects whose geometry was touched
+    objects     objects whose geometry was touched, or a setting that Blender evaluates nothing for, such as
+                whether a modifier is on in renders
     moved       objects that were moved
     meshes      meshes whose own geometry was touched: points, weights, topology, shape keys; not those that
                 only follow their shape keys' animation
@@ -107,10 +108,10 @@ class Changes:
         if self.after_step and isinstance(original, bpy.types.Key):
             self.meshes.add(original.user.session_uid)
         if isinstance(original, bpy.types.Object):
-            if update.is_updated_geometry:
+            if update.is_updated_geometry and not self.frame:
+                self.edited.append(original)
+            if update.is_updated_geometry or not (update.is_updated_transform or update.is_updated_shading):
                 self.objects.add(uid)
-                if not self.frame:
-                    self.edited.append(original)
             if update.is_updated_transform:
                 self.moved.add(uid)
 

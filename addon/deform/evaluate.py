@@ -94,7 +94,11 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
 
 
 def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
-    """The same for many meshes, evaluated once. Returns for each the error that prevents it, or None."""
+    """The same for many meshes, evaluated once, whatever their modifiers' icons say. Returns for each the
+    error that prevents it, or None."""
+    for obj, _method in wanted:
+        if properties.has_sinew(obj) and obj.is_editable:
+            attach.show(obj)
     return _use_methods(wanted, session.changing)
 
 

@@ -417,6 +417,7 @@ if events.IMPORTS_ARE_ANNOUNCED:
 def register() -> None:
     precomputing.begin()
     subscribers.precomputation_requested.append(precompute_watch.begin)
+    subscribers.before_removal.append(session.forget_object)
     session.forget()
     properties.listeners.method_changed = session.setting_changed
     properties.listeners.enabled_changed = session.enabled_changed
@@ -442,6 +443,7 @@ def adopt_open_file() -> None:
 def unregister() -> None:
     precomputing.end()
     subscribers.precomputation_requested.remove(precompute_watch.begin)
+    subscribers.before_removal.remove(session.forget_object)
     if bpy.app.timers.is_registered(precompute_watch.check):
         bpy.app.timers.unregister(precompute_watch.check)
     session.forget()

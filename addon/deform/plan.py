@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+
+from ..core.icons import Deformer
 
 # In these modes Blender's tools work through the Armature modifier, so it deforms the mesh meanwhile.
 ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})
@@ -15,6 +17,7 @@ class State(Enum):
 
     OFF = "off"  # the user switched Sinew off, or Sinew failed
     BUILT_IN = "built-in"  # the Armature modifier deforms, while Sinew is on
+    ASIDE = "aside"  # the Armature modifier or nothing, in both views, as the modifiers' icons say
     WAITING = "waiting"  # Sinew, with the Armature modifier's method until the chosen one's data is computed
     IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the usual case
     AFTER_UPDATE = "after update"  # Sinew, after the evaluation; Blender then evaluates once more
@@ -34,6 +37,20 @@ class Normals:
     are_for_viewport_alone: bool = False
 
 
+_IN_BOTH = {
+    Deformer.NOTHING: "Hidden by its modifier's icons",
+    Deformer.ARMATURE: "Its Armature modifier deforms: its icons are on",
+}
+_IN_VIEWPORT = {
+    Deformer.NOTHING: "Hidden in the viewport by its modifier's icon",
+    Deformer.ARMATURE: "Its Armature modifier deforms in the viewport: its icon is on",
+}
+_IN_RENDERS = {
+    Deformer.NOTHING: "Hidden in renders by its modifier's icon",
+    Deformer.ARMATURE: "Its Armature modifier deforms in renders: its icon is on",
+}
+
+
 @dataclass(frozen=True)
 class Plan:
     """Who deforms an object, when, and where its points and normals are stored.
@@ -43,6 +60,8 @@ class Plan:
     after_update    Sinew deforms after Blender's evaluation, not within it
     normals         the normals given along with the points
     normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
+    viewport        what deforms it in the viewport, or would if Blender did not do it for Sinew
+    render          the same in renders
     """
 
     state: State
@@ -51,10 +70,21 @@ class Plan:
     after_update: bool = False
     normals: Normals = Normals()
     normals_reason: str = ""
+    viewport: Deformer = Deformer.SINEW
+    render: Deformer = Deformer.SINEW
 
     @property
     def uses_builtin(self) -> bool:
-        return self.state in (State.OFF, State.BUILT_IN)
+        return self.state in (State.OFF, State.BUILT_IN, State.ASIDE)
+
+    @property
+    def view_reasons(self) -> list[str]:
+        """A sentence for the panel on each view in which something else deforms than Sinew, as the icons
+        say; one for both views where they agree."""
+        if self.viewport is self.render:
+            return [_IN_BOTH[self.viewport]] if self.viewport in _IN_BOTH else []
+        found = (_IN_VIEWPORT.get(self.viewport), _IN_RENDERS.get(self.render))
+        return [sentence for sentence in found if sentence is not None]
 
     @property
     def is_in_depsgraph(self) -> bool:
@@ -74,7 +104,9 @@ class ObjectFacts:
     mesh_is_editable            attributes can be added to the mesh: it is not linked
     is_comparison_copy          it is a copy that a comparison shows
     visibility_is_keyed         an animation switches one of the Armature modifiers on and off
-    views_differ                an Armature modifier is on only in the viewport or only in renders
+    viewport, render            what the modifiers' icons say that deforms it in each view
+    views_differ                one of several Armature modifiers is on only in the viewport or only in
+                                renders
     safe_mode                   nothing of Sinew may run within Blender's evaluation
     failure                     the error within Blender's evaluation; empty if there was none
     waits_for                   what its method needs and is not computed yet, as a clause; empty if nothing
@@ -97,6 +129,8 @@ class ObjectFacts:
     is_comparison_copy: bool = False
     has_heat_map: bool = False
     visibility_is_keyed: bool = False
+    viewport: Deformer = Deformer.SINEW
+    render: Deformer = Deformer.SINEW
     views_differ: bool = False
     safe_mode: bool = False
     failure: str = ""
@@ -109,6 +143,10 @@ class ObjectFacts:
 
 
 def plan(facts: ObjectFacts) -> Plan:
+    return replace(_plan(facts), viewport=facts.viewport, render=facts.render)
+
+
+def _plan(facts: ObjectFacts) -> Plan:
     if not facts.enabled:
         return Plan(State.OFF)
     if facts.is_linked:
@@ -122,9 +160,12 @@ def plan(facts: ObjectFacts) -> Plan:
     if facts.mode == "WEIGHT_PAINT" and facts.visibility_is_keyed:
         reason = "The visibility of its Armature modifier is animated: in this mode that shows its own shape"
         return Plan(State.BUILT_IN, reason)
-    if facts.builtin_is_faster:
+    views = {facts.viewport, facts.render}
+    if facts.builtin_is_faster and Deformer.ARMATURE not in views:
         reason = "Small: the Armature modifier has the same shape in less time, and deforms it"
         return Plan(State.BUILT_IN, reason)
+    if Deformer.SINEW not in views and not facts.has_upstream:
+        return Plan(State.ASIDE)
     reason = _why_not_in_depsgraph(facts)
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
@@ -166,6 +207,6 @@ def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
         (facts.upstream_changes_weights, "Modifiers in front of the Armature modifier change weights"),
         (facts.has_heat_map, "It shows a heat map"),
         (facts.visibility_is_keyed, "The visibility of its Armature modifier is animated"),
-        (facts.views_differ, "Its Armature modifier is on in the viewport or in renders alone"),
+        (facts.views_differ, "An Armature modifier is on in the viewport or in renders alone"),
     )
     return next((reason for holds, reason in reasons if holds), "")

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ..attach import attach, properties, stage_settings
-from ..core import parameters
+from ..core import icons, parameters
 from ..core.errors import SinewError
 from ..core.rig import Bones
 from ..core.scale_rule import BLENDER_4
@@ -49,11 +50,13 @@ def read(
             f"methods are {', '.join(f'{m.number} {m.label}' for m in properties.METHODS.values())}"
         )
     frames: Frames = []
-    for stage, (replaced, armature), is_keyed in zip(
-        skinned.bound.skin_stack.skin_stages, modifiers, skinned.visibility_keyed, strict=False
+    for stage, (replaced, armature), takes_part in zip(
+        skinned.bound.skin_stack.skin_stages,
+        modifiers,
+        _taking_part(evaluated, modifiers, skinned.visibility_keyed, mode),
+        strict=False,
     ):
-        flags = evaluated.modifiers[replaced.name] if is_keyed or skinned.uses_builtin else replaced
-        if armature is None or armature.data.is_editmode or not _takes_part(flags, mode):
+        if armature is None or armature.data.is_editmode or not takes_part:
             frames.append(None)
             continue
         space, back = armature_io.bones_from_model(evaluated, armature), None
@@ -135,5 +138,13 @@ def stage_values(settings: properties.SinewSettings) -> StageValues:
     return values
 
 
-def _takes_part(flags: properties.SinewReplacedModifier | bpy.types.Modifier, mode: str) -> bool:
-    return flags.show_render if mode == "RENDER" else flags.show_viewport
+def _taking_part(
+    evaluated: bpy.types.Object, modifiers: Modifiers, are_keyed: list[bool], mode: str
+) -> Sequence[bool]:
+    """Returns which of the modifiers deform in a view; where an animation sets their icons, it decides."""
+    name = f"show_{mode.lower()}"
+    shown = [
+        getattr(evaluated.modifiers[replaced.name] if is_keyed else replaced, name)
+        for (replaced, _armature), is_keyed in zip(modifiers, are_keyed, strict=False)
+    ]
+    return shown if any(are_keyed) else icons.taking_part(shown)

@@ -119,6 +119,14 @@ def forget() -> None:
     _set_pairs([])
 
 
+def forget_object(obj: bpy.types.Object) -> None:
+    """Forgets an object that Sinew is taken off; others stay bound."""
+    gone = current.skinned.pop(obj.session_uid, None)
+    current.objects = None
+    _set_pairs([(other, state) for other, state in current.pairs if state is not gone])
+    subscribe_to_frames()
+
+
 def forget_for_step(changed: set[int]) -> None:
     """Called before undo and redo, which make every reference invalid.
 

@@ -154,7 +154,7 @@ class SkinnedObject:
         """Notes that the plan was applied, and the state of the object it was applied to."""
         self.plan, self.needs_apply, self.name = plan, False, obj.name
         self.evaluation.was_tagged = True
-        self.builtin_fingerprint = small_meshes.fingerprint(obj) if plan.state is State.BUILT_IN else []
+        self.builtin_fingerprint = small_meshes.fingerprint(obj) if plan.uses_builtin else []
         self.visibility_keyed = [is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)]
         self.normals_domain = normals.domain_of(obj.data)
         self.modifier, self.object_state = stack.sinew_modifier(obj).name, object_state_of(obj)

@@ -37,7 +37,8 @@ def lead(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def set_method(context: bpy.types.Context, method: str) -> None:
-    """Sets `method` for all meshes that follow, with all of their Armature modifiers."""
+    """Sets `method` for all meshes that follow, with all of their Armature modifiers: wherever it is chosen
+    for the character."""
     with session.changing(context):
         for obj in followers(context):
             attach.use_one_method(obj, method)
@@ -106,6 +107,9 @@ def _computed(deferred: Any, group: str, name: str) -> object:
         if prop.type == "ENUM":
             # An item without identifier is a heading.
             value = next(i.identifier for i in prop.enum_items if i.identifier and i.value == value)
+        if (group, name) == ("", "method"):
+            set_method(bpy.context, value)
+            return
         each = [of_mesh(properties.of(obj)) for obj in followers(bpy.context)]
         if any(getattr(settings, name) != value for settings in each):
             with session.changing(bpy.context):
@@ -163,8 +167,9 @@ SinewCharacter.__annotations__.update(
     {
         "enabled": bpy.props.BoolProperty(
             name="On",
-            description="Deform all meshes of the character with Sinew; off: with Blender's Armature "
-            "modifier, to compare the two",
+            description="Deform all meshes of the character with Sinew where the icon of its modifier is on. "
+            "Where that of an Armature modifier is switched on, that deforms instead; where Sinew's is "
+            "switched off, nothing does. Off: Blender's Armature modifier deforms, to compare the two",
             get=_is_on,
             set=_switch,
             options=set(),

@@ -88,7 +88,7 @@ def _draw_character(
     # For a single mesh its own settings, which can have keys.
     settings = properties.of(lead) if len(meshes) == 1 else shared
     row = layout.row(align=True)
-    row.prop(shared, "enabled", text="On" if shared.enabled else "Off", toggle=True)
+    row.prop(shared, "enabled", text=state_text.switch_text(meshes), toggle=True)
     row.operator("sinew.rebind", icon="FILE_REFRESH")
     row.operator("sinew.remove", icon="X")
     layout.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")

@@ -82,7 +82,7 @@ def _draw_details(
     if not is_alone:
         row = layout.row(align=True)
         row.operator("sinew.own_settings", depress=settings.is_own).name = obj.name
-        row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
+        row.prop(settings, "enabled", text=state_text.switch_text([obj]), toggle=True)
         row.operator("sinew.remove", text="", icon="X").name = obj.name
         state_text.draw_mesh(layout, context, obj)
     column = layout.column()

@@ -21,7 +21,7 @@ def _draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
     box = self.layout.box()
     settings, row = properties.of(obj), box.row(align=True)
     row.label(text="Sinew", icon=state_text.icon_of(obj))
-    row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
+    row.prop(settings, "enabled", text=state_text.switch_text([obj]), toggle=True)
     row.operator("sinew.open_tab", text="", icon="MENU_PANEL")
     draw_text(box, context, state_text.sentence_of(obj), alert=bool(settings.error))
 

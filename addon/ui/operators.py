@@ -210,7 +210,9 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
 
         with updates_suspended():
             result = _for_each(self, objects, add, "Sinew deforms")
-        session.forget()
+        for obj in filter(properties.has_sinew, objects):
+            for sentence in attach.notes(obj):
+                self.report({"WARNING"}, f"{obj.name}: {tr(sentence)}")
         session.refresh(context)
         return result
 
@@ -250,9 +252,7 @@ class SINEW_OT_remove(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
-        result = _for_each(self, objects, attach.remove, "Removed Sinew from")
-        session.forget()
-        return result
+        return _for_each(self, objects, attach.remove, "Removed Sinew from")
 
 
 class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):

@@ -3,30 +3,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ..attach import attach, behind_nodes, properties
-from ..deform import session, small_meshes
-from ..deform.plan import ARMATURE_MODIFIER_MODES, ObjectFacts, State, plan
+from ..core.icons import RENDER, VIEWPORT, Deformer
+from ..deform import apply_plan, session, small_meshes
+from ..deform.plan import ARMATURE_MODIFIER_MODES, State
 from .sidebar import draw_text, names_text
 from .translations import tr
 
 ICONS = {
     State.OFF: "MODIFIER_OFF",
     State.BUILT_IN: "MOD_ARMATURE",
+    State.ASIDE: "HIDE_ON",
     State.WAITING: "SORTTIME",
     State.IN_DEPSGRAPH: "CHECKMARK",
     State.AFTER_UPDATE: "RECOVER_LAST",
 }
 
 
-def reason_of(obj: bpy.types.Object) -> str:
-    """Returns why it is not deformed as usual; empty where it is, or is off."""
-    settings, state = properties.of(obj), session.state_of(obj)
-    if not settings.enabled:
-        return ""
-    facts = ObjectFacts(is_linked=obj.library is not None, mode=obj.mode)
-    return plan(facts).reason or (state.plan.reason if state is not None else "")
+def reasons_of(obj: bpy.types.Object) -> list[str]:
+    """Returns why it is not deformed as usual, and what deforms instead in each view; empty where it is, or
+    is off."""
+    if not properties.of(obj).enabled:
+        return []
+    state, views = session.state_of(obj), apply_plan.plan_of_icons(obj)
+    reason = views.reason or (state.plan.reason if state is not None else "")
+    return [each for each in (reason, *views.view_reasons) if each]
 
 
 def sentence_of(obj: bpy.types.Object) -> str:
@@ -36,13 +41,32 @@ def sentence_of(obj: bpy.types.Object) -> str:
     if settings.error:
         return settings.error
     if not settings.enabled:
-        return tr("Off: {modifiers} deforms it", modifiers=replaced)
-    reason, method = tr(reason_of(obj)), tr(properties.method_label(settings.method))
+        text = "Off: {modifiers} deforms it"
+        if not any(modifier.show_viewport for modifier, _replaced in attach.replaced_modifiers(obj)):
+            text = "Off, and so is {modifiers} in the viewport"
+        return tr(text, modifiers=replaced)
+    method = tr(properties.method_label(settings.method))
+    views = ". ".join(map(tr, apply_plan.plan_of_icons(obj).view_reasons))
     if state is None or uses_builtin(obj) or state.plan.state is State.WAITING:
         until = tr("{modifiers} deforms it until the next frame", modifiers=replaced)
-        return f"{method}. {reason or until}"
+        return ". ".join((method, *map(tr, reasons_of(obj) or (until,))))
     text = tr("{method} in the place of {modifiers}", method=method, modifiers=replaced)
-    return tr("{text}, after Blender's evaluation: {reason}", text=text, reason=reason) if reason else text
+    if state.plan.reason:
+        reason = tr(state.plan.reason)
+        text = tr("{text}, after Blender's evaluation: {reason}", text=text, reason=reason)
+    return f"{text}. {views}" if views else text
+
+
+def switch_text(objects: Sequence[bpy.types.Object]) -> str:
+    """Returns what the switch of these meshes shows."""
+    on = [obj for obj in objects if properties.of(obj).enabled]
+    if not on:
+        return "Off"
+    views = {attach.deformer(obj, name) for obj in on for name in (VIEWPORT, RENDER)}
+    if views == {Deformer.SINEW}:
+        return "On"
+    shown = {attach.deformer(obj, VIEWPORT) for obj in on}
+    return "On, hidden" if shown == {Deformer.NOTHING} else "On, in part"
 
 
 def icon_of(obj: bpy.types.Object) -> str:
@@ -51,7 +75,10 @@ def icon_of(obj: bpy.types.Object) -> str:
         return "ERROR"
     if not settings.enabled or state is None:
         return ICONS[State.OFF]
-    return ICONS[State.BUILT_IN if uses_builtin(obj) else state.plan.state]
+    if attach.deformer(obj, VIEWPORT) is Deformer.NOTHING:
+        return ICONS[State.ASIDE]
+    is_built_in = uses_builtin(obj) or attach.deformer(obj, VIEWPORT) is Deformer.ARMATURE
+    return ICONS[State.BUILT_IN if is_built_in else state.plan.state]
 
 
 def problems_of(obj: bpy.types.Object) -> list[str]:
@@ -109,8 +136,8 @@ def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
     """Draws everything about one mesh."""
     if properties.of(obj).error:
         draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
-    elif reason_of(obj):
-        draw_text(layout, context, reason_of(obj), icon="INFO")
+    for sentence in (*reasons_of(obj), *attach.notes(obj)):
+        draw_text(layout, context, sentence, icon="INFO")
     draw_in_mode(layout, context, obj)
     state = session.state_of(obj)
     if state is not None and state.plan.normals_reason:
@@ -133,8 +160,9 @@ def draw_character(
             draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
     by_reason: dict[str, list[str]] = {}
     for obj in meshes:
-        if properties.of(obj).enabled and uses_builtin(obj):
-            by_reason.setdefault(reason_of(obj), []).append(obj.name)
+        views = apply_plan.plan_of_icons(obj).view_reasons if properties.of(obj).enabled else []
+        for reason in (*(reasons_of(obj) if uses_builtin(obj) else views), *attach.notes(obj)):
+            by_reason.setdefault(reason, []).append(obj.name)
     for reason, names in by_reason.items():
         who = names_text(names, most=2)
         if len(names) == len(meshes):
@@ -153,4 +181,4 @@ def uses_builtin(obj: bpy.types.Object) -> bool:
     settings, state = properties.of(obj), session.state_of(obj)
     if not settings.enabled or state is None:
         return False
-    return obj.mode in ARMATURE_MODIFIER_MODES or state.plan.state is State.BUILT_IN
+    return obj.mode in ARMATURE_MODIFIER_MODES or state.plan.state in (State.BUILT_IN, State.ASIDE)

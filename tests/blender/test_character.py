@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.deform import small_meshes
+from sinew_addon.deform import session, small_meshes
 from sinew_addon.ui import character, main_panel, operators, state_text
 from sinew_addon.ui.sidebar import names_text, shortened
 
@@ -115,7 +115,8 @@ def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
     """Settings that are added to a mesh must be added here, too."""
     ours = {
         *("enabled", "heat", "error", "is_own"),
-        *("stand_ins", "standing_in", "is_saved", "replaced_smooth", "parent_type", "attribute"),
+        *("stand_ins", "situation", "hidden_viewport", "hidden_render", "baked", "is_saved"),
+        *("replaced_smooth", "parent_type", "attribute"),
         *("normals_attribute", "carrier", "modifier_name"),
         *(
             "front",
@@ -133,6 +134,42 @@ def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
     assert names == set(character.SinewCharacter.bl_rna.properties.keys()) - {
         *("rna_type", "name", "enabled", "row", "chosen")
     }
+
+
+@pytest.mark.parametrize("door", ["panel", "menu", "mesh", "preset"])
+@pytest.mark.parametrize("method", ["lbs", "qv"])
+def test_a_method_goes_to_all_modifiers_of_a_mesh(armature, door, method):
+    """Wherever it is chosen, and also if the mesh has it already."""
+    body = bpy.data.objects["Body"]
+    second = body.modifiers.new("Second", "ARMATURE")
+    second.object, second.use_multi_modifier = armature, True
+    body.modifiers.move(len(body.modifiers) - 1, 1)
+    bpy.ops.sinew.add(method="lbs")
+    replaced = properties.of(body).replaced_modifiers[1]
+    replaced.method = "dq"
+    if door == "panel":
+        shared().method = method
+    elif door == "menu":
+        bpy.ops.sinew.use_method(method=method)
+    elif door == "mesh":
+        properties.of(body).method = method
+    else:
+        exec(f"character.method = {method!r}", {"character": shared()})
+    assert (properties.of(body).method, replaced.method) == (method, properties.SAME_METHOD)
+
+
+def test_another_character_stays_bound(armature):
+    bpy.ops.sinew.add(method="dq")
+    bound = [session.state_of(obj).bound for obj in meshes()]
+    other, _rig = scenes.make_arm(name="Other")
+    five_meshes.select(other)
+    bpy.ops.sinew.add(method="dq")
+    bpy.context.scene.frame_set(7)
+    assert [session.state_of(obj).bound for obj in meshes()] == bound
+    bpy.ops.sinew.remove()
+    bpy.context.scene.frame_set(8)
+    assert all(session.state_of(obj).bound is each for obj, each in zip(meshes(), bound, strict=True))
+    assert session.state_of(other) is None
 
 
 def test_one_mesh_can_differ_and_follow_again(armature):

@@ -13,6 +13,7 @@ from sinew_addon.attach import attach, normals, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
 from sinew_addon.deform import events, handlers, session, small_meshes
 from sinew_addon.features.heat import live
+from sinew_addon.ui import state_text
 
 FRAMES = [1, 6, 11]
 
@@ -359,3 +360,33 @@ def test_fewer_are_left_where_sinew_gives_normals(kind, monkeypatch):
     assert deformer(obj) == "sinew"
     properties.of(obj).normals = properties.LEAVE_NORMALS
     assert deformer(obj) == "blender"
+
+
+def test_the_icons_of_a_mesh_that_is_left_to_blender(arm):
+    """That of the Armature modifier hides it, as it deforms in Sinew's place; Sinew's own takes it over."""
+    obj, _armature = arm
+    own, sinews = obj.modifiers["Armature"], stack.sinew_modifier(obj)
+    bpy.context.scene.frame_set(6)
+    shape = scenes.final_points(obj)
+
+    def flags() -> list[tuple[bool, bool]]:
+        bpy.context.view_layer.update()
+        return [(modifier.show_viewport, modifier.show_render) for modifier in (own, sinews)]
+
+    own.show_viewport = own.show_render = False
+    assert flags() == [(False, False), (False, False)]
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) == 0.0
+    assert "Hidden by" in state_text.sentence_of(obj)
+    # Tools that show everything again also switch Sinew's on.
+    for modifier in (own, sinews):
+        modifier.show_viewport = modifier.show_render = True
+    assert flags() == [(True, True), (False, False)]
+    assert deformer(obj) == "blender"
+    sinews.show_viewport = True
+    assert flags() == [(False, False), (True, True)]
+    assert not properties.of(obj).leave_small
+    assert deformer(obj) == "sinew"
+    bpy.context.scene.frame_set(6)
+    assert scenes.worst(scenes.final_points(obj), shape) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    attach.remove(obj)
+    assert (own.show_viewport, own.show_render) == (True, True)

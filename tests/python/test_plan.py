@@ -3,21 +3,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from dataclasses import fields
-from pathlib import Path
+from dataclasses import fields, replace
 
 import pytest
+from sinew_addon.core.icons import Deformer, Icons, Situation, View, follow, icons
+from sinew_addon.deform.plan import ObjectFacts, State, plan
 
-# The package around this file imports bpy; the file itself does not.
-_PATH = Path(__file__).resolve().parents[2] / "addon" / "deform" / "plan.py"
-_SPEC = importlib.util.spec_from_file_location("sinew_plan", _PATH)
-plan_module = importlib.util.module_from_spec(_SPEC)
-sys.modules["sinew_plan"] = plan_module
-_SPEC.loader.exec_module(plan_module)
-ObjectFacts, State, plan = plan_module.ObjectFacts, plan_module.State, plan_module.plan
-
+_HIDDEN = {"viewport": Deformer.NOTHING, "render": Deformer.NOTHING}
 TABLE = [
     ({}, State.IN_DEPSGRAPH, ""),
     ({"enabled": False}, State.OFF, ""),
@@ -39,6 +31,16 @@ TABLE = [
     ({"visibility_is_keyed": True}, State.AFTER_UPDATE, "animated"),
     ({"visibility_is_keyed": True, "mode": "WEIGHT_PAINT"}, State.BUILT_IN, "animated"),
     ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
+    ({"viewport": Deformer.NOTHING}, State.IN_DEPSGRAPH, ""),
+    ({"viewport": Deformer.ARMATURE, "mesh_is_shared": True}, State.IN_DEPSGRAPH, ""),
+    ({"render": Deformer.ARMATURE, "safe_mode": True}, State.AFTER_UPDATE, "Safe mode"),
+    ({"viewport": Deformer.NOTHING, "render": Deformer.ARMATURE}, State.ASIDE, ""),
+    ({"viewport": Deformer.NOTHING, "render": Deformer.NOTHING, "safe_mode": True}, State.ASIDE, ""),
+    ({**_HIDDEN, "has_upstream": True}, State.IN_DEPSGRAPH, ""),
+    ({**_HIDDEN, "builtin_is_faster": True}, State.BUILT_IN, "Small"),
+    ({"render": Deformer.ARMATURE, "builtin_is_faster": True}, State.IN_DEPSGRAPH, ""),
+    ({**_HIDDEN, "mode": "EDIT"}, State.BUILT_IN, "In this mode"),
+    ({**_HIDDEN, "enabled": False}, State.OFF, ""),
     ({"waits_for": "until found"}, State.WAITING, "until found"),
     ({"waits_for": "until found", "safe_mode": True}, State.WAITING, "until found"),
     ({"waits_for": "until found", "mode": "EDIT"}, State.BUILT_IN, "In this mode"),
@@ -104,6 +106,88 @@ def test_who_computes_normals(facts, domain, reason):
     assert found.normals.are_for_viewport_alone == facts.get("normals_for_viewport_alone", False)
     assert reason in found.normals_reason
     assert bool(found.normals_reason) == bool(reason)
+
+
+CLICKS = [
+    # Sinew's icon (S) and that of the Armature modifier (A) in one view, as clicked: what deforms.
+    ("", Deformer.SINEW),
+    ("A", Deformer.ARMATURE),
+    ("AA", Deformer.SINEW),
+    ("AS", Deformer.SINEW),
+    ("S", Deformer.NOTHING),
+    ("SS", Deformer.SINEW),
+    ("SA", Deformer.ARMATURE),
+    ("SAA", Deformer.NOTHING),
+    ("SAAS", Deformer.SINEW),
+    ("SASA", Deformer.ARMATURE),
+    ("SASAA", Deformer.SINEW),
+]
+
+
+def _after(clicks: str, situation: Situation, view: View, name: str) -> View:
+    for click in clicks:
+        before = icons(view, situation, name)
+        sinew, (modifier,) = before.sinew ^ (click == "S"), before.modifiers
+        view = follow(view, situation, name, Icons(sinew, (modifier ^ (click == "A"),)))
+        # What Sinew sets then is not taken for a click.
+        assert follow(view, situation, name, icons(view, situation, name)) == view
+    return view
+
+
+@pytest.mark.parametrize("name", ["viewport", "render"])
+@pytest.mark.parametrize(("clicks", "deformer"), CLICKS)
+def test_the_order_of_clicks(clicks, deformer, name):
+    view = _after(clicks, Situation.SINEW, View((True,)), name)
+    assert view.deformer is deformer
+    is_on = (deformer is Deformer.SINEW, deformer is Deformer.ARMATURE)
+    set_now = icons(view, Situation.SINEW, name)
+    assert (set_now.sinew, *set_now.modifiers) == is_on
+    assert view.shown == (True,)
+    # While Sinew is off, the Armature modifier is as before.
+    assert icons(view, Situation.OFF, name) == Icons(False, (True,))
+
+
+@pytest.mark.parametrize(
+    ("situation", "clicks", "deformer"),
+    [
+        (Situation.BUILT_IN, "A", Deformer.NOTHING),
+        (Situation.BUILT_IN, "AA", Deformer.SINEW),
+        (Situation.BUILT_IN, "AS", Deformer.SINEW),
+        (Situation.OFF, "A", Deformer.NOTHING),
+        (Situation.OFF, "AA", Deformer.SINEW),
+        (Situation.PAINT, "A", Deformer.SINEW),
+        (Situation.PAINT, "S", Deformer.NOTHING),
+        (Situation.PAINT, "SA", Deformer.ARMATURE),
+    ],
+)
+def test_clicks_while_the_armature_modifier_is_on_for_sinew(situation, clicks, deformer):
+    assert _after(clicks, situation, View((True,)), "viewport").deformer is deformer
+
+
+def test_several_armature_modifiers():
+    """Each icon is for its own modifier; by Sinew, those deform that were on."""
+    view, both = View((True, False)), View((False, False), hidden=True)
+    assert icons(view, Situation.BUILT_IN, "render").modifiers == (True, False)
+    assert icons(replace(both, hidden=False), Situation.BUILT_IN, "render").modifiers == (True, True)
+    assert icons(both, Situation.BUILT_IN, "render").modifiers == (False, False)
+    aside = follow(view, Situation.SINEW, "render", Icons(True, (False, True)))
+    assert icons(aside, Situation.SINEW, "render") == Icons(False, (False, True))
+    more = follow(aside, Situation.SINEW, "render", Icons(False, (True, True)))
+    assert icons(more, Situation.SINEW, "render") == Icons(False, (True, True))
+    assert follow(more, Situation.SINEW, "render", Icons(False, (False, False))).deformer is Deformer.SINEW
+
+
+@pytest.mark.parametrize("viewport", Deformer)
+@pytest.mark.parametrize("render", Deformer)
+def test_the_panel_says_what_deforms_in_each_view(viewport, render):
+    said = " ".join(plan(ObjectFacts(viewport=viewport, render=render)).view_reasons)
+    of_views = {"viewport": viewport, "renders": render}
+    for name, deformer in of_views.items() if viewport is not render else ():
+        assert (f"in {'the ' if name == 'viewport' else ''}{name}" in said) == (
+            deformer is not Deformer.SINEW
+        )
+    assert ("Hidden" in said) == (Deformer.NOTHING in of_views.values())
+    assert ("Armature modifier" in said) == (Deformer.ARMATURE in of_views.values())
 
 
 def test_every_fact_matters():

@@ -19,7 +19,7 @@ from ...core import bake
 from ...core.errors import SinewError
 from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...core.names import as_file_name
-from ...deform import evaluate, session
+from ...deform import evaluate
 from ...io import files
 from ...io.animation_paths import curves_of
 from . import bake_export, bake_state, shape_animation
@@ -192,7 +192,6 @@ class Bake:
         except BaseException:
             self.discard()
             raise
-        session.forget()
 
     @property
     def files(self) -> list[tuple[Path, Path]]:

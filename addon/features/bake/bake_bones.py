@@ -23,7 +23,7 @@ from ...core.influences import Influences, joined
 from ...core.session import SkinStack, SkinStageFrame
 from ...core.spaces import transformed
 from ...core.stages import StageValues
-from ...deform import evaluate, session
+from ...deform import evaluate
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io, mesh_io
 from . import bake_state, error_map, shape_animation
@@ -92,7 +92,6 @@ class BoneBake:
     def place(self) -> None:
         for rig in self._rigs:
             rig.place(self.frames)
-        session.forget()
 
     def publish(self) -> None:
         """Does nothing, as nothing is in files."""

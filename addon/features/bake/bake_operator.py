@@ -24,7 +24,9 @@ WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
 class SINEW_OT_bake(OnSinewObjects, stepped.Asking, bpy.types.Operator):
     bl_idname = "sinew.bake"
     bl_label = "Bake"
-    bl_description = "Write what Sinew deforms as data that plays without it"
+    bl_description = (
+        "Write what Sinew deforms as data that plays without it. A bake into this file takes Sinew off"
+    )
     bl_options = {"REGISTER", "UNDO"}
     saying = "Sinew bakes"
     stopped = "Bake stopped; nothing was written"
@@ -105,6 +107,8 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Asking, bpy.types.Operator):
             of_kind = ("folder", "overwrite")
         for name in ("kind", "frames", "step", *of_kind):
             layout.prop(self, name)
+        if self.kind not in EXPORTS:
+            layout.label(text="Takes Sinew off: what is baked plays without it", icon="INFO")
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         self.started = self._start(context)

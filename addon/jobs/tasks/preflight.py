@@ -12,7 +12,7 @@ import bpy
 from ...attach import attach, properties, stack, upstream_proxy
 from ...attach.updates import updates_suspended
 from ...core.errors import SinewError
-from ...deform import evaluate
+from ...deform import apply_plan, evaluate
 from ...io import files
 
 
@@ -32,16 +32,26 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
     objects = [obj for obj in bpy.data.objects if obj not in overridden and not properties.is_copy(obj)]
     skinned = [obj for obj in objects if properties.has_sinew(obj)]
+    for obj in skinned:
+        if obj.is_editable:
+            attach.follow_icons(obj)
     # Read before they are tried, which switches them on.
     meshes = [
         {"object": obj.name, "method": properties.of(obj).method}
         for obj in skinned
-        if properties.of(obj).enabled
+        if properties.of(obj).enabled and attach.deforms(obj)
     ]
     off = [obj.name for obj in skinned if not properties.of(obj).enabled]
+    told = [
+        f"{obj.name}: {sentence}"
+        for obj in skinned
+        if properties.of(obj).enabled
+        for sentence in (*apply_plan.plan_of_icons(obj).view_reasons, *attach.notes(obj))
+    ]
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
     problems += _not_deformable(skinned)
     notes += [f"{name} is switched off: its Armature modifier deforms it" for name in off]
+    notes += told
     notes += [
         f"library {library.filepath} is missing: whether Sinew deforms what it links is not known"
         for library in bpy.data.libraries

@@ -21,7 +21,7 @@ from ...core.frames import parse_frames
 from ...core.names import fits
 from ...core.output import remove
 from ...core.views import seen_extent, whole_view
-from ...deform import evaluate, session
+from ...deform import apply_plan, evaluate, session
 from ...features.bake import bake_copy
 from ...features.compare import comparison
 from ...features.pages import render
@@ -117,7 +117,6 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
                 left_out.append(str(error))
                 continue
             meshes.append({"object": obj.name, "method": method, "warnings": []})
-        session.forget()
     if not meshes:
         reason = left_out.pop() if left_out else "no mesh is deformed by Sinew"
         raise SinewError(f"{source}: {reason}; nothing written")
@@ -150,10 +149,15 @@ def _use_sinew(
             "before": way,
             "method": method,
             "scale": properties.of(obj).scale_rule,
-            "warnings": list(state.bound.facts.warnings) if state is not None else [],
+            "warnings": [*(state.bound.facts.warnings if state is not None else ()), *_told(obj)],
         }
         skinned.append((obj, mesh))
     return skinned, left_out
+
+
+def _told(obj: bpy.types.Object) -> list[str]:
+    """Returns what else deforms the mesh than Sinew, and what was found switched off."""
+    return [*apply_plan.plan_of_icons(obj).view_reasons, *attach.notes(obj)]
 
 
 def _meant(settings: dict, source: Path) -> list[bpy.types.Object]:

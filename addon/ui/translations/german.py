@@ -166,8 +166,10 @@ TEXTS = {
     "How the bones' motions are blended, for all meshes of the character": (
         "Wie die Bewegungen der Knochen gemischt werden, für alle Maschen der Figur"
     ),
-    "How this modifier blends, where several chained Armature modifiers deform the mesh": (
-        "Wie dieser Modifikator mischt, wenn mehrere Skelett-Modifikatoren nacheinander die Masche verformen"
+    "How this modifier blends, where several chained Armature modifiers deform the mesh. A method that is "
+    "chosen for the mesh or the character goes to all of them again": (
+        "Wie dieser Modifikator mischt, wenn mehrere Skelett-Modifikatoren nacheinander die Masche "
+        "verformen. Eine Methode, die für die Masche oder die Figur gewählt wird, gilt wieder für alle"
     ),
     "Same Method": "Gleiche Methode",
     "The method that is chosen for the object": "Die Methode, die für das Objekt gewählt ist",
@@ -193,13 +195,21 @@ TEXTS = {
     "off": "aus",
     "none": "keins",
     "and": "und",
-    "Deform with Sinew; off: with Blender's Armature modifier, to compare the two": (
-        "Mit Sinew verformen; aus: mit Blenders Skelett-Modifikator, um beide zu vergleichen"
+    "On, hidden": "An, verborgen",
+    "On, in part": "An, teilweise",
+    "Deform with Sinew where the icon of its modifier is on. Where that of an Armature modifier is switched "
+    "on, that deforms instead; where Sinew's is switched off, nothing does. Off: Blender's Armature modifier "
+    "deforms, to compare the two": (
+        "Mit Sinew verformen, wo das Symbol seines Modifikators an ist. Wo das eines Skelett-Modifikators "
+        "angeschaltet wird, verformt dieser stattdessen; wo das von Sinew ausgeschaltet wird, nichts. Aus: "
+        "Blenders Skelett-Modifikator verformt, um beide zu vergleichen"
     ),
-    "Deform all meshes of the character with Sinew; off: with Blender's Armature modifier, to compare "
-    "the two": (
-        "Alle Maschen der Figur mit Sinew verformen; aus: mit Blenders Skelett-Modifikator, um beide zu "
-        "vergleichen"
+    "Deform all meshes of the character with Sinew where the icon of its modifier is on. Where that of an "
+    "Armature modifier is switched on, that deforms instead; where Sinew's is switched off, nothing does. "
+    "Off: Blender's Armature modifier deforms, to compare the two": (
+        "Alle Maschen der Figur mit Sinew verformen, wo das Symbol seines Modifikators an ist. Wo das eines "
+        "Skelett-Modifikators angeschaltet wird, verformt dieser stattdessen; wo das von Sinew ausgeschaltet "
+        "wird, nichts. Aus: Blenders Skelett-Modifikator verformt, um beide zu vergleichen"
     ),
     "Own Settings": "Eigenständig",
     "This mesh keeps settings of its own: what is set for the character does not change it": (
@@ -413,6 +423,33 @@ TEXTS = {
     # Who deforms a mesh, and why
     "{method} in the place of {modifiers}": "{method} anstelle von {modifiers}",
     "Off: {modifiers} deforms it": "Aus: {modifiers} verformt sie",
+    "Off, and so is {modifiers} in the viewport": "Aus, und im Ansichtsfenster auch {modifiers}",
+    "Hidden by its modifier's icons": "Durch die Symbole seines Modifikators verborgen",
+    "Hidden in the viewport by its modifier's icon": (
+        "Im Ansichtsfenster durch das Symbol seines Modifikators verborgen"
+    ),
+    "Hidden in renders by its modifier's icon": "Beim Rendern durch das Symbol seines Modifikators verborgen",
+    "Its Armature modifier deforms: its icons are on": (
+        "Ihr Skelett-Modifikator verformt sie: Seine Symbole sind an"
+    ),
+    "Its Armature modifier deforms in the viewport: its icon is on": (
+        "Im Ansichtsfenster verformt sie ihr Skelett-Modifikator: Sein Symbol ist an"
+    ),
+    "Its Armature modifier deforms in renders: its icon is on": (
+        "Beim Rendern verformt sie ihr Skelett-Modifikator: Sein Symbol ist an"
+    ),
+    "Its Armature modifier was off before Sinew; Remove switches it off again": (
+        "Ihr Skelett-Modifikator war vor Sinew aus; Entfernen schaltet ihn wieder aus"
+    ),
+    "Its baked shape keys are muted; Remove unmutes them": (
+        "Ihre gebackenen Formschlüssel sind stumm; Entfernen schaltet sie wieder ein"
+    ),
+    "{names} plays baked shapes, and is off; Remove switches it on again": (
+        "{names} spielt gebackene Formen ab und ist aus; Entfernen schaltet ihn wieder an"
+    ),
+    "Its shape keys are animated and deform it, too: mute those that are a bake": (
+        "Ihre Formschlüssel sind animiert und verformen sie auch: Schalte die stumm, die gebacken sind"
+    ),
     "{modifiers} deforms it until the next frame": "Bis zum nächsten Einzelbild verformt sie {modifiers}",
     "{text}, after Blender's evaluation: {reason}": "{text}, nach Blenders Auswertung: {reason}",
     "Blender computes normals: {reason}": "Blender berechnet die Normalen: {reason}",
@@ -441,8 +478,8 @@ TEXTS = {
     "The visibility of its Armature modifier is animated": (
         "Die Sichtbarkeit ihres Skelett-Modifikators ist animiert"
     ),
-    "Its Armature modifier is on in the viewport or in renders alone": (
-        "Ihr Skelett-Modifikator ist nur im Ansichtsfenster oder nur beim Rendern an"
+    "An Armature modifier is on in the viewport or in renders alone": (
+        "Ein Skelett-Modifikator ist nur im Ansichtsfenster oder nur beim Rendern an"
     ),
     "it shows a heat map": "sie zeigt eine Wärmekarte",
     "it has instances on its vertices or faces": "sie hat Instanzen auf ihren Punkten oder Flächen",
@@ -889,8 +926,12 @@ TEXTS = {
         "Dunkelviolett ist 0, Gelb {end}: RMS jedes Punktes über die Einzelbilder"
     ),
     "Bake Shapes…": "Formen backen…",
-    "Write what Sinew deforms as data that plays without it": (
-        "Was Sinew verformt als Daten schreiben, die ohne Sinew abspielen"
+    "Write what Sinew deforms as data that plays without it. A bake into this file takes Sinew off": (
+        "Was Sinew verformt als Daten schreiben, die ohne Sinew abspielen. In dieser Datei nimmt das Backen "
+        "Sinew herunter"
+    ),
+    "Takes Sinew off: what is baked plays without it": (
+        "Nimmt Sinew herunter: Was gebacken ist, spielt ohne Sinew ab"
     ),
     "To": "Nach",
     "What plays the shapes: a modifier or shape keys of this file, or another program": (

@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The icons of Sinew's modifier and of the Armature modifier: whatever is switched, in any order, one of
+three things deforms in each view, and the panel says which."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import product
+
+import bpy
+import numpy as np
+import pytest
+import routes
+import scenes
+from sinew_addon.attach import attach, properties
+from sinew_addon.core.icons import Deformer
+from sinew_addon.ui import state_text
+
+VIEWS = ("viewport", "render")
+CLICKS = tuple(product(("Sinew", "Armature"), VIEWS))
+SINEW, ARMATURE, NOTHING = Deformer.SINEW, Deformer.ARMATURE, Deformer.NOTHING
+
+
+@dataclass
+class Rule:
+    """What the icons should mean, apart from Sinew's own code: for each view, whether Sinew's was switched
+    off, and whether the Armature modifier's is on."""
+
+    hidden: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, False))
+    aside: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, False))
+
+    def click(self, modifier: str, view: str) -> None:
+        if modifier == "Armature":
+            self.aside[view] = not self.aside[view]
+        elif self.deformer(view) is SINEW:
+            self.hidden[view] = True
+        else:
+            self.hidden[view] = self.aside[view] = False
+
+    def deformer(self, view: str) -> Deformer:
+        return ARMATURE if self.aside[view] else NOTHING if self.hidden[view] else SINEW
+
+    def icons(self) -> dict[str, tuple[bool, bool]]:
+        views = [self.deformer(view) for view in VIEWS]
+        of = {"Sinew": SINEW, "Armature": ARMATURE}
+        return {name: tuple(view is meant for view in views) for name, meant in of.items()}
+
+
+class Character:
+    """An arm by dual quaternions, whose Armature modifier blends linearly, and its three shapes."""
+
+    def __init__(self, prepare: Callable[[bpy.types.Object], None] = lambda obj: None) -> None:
+        obj, _armature = scenes.make_arm()
+        prepare(obj)
+        bpy.context.scene.frame_set(9)
+        self.shapes = {ARMATURE: scenes.final_points(obj)}
+        obj.modifiers["Armature"].show_viewport = False
+        self.shapes[NOTHING] = scenes.final_points(obj)
+        obj.modifiers["Armature"].show_viewport = True
+        scenes.add_sinew(obj, "dq")
+        self.shapes[SINEW] = scenes.final_points(obj)
+
+    @property
+    def obj(self) -> bpy.types.Object:
+        """Found anew, as loading and undo make another."""
+        return bpy.data.objects["Arm"]
+
+    def icons(self) -> dict[str, tuple[bool, bool]]:
+        shown = {m.name: (m.show_viewport, m.show_render) for m in self.obj.modifiers}
+        return {name: shown[name] for name in ("Sinew", "Armature") if name in shown}
+
+    def click(self, modifier: str, view: str) -> None:
+        found = self.obj.modifiers[modifier]
+        setattr(found, f"show_{view}", not getattr(found, f"show_{view}"))
+        bpy.context.view_layer.update()
+
+    def deformer(self, points: np.ndarray) -> Deformer:
+        near = {each: scenes.worst(points, shape) for each, shape in self.shapes.items()}
+        best = min(near, key=near.get)
+        assert near[best] <= scenes.TOLERANCE * scenes.diagonal(self.obj)
+        return best
+
+    def check(self, rule: Rule, rendered_points: Callable | None = None) -> None:
+        assert self.deformer(scenes.final_points(self.obj)) is rule.deformer("viewport")
+        assert self.icons() == rule.icons()
+        assert properties.of(self.obj).error == ""
+        is_plain = all(rule.deformer(view) is SINEW for view in VIEWS)
+        assert (state_text.switch_text([self.obj]) == "On") == is_plain
+        said = state_text.sentence_of(self.obj)
+        words = {ARMATURE: "Its Armature modifier deforms", NOTHING: "Hidden", SINEW: "in the place of"}
+        assert all(words[rule.deformer(view)] in said for view in VIEWS)
+        if rendered_points is not None:
+            assert self.deformer(rendered_points(self.obj)) is rule.deformer("render")
+
+
+def test_every_order_of_three_clicks(rendered_points):
+    character, drawn, seen = Character(), set(), set()
+    for clicks in product(CLICKS, repeat=3):
+        rule = Rule()
+        for number, click in enumerate(clicks):
+            character.click(*click)
+            rule.click(*click)
+            if clicks[: number + 1] not in seen:
+                seen.add(clicks[: number + 1])
+                # Each state after each click is drawn once.
+                state = (*rule.hidden.values(), *rule.aside.values(), click)
+                character.check(rule, None if state in drawn else rendered_points)
+                drawn.add(state)
+        attach.remove(character.obj)
+        assert character.icons() == {"Armature": (True, True)}
+        scenes.add_sinew(character.obj, "dq")
+    assert len(seen) == 4 + 16 + 64
+
+
+def _in_front(obj: bpy.types.Object) -> None:
+    obj.modifiers.new("Front", "SMOOTH").iterations = 4
+    obj.modifiers.move(1, 0)
+
+
+def _with_keys(obj: bpy.types.Object) -> None:
+    obj.modifiers.new("Behind", "SMOOTH").iterations = 2
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Key").data[3].co.z += 0.1
+    obj.data.shape_keys.key_blocks["Key"].value = 0.7
+
+
+def _switch(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: str) -> None:
+    properties.of(character.obj).enabled = False
+    assert character.icons() == {"Sinew": (False, False), "Armature": (True, True)}
+    assert character.deformer(scenes.final_points(character.obj)) is ARMATURE
+    properties.of(character.obj).enabled = True
+
+
+def _reopen(_character: Character, _rule: Rule, _chosen: tuple[str, str], path: str) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+
+
+def _undo(character: Character, rule: Rule, chosen: tuple[str, str], _path: str) -> None:
+    bpy.ops.ed.undo_push()
+    character.click(*chosen)
+    bpy.ops.ed.undo_push()
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    character.check(rule)
+    bpy.ops.ed.redo()
+    bpy.context.view_layer.update()
+    rule.click(*chosen)
+
+
+def _duplicate(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: str) -> None:
+    old = character.obj
+    new = old.copy()
+    new.data = old.data.copy()
+    bpy.context.scene.collection.objects.link(new)
+    bpy.context.view_layer.update()
+    bpy.data.objects.remove(old)
+    new.name = "Arm"
+    bpy.context.view_layer.objects.active = new
+    bpy.context.view_layer.update()
+
+
+def _paint(character: Character, rule: Rule, chosen: tuple[str, str], _path: str) -> None:
+    """In this mode the Armature modifier is on while Sinew deforms, which its own icon does not change."""
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    bpy.context.view_layer.update()
+    assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
+    if chosen != ("Armature", "viewport"):
+        character.click(*chosen)
+        rule.click(*chosen)
+        assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+
+
+def _edit(_character: Character, _rule: Rule, _chosen: tuple[str, str], _path: str) -> None:
+    for mode in ("EDIT", "SCULPT", "OBJECT"):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.view_layer.update()
+
+
+@pytest.fixture
+def by_route(request):
+    routes.force(request.param)
+    yield
+    routes.release()
+
+
+@pytest.mark.parametrize(
+    ("prepare", "by_route"), [(_in_front, "evaluation"), (_with_keys, "update")], indirect=["by_route"]
+)
+@pytest.mark.usefixtures("by_route")
+def test_clicks_among_everything_else(prepare, rendered_points, tmp_path):
+    """A long walk: clicks, Sinew off and on, saving and loading, undo, duplicates, modes."""
+    character, rule, dice = Character(prepare), Rule(), random.Random(7)
+    others = (_switch, _reopen, _undo, _duplicate, _paint, _edit)
+    for step in range(60):
+        chosen = dice.choice(CLICKS)
+        if step % 2:
+            dice.choice(others)(character, rule, chosen, str(tmp_path / "arm.blend"))
+        else:
+            character.click(*chosen)
+            rule.click(*chosen)
+        character.check(rule, rendered_points if step % 5 == 0 else None)
+    attach.remove(character.obj)
+    assert character.icons() == {"Armature": (True, True)}
+
+
+@pytest.mark.parametrize("shown", [(False, False), (True, False), (False, True)])
+def test_add_to_what_is_off(shown, rendered_points, capfd):
+    """Off in both views, Sinew deforms in both and says so; off in one, it deforms in the other."""
+    obj, _armature = scenes.make_arm()
+    bpy.context.scene.frame_set(9)
+    modifier = obj.modifiers["Armature"]
+    modifier.use_deform_preserve_volume = True
+    shapes = {True: scenes.final_points(obj), False: scenes.rest_points(obj)}
+    modifier.show_viewport, modifier.show_render = shown
+    bpy.ops.sinew.add()
+    printed, deforms = capfd.readouterr().out, shown if any(shown) else (True, True)
+    near = scenes.TOLERANCE * scenes.diagonal(obj)
+    assert scenes.worst(scenes.final_points(obj), shapes[deforms[0]]) <= near
+    assert scenes.worst(rendered_points(obj), shapes[deforms[1]]) <= near
+    assert ("was off before Sinew" in printed) == (not any(shown))
+    assert ("Hidden" in state_text.sentence_of(obj)) == any(shown)
+    properties.of(obj).enabled = False
+    assert (modifier.show_viewport, modifier.show_render) == deforms
+    properties.of(obj).enabled = True
+    # Sinew's own icon puts it where the Armature modifier was off.
+    obj.modifiers["Sinew"].show_viewport = obj.modifiers["Sinew"].show_render = True
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), shapes[True]) <= near
+    assert scenes.worst(rendered_points(obj), shapes[True]) <= near
+    bpy.ops.sinew.remove()
+    assert (modifier.show_viewport, modifier.show_render) == shown
+
+
+@pytest.mark.parametrize("kind", ["shape-keys", "mdd"])
+def test_add_to_a_bake(kind, tmp_path, capfd):
+    """What was baked is off while Sinew is on, and plays again without it."""
+    obj, _armature = scenes.make_arm()
+    other = obj.copy()
+    other.data, other.name = obj.data.copy(), "Other"
+    bpy.context.scene.collection.objects.link(other)
+    path = str(tmp_path / "arm.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    linear, both = (scenes.modifier_shapes(obj, [1, 6, 11], volume) for volume in (False, True))
+    scenes.add_sinew(obj, "dq")
+    assert bpy.ops.sinew.bake(kind=kind) == {"FINISHED"}
+    near = scenes.TOLERANCE * scenes.diagonal(obj)
+    for _again in range(2):
+        capfd.readouterr()
+        assert bpy.ops.sinew.add(method="lbs") == {"FINISHED"}
+        printed = capfd.readouterr().out
+        assert "Arm: Its Armature modifier was off before Sinew" in printed
+        assert ("are muted" if kind == "shape-keys" else "plays baked shapes") in printed
+        assert "Other:" not in printed
+        assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), linear) <= near
+        assert scenes.worst(scenes.shapes(other, [1, 6, 11]), linear) <= near
+        bpy.ops.sinew.use_method(method="dq")
+        assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), both) <= near
+        bpy.ops.wm.save_mainfile()
+        bpy.ops.wm.open_mainfile(filepath=path)
+        obj, other = bpy.data.objects["Arm"], bpy.data.objects["Other"]
+        assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), both) <= near
+        bpy.ops.sinew.remove()
+        assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), both) <= near
+        assert scenes.worst(scenes.shapes(other, [1, 6, 11]), linear) <= near
+        assert [(m.show_viewport, m.show_render) for m in obj.modifiers if m.type == "ARMATURE"] == [
+            (False, False)
+        ]
+        assert obj.data.shape_keys is None or not obj.data.shape_keys.keys()
+    # A bake of it replaces the one before.
+    bpy.ops.sinew.add(method="lbs")
+    assert bpy.ops.sinew.bake(kind=kind, overwrite=True) == {"FINISHED"}
+    assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), linear) <= near
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_keys_on_sinews_icon(view, rendered_points):
+    character = Character()
+    obj = character.obj
+    sinews, frames = obj.modifiers["Sinew"], (9, 10, 11)
+    shapes = {frame: (scenes.shapes(obj, [frame])[0], scenes.rest_points(obj)) for frame in frames}
+    for frame, is_on in ((1, True), (10, False), (11, True)):
+        setattr(sinews, f"show_{view}", is_on)
+        sinews.keyframe_insert(f"show_{view}", frame=frame)
+    bpy.context.view_layer.update()
+    for frame in (9, 10, 11, 10, 9):
+        bpy.context.scene.frame_set(frame)
+        for each, points in (("viewport", scenes.final_points(obj)), ("render", rendered_points(obj))):
+            expected = shapes[frame][each == view and frame == 10]
+            assert scenes.worst(points, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+        assert not obj.modifiers["Armature"].show_viewport
+    attach.remove(obj)
+    assert character.icons() == {"Armature": (True, True)}
