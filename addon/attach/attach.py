@@ -162,26 +162,23 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
 
 
 def _begin_with_icons(obj: bpy.types.Object) -> None:
-    """Has Sinew deform where the Armature modifiers do; and in both views where they are off in both: what
-    replaces them, such as a bake, is switched off then."""
-    settings, pairs = properties.of(obj), replaced_modifiers(obj)
-    shown = {name: any(getattr(replaced, f"show_{name}") for _m, replaced in pairs) for name in VIEWS}
-    if any(shown.values()):
-        settings.hidden_viewport, settings.hidden_render = (not shown[name] for name in VIEWS)
+    """Has Sinew deform in both views where the Armature modifiers are off in both: what replaces them, such
+    as a bake, is switched off then."""
+    views = {name: _view(obj, name) for name in VIEWS}
+    if any(any(view.shown) for view in views.values()):
         return
-    for modifier, replaced in pairs:
-        replaced.was_off = replaced.show_viewport = replaced.show_render = True
-        _show(modifier, True, True)
+    for name, view in views.items():
+        _store(obj, name, view.switched_on())
+    _set_icons(obj, Situation.OFF)
     baked.switch_off(obj)
 
 
 def notes(obj: bpy.types.Object) -> list[str]:
     """Returns sentences on what Add found switched off, and on what it switched off itself."""
-    found = baked.notes(obj)
-    if any(replaced.was_off for replaced in properties.of(obj).replaced_modifiers):
-        text = "Its Armature modifier was off before Sinew; Remove switches it off again"
-        found.insert(0, phrase(text))
-    return found
+    if not was_off(obj):
+        return []
+    text = "Its Armature modifier was off before Sinew; Remove switches it off again"
+    return [phrase(text), *baked.notes(obj)]
 
 
 def method_of(modifier: bpy.types.ArmatureModifier) -> str:
@@ -308,16 +305,15 @@ def _follow_ended_keys(obj: bpy.types.Object) -> None:
         properties.store(replaced, "visibility_is_keyed", False)
         for name in VIEWS:
             properties.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
-    for name in VIEWS:
-        shown = _view(obj, name).shown
-        _store(obj, name, icons.View(shown, hidden=not any(shown)))
+        for name in VIEWS:
+            properties.store(replaced, f"was_off_{name}", False)
     _set_icons(obj, Situation(properties.of(obj).situation))
 
 
 def show(obj: bpy.types.Object) -> None:
     """Has Sinew deform it in both views, whatever was switched before."""
     for name in VIEWS:
-        _store(obj, name, icons.View(_view(obj, name).shown))
+        _store(obj, name, _view(obj, name).switched_on())
     _set_icons(obj, Situation(properties.of(obj).situation))
 
 
@@ -332,28 +328,35 @@ def deforms(obj: bpy.types.Object) -> bool:
 
 
 def do_views_differ(obj: bpy.types.Object) -> bool:
-    """Whether other Armature modifiers take part in the viewport than in renders."""
-    taking_part = {icons.taking_part(_view(obj, name).shown) for name in VIEWS}
-    return len(taking_part) > 1
+    """Whether Sinew deforms by other Armature modifiers in the viewport than in renders."""
+    viewport, render = (_view(obj, name).shown for name in VIEWS)
+    return any(viewport) and any(render) and viewport != render
 
 
 def _view(obj: bpy.types.Object, name: str) -> icons.View:
     settings = properties.of(obj)
-    pairs = [replaced for _modifier, replaced in replaced_modifiers(obj)]
-    shown, own = (tuple(getattr(each, f"{kind}_{name}") for each in pairs) for kind in ("show", "on"))
-    return icons.View(shown, getattr(settings, f"hidden_{name}"), own)
+    pairs = replaced_modifiers(obj)
+    shown, forced, own = (
+        tuple(getattr(replaced, f"{kind}_{name}") for _modifier, replaced in pairs)
+        for kind in ("show", "was_off", "on")
+    )
+    # One that an animation switches may be on in any frame.
+    shown = tuple(is_shown or _is_keyed(obj, *pair) for is_shown, pair in zip(shown, pairs, strict=True))
+    return icons.View(shown, forced, getattr(settings, f"hidden_{name}"), own)
 
 
 def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
-    pairs = replaced_modifiers(obj)
     properties.store(properties.of(obj), f"hidden_{name}", view.hidden)
-    own = view.own or (False,) * len(pairs)
-    for (_modifier, replaced), shown, is_on in zip(pairs, view.shown, own, strict=True):
-        if getattr(replaced, f"show_{name}") != shown:
-            # The artist's own choice from now on.
-            properties.store(replaced, "was_off", False)
-        properties.store(replaced, f"show_{name}", shown)
-        properties.store(replaced, f"on_{name}", is_on)
+    pairs = replaced_modifiers(obj)
+    none = (False,) * len(pairs)
+    for pair, shown, forced, own in zip(
+        pairs, view.shown, view.forced or none, view.own or none, strict=True
+    ):
+        _modifier, replaced = pair
+        if not _is_keyed(obj, *pair):
+            properties.store(replaced, f"show_{name}", shown)
+        properties.store(replaced, f"was_off_{name}", forced)
+        properties.store(replaced, f"on_{name}", own)
 
 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
@@ -462,7 +465,16 @@ def _is_keyed(
 
 def own_visibility(replaced: properties.SinewReplacedModifier) -> tuple[bool, bool]:
     """Returns an Armature modifier's icons without Sinew: in the viewport, and in renders."""
-    return replaced.show_viewport and not replaced.was_off, replaced.show_render and not replaced.was_off
+    viewport, render = (
+        getattr(replaced, f"show_{name}") and not getattr(replaced, f"was_off_{name}") for name in VIEWS
+    )
+    return viewport, render
+
+
+def was_off(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifiers were off in both views before Sinew."""
+    kept = properties.of(obj).replaced_modifiers
+    return any(replaced.was_off_viewport and replaced.was_off_render for replaced in kept)
 
 
 def _restore_unkeyed_visibility(

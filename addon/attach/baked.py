@@ -58,8 +58,7 @@ def notes(obj: bpy.types.Object) -> list[str]:
     if names:
         text = "{names} plays baked shapes, and is off; Remove switches it on again"
         found.append(phrase(text, names=", ".join(names)))
-    is_replaced = any(replaced.was_off for replaced in properties.of(obj).replaced_modifiers)
-    if is_replaced and keys is not None and _animated_keys(keys):
+    if keys is not None and _animated_keys(keys):
         found.append(phrase("Its shape keys are animated and deform it, too: mute those that are a bake"))
     return found
 

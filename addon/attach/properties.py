@@ -124,11 +124,9 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
     # The Armature modifier's own icons, restored on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
-    was_off: bpy.props.BoolProperty(
-        description="It was off in both views before Sinew, and removal switches it off again",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
-    )
+    # Its icons were off before Sinew, which deforms by it nevertheless; removal switches them off again.
+    was_off_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    was_off_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     # The artist switched its icon on while Sinew is on, so that it deforms in Sinew's place.
     on_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     on_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)

@@ -7,7 +7,7 @@ an Armature modifier whose icon was switched on; or nothing, where Sinew's icon 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -47,12 +47,14 @@ class Icons:
 class View:
     """What is known of one view.
 
-    shown   for each Armature modifier, whether it is on without Sinew
+    shown   for each Armature modifier, whether it deforms by Sinew, or without it
+    forced  for each Armature modifier, whether it is shown because of Sinew alone
     hidden  Sinew's icon was switched off
     own     for each Armature modifier, whether it was switched on while Sinew is on
     """
 
     shown: tuple[bool, ...]
+    forced: tuple[bool, ...] = ()
     hidden: bool = False
     own: tuple[bool, ...] = ()
 
@@ -60,13 +62,23 @@ class View:
     def deformer(self) -> Deformer:
         if any(self.own):
             return Deformer.ARMATURE
-        return Deformer.NOTHING if self.hidden else Deformer.SINEW
+        return Deformer.NOTHING if self.hidden or not any(self.shown) else Deformer.SINEW
+
+    def switched_on(self, wanted: tuple[bool, ...] = ()) -> View:
+        """Returns the view with Sinew in it.
+
+        wanted  which Armature modifiers deform, where none did; empty for all
+        """
+        if any(self.shown):
+            return View(self.shown, self.forced)
+        shown = wanted or (True,) * len(self.shown)
+        return View(shown, shown)
 
 
-def taking_part(shown: Sequence[bool]) -> tuple[bool, ...]:
-    """Returns which Armature modifiers deform in a view by Sinew. Where all of them were off before Sinew,
-    the artist has switched Sinew's icon on, so all do."""
-    return tuple(shown) if any(shown) else (True,) * len(shown)
+def taking_part(shown: Sequence[bool], in_other_view: Sequence[bool]) -> Sequence[bool]:
+    """Returns which Armature modifiers Sinew deforms by in a view. Where none does, its shape is not shown,
+    and is that of the other view, as one evaluation may be for both."""
+    return shown if any(shown) else in_other_view
 
 
 def icons(view: View, situation: Situation, name: str) -> Icons:
@@ -83,7 +95,7 @@ def icons(view: View, situation: Situation, name: str) -> Icons:
         return Icons(False, none)
     is_kept_on = situation is Situation.PAINT and name == VIEWPORT
     is_on = situation is Situation.BUILT_IN or is_kept_on
-    return Icons(situation.is_by_sinew, taking_part(view.shown) if is_on else none)
+    return Icons(situation.is_by_sinew, view.shown if is_on else none)
 
 
 def follow(view: View, situation: Situation, name: str, now: Icons) -> View:
@@ -94,26 +106,35 @@ def follow(view: View, situation: Situation, name: str, now: Icons) -> View:
     before = icons(view, situation, name)
     if now == before:
         return view
-    nothing_own = replace(view, own=())
     if situation is Situation.OFF:
-        # These are the artist's own choice for the Armature modifiers, which Remove leaves as it is.
-        is_same = any(now.modifiers) == any(before.modifiers)
-        hidden = not now.sinew and (view.hidden if is_same else not any(now.modifiers))
-        own = view.own if now.modifiers == before.modifiers else ()
-        return View(now.modifiers, hidden, own)
+        return _followed_off(view, now)
     if now.sinew and not before.sinew:
-        return replace(nothing_own, hidden=False)
+        return view.switched_on()
     if situation is Situation.BUILT_IN:
         if any(now.modifiers) and view.deformer is Deformer.NOTHING:
-            return replace(nothing_own, hidden=False)
+            return view.switched_on(now.modifiers)
         if not any(now.modifiers) and view.deformer is Deformer.SINEW:
-            return replace(nothing_own, hidden=True)
+            return replace(view, hidden=True)
         return replace(view, own=now.modifiers)
-    hidden = view.hidden or (before.sinew and not now.sinew)
     own = now.modifiers
     if view.deformer is Deformer.SINEW:
         # Those that are kept on say nothing.
-        own = tuple(
-            is_on and not was_on for is_on, was_on in zip(now.modifiers, before.modifiers, strict=True)
-        )
-    return View(view.shown, hidden, own)
+        own = _each(lambda is_on, was_on: is_on and not was_on, own, before.modifiers)
+    hidden = view.hidden or (before.sinew and not now.sinew)
+    return replace(view, own=own if any(own) else (), hidden=hidden)
+
+
+def _followed_off(view: View, now: Icons) -> View:
+    """The Armature modifiers' icons are the artist's own choice then, which Remove leaves as it is."""
+    is_same = _each(lambda is_on, was_on: is_on == was_on, now.modifiers, view.shown)
+    forced = _each(lambda was_forced, same: was_forced and same, view.forced or is_same, is_same)
+    return View(
+        now.modifiers,
+        forced if view.forced else (),
+        view.hidden and not now.sinew,
+        view.own if all(is_same) else (),
+    )
+
+
+def _each(function: Callable[[bool, bool], bool], *flags: tuple[bool, ...]) -> tuple[bool, ...]:
+    return tuple(map(function, *flags))

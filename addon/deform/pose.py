@@ -142,9 +142,12 @@ def _taking_part(
     evaluated: bpy.types.Object, modifiers: Modifiers, are_keyed: list[bool], mode: str
 ) -> Sequence[bool]:
     """Returns which of the modifiers deform in a view; where an animation sets their icons, it decides."""
-    name = f"show_{mode.lower()}"
-    shown = [
-        getattr(evaluated.modifiers[replaced.name] if is_keyed else replaced, name)
-        for (replaced, _armature), is_keyed in zip(modifiers, are_keyed, strict=False)
-    ]
-    return shown if any(are_keyed) else icons.taking_part(shown)
+    viewport, render = (
+        [
+            getattr(evaluated.modifiers[replaced.name] if is_keyed else replaced, f"show_{name}")
+            for (replaced, _armature), is_keyed in zip(modifiers, are_keyed, strict=False)
+        ]
+        for name in icons.VIEWS
+    )
+    shown, other = (render, viewport) if mode == "RENDER" else (viewport, render)
+    return shown if any(are_keyed) else icons.taking_part(shown, other)

@@ -127,7 +127,7 @@ def test_settings_are_copied_whole():
     properties.copy(settings, properties.of(other))
     copied = properties.of(other)
     assert [s.name for s in copied.replaced_modifiers] == [s.name for s in settings.replaced_modifiers]
-    for name in ("method", "leave_small", "scale_rule", "enabled", "standing_in"):
+    for name in ("method", "leave_small", "scale_rule", "enabled", "situation", "hidden_render"):
         assert getattr(copied, name) == getattr(settings, name)
 
 

@@ -343,6 +343,10 @@ def add(w: Walker, r: random.Random) -> str | None:
         return None
     method, leave = r.choice((None, _method(r))), r.random() < 0.15
     w.object_mode()
+    if not any(m.show_viewport or m.show_render for m in armature_modifiers(obj)):
+        # Sinew would deform it nevertheless, until it is removed.
+        for modifier in armature_modifiers(obj):
+            modifier.show_viewport = modifier.show_render = True
     flags = {w.side.preserve_volume(m) for m in armature_modifiers(obj)}
     if len(flags) > 1 and method is None:
         method = "lbs"

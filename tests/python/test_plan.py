@@ -166,15 +166,30 @@ def test_clicks_while_the_armature_modifier_is_on_for_sinew(situation, clicks, d
 
 def test_several_armature_modifiers():
     """Each icon is for its own modifier; by Sinew, those deform that were on."""
-    view, both = View((True, False)), View((False, False), hidden=True)
+    view = View((True, False))
     assert icons(view, Situation.BUILT_IN, "render").modifiers == (True, False)
-    assert icons(replace(both, hidden=False), Situation.BUILT_IN, "render").modifiers == (True, True)
-    assert icons(both, Situation.BUILT_IN, "render").modifiers == (False, False)
     aside = follow(view, Situation.SINEW, "render", Icons(True, (False, True)))
     assert icons(aside, Situation.SINEW, "render") == Icons(False, (False, True))
     more = follow(aside, Situation.SINEW, "render", Icons(False, (True, True)))
     assert icons(more, Situation.SINEW, "render") == Icons(False, (True, True))
     assert follow(more, Situation.SINEW, "render", Icons(False, (False, False))).deformer is Deformer.SINEW
+
+
+def test_modifiers_that_were_off():
+    """Where none was on, Sinew's icon has it deform by all of them, which Remove takes back."""
+    off = View((False, False))
+    assert off.deformer is Deformer.NOTHING
+    assert icons(off, Situation.SINEW, "render") == Icons(False, (False, False))
+    on = follow(off, Situation.SINEW, "render", Icons(True, (False, False)))
+    assert on == View((True, True), forced=(True, True))
+    hidden = follow(on, Situation.SINEW, "render", Icons(False, (False, False)))
+    assert hidden == replace(on, hidden=True)
+    # What the artist switches while Sinew is off is not taken back.
+    kept = follow(on, Situation.OFF, "render", Icons(False, (True, False)))
+    assert kept == View((True, False), forced=(True, False))
+    none = follow(on, Situation.OFF, "render", Icons(False, (False, False)))
+    again = follow(none, Situation.OFF, "render", Icons(False, (True, False)))
+    assert again == View((True, False), forced=(False, False))
 
 
 @pytest.mark.parametrize("viewport", Deformer)
