@@ -225,9 +225,7 @@ def refresh(context: bpy.types.Context) -> None:
         current.objects = None
         for state in current.skinned.values():
             state.needs_apply = True
-        with updates_suspended():
-            # Its event is noted, and handled below.
-            depsgraph = context.evaluated_depsgraph_get()
+        depsgraph = context.evaluated_depsgraph_get()
         update_all(depsgraph, Changes())
         unsubscribe_from_frames()
         # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
