@@ -294,8 +294,12 @@ class VertexData:
 def _fits(method: sinew.Method, found: np.ndarray, points: np.ndarray, influences: Influences) -> bool:
     """Whether stored data can be that of the mesh: centres and first moments are means of the rest points."""
     rows = len(found) if method.keeps_moments else len(points)
-    if found.shape != (rows, method.vertex_floats) or found.dtype != np.float32 or not len(found):
-        return found.shape == (0, method.vertex_floats) and len(points) == 0
+    if found.shape != (rows, method.vertex_floats) or found.dtype != np.float32:
+        return False
+    owners = np.repeat(np.arange(len(points)), np.diff(influences.offsets))
+    weighted = np.unique(owners[influences.weights > 0])
+    if not len(found):
+        return not len(points) or not len(weighted)
     lowest, highest = points.min(axis=0), points.max(axis=0)
     diagonal = float(np.linalg.norm(highest - lowest))
     margin = 1e-3 * diagonal + 1e-6 * float(np.abs(points).max())
@@ -309,7 +313,7 @@ def _fits(method: sinew.Method, found: np.ndarray, points: np.ndarray, influence
             and (np.diff(vertices) >= 0).all()
             and 0 <= vertices[0] <= vertices[-1] < len(points)
             and ((weights > 0) & (weights <= 1.001)).all()
-            and np.isin(np.flatnonzero(np.diff(influences.offsets)), vertices).all()
+            and np.isin(weighted, vertices).all()
         )
         if not is_sound:
             return False

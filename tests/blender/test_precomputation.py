@@ -501,6 +501,19 @@ def test_damaged_data_is_computed_anew(method, store, harm, tmp_path, caplog):
     assert obj.sinew.enabled
 
 
+def test_data_of_a_mesh_without_weights_is_not_damaged(caplog):
+    obj, _armature = scenes.make_arm(bones=3)
+    for group in obj.vertex_groups:
+        group.remove(range(len(obj.data.vertices)))
+    scenes.add_sinew(obj, "ddm")
+    bpy.context.scene.frame_set(FRAME)
+    session.forget()
+    session.refresh(bpy.context)
+    bpy.context.scene.frame_set(FRAME + 1)
+    assert "ddm" in session.state_of(obj).bound.binding.vertex_data.made
+    assert "damaged" not in caplog.text
+
+
 def test_reskin_puts_it_into_the_file(gate, tmp_path):
     scenes.make_arm(bones=3)
     path = tmp_path / "plain.blend"
