@@ -24,7 +24,7 @@ from PIL import Image, ImageDraw, ImageFont
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.metrics import Measured
 from sinew_addon.core.views import View, close_view, seen_extent, whole_view
-from sinew_addon.deform import evaluate
+from sinew_addon.deform import characters
 from sinew_addon.features.pages import measure, render
 from sinew_addon.io import files
 
@@ -124,7 +124,7 @@ def path_of(name: str) -> Path | None:
 
 
 def choose(meshes: Sequence[bpy.types.Object], variant: Variant) -> None:
-    evaluate.use_method_on(meshes, variant.method)
+    characters.use_method_on(meshes, variant.method)
     for obj in meshes:
         settings = properties.of(obj)
         settings.mix.method = properties.OFF
@@ -152,8 +152,8 @@ def draw(case: Case, path: Path, out: Path) -> dict[str, Measured]:
     """Writes the picture; the measures of each variant by its title, distances to the Armature modifier."""
     files.open_file(path)
     scene = bpy.context.scene
-    evaluate.set_frame(scene, case.frame)
-    meshes, _left_out = evaluate.deformable_meshes(scene, path, ["dq"])
+    characters.set_frame(scene, case.frame)
+    meshes, _left_out = characters.deformable_meshes(scene, path, ["dq"])
     for obj in meshes:
         obj.vertex_groups.new(name=GROUP).add(range(len(obj.data.vertices)), 0.5, "REPLACE")
     subject = measure.gather(scene, meshes)
@@ -170,7 +170,7 @@ def draw(case: Case, path: Path, out: Path) -> dict[str, Measured]:
         pictures = []
         for number, variant in enumerate(chosen):
             choose(meshes, variant)
-            evaluate.set_frame(scene, case.frame)
+            characters.set_frame(scene, case.frame)
             pictures.append(Path(folder) / f"{number}.png")
             studio.picture(view, pictures[-1])
         write_grid(case, [variant.title for variant in chosen], pictures, out / f"pictures-{case.name}.webp")

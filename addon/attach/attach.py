@@ -413,7 +413,7 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
         properties.store(replaced, "preserve_volume", own)
         properties.store(replaced, "was_nearest", own == wanted)
         _preserve_volume(modifier, wanted)
-    properties.store(settings, "is_saved", True)
+    properties.store(settings, "has_nearest_volume", True)
 
 
 def restore_volume(obj: bpy.types.Object) -> None:
@@ -426,7 +426,7 @@ def restore_volume(obj: bpy.types.Object) -> None:
         # What the artist has switched since stays, too.
         if modifier is not None and not replaced.was_nearest:
             _preserve_volume(modifier, replaced.preserve_volume)
-    properties.store(settings, "is_saved", False)
+    properties.store(settings, "has_nearest_volume", False)
 
 
 def has_switched_volume(obj: bpy.types.Object) -> bool:

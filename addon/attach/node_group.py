@@ -28,15 +28,15 @@ POSE = "Pose"
 # A custom property on the group: what it was made of, by which a group that was taken apart is recognised.
 _MADE_OF = "sinew_made_of"
 # What a group says to those who open the file without Sinew.
-MISSING = (
-    "The extension Sinew deforms this mesh, and is not there. Install it, or leave this modifier off: the "
-    "Armature modifier shows the nearest shape that Blender has."
+NEEDS_SINEW = (
+    "This modifier needs the extension Sinew. Without it, leave the modifier off: the Armature modifier then "
+    "deforms the mesh, as closely as Blender can."
 )
 # The nodes of add_warnings().
 _WARNING, _WARNING_USER = "Sinew Is Missing", "User of Sinew Is Missing"
 
 # Inputs that name a helper object, or an attribute where there is no helper.
-_HELPER_INPUTS = ("Points", "Front")
+_HELPER_INPUTS = ("Points", "Upstream")
 
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
 IN_RENDERS_SOCKET = (
@@ -178,7 +178,7 @@ def add_warnings() -> None:
             continue
         warning, user = add_nodes(group, "GeometryNodeWarning", "GeometryNodeSwitch")
         warning.name, user.name, user.input_type = _WARNING, _WARNING_USER, "GEOMETRY"
-        warning.inputs["Message"].default_value = MISSING
+        warning.inputs["Message"].default_value = NEEDS_SINEW
         warning.inputs["Show"].default_value = True
         geometry, output = last.from_socket, last.to_socket
         # Blender does not evaluate a warning whose output is not used.
@@ -227,7 +227,7 @@ def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.t
         made.hide_in_modifier = True
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     frame = group.nodes.new("NodeFrame")
-    frame.label, frame.label_size, frame.location = MISSING, 20, (0, 300)
+    frame.label, frame.label_size, frame.location = NEEDS_SINEW, 20, (0, 300)
     return group
 
 
@@ -353,13 +353,13 @@ def _name(name: str, normals: str) -> str:
 
 def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
     group = new_group(
-        _name("Sinew Carrier", normals),
+        _name("Sinew Point Buffer", normals),
         POINT_BUFFER + _WITH_NORMALS[normals],
         {
             "Points": ("NodeSocketObject", "Object whose vertices are the deformed positions"),
-            "Front": (
+            "Upstream": (
                 "NodeSocketObject",
-                "Object that has the modifiers in front, to be evaluated with this one",
+                "Object that has the upstream modifiers, to be evaluated with this one",
             ),
             **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
             POSE: POSE_SOCKET,
@@ -390,7 +390,7 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
     # This switch is never on: a node that names the object makes Blender evaluate it.
     upstream_proxy, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
     choice.input_type = "GEOMETRY"
-    link(source.outputs["Front"], upstream_proxy.inputs["Object"])
+    link(source.outputs["Upstream"], upstream_proxy.inputs["Object"])
     link(moved, choice.inputs["False"])
     link(upstream_proxy.outputs["Geometry"], choice.inputs["True"])
     link(choice.outputs["Output"], result.inputs["Geometry"])

@@ -15,8 +15,8 @@ This file uses Sinew, an extension for Blender that deforms these meshes:
 
 {names}
 
-Where Sinew is installed it goes on by itself when the file is opened. Where it is not, the Armature
-modifiers deform them, by the nearest shape that Blender has. Leave the modifiers called "Sinew" off then.
+With Sinew installed, the meshes deform as soon as the file is opened. Without it, the Armature modifiers
+deform them, as closely as Blender can. Leave the modifiers called "Sinew" off then.
 """
 
 

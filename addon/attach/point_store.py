@@ -34,7 +34,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
         if settings.attribute:
             remove_attributes(obj)
             _forget_names(settings)
-        kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Front": made}
+        kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Upstream": made}
     else:
         upstream_proxy.remove(obj)
         point_buffer.remove(obj)

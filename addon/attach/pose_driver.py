@@ -23,7 +23,7 @@ from . import node_group, properties, references, stack
 
 PATH = "sinew.pose"
 # The properties that the last two variables read.
-OBJECT_REQUEST_PATH, MESH_REQUEST_PATH = "sinew.asked", "sinew_asked"
+OBJECT_REQUEST_PATH, MESH_REQUEST_PATH = "sinew.request", "sinew_request"
 WORLD_MATRIX = "matrix_world[0][0]"
 # Blender reads an object's dimensions only after its modifiers are evaluated (seen on 4.2 to 5.2).
 EVALUATED_SIZE = "dimensions[0]"

@@ -141,7 +141,7 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         override=OVERRIDABLE,
     )
     was_nearest: bpy.props.BoolProperty(
-        description="That was the nearest already, so nothing is to be given back",
+        description="The artist's choice was the nearest one, so that it is not restored",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
@@ -174,7 +174,7 @@ METHOD_GROUPS = stage_settings.method_groups(_method_changed)
 
 
 class SinewSettings(bpy.types.PropertyGroup):
-    """How Sinew deforms this object, in place of the Armature modifiers in `stand_ins`. If that is empty, the
+    """How Sinew deforms this object, in place of the `replaced_modifiers`. Where there are none, the
     object has no Sinew."""
 
     method: bpy.props.EnumProperty(
@@ -242,7 +242,7 @@ class SinewSettings(bpy.types.PropertyGroup):
         update=_method_changed,
         override=OVERRIDABLE,
     )
-    stand_ins: bpy.props.CollectionProperty(
+    replaced_modifiers: bpy.props.CollectionProperty(
         type=SinewReplacedModifier, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
     situation: bpy.props.StringProperty(
@@ -253,9 +253,9 @@ class SinewSettings(bpy.types.PropertyGroup):
     # The artist switched the icon of Sinew's modifier off.
     hidden_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     hidden_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    is_saved: bpy.props.BoolProperty(
-        description="The Armature modifiers deform by their nearest shape: in saved files, and in modes of "
-        "tools that need them",
+    has_nearest_volume: bpy.props.BoolProperty(
+        description="The Armature modifiers have the Preserve Volume nearest to Sinew's method, not the "
+        "artist's own: in saved files, and in modes of tools that need them",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
@@ -280,9 +280,22 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
-    carrier: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
-    front: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
-    front_signature: bpy.props.StringProperty(options={"HIDDEN"})
+    point_buffer: bpy.props.PointerProperty(
+        description="The object whose vertices are the deformed points (point_buffer.py)",
+        type=bpy.types.Object,
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    upstream_proxy: bpy.props.PointerProperty(
+        description="The copy that has only the upstream modifiers (upstream_proxy.py)",
+        type=bpy.types.Object,
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    upstream_signature: bpy.props.StringProperty(
+        description="What the proxy was made from, as upstream_proxy.signature() returns it",
+        options={"HIDDEN"},
+    )
     helper: bpy.props.BoolProperty(
         description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
     )
@@ -303,10 +316,10 @@ class SinewSettings(bpy.types.PropertyGroup):
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )
-    asked: bpy.props.FloatProperty(
+    request: bpy.props.FloatProperty(
         get=_object_requested,
         options={"HIDDEN"},
-        description="Read by pose_driver's driver, to ask for points",
+        description="Read by pose_driver's driver, to request points",
     )
     error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     modifier_name: bpy.props.StringProperty(
@@ -314,50 +327,10 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
-    # Files have the names above since the first version; code uses these.
-
-    @property
-    def replaced_modifiers(self) -> bpy.types.bpy_prop_collection:
-        """What Sinew stores about each Armature modifier that it replaces."""
-        return self.stand_ins
-
     @property
     def replaces_modifiers(self) -> bool:
         """Whether Sinew deforms now, wherever the icons of its modifier say so."""
         return Situation(self.situation).is_by_sinew
-
-    @property
-    def has_nearest_volume(self) -> bool:
-        """Whether the Armature modifiers have the Preserve Volume nearest to Sinew's method, not the artist's
-        own."""
-        return self.is_saved
-
-    @property
-    def point_buffer(self) -> bpy.types.Object | None:
-        """The object whose vertices are the deformed points (point_buffer.py)."""
-        return self.carrier
-
-    @point_buffer.setter
-    def point_buffer(self, made: bpy.types.Object | None) -> None:
-        self.carrier = made
-
-    @property
-    def upstream_proxy(self) -> bpy.types.Object | None:
-        """The copy that has only the upstream modifiers (upstream_proxy.py)."""
-        return self.front
-
-    @upstream_proxy.setter
-    def upstream_proxy(self, made: bpy.types.Object | None) -> None:
-        self.front = made
-
-    @property
-    def upstream_signature(self) -> str:
-        """What the proxy was made from, as upstream_proxy.signature() returns it."""
-        return self.front_signature
-
-    @upstream_signature.setter
-    def upstream_signature(self, signature: str) -> None:
-        self.front_signature = signature
 
     @property
     def mixed_method(self) -> str:
@@ -463,14 +436,14 @@ CLASSES = (
 
 # A property of meshes, so that its getter receives the evaluated mesh and nothing is stored.
 MESH_REQUEST = bpy.props.FloatProperty(
-    get=_mesh_requested, options={"HIDDEN"}, description="Read by pose_driver's driver, to ask for points"
+    get=_mesh_requested, options={"HIDDEN"}, description="Read by pose_driver's driver, to request points"
 )
 
 
 def register() -> None:
     bpy.types.Object.sinew = bpy.props.PointerProperty(type=SinewSettings, override=OVERRIDABLE)
-    bpy.types.Mesh.sinew_asked = MESH_REQUEST
+    bpy.types.Mesh.sinew_request = MESH_REQUEST
 
 
 def unregister() -> None:
-    del bpy.types.Object.sinew, bpy.types.Mesh.sinew_asked
+    del bpy.types.Object.sinew, bpy.types.Mesh.sinew_request

@@ -139,7 +139,7 @@ def _bake(
     import bpy
 
     from ..attach import attach
-    from ..deform import evaluate
+    from ..deform import characters
     from ..features.bake import bake, bake_apart, bake_bones
     from ..io import files
 
@@ -155,11 +155,11 @@ def _bake(
     outcome.left_out += [
         f"{obj.name} is not in the scene {scene.name}" for obj in other_scenes if obj not in meshes
     ]
-    evaluate.set_parameters(args.set)
+    characters.set_parameters(args.set)
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     # Hidden objects are baked as well, and hidden again in the copy.
-    with evaluate.shown(meshes):
-        errors = evaluate.use_methods([(obj, args.method) for obj in meshes])
+    with characters.shown(meshes):
+        errors = characters.use_methods([(obj, args.method) for obj in meshes])
         outcome.left_out += [str(error) for error in errors if error is not None]
         taken = [obj for obj, error in zip(meshes, errors, strict=True) if error is None]
         if not taken:
@@ -189,7 +189,7 @@ def _bake(
             files.save_copy(source, target, started.publish)
     outcome.meshes, outcome.frames = len(taken), len(chosen)
     if isinstance(started, bake_bones.BoneBake):
-        outcome.bones, outcome.unit = started.reports, evaluate.length_unit(scene)
+        outcome.bones, outcome.unit = started.reports, characters.length_unit(scene)
 
 
 @contextmanager

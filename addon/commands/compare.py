@@ -81,12 +81,12 @@ def _folder_or_sheet(given: str) -> Path:
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..deform import evaluate
+    from ..deform import characters
     from ..features.pages import render, video
 
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
-    evaluate.check_methods([*methods, args.reference])
-    evaluate.set_parameters(args.set)
+    characters.check_methods([*methods, args.reference])
+    characters.set_parameters(args.set)
     if args.size is not None:
         render.check_size(args.size)
     if args.out.suffix.lower() in sheet.PICTURES:
@@ -130,16 +130,16 @@ def _compare(
     """Writes one file's page; returns False where a mesh was left out."""
     import bpy
 
-    from ..deform import evaluate
+    from ..deform import characters
     from ..features.pages import illustrate, measure, render
     from ..io import files
 
     console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
     frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
-    evaluate.set_frame(scene, frames[0])
+    characters.set_frame(scene, frames[0])
     played = [*methods, args.reference]
-    meshes, left_out = evaluate.deformable_meshes(scene, path, played, args.object)
+    meshes, left_out = characters.deformable_meshes(scene, path, played, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     subject = measure.gather(scene, meshes)
@@ -187,7 +187,7 @@ def _measure(
     console: Console,
 ) -> Comparison:
     from ..attach import properties
-    from ..deform import evaluate
+    from ..deform import characters
     from ..features.pages import measure
 
     batches = measure.batches(subject, frames, len(methods) + 1)
@@ -209,7 +209,7 @@ def _measure(
         [obj.name for obj in subject.meshes],
         {method: properties.method_label(method) for method in methods},
         args.reference,
-        evaluate.length_unit(subject.scene),
+        characters.length_unit(subject.scene),
         rest,
         frames,
         summaries,

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     import sinew
 
     from ..attach import attach, properties
-    from ..deform import evaluate
+    from ..deform import characters
     from ..features.gltf import export
     from ..io import files
 
@@ -57,10 +57,10 @@ def run(args: argparse.Namespace, console: Console) -> int:
     meshes = attach.deformed_meshes(list(scene.objects))
     left_out: list[str] = []
     # Blender does not evaluate hidden objects.
-    with evaluate.shown(meshes):
+    with characters.shown(meshes):
         if args.method is not None:
-            evaluate.set_parameters(args.set)
-            errors = evaluate.use_methods([(obj, args.method) for obj in meshes])
+            characters.set_parameters(args.set)
+            errors = characters.use_methods([(obj, args.method) for obj in meshes])
             left_out += [str(error) for error in errors if error is not None]
         if not any(properties.has_sinew(obj) and properties.of(obj).enabled for obj in meshes):
             reason = left_out[0] if left_out else "no mesh has Sinew; choose a method by --method"

@@ -44,15 +44,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
     import bpy
 
     from ..attach import properties
-    from ..deform import evaluate
+    from ..deform import characters
     from ..io import files
 
     frames = parse_frames(args.frames)
-    evaluate.check_methods([args.method])
-    evaluate.set_parameters(args.set)
+    characters.check_methods([args.method])
+    characters.set_parameters(args.set)
     console.note_on(args.file, files.open_file(args.file))
     try:
-        meshes = evaluate.deformed_meshes(bpy.context.scene, args.object)
+        meshes = characters.deformed_meshes(bpy.context.scene, args.object)
     except SinewError as error:
         raise SinewError(f"{args.file}: {error}") from None
 
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     taken = []
     for obj in meshes:
         try:
-            evaluate.use_method(obj, args.method)
+            characters.use_method(obj, args.method)
             taken.append(obj)
         except SinewError as error:
             failed = True
@@ -75,11 +75,11 @@ def run(args: argparse.Namespace, console: Console) -> int:
     keys = {obj: obj.name if names[obj.name] == 1 else obj.name_full for obj in taken}
     points: dict[str, list[np.ndarray]] = {key: [] for key in keys.values()}
     for frame in console.progress(frames, len(frames), f"Deforming {args.file.name}"):
-        evaluate.set_frame(bpy.context.scene, frame)
+        characters.set_frame(bpy.context.scene, frame)
         for obj in taken:
             if args.method != properties.BLENDER and not obj.sinew.enabled:
                 raise SinewError(f"{args.file}: frame {frame}: {obj.sinew.error}")
-            points[keys[obj]].append(evaluate.final_points(obj))
+            points[keys[obj]].append(characters.final_points(obj))
     arrays = {name: _stack(name, per_frame, frames) for name, per_frame in points.items()}
     _write(args.out, {**arrays, "frames": np.array(frames)})
     for name, array in arrays.items():

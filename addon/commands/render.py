@@ -62,7 +62,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..deform import evaluate
+    from ..deform import characters
 
     if not args.tolerance >= 0.0:
         raise WrongUse(f"tolerance: expected a percentage of 0 or more, got {args.tolerance}")
@@ -77,9 +77,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
         frames = parse_frames(args.frames)
     if method is None or frames is None:
         raise WrongUse("render: --method and --frames are needed where there is no --against")
-    evaluate.check_methods([method])
+    characters.check_methods([method])
     parameters = {**parse(golden.set), **args.set} if golden is not None else args.set
-    evaluate.set_parameters(parameters)
+    characters.set_parameters(parameters)
     if golden is not None:
         _check_fits(args, golden, frames)
     _check_free(args.out, frames)
@@ -122,7 +122,7 @@ def _draw(
 ) -> None:
     import bpy
 
-    from ..deform import evaluate
+    from ..deform import characters
     from ..features.pages import render
     from ..io import files
 
@@ -130,11 +130,11 @@ def _draw(
     render.check_size(size)
     console.note_on(args.file, files.open_file(args.file))
     scene = bpy.context.scene
-    evaluate.set_frame(scene, frames[0])
-    meshes, left_out = evaluate.deformable_meshes(scene, args.file, [method], args.object)
+    characters.set_frame(scene, frames[0])
+    meshes, left_out = characters.deformable_meshes(scene, args.file, [method], args.object)
     if left_out:
         raise SinewError(f"{args.file}: {left_out[0]}")
-    evaluate.use_method_on(meshes, method)
+    characters.use_method_on(meshes, method)
     studio: render.OwnLook | render.Studio
     if args.own_look:
         studio = render.OwnLook(scene, args.file)
@@ -144,7 +144,7 @@ def _draw(
         if golden is not None:
             views = [golden.views[golden.frames.index(frame)] for frame in frames]
         else:
-            views = evaluate.whole_views(meshes, [method], frames)
+            views = characters.whole_views(meshes, [method], frames)
         studio = render.Studio(scene, meshes, engine, size)
     names = [obj.name for obj in meshes]
     settings = RenderSettings(
@@ -153,7 +153,7 @@ def _draw(
     # Written first: it marks the pictures as made by this command, even if that is interrupted.
     write_text(args.out / SETTINGS, settings.to_json())
     for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):
-        evaluate.set_frame(scene, frame)
+        characters.set_frame(scene, frame)
         path = args.out / picture_name(frame)
         if isinstance(studio, render.OwnLook):
             studio.picture(path)

@@ -24,7 +24,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     import bpy
 
     from ..attach import properties
-    from ..deform import evaluate
+    from ..deform import characters
     from ..features.pages import measure, render
     from ..io import files
 
@@ -37,8 +37,8 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     (path,), (frame,) = args.files, frames
     console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
-    evaluate.set_frame(scene, frame)
-    meshes, left_out = evaluate.deformable_meshes(scene, path, methods, args.object)
+    characters.set_frame(scene, frame)
+    meshes, left_out = characters.deformable_meshes(scene, path, methods, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
 
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     shapes = measure.shapes_at(subject, methods, frame)
     rest = subject.gauge.rest.volume
     volumes = {method: subject.gauge.measure(points).shape.volume for method, points in shapes.items()}
-    views = [("Whole", evaluate.whole_views(meshes, methods, [frame])[0])]
+    views = [("Whole", characters.whole_views(meshes, methods, [frame])[0])]
     vertex = most_different_vertex(list(shapes.values()))
     if vertex is not None:
         positions = np.stack([points[vertex] for points in shapes.values()])
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     columns = []
     with scratch_folder() as folder:
         for method in console.progress(methods, len(methods), f"Drawing {path.name}"):
-            evaluate.use_method_on(meshes, method)
+            characters.use_method_on(meshes, method)
             pictures = []
             for index, (_title, view) in enumerate(views):
                 pictures.append(folder / f"{method}-{index}.png")

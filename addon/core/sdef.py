@@ -12,7 +12,7 @@ METHOD = "sdef"
 KEYS = ("mmd_sdef_c", "mmd_sdef_r0", "mmd_sdef_r1")
 """Shape keys whose points are C, R0 and R1."""
 
-MISSING = phrase(
+LACKS_KEYS = phrase(
     "The mesh lacks the shape keys {first}, {second} and {third}: all vertices are blended linearly",
     first=KEYS[0],
     second=KEYS[1],

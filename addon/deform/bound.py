@@ -16,7 +16,7 @@ from ..attach.properties import METHODS
 from ..core import sdef
 from ..core.phrases import phrase
 from ..core.rig import Bones, RigFacts, Weighting
-from ..core.session import Binding, SkinStack, SkinStage
+from ..core.skin_stack import SkinDeformer, SkinStack, SkinStage
 from ..core.stage_mesh import StageMesh
 from ..core.stages import StagesAfter
 from ..core.vertex_data import VertexData
@@ -53,7 +53,7 @@ class Bound:
     @property
     def data_versions(self) -> list[int]:
         """The version of the methods' vertex data, for each Armature modifier."""
-        data = (stage.binding.vertex_data for stage in self.skin_stack.skin_stages)
+        data = (stage.deformer.vertex_data for stage in self.skin_stack.skin_stages)
         return [0 if each is None else each.version for each in data]
 
     def lacks(self, methods: Iterable[str]) -> list[str]:
@@ -62,7 +62,7 @@ class Bound:
         lacks_keys = sdef.METHOD in methods and self.source.sdef_keys is None
         triangles = self.source.triangles
         return [
-            *([sdef.MISSING] if lacks_keys else []),
+            *([sdef.LACKS_KEYS] if lacks_keys else []),
             *(
                 phrase(
                     "The mesh has no faces, which {method} needs: its vertices are blended linearly",
@@ -96,9 +96,9 @@ class Bound:
         source.normals.write(points, given.domain, out)
 
     @property
-    def binding(self) -> Binding:
-        """That of the first Armature modifier."""
-        return self.skin_stack.skin_stages[0].binding
+    def first_deformer(self) -> SkinDeformer:
+        """Deforms by the first Armature modifier."""
+        return self.skin_stack.skin_stages[0].deformer
 
 
 def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | None = None) -> Bound:
@@ -117,7 +117,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
-                stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
+                stage.deformer.vertex_data = _vertex_data(stage.deformer.weighting, read_now, stage)
         if np.array_equal(read_now.points, old.source.points):
             # An identical array signals that nothing moved.
             read_now.points = old.source.points
@@ -131,9 +131,9 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
         if option is None:
             break
         weighting = option.weighting(obj, read_now.weights, its_bones)
-        binding = Binding(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
-        stages.append(SkinStage(binding, option.mask_weights(obj, read_now.weights), option.multi))
-    weighting = stages[0].binding.weighting
+        deformer = SkinDeformer(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
+        stages.append(SkinStage(deformer, option.mask_weights(obj, read_now.weights), option.multi))
+    weighting = stages[0].deformer.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
     skin_stack = SkinStack(stages, StagesAfter(_stage_mesh(read_now, stages), masks))
@@ -142,7 +142,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
 
 def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | None) -> VertexData:
     """before: the stage of the same modifier as it was last bound."""
-    old = None if before is None else before.binding.vertex_data
+    old = None if before is None else before.deformer.vertex_data
     given = {}
     if read_now.sdef_keys is not None:
         basis, *keys = read_now.sdef_keys
@@ -160,7 +160,7 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
     read_now = source.with_surface(obj, depsgraph, old.source)
     read_now.keep_normals_of(old.source)
     for stage in old.skin_stack.skin_stages:
-        stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
+        stage.deformer.vertex_data = _vertex_data(stage.deformer.weighting, read_now, stage)
     return replace(old, source=read_now)
 
 
@@ -191,7 +191,7 @@ def have_bones_changed(
     for stage, replaced in zip(
         bound.skin_stack.skin_stages, properties.of(obj).replaced_modifiers, strict=False
     ):
-        armature, known = replaced.armature, stage.binding.bones
+        armature, known = replaced.armature, stage.deformer.bones
         if armature is None or armature.data.is_editmode:
             continue
         if are_unknown or armature.data.session_uid in changes.armatures or not known.complete:
@@ -209,7 +209,7 @@ def uid(data: bpy.types.ID | None) -> int:
 
 
 def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> bool:
-    known = [stage.binding.bones for stage in old.skin_stack.skin_stages]
+    known = [stage.deformer.bones for stage in old.skin_stack.skin_stages]
     return read_now.equals_but_for_points(old.source) and all(
         now.equals(before) for now, before in zip(bones, known, strict=False)
     )
@@ -228,7 +228,7 @@ def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> d
 
 
 def _stage_mesh(read_now: Source, stages: list[SkinStage]) -> StageMesh:
-    weightings = [stage.binding.weighting for stage in stages]
+    weightings = [stage.deformer.weighting for stage in stages]
     masks = [stage.mask for stage in stages]
     return StageMesh(read_now.topology, read_now.own_points, weightings, masks)
 

@@ -14,7 +14,7 @@ from ..core import icons, parameters
 from ..core.errors import SinewError
 from ..core.rig import Bones
 from ..core.scale_rule import BLENDER_4
-from ..core.session import NO_STAGES, SkinStageFrame
+from ..core.skin_stack import NO_STAGES, SkinStageFrame
 from ..core.spaces import SAME_SPACE
 from ..core.stages import ORDER, StageValues
 from ..io import armature_io
@@ -65,11 +65,11 @@ def read(
             if not np.isfinite(back).all():
                 frames.append(None)
                 continue
-        pose = _finite(armature_io.read_pose(armature, stage.binding.bones), stage.binding.bones)
+        pose = _finite(armature_io.read_pose(armature, stage.deformer.bones), stage.deformer.bones)
         own = method if not frames else properties.method_of_modifier(method, replaced.method, is_first=False)
-        is_mixed = stage.binding.mix_weights is not None and own == method
+        is_mixed = stage.deformer.mix_weights is not None and own == method
         mix = settings.mixed_method if is_mixed else ""
-        data = stage.binding.vertex_data
+        data = stage.deformer.vertex_data
         if data is not None and not data.is_ready(own):
             # The modifier's own method, until what the chosen one needs is computed.
             own, mix = attach.method_of(evaluated.modifiers[replaced.name]), ""
@@ -114,7 +114,7 @@ def _parameters(
 def lacks_data(bound: Bound, frames: Frames) -> bool:
     """Whether one of the methods needed vertex data that it does not have."""
     for stage, frame in zip(bound.skin_stack.skin_stages, frames, strict=False):
-        data = stage.binding.vertex_data
+        data = stage.deformer.vertex_data
         if data is not None and data.missed and frame is not None and not all(map(data.has, data.missed)):
             return True
     return False

@@ -177,8 +177,8 @@ def _needed(obj: bpy.types.Object, skinned: SkinnedObject) -> list[tuple[bpy.typ
     methods = methods_of(obj)
     replaced_modifiers = properties.of(obj).replaced_modifiers
     for stage, replaced in zip(skinned.bound.skin_stack.skin_stages, replaced_modifiers, strict=False):
-        data = stage.binding.vertex_data
-        if data is None or replaced.armature is None or not stage.binding.bones.names:
+        data = stage.deformer.vertex_data
+        if data is None or replaced.armature is None or not stage.deformer.bones.names:
             continue
         for name in methods:
             data.take_parameters(name, stage_settings.method_values(properties.of(obj), (name,)))

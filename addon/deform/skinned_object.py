@@ -12,7 +12,7 @@ import numpy as np
 from ..attach import attach, normals, properties, stack, upstream_proxy
 from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
-from ..core.session import NO_STAGES, SkinStageFrame
+from ..core.skin_stack import NO_STAGES, SkinStageFrame
 from ..core.stages import StageValues
 from ..io import mesh_io
 from ..io.animation_paths import animated_paths, is_visibility_animated

@@ -322,6 +322,6 @@ def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject, plan: Pl
         (replaced.armature, path)
         for (_modifier, replaced), stage in zip(pairs, skinned.bound.skin_stack.skin_stages, strict=False)
         if replaced.armature is not None
-        for path in armature_io.paths_to_wait_for(replaced.armature, stage.binding.moving_bones)
+        for path in armature_io.paths_to_wait_for(replaced.armature, stage.deformer.moving_bones)
     ]
     pose_driver.ensure(obj, list(dict.fromkeys(poses)), plan.is_in_depsgraph)

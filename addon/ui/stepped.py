@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..core.errors import SinewError
-from ..deform import evaluate, precompute_watch, session
+from ..deform import characters, precompute_watch, session
 from ..io import pose_io
 from . import status_bar
 from .translations import tr
@@ -166,7 +166,7 @@ def kept_frame(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object]) ->
     try:
         yield
     finally:
-        evaluate.set_frame(scene, frame)
+        characters.set_frame(scene, frame)
         moved = [armature for armature, pose in poses if pose_io.write_channels(armature.pose.bones, pose)]
         for armature in moved:
             armature.update_tag()

@@ -17,7 +17,7 @@ import pytest
 import scenes
 import sinew_addon
 from sinew_addon.attach import normals
-from sinew_addon.deform import evaluate, small_meshes
+from sinew_addon.deform import characters, small_meshes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 # The reader of glTF for engines.
@@ -25,7 +25,7 @@ sys.path.append(str(REPOSITORY / "shaders"))
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
 # Tests of what commands write: they only run in 4.2 and in the newest Blender. The versions in between run
 # all other tests: how Blender evaluates, stores and edits.
-LEFT_TO_OTHERS = {
+OLDEST_AND_NEWEST = {
     *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_blend", "test_check"),
     "test_cluster",
     *("test_command_line", "test_compare", "test_comparison", "test_export", "test_flamenco", "test_hostile"),
@@ -33,7 +33,7 @@ LEFT_TO_OTHERS = {
 }
 # Tests of what Sinew computes from a character, and of its panels: they only run in long-term releases. The
 # others run how Blender evaluates, stores, edits and renders.
-LEFT_TO_LONG_TERM = {
+LONG_TERM = {
     *("test_bulge_limit", "test_character", "test_corrective_key", "test_ddm", "test_delta_mush"),
     *("test_diagnostics_panel", "test_found_where_looked_for", "test_golden", "test_heat_map", "test_ik"),
     *("test_inbetween", "test_lesson", "test_mask_groups", "test_mending", "test_method_parameters"),
@@ -69,9 +69,9 @@ def pytest_unconfigure():
 
 
 def pytest_collection_modifyitems(items):
-    left = LEFT_TO_OTHERS if os.environ.get("SINEW_BETWEEN") else set()
+    left = OLDEST_AND_NEWEST if os.environ.get("SINEW_BETWEEN") else set()
     if os.environ.get("SINEW_SHORT_TERM"):
-        left = left | LEFT_TO_LONG_TERM
+        left = left | LONG_TERM
     skip = pytest.mark.skip(reason="left to the versions before and after this one")
     for item in items:
         if item.path.stem in left:
@@ -101,7 +101,7 @@ def nothing_of_commands(monkeypatch):
     """Undoes what a command sets for its process when the test ends."""
     monkeypatch.setattr(normals, "are_used", normals.are_used)
     yield
-    evaluate.set_parameters({})
+    characters.set_parameters({})
 
 
 @pytest.fixture(autouse=True)

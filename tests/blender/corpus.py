@@ -19,7 +19,7 @@ import scenes
 from sinew_addon.attach import properties
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.precompute import precomputations
-from sinew_addon.deform import evaluate
+from sinew_addon.deform import characters
 from sinew_addon.io import files
 from sinew_addon.prepare import prepare_blender
 
@@ -34,12 +34,12 @@ def results(file: Path) -> Iterator[tuple[str, str]]:
     files.open_file(file)
     scene = bpy.context.scene
     frames = np.unique(np.linspace(scene.frame_start, scene.frame_end, FRAMES).round()).tolist()
-    for obj in evaluate.deformed_meshes(scene):
+    for obj in characters.deformed_meshes(scene):
         try:
             errors = {method: _error(obj, method, frames) for method in ("lbs", "dq")}
             wrong = [f"{method} differs" for method, error in errors.items() if not error <= LIMIT]
             for method in properties.METHODS:
-                evaluate.use_method(obj, method)
+                characters.use_method(obj, method)
                 if not np.isfinite(scenes.shapes(obj, frames)).all():
                     wrong.append(f"{method} is not finite")
         except SinewError as error:
@@ -51,9 +51,9 @@ def results(file: Path) -> Iterator[tuple[str, str]]:
 
 def _error(obj: bpy.types.Object, method: str, frames: list[float]) -> float:
     """The largest difference from the Armature modifier's shapes, as a share of the diagonal."""
-    evaluate.use_method(obj, properties.BLENDER)
+    characters.use_method(obj, properties.BLENDER)
     theirs = scenes.modifier_shapes(obj, frames, preserve_volume=method == "dq")
-    evaluate.use_method(obj, method)
+    characters.use_method(obj, method)
     ours = scenes.shapes(obj, frames)
     return scenes.worst(ours, theirs) / (float(np.linalg.norm(np.ptp(theirs[0], axis=0))) or 1.0)
 

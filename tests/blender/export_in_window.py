@@ -74,7 +74,7 @@ def steps() -> Iterator[None]:
     facts["attributes"] = [
         a.name for mesh in bpy.data.meshes for a in mesh.attributes if a.name.startswith("_SINEW")
     ]
-    facts["on"] = [obj.sinew.enabled for obj in bpy.data.objects if obj.sinew.stand_ins]
+    facts["on"] = [obj.sinew.enabled for obj in bpy.data.objects if obj.sinew.replaced_modifiers]
     print("FACTS " + json.dumps(facts), flush=True)
 
 

@@ -37,7 +37,7 @@ import routes
 import scenes
 from mathutils import Euler, Matrix, Vector
 from sinew_addon.attach import attach, properties, stage_settings
-from sinew_addon.core import session as core_session
+from sinew_addon.core import skin_stack
 from sinew_addon.deform import session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
@@ -408,21 +408,21 @@ def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
 def undecided(obj: bpy.types.Object) -> np.ndarray:
     """bool [vertices]: those at a discontinuity of a modifier, for an object that was just deformed."""
     skinned = session.state_of(obj)
-    bindings = [
-        stage.binding
+    deformers = [
+        stage.deformer
         for stage in skinned.bound.skin_stack.skin_stages
-        if stage.binding.last_frame is not None
+        if stage.deformer.last_frame is not None
     ]
-    return np.logical_or.reduce([undecided_by(binding) for binding in bindings])
+    return np.logical_or.reduce([undecided_by(deformer) for deformer in deformers])
 
 
-def undecided_by(binding: core_session.Binding) -> np.ndarray:
-    frame = binding.last_frame
+def undecided_by(deformer: skin_stack.SkinDeformer) -> np.ndarray:
+    frame = deformer.last_frame
     space = frame.bones_from_model
     points = frame.rest_points @ space[:3, :3].T + space[:3, 3]
-    influences = binding.weighting.influences_over_joints(points)
-    motions = frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64))
-    rest_axes = binding.bones.rest_axes.astype(np.float64)
+    influences = deformer.weighting.influences_over_joints(points)
+    motions = frame.pose.astype(np.float64) @ np.linalg.inv(deformer.bones.rest.astype(np.float64))
+    rest_axes = deformer.bones.rest_axes.astype(np.float64)
     quaternions = np.array(
         [
             reference.quaternion(reference.rotation_of_bone(motion, rest))
@@ -440,7 +440,7 @@ def undecided_by(binding: core_session.Binding) -> np.ndarray:
             total += (
                 np.copysign(weight, meeting) * quaternions[bone] if length else weight * quaternions[bone]
             )
-    entries = binding.weighting.entries
+    entries = deformer.weighting.entries
     sums = np.bincount(entries.vertices, weights=entries.weights, minlength=len(points))
     return result | (np.abs(sums - 1e-4) < MARGIN * 1e-4)
 
@@ -455,10 +455,10 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     for points in (rest_points, rest_points + moved):
         stages = []
         for known in skinned.bound.skin_stack.skin_stages:
-            own = known.binding
-            binding = core_session.Binding(own.weighting, own.mix_weights, own.vertex_data)
-            stages.append(core_session.SkinStage(binding, known.mask, known.multi))
-        chain = core_session.SkinStack(stages)
+            own = known.deformer
+            deformer = skin_stack.SkinDeformer(own.weighting, own.mix_weights, own.vertex_data)
+            stages.append(skin_stack.SkinStage(deformer, known.mask, known.multi))
+        chain = skin_stack.SkinStack(stages)
         chain.deform(points.astype(np.float32), skinned.shown.frames)
         shapes.append(chain.points)
     moved = np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import sinew
-from sinew_addon.core import session as core_session
+from sinew_addon.core import skin_stack
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import bulge_limit_reference
@@ -32,9 +32,9 @@ MARGINS = {"log": 0.03}
 
 
 def deform(
-    stack: core_session.SkinStack,
+    stack: skin_stack.SkinStack,
     rest_points: np.ndarray,
-    frames: list[core_session.SkinStageFrame | None],
+    frames: list[skin_stack.SkinStageFrame | None],
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """float64 [of `vertices`, 3], object space, and bool [of them]: those where rounding does not decide.
@@ -51,7 +51,7 @@ def deform(
         start_before = start
         if frame is None:
             continue
-        deformed, is_decided = _by_one_modifier(stage.binding, frame, start, vertices)
+        deformed, is_decided = _by_one_modifier(stage.deformer, frame, start, vertices)
         share = np.ones(len(vertices)) if stage.mask is None else stage.mask[vertices].astype(np.float64)
         points = points.copy()
         points[vertices] += share[:, None] * (deformed - points[vertices])
@@ -60,10 +60,10 @@ def deform(
 
 
 def stages_after(
-    stack: core_session.SkinStack,
+    stack: skin_stack.SkinStack,
     points: np.ndarray,
     rest_points: np.ndarray,
-    frames: list[core_session.SkinStageFrame | None],
+    frames: list[skin_stack.SkinStageFrame | None],
     values: Mapping[str, Mapping[str, Any]],
     rounding: np.ndarray | float = 0.0,
 ) -> np.ndarray:
@@ -93,10 +93,10 @@ def stages_after(
 
 
 def _limited(
-    stack: core_session.SkinStack,
+    stack: skin_stack.SkinStack,
     points: np.ndarray,
     rest_points: np.ndarray,
-    frames: list[core_session.SkinStageFrame | None],
+    frames: list[skin_stack.SkinStageFrame | None],
     mask: np.ndarray | None,
     options: Mapping[str, Any],
 ) -> np.ndarray:
@@ -108,7 +108,7 @@ def _limited(
     mask = np.ones(len(points)) if mask is None else mask
     if stage.mask is not None:
         mask = np.where(stage.mask >= 1.0, mask, 0.0)
-    space, weighting = frame.bones_from_model, stage.binding.weighting
+    space, weighting = frame.bones_from_model, stage.deformer.weighting
     rest = _moved(space, rest_points.astype(np.float64))
     influences = weighting.influences_over_joints(rest)
     result = bulge_limit_reference.limit(
@@ -126,33 +126,33 @@ def _limited(
 
 
 def _by_one_modifier(
-    binding: core_session.Binding,
-    frame: core_session.SkinStageFrame,
+    deformer: skin_stack.SkinDeformer,
+    frame: skin_stack.SkinStageFrame,
     points: np.ndarray,
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points, and whether they are independent of rounding."""
-    deformed, decided = _by_one_method(binding, frame, frame.method, points, vertices)
-    if not frame.mix or binding.mix_weights is None:
+    deformed, decided = _by_one_method(deformer, frame, frame.method, points, vertices)
+    if not frame.mix or deformer.mix_weights is None:
         return deformed, decided
-    second, is_decided = _by_one_method(binding, frame, frame.mix, points, vertices)
-    share = np.clip(binding.mix_weights[vertices].astype(np.float64), 0.0, 1.0)
+    second, is_decided = _by_one_method(deformer, frame, frame.mix, points, vertices)
+    share = np.clip(deformer.mix_weights[vertices].astype(np.float64), 0.0, 1.0)
     mixed = deformed + share[:, None] * (second - deformed)
     return mixed, (decided | (share == 1.0)) & (is_decided | (share == 0.0))
 
 
 def _by_one_method(
-    binding: core_session.Binding,
-    frame: core_session.SkinStageFrame,
+    deformer: skin_stack.SkinDeformer,
+    frame: skin_stack.SkinStageFrame,
     method: str,
     points: np.ndarray,
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     space, back = frame.bones_from_model, np.linalg.inv(frame.bones_from_model)
     in_armature = _moved(space, points)
-    influences = binding.weighting.influences_over_joints(in_armature)
+    influences = deformer.weighting.influences_over_joints(in_armature)
     spans = [slice(influences.offsets[v], influences.offsets[v + 1]) for v in vertices]
-    kept = None if binding.vertex_data is None else binding.vertex_data.of(method, space)
+    kept = None if deformer.vertex_data is None else deformer.vertex_data.of(method, space)
     data: dict[str, np.ndarray] = {}
     if kept is not None and METHODS[method].keeps_moments:
         data = {method: _moments(kept.astype(np.float64), vertices, space, influences, in_armature)}
@@ -166,8 +166,8 @@ def _by_one_method(
             np.cumsum([0, *(span.stop - span.start for span in spans)]),
             np.concatenate([influences.bones[span] for span in spans]),
             np.concatenate([influences.weights[span] for span in spans]),
-            frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64)),
-            binding.bones.rest_axes.astype(np.float64),
+            frame.pose.astype(np.float64) @ np.linalg.inv(deformer.bones.rest.astype(np.float64)),
+            deformer.bones.rest_axes.astype(np.float64),
             data,
             frame.parameters,
         )

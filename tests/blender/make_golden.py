@@ -27,7 +27,7 @@ from mathutils import Euler, Quaternion
 from sinew_addon.attach.properties import METHODS
 from sinew_addon.core.parameters import Value
 from sinew_addon.core.sdef import KEYS
-from sinew_addon.deform import evaluate, session
+from sinew_addon.deform import characters, session
 from sinew_addon.io import mesh_io
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
@@ -186,8 +186,8 @@ def make(set_up: SetUp) -> tuple[dict, dict[str, np.ndarray]]:
         if result.by == "Blender":
             arrays[result.array] = scenes.modifier_shapes(obj, [1], result.method == "dq")[0]
             continue
-        evaluate.set_parameters(result.values)
-        evaluate.use_method(obj, result.method)
+        characters.set_parameters(result.values)
+        characters.use_method(obj, result.method)
         arrays[result.array] = scenes.final_points(obj)
         data = vertex_data(obj, result.method)
         if data is not None:
@@ -248,7 +248,7 @@ def vertex_data(obj: bpy.types.Object, method: str) -> np.ndarray | None:
     """The method's vertex data in the library's form."""
     state = session.state_of(obj)
     assert state is not None
-    kept = state.bound.binding.vertex_data
+    kept = state.bound.first_deformer.vertex_data
     return None if kept is None else kept.of(method, np.eye(4))
 
 

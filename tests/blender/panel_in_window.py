@@ -52,7 +52,7 @@ def meshes() -> list[bpy.types.Object]:
 
 
 def methods() -> list[str]:
-    return [obj.sinew.method if obj.sinew.stand_ins else "" for obj in meshes()]
+    return [obj.sinew.method if obj.sinew.replaced_modifiers else "" for obj in meshes()]
 
 
 def scene() -> bpy.types.Scene:

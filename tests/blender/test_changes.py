@@ -12,7 +12,7 @@ import scenes
 import sinew_addon
 import walk_sides
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import apply_plan, evaluate, safe_mode, session, update
+from sinew_addon.deform import apply_plan, characters, safe_mode, session, update
 from sinew_addon.deform.plan import State
 from sinew_addon.io import animation_paths, mesh_io
 from sinew_addon.ui import state_text
@@ -485,27 +485,27 @@ def test_a_driver_that_gives_no_method_is_said_so():
 
 def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkeypatch):
     obj, _armature = scenes.make_arm()
-    evaluate.use_method(obj, "dq")
+    characters.use_method(obj, "dq")
     bpy.context.scene.frame_set(11)
     reads, read = [], mesh_io.read_group_weights
     monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: reads.append(mesh) or read(mesh))
     bpy.context.view_layer.update()
     reads.clear()
     for method in ("lbs", "qv", "dq"):
-        evaluate.use_method(obj, method)
+        characters.use_method(obj, method)
         bpy.context.scene.frame_set(10)
         bpy.context.scene.frame_set(11)
     assert reads == []
     before = scenes.final_points(obj)
     obj.vertex_groups["bone.1"].remove(range(len(obj.data.vertices)))
     obj.data.update()
-    evaluate.use_method(obj, "lbs")
+    characters.use_method(obj, "lbs")
     assert len(reads) == 1
     expected = scenes.rest_points(obj)
     assert scenes.worst(before, expected) > 0.1
-    evaluate.use_method(obj, "blender")
+    characters.use_method(obj, "blender")
     expected = scenes.final_points(obj)
-    evaluate.use_method(obj, "lbs")
+    characters.use_method(obj, "lbs")
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 

@@ -115,19 +115,26 @@ def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
     """Settings that are added to a mesh must be added here, too."""
     ours = {
         *("enabled", "heat", "error", "is_own"),
-        *("stand_ins", "situation", "hidden_viewport", "hidden_render", "baked", "is_saved"),
-        *("replaced_smooth", "parent_type", "attribute"),
-        *("normals_attribute", "carrier", "modifier_name"),
         *(
-            "front",
-            "front_signature",
+            "replaced_modifiers",
+            "situation",
+            "hidden_viewport",
+            "hidden_render",
+            "baked",
+            "has_nearest_volume",
+        ),
+        *("replaced_smooth", "parent_type", "attribute"),
+        *("normals_attribute", "point_buffer", "modifier_name"),
+        *(
+            "upstream_proxy",
+            "upstream_signature",
             "helper",
             "token",
             "copied",
             "copied_for",
             "had_animation",
             "pose",
-            "asked",
+            "request",
         ),
     }
     names = set(properties.SinewSettings.bl_rna.properties.keys()) - ours - {"rna_type", "name"}

@@ -13,12 +13,12 @@ import whole_file
 from conftest import BLEND_FILES
 from program import run_sinew
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import evaluate
+from sinew_addon.deform import characters
 from sinew_addon.features.compare import comparison_labels, comparison_state
 from sinew_addon.io import files
 from sinew_addon.ui import operators
 
-METHODS = evaluate.method_names()
+METHODS = characters.method_names()
 # The copies' coordinates are larger than the original's by the offset.
 TOLERANCE = 1e-6
 
@@ -72,14 +72,14 @@ def shapes_of_methods(obj: bpy.types.Object, frames: list[int]) -> dict[str, np.
         properties.has_sinew(obj),
         properties.of(obj).method if obj.is_property_set("sinew") else "",
     )
-    found = {evaluate.BLENDER: scenes.shapes(obj, frames)} if not skinned else {}
+    found = {characters.BLENDER: scenes.shapes(obj, frames)} if not skinned else {}
     for name in METHODS[:-1]:
-        evaluate.use_method(obj, name)
+        characters.use_method(obj, name)
         found[name] = scenes.shapes(obj, frames)
     if skinned:
-        evaluate.use_method(obj, evaluate.BLENDER)
-        found[evaluate.BLENDER] = scenes.shapes(obj, frames)
-        evaluate.use_method(obj, method)
+        characters.use_method(obj, characters.BLENDER)
+        found[characters.BLENDER] = scenes.shapes(obj, frames)
+        characters.use_method(obj, method)
     else:
         attach.remove(obj)
     return found
@@ -231,7 +231,7 @@ def test_posing_by_hand():
         }
         lbs = scenes.final_points(obj)
         assert scenes.worst(got["lbs"], lbs) <= scenes.TOLERANCE * scenes.diagonal(obj)
-        assert scenes.worst(got[evaluate.BLENDER], lbs) <= TOLERANCE * scenes.diagonal(obj)
+        assert scenes.worst(got[characters.BLENDER], lbs) <= TOLERANCE * scenes.diagonal(obj)
         obj.modifiers["Armature"].use_deform_preserve_volume = True
         dq = scenes.final_points(obj)
         obj.modifiers["Armature"].use_deform_preserve_volume = False
@@ -493,7 +493,7 @@ def test_eyes_on_a_bone_stand_with_their_body():
         bpy.context.scene.frame_set(frame)
         assert set(copies(eye)) == {"lbs", "dq"}
         for place, copy in enumerate(copies(eye).values(), 1):
-            moved = evaluate.world_points([copy]) - evaluate.world_points([eye])
+            moved = characters.world_points([copy]) - characters.world_points([eye])
             assert np.allclose(moved, (place * state().spacing, 0.0, 0.0), atol=1e-5)
     bpy.context.scene.frame_set(1)
     assert_ends_without_trace(before)
@@ -542,7 +542,7 @@ def test_labels_stand_over_the_characters():
     names = [text for text, _colour, _place in found]
     assert names == ["Original: Quaternion-Vector", "Linear Blend", "Dual Quaternion"]
     for (_text, _colour, place), shown in zip(found, (obj, *copies(obj).values()), strict=True):
-        points = evaluate.world_points([shown])
+        points = characters.world_points([shown])
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         assert np.allclose(place, (*middle[:2], points[:, 2].max()), atol=1e-4)
 
@@ -562,9 +562,9 @@ def test_labels_do_not_cover_each_other():
 
 def test_each_method_has_a_colour_of_its_own():
     obj, _armature = scenes.make_arm()
-    compare(obj, set(evaluate.method_names()))
+    compare(obj, set(characters.method_names()))
     colours = {tuple(copy.color) for copy in copies(obj).values()}
-    assert len(colours) == len(evaluate.method_names())
+    assert len(colours) == len(characters.method_names())
     assert (1.0, 1.0, 1.0, 1.0) not in colours
 
 
@@ -688,7 +688,7 @@ def test_commands_leave_copies_out(tmp_path):
     compare(obj, {"qv", "dq"})
     path = test_restore.save(tmp_path / "compared.blend")
     files.open_file(path)
-    assert [o.name for o in evaluate.deformed_meshes(bpy.context.scene)] == ["Arm"]
+    assert [o.name for o in characters.deformed_meshes(bpy.context.scene)] == ["Arm"]
     assert not state().collection.hide_render
     assert all(
         copy.hide_render and not copy.visible_get() for copy in copies(bpy.data.objects["Arm"]).values()

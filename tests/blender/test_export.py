@@ -20,7 +20,7 @@ import sinew_addon
 from conftest import REPOSITORY
 from mathutils import Euler
 from sinew_addon import cli
-from sinew_addon.deform import evaluate
+from sinew_addon.deform import characters
 from sinew_addon.features.gltf import export
 
 FRAMES = [1, 6, 11]
@@ -69,8 +69,8 @@ def paint(obj: bpy.types.Object) -> None:
 def use(obj: bpy.types.Object, method: str, mixed: str = "") -> None:
     if mixed:
         paint(obj)
-    evaluate.set_parameters({"mix.method": mixed, "mix.group": GROUP} if mixed else {})
-    evaluate.use_method(obj, method)
+    characters.set_parameters({"mix.method": mixed, "mix.group": GROUP} if mixed else {})
+    characters.use_method(obj, method)
 
 
 def write(path: Path, **options: object) -> read_glb.File:
@@ -83,7 +83,7 @@ def world_shapes(obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
     shapes = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
-        shapes.append(evaluate.world_points([obj]))
+        shapes.append(characters.world_points([obj]))
     return np.array(shapes)
 
 
@@ -251,8 +251,8 @@ def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
 
 def test_parameters_and_stages_are_named(tmp_path):
     obj = make_character()
-    evaluate.set_parameters({"ddm.variant": "2", "ddm.radius": 0.25, "bulge_limit.enabled": True})
-    evaluate.use_method(obj, "ddm")
+    characters.set_parameters({"ddm.variant": "2", "ddm.radius": 0.25, "bulge_limit.enabled": True})
+    characters.use_method(obj, "ddm")
     extras = write(tmp_path / "a.glb").header["meshes"][0]["extras"]["sinew"]
     assert extras == {
         "version": 1,

@@ -19,7 +19,7 @@ from sinew_addon.commands import compare
 from sinew_addon.commands.console import Console
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS
-from sinew_addon.deform import evaluate, session
+from sinew_addon.deform import characters, session
 from sinew_addon.features.heat import heat_legend, heat_map, heat_nodes, live, measures
 from sinew_addon.features.pages import measure
 
@@ -85,7 +85,7 @@ def test_colours_are_those_of_the_measure(quantity, set_up):
     scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(11)
     expected = expected_fields([obj], ("lbs", "blender"), 11)
-    evaluate.use_method(obj, "lbs")
+    characters.use_method(obj, "lbs")
     choose(quantity)
     bpy.ops.sinew.heat_map()
     values = expected[quantity]
@@ -356,8 +356,8 @@ def test_a_duplicate_has_colours_of_its_own():
     properties.of(twin).heat = False
     bpy.context.scene.frame_set(7)
     assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
-    carriers = [properties.of(each).point_buffer for each in (obj, twin)]
-    assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in carriers] == [True, False]
+    buffers = [properties.of(each).point_buffer for each in (obj, twin)]
+    assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in buffers] == [True, False]
 
 
 def test_a_point_buffer_that_is_not_filled_yet_is_left_alone():

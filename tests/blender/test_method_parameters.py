@@ -14,7 +14,7 @@ import sinew
 from program import run_sinew
 from sinew_addon.attach import method_items, properties, stage_settings
 from sinew_addon.core.parameters import parse
-from sinew_addon.deform import evaluate, session
+from sinew_addon.deform import characters, session
 from test_sdef import make_model
 
 FRAME = 9
@@ -173,9 +173,9 @@ def test_commands_take_it_by_its_full_name(tmp_path):
 
 def test_scripts_set_it_for_all():
     obj, _armature = make_model()
-    evaluate.set_parameters(parse(["sdef.interpolation=slerp"]))
+    characters.set_parameters(parse(["sdef.interpolation=slerp"]))
     try:
-        evaluate.use_method(obj, "sdef")
+        characters.use_method(obj, "sdef")
     finally:
-        evaluate.set_parameters({})
+        characters.set_parameters({})
     assert obj.sinew.sdef.interpolation == "slerp"

@@ -313,7 +313,7 @@ def test_outdated_centres_of_a_mesh_whose_triangles_are_no_longer_read_are_not_a
     obj, _armature = scenes.make_arm()
     bpy.context.scene.frame_set(11)
     scenes.add_sinew(obj, "cor")
-    before = session.state_of(obj).bound.binding.vertex_data
+    before = session.state_of(obj).bound.first_deformer.vertex_data
     assert before.is_current("cor")
     after = VertexData(before.weighting, before.points + 0.1, before=before)
     assert not after.is_ready("cor")
@@ -396,7 +396,7 @@ def test_copies_and_libraries_have_it(gate, tmp_path):
     assert rig is not None
     bpy.context.view_layer.update()
     assert session.state_of(over) is not None
-    assert "cor" in session.state_of(over).bound.binding.vertex_data.made
+    assert "cor" in session.state_of(over).bound.first_deformer.vertex_data.made
     assert gate.count == 1
     bpy.ops.wm.open_mainfile(filepath=path)
     forget_made()
@@ -408,7 +408,7 @@ def test_copies_and_libraries_have_it(gate, tmp_path):
         bpy.context.scene.collection.objects.link(copy)
         bpy.context.view_layer.update()
         session.refresh(bpy.context)
-        assert "cor" in session.state_of(copy).bound.binding.vertex_data.made
+        assert "cor" in session.state_of(copy).bound.first_deformer.vertex_data.made
     assert gate.count == 1
 
 
@@ -510,7 +510,7 @@ def test_data_of_a_mesh_without_weights_is_not_damaged(caplog):
     session.forget()
     session.refresh(bpy.context)
     bpy.context.scene.frame_set(FRAME + 1)
-    assert "ddm" in session.state_of(obj).bound.binding.vertex_data.made
+    assert "ddm" in session.state_of(obj).bound.first_deformer.vertex_data.made
     assert "damaged" not in caplog.text
 
 
@@ -534,6 +534,6 @@ def test_the_folder_has_what_no_file_has(gate, monkeypatch):
         forget_made()
         obj, _armature = scenes.make_arm(bones=3)
         scenes.add_sinew(obj, "cor")
-        assert "cor" in session.state_of(obj).bound.binding.vertex_data.made
+        assert "cor" in session.state_of(obj).bound.first_deformer.vertex_data.made
     assert gate.count == 1
     assert properties.has_sinew(obj)

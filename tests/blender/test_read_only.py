@@ -11,7 +11,7 @@ import pytest
 import scenes
 from program import run_sinew
 from sinew_addon.core.errors import SinewError
-from sinew_addon.deform import evaluate
+from sinew_addon.deform import characters
 from sinew_addon.io import files
 
 SIMULATED = {"cloth": "CLOTH", "soft": "SOFT_BODY", "hair": "PARTICLE_SYSTEM", "paint": "DYNAMIC_PAINT"}
@@ -167,7 +167,7 @@ def test_commands_leave_modes(which, mode, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     assert len(files.open_file(file)) == (mode != "POSE")
     assert all(obj.mode in ("OBJECT", "POSE") for obj in bpy.data.objects)
-    (mesh,) = evaluate.deformed_meshes(bpy.context.scene)
-    evaluate.use_method(mesh, "lbs")
-    evaluate.set_frame(bpy.context.scene, 11)
-    np.testing.assert_allclose(evaluate.final_points(mesh), expected, atol=1e-5)
+    (mesh,) = characters.deformed_meshes(bpy.context.scene)
+    characters.use_method(mesh, "lbs")
+    characters.set_frame(bpy.context.scene, 11)
+    np.testing.assert_allclose(characters.final_points(mesh), expected, atol=1e-5)

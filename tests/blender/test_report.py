@@ -75,17 +75,17 @@ def test_twist_of_linear_matrices_by_hand(figures):
 
 def test_the_first_picture_of_a_chain_is_the_pose_in_the_file():
     import bpy
-    from sinew_addon.deform import evaluate
+    from sinew_addon.deform import characters
     from sinew_addon.io import files
 
     files.open_file(REPOSITORY / "blend_files" / report_figures.LINKS)
     scene = bpy.context.scene
-    (obj,) = evaluate.deformed_meshes(scene)
+    (obj,) = characters.deformed_meshes(scene)
     poses = {}
     for frame in (report_figures.FIRST_KEY, report_figures.SECOND_KEY):
-        evaluate.set_frame(scene, frame)
+        characters.set_frame(scene, frame)
         # The Armature modifier's own shape.
-        poses[frame] = evaluate.world_points([obj])
+        poses[frame] = characters.world_points([obj])
     chain = report_figures.read_chain(obj)
     for method in meshes.HIERARCHIES:
         for t, frame in ((0.0, report_figures.FIRST_KEY), (1.0, report_figures.SECOND_KEY)):

@@ -92,7 +92,7 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
     assert any("Sinew" in label for label in facts["labels"])
     assert facts["drivers"] == []
     if hasattr(bpy.types, "GeometryNodeWarning"):
-        assert node_group.MISSING in facts["warnings"]
+        assert node_group.NEEDS_SINEW in facts["warnings"]
     bpy.ops.wm.open_mainfile(filepath=str(path))
     obj = bpy.data.objects["Arm"]
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)

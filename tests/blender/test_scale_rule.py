@@ -37,9 +37,9 @@ def posed_arm(scaled: bool) -> bpy.types.Object:
 
 
 def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
-    binding = session.state_of(obj).bound.binding
-    frame, rest = binding.last_frame, binding.bones.rest.astype(np.float64)
-    influences = binding.weighting.influences(frame.rest_points)
+    deformer = session.state_of(obj).bound.first_deformer
+    frame, rest = deformer.last_frame, deformer.bones.rest.astype(np.float64)
+    influences = deformer.weighting.influences(frame.rest_points)
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(rest)
     rigid = np.tile(np.eye(4), (len(rest), 1, 1))
     for bone, motion in enumerate(motions):

@@ -135,7 +135,7 @@ def test_without_the_keys_all_is_linear_and_the_panel_says_so(route):
     bpy.context.scene.frame_set(8)
     assert scenes.worst(scenes.final_points(obj), linear) <= scenes.TOLERANCE * scenes.diagonal(obj)
     bound = session.state_of(obj).bound
-    assert bound.lacks(["dq", "sdef"]) == [sdef.MISSING]
+    assert bound.lacks(["dq", "sdef"]) == [sdef.LACKS_KEYS]
     assert bound.lacks(["dq", "off"]) == []
 
 
@@ -154,7 +154,7 @@ def test_keys_that_change_or_come_are_read_again(route):
     obj.shape_key_clear()
     bpy.context.scene.frame_set(9)
     assert_as_expected(obj)
-    assert session.state_of(obj).bound.lacks(["sdef"]) == [sdef.MISSING]
+    assert session.state_of(obj).bound.lacks(["sdef"]) == [sdef.LACKS_KEYS]
 
 
 def test_it_is_mixed_with_another_method(route):

@@ -20,7 +20,7 @@ from program import run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS, Measured
-from sinew_addon.deform import evaluate, session
+from sinew_addon.deform import characters, session
 from sinew_addon.features.bake import bake
 from sinew_addon.features.heat import live, worst_frames
 from sinew_addon.features.pages import measure
@@ -81,10 +81,10 @@ def measured(obj: bpy.types.Object, frame: int, shape: np.ndarray) -> Measured:
     """The measures of the object's final mesh, which is `shape`, from Blender's own evaluations;
     distances are to the Armature modifier. Leaves the object under dq."""
     subject = measure.gather(bpy.context.scene, [obj])
-    shapes = measure.shapes_at(subject, ("dq", evaluate.BLENDER), frame)
+    shapes = measure.shapes_at(subject, ("dq", characters.BLENDER), frame)
     np.testing.assert_allclose(shapes["dq"], shape, atol=1e-6)
-    found = subject.gauge.measure(shapes["dq"], shapes[evaluate.BLENDER])
-    evaluate.use_method(obj, "dq")
+    found = subject.gauge.measure(shapes["dq"], shapes[characters.BLENDER])
+    characters.use_method(obj, "dq")
     return found
 
 
@@ -98,10 +98,10 @@ def test_compare_measures_the_shapes_with_it(arm, stage, tmp_path):
     )
     with open(tmp_path / "page" / "arm" / "metrics.csv", newline="", encoding="utf-8") as file:
         rows = {row["method"]: row for row in csv.DictReader(file)}
-    evaluate.use_method(obj, evaluate.BLENDER)
+    characters.use_method(obj, characters.BLENDER)
     # The Armature modifier has no stages.
     blender = scenes.shapes(obj, [11])[0]
-    for method, shape in (("dq", shapes[-1]), (evaluate.BLENDER, blender)):
+    for method, shape in (("dq", shapes[-1]), (characters.BLENDER, blender)):
         mesh = trimesh.Trimesh(shape.astype(np.float64), test_compare.triangles_of(obj), process=False)
         assert float(rows[method]["volume"]) == pytest.approx(mesh.volume, rel=1e-4)
         assert float(rows[method]["area"]) == pytest.approx(mesh.area, rel=1e-4)
@@ -134,7 +134,7 @@ def test_numbers_and_worst_frames_are_of_it(arm, stage):
         assert found[frame] == pytest.approx(own.entry(METRICS["stretch"].worst), rel=1e-3, abs=1e-5)
     bpy.context.scene.frame_set(11)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    numbers = live.measure(session.states_of([obj], depsgraph), evaluate.BLENDER, depsgraph).measured
+    numbers = live.measure(session.states_of([obj], depsgraph), characters.BLENDER, depsgraph).measured
     for name, value in expected[11].summary().__dict__.items():
         assert numbers.summary().__dict__[name] == pytest.approx(value, rel=2e-4, abs=2e-5), name
 

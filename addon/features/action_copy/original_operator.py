@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ...deform import evaluate
+from ...deform import characters
 from ...ui import operators
 from ...ui.translations import tr
 from . import action_copy
@@ -49,7 +49,7 @@ class SINEW_OT_original_action(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         for armature in filter(action_copy.is_on, operators.armatures(context)):
             action_copy.restore(armature)
-        evaluate.set_frame(context.scene, context.scene.frame_float)
+        characters.set_frame(context.scene, context.scene.frame_float)
         return {"FINISHED"}
 
 

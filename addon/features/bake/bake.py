@@ -19,7 +19,7 @@ from ...core import bake
 from ...core.errors import SinewError
 from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...core.names import as_file_name
-from ...deform import evaluate
+from ...deform import characters
 from ...io import files
 from ...io.animation_paths import curves_of
 from . import bake_export, bake_state, shape_animation
@@ -143,7 +143,7 @@ class Bake:
         self.bakes: list[ShapeKeys | Cache] = []
         scene = bpy.context.scene
         before = scene.frame_float
-        evaluate.set_frame(scene, frames[0])
+        characters.set_frame(scene, frames[0])
         names: set[str] = set()
         try:
             for obj in meshes:
@@ -158,7 +158,7 @@ class Bake:
             self.discard()
             raise
         finally:
-            evaluate.set_frame(scene, before)
+            characters.set_frame(scene, before)
 
     @property
     def what(self) -> str:
@@ -170,7 +170,7 @@ class Bake:
         before = scene.frame_float
         try:
             for number, frame in enumerate(self.frames):
-                evaluate.set_frame(scene, frame)
+                characters.set_frame(scene, frame)
                 for one in self.bakes:
                     one.take(points_of(one.obj))
                 if number == len(self.frames) - 1:
@@ -181,7 +181,7 @@ class Bake:
             self.discard()
             raise
         finally:
-            evaluate.set_frame(scene, before)
+            characters.set_frame(scene, before)
 
     def place(self) -> None:
         try:

@@ -20,10 +20,10 @@ from ...core import helper_bones, pose_helpers, pose_samples
 from ...core.errors import SinewError
 from ...core.helper_bones import POSE, SCALED_KEYS, HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
-from ...core.session import SkinStack, SkinStageFrame
+from ...core.skin_stack import SkinStack, SkinStageFrame
 from ...core.spaces import transformed
 from ...core.stages import StageValues
-from ...deform import evaluate
+from ...deform import characters
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io, mesh_io
 from . import bake_state, error_map, shape_animation
@@ -51,14 +51,14 @@ class BoneBake:
     ) -> None:
         scene = bpy.context.scene
         before = scene.frame_float
-        evaluate.set_frame(scene, frames[0])
+        characters.set_frame(scene, frames[0])
         try:
             rigs: dict[bpy.types.Object, list[bpy.types.Object]] = {}
             for obj in meshes:
                 _check_bones(obj, bake_state.posed_state_of(obj))
                 rigs.setdefault(_rig_of(obj), []).append(obj)
         finally:
-            evaluate.set_frame(scene, before)
+            characters.set_frame(scene, before)
         self.frames, self.options = frames, options
         self._rigs = [_Rig(rig, own) for rig, own in rigs.items()]
         self.reports: list[Report] = []
@@ -78,12 +78,12 @@ class BoneBake:
         before = scene.frame_float
         try:
             for number, frame in enumerate(self.frames):
-                evaluate.set_frame(scene, frame)
+                characters.set_frame(scene, frame)
                 for rig in self._rigs:
                     rig.take()
                 yield _SAMPLING * (number + 1) / len(self.frames)
         finally:
-            evaluate.set_frame(scene, before)
+            characters.set_frame(scene, before)
         for number, rig in enumerate(self._rigs):
             for share in _naming(rig.meshes, rig.solve(self.options)):
                 yield _SAMPLING + (1.0 - _SAMPLING) * (number + share) / len(self._rigs)
@@ -117,16 +117,16 @@ class _Rig:
         """Records the evaluated frame."""
         states = [bake_state.posed_state_of(obj) for obj in self.meshes]
         frames = [state.shown.frames[0] for state in states]
-        bindings = [state.bound.binding for state in states]
+        deformers = [state.bound.first_deformer for state in states]
         targets, rest = [], []
         for state, frame in zip(states, frames, strict=True):
             targets.append(transformed(state.points, frame.bones_from_model))
             rest.append(transformed(state.shown.rest_points, frame.bones_from_model))
-        influences = [b.weighting.influences(p) for b, p in zip(bindings, rest, strict=True)]
+        influences = [b.weighting.influences(p) for b, p in zip(deformers, rest, strict=True)]
         if self._poses:
             self._check_same(influences)
         else:
-            self._bones, self._influences = bindings[0].bones, influences
+            self._bones, self._influences = deformers[0].bones, influences
             scale = np.array(self.rig.matrix_world, dtype=np.float64)[:3, :3]
             self._unit = float(np.cbrt(abs(np.linalg.det(scale))))
             self._stacks = [state.bound.skin_stack.another() for state in states]
@@ -218,7 +218,7 @@ class _Rig:
         own = [bones.names[bone] for bone in solution.parents]
         follows_pose = bool(solution.blends)
         # Only visible objects can be edited.
-        with nullcontext() if self.rig.visible_get() else evaluate.shown([self.rig]):
+        with nullcontext() if self.rig.visible_get() else characters.shown([self.rig]):
             helper_bones_io.use_copy_of_armature(self.rig)
             names = helper_bones_io.add_bones(self.rig, own, solution.heads, hanging=not follows_pose)
             if follows_pose:
@@ -293,8 +293,8 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
 
 def _check_bones(obj: bpy.types.Object, state: SkinnedObject) -> None:
     """Raises SinewError for bendy bones, which no engine has."""
-    binding = state.bound.binding
-    bendy = [name for name, n in zip(binding.bones.names, binding.bones.segments, strict=True) if n > 1]
-    found = [name for name in bendy if name in binding.moving_bones]
+    deformer = state.bound.first_deformer
+    bendy = [name for name, n in zip(deformer.bones.names, deformer.bones.segments, strict=True) if n > 1]
+    found = [name for name in bendy if name in deformer.moving_bones]
     if found:
         raise SinewError(f"{obj.name}: {', '.join(found)} bends in segments; bake to mdd or pc2")

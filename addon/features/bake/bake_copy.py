@@ -12,7 +12,7 @@ from ...core.bake import EXPORTS, KINDS, bake_path
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
 from ...core.names import fits
-from ...deform import evaluate
+from ...deform import characters
 from ...io import files
 from . import bake
 from .bake_bones import BoneBake
@@ -39,7 +39,7 @@ def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
     bakes = []
     try:
         wanted = _wanted(settings, meshes)
-        with evaluate.shown([obj for objects in wanted.values() for obj in objects]):
+        with characters.shown([obj for objects in wanted.values() for obj in objects]):
             for kind, objects in wanted.items():
                 path = bake_path(target, kind)
                 names = [obj.name for obj in objects]

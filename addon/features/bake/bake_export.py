@@ -20,7 +20,7 @@ from ...core import bake as core
 from ...core.errors import SinewError
 from ...core.output import remove, writing
 from ...core.spaces import transformed
-from ...deform import evaluate, session
+from ...deform import characters, session
 from ...io import files
 from . import bake_state, shape_animation, usd_textures
 
@@ -144,7 +144,7 @@ class SceneExport(_Export):
             raise
         finally:
             scene.frame_start, scene.frame_end = before[1:]
-            evaluate.set_frame(scene, before[0])
+            characters.set_frame(scene, before[0])
 
     def whole_in_a_copy(self) -> AbstractContextManager[None]:
         return self.textures.on_disk()
@@ -176,7 +176,7 @@ class MorphExport(_Export):
         before = scene.frame_float
         try:
             for number, frame in enumerate(self.frames):
-                evaluate.set_frame(scene, frame)
+                characters.set_frame(scene, frame)
                 for obj in self.meshes:
                     bake_state.check_on(obj)
                 for obj, samples in self.samples.items():
@@ -188,7 +188,7 @@ class MorphExport(_Export):
                         )
                     samples.append(points)
                 yield SAMPLED * (number + 1) / len(self.frames)
-            evaluate.set_frame(scene, self.frames[0])
+            characters.set_frame(scene, self.frames[0])
             self._make()
             with _unstretched(scene), _selected(self.made):
                 self._animate()
@@ -204,13 +204,13 @@ class MorphExport(_Export):
             raise
         finally:
             self._remove()
-            evaluate.set_frame(scene, before)
+            characters.set_frame(scene, before)
         yield 1.0
 
     def _in_first_space(self, obj: bpy.types.Object) -> np.ndarray:
         """Returns the final points in the object's space of the first frame, as only morph targets are
         animated."""
-        points = evaluate.final_points(obj)
+        points = characters.final_points(obj)
         world = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
         first = self.spaces.setdefault(obj, world)
         if world == first:
@@ -289,7 +289,7 @@ def _prepare(export: SceneExport | MorphExport, path: Path) -> Path:
     """Returns the temporary path of the export; raises SinewError where the disk has no room for it."""
     for obj in export.meshes:
         bake_state.check_on(obj)
-    vertices = sum(len(evaluate.final_points(obj)) for obj in (*export.meshes, *export.carried))
+    vertices = sum(len(characters.final_points(obj)) for obj in (*export.meshes, *export.carried))
     # Points and normals.
     core.check_space(path.parent, 24 * vertices * len(export.frames))
     unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")

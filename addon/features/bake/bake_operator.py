@@ -12,7 +12,7 @@ from ...core.bake import BONES, EXPORTS
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
 from ...core.helper_bones import KEYS, POSE, SCALED_KEYS, HelperOptions
-from ...deform import evaluate
+from ...deform import characters
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.translations import tr
@@ -126,7 +126,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Asking, bpy.types.Operator):
         self.report({"INFO"}, tr("Baked {names}", names=self.started.what))
         if isinstance(self.started, bake_bones.BoneBake):
             for report in self.started.reports:
-                for sentence in report.sentences(evaluate.length_unit(context.scene)):
+                for sentence in report.sentences(characters.length_unit(context.scene)):
                     self.report({"INFO"}, tr(sentence))
         return {"FINISHED"}
 

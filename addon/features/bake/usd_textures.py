@@ -38,17 +38,17 @@ class Textures:
     def on_disk(self) -> Iterator[None]:
         """Context in which materials use files, as the exporter takes only those. Raises SinewError where one
         cannot be written."""
-        replaced_modifiers: list[tuple[bpy.types.Image, bpy.types.Image]] = []
+        replaced_images: list[tuple[bpy.types.Image, bpy.types.Image]] = []
         try:
             for image in _only_in_file(self._objects):
                 replaced = bpy.data.images.load(str(self._write(image)))
                 replaced.colorspace_settings.name = image.colorspace_settings.name
                 replaced.alpha_mode = image.alpha_mode
-                replaced_modifiers.append((image, replaced))
+                replaced_images.append((image, replaced))
                 image.user_remap(replaced)
             yield
         finally:
-            for image, replaced in replaced_modifiers:
+            for image, replaced in replaced_images:
                 replaced.user_remap(image)
                 bpy.data.images.remove(replaced)
 

@@ -28,7 +28,7 @@ from ...core import side_by_side
 from ...core.errors import SinewError
 from ...core.spaces import transformed
 from ...core.stages import ORDER
-from ...deform import evaluate, session
+from ...deform import characters, session
 from ...io import actions
 from . import comparison_state, offset_nodes
 
@@ -54,9 +54,9 @@ ACTION_MARK = "sinew_comparison"
 def start(
     context: bpy.types.Context, meshes: Sequence[bpy.types.Object], methods: Sequence[str], right: np.ndarray
 ) -> list[str]:
-    """Compares the visible parts of a character under `methods` of evaluate.method_names(), in the context's
-    scene and in place of the current comparison. Returns a sentence for each mesh that cannot be compared,
-    and for each method that fails on one.
+    """Compares the visible parts of a character under `methods` of characters.method_names(), in the
+    context's scene and in place of the current comparison. Returns a sentence for each mesh that cannot be
+    compared, and for each method that fails on one.
 
     right  [3], the direction of the screen's right in the world; the copies are placed along the nearest axis
 
@@ -95,7 +95,7 @@ def start(
 def _other_than(first: str, methods: Sequence[str]) -> str:
     """Returns the method to flip to: the last of Sinew's own methods, if that is another one."""
     others = [method for method in methods if method != first]
-    return next((m for m in reversed(others) if m != evaluate.BLENDER), others[-1] if others else first)
+    return next((m for m in reversed(others) if m != characters.BLENDER), others[-1] if others else first)
 
 
 def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Object], list[str]]:
@@ -202,10 +202,10 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     if copy.field is not None:
         copy.field.type = "NONE"
     copy.hide_select = True
-    copy.color = (*COLOURS[evaluate.method_names().index(method) % len(COLOURS)], 1.0)
+    copy.color = (*COLOURS[characters.method_names().index(method) % len(COLOURS)], 1.0)
     settings = properties.of(copy)
     settings.copied, settings.copied_for = obj, method
-    if method != evaluate.BLENDER and attach.armature_of(copy) is not None:
+    if method != characters.BLENDER and attach.armature_of(copy) is not None:
         attach.add(copy, method)
         if original is not None:
             settings.scale_rule = original.scale_rule

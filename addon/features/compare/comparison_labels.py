@@ -15,7 +15,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...attach import properties
-from ...deform import evaluate, session
+from ...deform import characters, session
 from ...ui.translations import tr
 from . import comparison, comparison_state
 
@@ -67,7 +67,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
 def _method_label(obj: bpy.types.Object) -> str:
     settings = properties.of(obj)
     by_sinew = settings.enabled and session.state_of(obj) is not None
-    return tr(properties.method_label(settings.method if by_sinew else evaluate.BLENDER))
+    return tr(properties.method_label(settings.method if by_sinew else characters.BLENDER))
 
 
 def _top(

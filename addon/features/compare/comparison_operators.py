@@ -9,7 +9,7 @@ import numpy as np
 from ...attach import attach, properties
 from ...core.comparison import USUAL_METHODS
 from ...core.errors import SinewError
-from ...deform import evaluate
+from ...deform import characters
 from ...ui import operators
 from ...ui.translations import tr
 from . import comparison, comparison_state, framing
@@ -57,8 +57,8 @@ class SinewComparisonChoice(bpy.types.PropertyGroup):
 METHOD_ITEMS = [
     *((m.name, m.label, m.description) for m in properties.METHODS.values()),
     (
-        evaluate.BLENDER,
-        properties.method_label(evaluate.BLENDER),
+        characters.BLENDER,
+        properties.method_label(characters.BLENDER),
         "As it stands in the stack, without Sinew",
     ),
 ]
@@ -117,7 +117,7 @@ class SINEW_OT_compare(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.choices:
             self.methods = {choice.name for choice in self.choices if choice.is_shown}
-        methods = [name for name in evaluate.method_names() if name in self.methods]
+        methods = [name for name in characters.method_names() if name in self.methods]
         meshes = character(context) or _compared(context)
         try:
             if not methods:

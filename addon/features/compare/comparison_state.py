@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ...attach import properties
-from ...deform import evaluate
+from ...deform import characters
 from . import offset_nodes
 
 SIDE_BY_SIDE, OVERLAID, ONE_OF_TWO = "SIDE", "OVERLAY", "FLIP"
@@ -96,7 +96,7 @@ def copies_of(state: SinewComparison) -> list[bpy.types.Object]:
 def methods_of(state: SinewComparison) -> list[str]:
     """Returns the methods that have copies, in the table's order."""
     there = {properties.of(obj).copied_for for obj in copies_of(state)}
-    return [name for name in evaluate.method_names() if name in there]
+    return [name for name in characters.method_names() if name in there]
 
 
 def arrange(state: SinewComparison) -> None:

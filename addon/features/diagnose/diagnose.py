@@ -18,7 +18,7 @@ from ...core.errors import SinewError
 from ...core.influences import GroupWeights
 from ...core.rig import Bones, Weighting
 from ...core.rotations import rotations_of
-from ...deform import evaluate, events, group_uses, session
+from ...deform import characters, events, group_uses, session
 from ...io import armature_io, mesh_io
 from ...ui import stepped
 from ...ui.translations import tr
@@ -90,7 +90,7 @@ def check_frames(
     frames = stepped.frames_over(scene, armatures, over)
     with stepped.kept_frame(scene, armatures):
         for number, frame in enumerate(frames):
-            evaluate.set_frame(scene, frame)
+            characters.set_frame(scene, frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
             for reading in readings:
                 reading.add_pose(frame, depsgraph)

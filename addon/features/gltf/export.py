@@ -93,14 +93,14 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
     if obj.data.library is not None or obj.mode == "EDIT":
         raise SinewError("its mesh is linked or in edit mode")
     settings = properties.of(obj)
-    binding = states[0][1].bound.binding
+    deformer = states[0][1].bound.first_deformer
     mixed = settings.mixed_method
-    if binding.mix_weights is None or mixed == settings.method:
+    if deformer.mix_weights is None or mixed == settings.method:
         mixed = ""
     skinning = Skinning(obj, {"version": VERSION, "method": settings.method})
     if mixed:
         skinning.extras["mix"] = mixed
-        skinning.shares = binding.mix_weights
+        skinning.shares = deformer.mix_weights
     parameters = stage_settings.method_values(settings, [settings.method, mixed])
     stages = [name for name in stage_settings.names_on(settings) if name != "mix"]
     skinning.extras |= {
@@ -109,9 +109,9 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
     if "cor" in (settings.method, mixed):
         armature = settings.armature
         assert armature is not None
-        assert binding.vertex_data is not None
+        assert deformer.vertex_data is not None
         space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
-        skinning.centres = binding.vertex_data.of("cor", space)
+        skinning.centres = deformer.vertex_data.of("cor", space)
     return skinning
 
 

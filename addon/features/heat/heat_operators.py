@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import bpy
 
 from ...attach import properties
-from ...deform import evaluate
+from ...deform import characters
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.translations import tr
@@ -83,7 +83,7 @@ class SINEW_OT_go_to_frame(bpy.types.Operator):
     frame: bpy.props.FloatProperty(name="Frame", description="Of the scene")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        evaluate.set_frame(context.scene, self.frame)
+        characters.set_frame(context.scene, self.frame)
         return {"FINISHED"}
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ...attach import attach, corrective_smooth, properties, stage_settings, upstream_proxy
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
-from ...core.session import SkinStack
+from ...core.skin_stack import SkinStack
 from ...core.spaces import is_same_space, transformed, transformed_axes
 from ...core.stages import StageValues
 from ...core.surface import Surface, joined
@@ -149,9 +149,9 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         skin_stack = skinned.bound.skin_stack
         surface = mesh_io.read_surface(mesh)
         for stage in skin_stack.skin_stages:
-            if stage.binding.vertex_data is not None:
+            if stage.deformer.vertex_data is not None:
                 # Distances may be measured to a method that needs them.
-                stage.binding.vertex_data.add_triangles(surface.triangles)
+                stage.deformer.vertex_data.add_triangles(surface.triangles)
         parts.append(Part(obj, skinned, skinned.bound, surface, skin_stack.another()))
     if not parts:
         return None
@@ -161,7 +161,7 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         return old
     entries, bone_counts = [], []
     for part in parts:
-        weighting, shown = part.bound.binding.weighting, part.skinned.shown
+        weighting, shown = part.bound.first_deformer.weighting, part.skinned.shown
         space = _space(part, depsgraph)
         entries.append(weighting.influences_over_joints(transformed(shown.rest_points, space)))
         bone_counts.append(len(weighting.bones.rest))
@@ -240,7 +240,7 @@ def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
 def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
     rest_axes, posed_axes, motions = [], [], []
     for part, armature in zip(subject.parts, armatures, strict=True):
-        bones, frame = part.bound.binding.bones, part.skinned.shown.frames[0]
+        bones, frame = part.bound.first_deformer.bones, part.skinned.shown.frames[0]
         at_rest = armature @ bones.rest
         posed = at_rest if frame is None else armature @ frame.pose
         rest_axes.append(bone_axes(bones, at_rest))

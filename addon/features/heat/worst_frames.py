@@ -13,7 +13,7 @@ from ...core.comparison import LENGTHS, ROUNDING, peaks
 from ...core.errors import SinewError
 from ...core.heat import HeatScale
 from ...core.metrics import METRICS, Metric
-from ...deform import evaluate, session
+from ...deform import characters, session
 from ...ui import stepped
 from . import live
 
@@ -64,7 +64,7 @@ def measure_at(
 ) -> tuple[live.Subject, bpy.types.Depsgraph]:
     """Goes to the frame and measures there, as live.measure(). Raises SinewError where there is nothing to
     measure."""
-    evaluate.set_frame(scene, frame)
+    characters.set_frame(scene, frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     subject = live.measure(session.states_of(objects, depsgraph), other, depsgraph)
     if subject is None:

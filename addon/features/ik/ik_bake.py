@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core import ik as core
 from ...core.errors import SinewError
-from ...deform import evaluate
+from ...deform import characters
 from ...io import actions, ik_io, pose_io
 from ..action_copy import action_copy
 
@@ -48,7 +48,7 @@ def steps(
                 muted += tree.constraints
                 posed = []
                 for frame in frames:
-                    evaluate.set_frame(bpy.context.scene, frame)
+                    characters.set_frame(bpy.context.scene, frame)
                     posed.append(ik_io.read_posed(armature, tree))
                     yield (number + len(posed) / len(frames)) / len(trees)
                 found.append(_bake(armature, tree, core.stack(posed), frames, method))

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...core import ik as core
-from ...deform import evaluate
+from ...deform import characters
 from ...io import ik_io
 
 BLENDER = "blender"
@@ -51,15 +51,15 @@ def measure(
     scene = bpy.context.scene
     theirs, posed = [], []
     for number, frame in enumerate(frames):
-        evaluate.set_frame(scene, frame)
+        characters.set_frame(scene, frame)
         theirs.append(ik_io.read_posed(armature, tree).bones)
         progress(0.5 * number / len(frames))
     with ik_io.muted(armature, tree):
         for number, frame in enumerate(frames):
-            evaluate.set_frame(scene, frame)
+            characters.set_frame(scene, frame)
             posed.append(ik_io.read_posed(armature, tree))
             progress(0.5 + 0.5 * number / len(frames))
-    evaluate.set_frame(scene, frames[len(frames) // 2])
+    characters.set_frame(scene, frames[len(frames) // 2])
     stacked = core.stack(posed)
     problem = core.problem_of(tree, stacked)
     matrices = np.stack(theirs).astype(np.float64)

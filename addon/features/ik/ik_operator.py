@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...core import ik as core
-from ...deform import evaluate
+from ...deform import characters
 from ...io import ik_io
 from ...ui import operators, stepped
 from ...ui.translations import tr
@@ -45,7 +45,7 @@ class SINEW_OT_bake_ik(OnArmature, stepped.Asking, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context) -> set[str]:
         # The baked action applies at the current frame, too.
-        evaluate.set_frame(context.scene, context.scene.frame_float)
+        characters.set_frame(context.scene, context.scene.frame_float)
         bones = sum(len(each.tree.bones) for each in self._found)
         worst = max(float(np.max(each.errors)) for each in self._found)
         text = tr(

@@ -15,7 +15,7 @@ from ...core.metrics import METRICS, Metric
 from ...core.page import Row, Sheet
 from ...core.sheet import Column, write_sheet
 from ...core.views import View, close_view
-from ...deform import evaluate
+from ...deform import characters
 from . import measure
 from .measure import Subject
 from .render import Studio
@@ -56,7 +56,7 @@ class Illustrator:
             if comparison.shows(metric.worst, (worst := comparison.worst(metric.worst)).value)
         ]
         drawn = sorted({*self.frames, *(heat.frame for heat in self._heat)})
-        views = evaluate.whole_views(self._subject.meshes, self._methods, drawn)
+        views = characters.whole_views(self._subject.meshes, self._methods, drawn)
         self._whole = dict(zip(drawn, views, strict=True))
 
     @property
@@ -128,8 +128,8 @@ class Illustrator:
         )
 
     def _pose(self, method: str, frame: float) -> None:
-        evaluate.use_method_on(self._subject.meshes, method)
-        evaluate.set_frame(self._subject.scene, frame)
+        characters.use_method_on(self._subject.meshes, method)
+        characters.set_frame(self._subject.scene, frame)
 
     def _picture(self, view: View, name: str) -> Path:
         path = self._folder / f"{name.replace(' ', '-')}.png"
@@ -140,13 +140,13 @@ class Illustrator:
 def film(subject: Subject, comparison: Comparison, studio: Studio, folder: Path) -> Iterator[Path]:
     """Draws each frame of the comparison into one picture, the methods side by side. Requires Pillow."""
     methods = list(comparison.methods)
-    views = evaluate.whole_views(subject.meshes, methods, comparison.frames)
+    views = characters.whole_views(subject.meshes, methods, comparison.frames)
     # One method at a time would be faster, as it is changed less often, but would need all pictures at once.
     for index, (frame, view) in enumerate(zip(comparison.frames, views, strict=True)):
         columns = []
         for method, label in comparison.methods.items():
-            evaluate.use_method_on(subject.meshes, method)
-            evaluate.set_frame(subject.scene, frame)
+            characters.use_method_on(subject.meshes, method)
+            characters.set_frame(subject.scene, frame)
             picture = folder / f"{method}.png"
             studio.picture(view, picture)
             change = comparison.summaries[method][index].volume_change

@@ -26,7 +26,7 @@ from ...core.metrics import FrameOfRig, Gauge, Summary, bone_axes
 from ...core.rig import Bones, Weighting
 from ...core.spaces import transformed
 from ...core.surface import joined
-from ...deform import evaluate, group_uses, session
+from ...deform import characters, group_uses, session
 from ...io import armature_io, mesh_io
 
 # Shapes are kept for as many frames as fit into this, as each method plays all of them.
@@ -106,7 +106,7 @@ class Measurements:
 def gather(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> Subject:
     """Reads meshes that an armature deforms."""
     with skinning_alone(meshes):
-        evaluate.use_method_on(meshes, evaluate.BLENDER)
+        characters.use_method_on(meshes, characters.BLENDER)
         for obj in meshes:
             _show(attach.armature_of(obj))
         with _at_rest(meshes):
@@ -203,20 +203,20 @@ def _play(
     result  receives the times, if it contains the method
     poses   receives each frame's matrices of each mesh's bones in world space
     """
-    evaluate.use_method_on(subject.meshes, method)
+    characters.use_method_on(subject.meshes, method)
     # Before the first frame: binding is not part of a frame's time, and a frame has to change to be timed.
-    evaluate.set_frame(subject.scene, frames[0] - 1)
+    characters.set_frame(subject.scene, frames[0] - 1)
     shapes = []
     for frame in frames:
         started = time.perf_counter()
-        evaluate.set_frame(subject.scene, frame)
+        characters.set_frame(subject.scene, frame)
         taken = 1000.0 * (time.perf_counter() - started)
         shapes.append(_world_points(subject, frame))
         if poses is not None:
             poses.append([_bone_matrices(part) for part in subject.parts])
         if result is not None and method in result.times:
             result.times[method].append(taken)
-            states = [session.state_of(obj) for obj in subject.meshes if method != evaluate.BLENDER]
+            states = [session.state_of(obj) for obj in subject.meshes if method != characters.BLENDER]
             result.own[method].append(sum(state.shown.milliseconds for state in states if state is not None))
     return shapes
 
@@ -224,17 +224,17 @@ def _play(
 def _play_rest(subject: Subject, frames: Sequence[float]) -> list[tuple[np.ndarray, list[np.ndarray]]]:
     """Returns world points at each frame without any bone's effect, with the matrices of each mesh's
     bones."""
-    evaluate.use_method_on(subject.meshes, evaluate.BLENDER)
+    characters.use_method_on(subject.meshes, characters.BLENDER)
     rests = []
     with _at_rest(subject.meshes):
         for frame in frames:
-            evaluate.set_frame(subject.scene, frame)
+            characters.set_frame(subject.scene, frame)
             rests.append((_world_points(subject, frame), [_bone_matrices(part) for part in subject.parts]))
     return rests
 
 
 def _world_points(subject: Subject, frame: float) -> np.ndarray:
-    points = evaluate.world_points(subject.meshes)
+    points = characters.world_points(subject.meshes)
     if len(points) != subject.gauge.surface.vertex_count:
         names = ", ".join(obj.name for obj in subject.meshes)
         raise SinewError(

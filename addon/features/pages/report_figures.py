@@ -18,7 +18,7 @@ from ...core.metrics import volume
 from ...core.report import meshes
 from ...core.report.model import Figure, Picture
 from ...core.views import View, seen_extent, whole_view
-from ...deform import evaluate
+from ...deform import characters
 from ...io import armature_io, files, mesh_io
 from .render import Studio
 
@@ -49,7 +49,7 @@ def figures(
 
 def _open(path: Path) -> bpy.types.Object:
     files.open_file(path)
-    return evaluate.deformed_meshes(bpy.context.scene)[0]
+    return characters.deformed_meshes(bpy.context.scene)[0]
 
 
 def _studio(mesh: bpy.types.Object, engine: str, size: int) -> Studio:
@@ -74,7 +74,7 @@ def _parents(armature: bpy.types.Object, bones: armature_io.Bones) -> np.ndarray
 
 def _pose(armature: bpy.types.Object, bones: armature_io.Bones, frame: int) -> np.ndarray:
     """float64 [bones, 4, 4] at a frame, to which the scene is set."""
-    evaluate.set_frame(bpy.context.scene, frame)
+    characters.set_frame(bpy.context.scene, frame)
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return armature_io.read_pose(evaluated, bones).astype(np.float64)
 
@@ -118,8 +118,8 @@ def _hierarchies(path: Path, engine: str, size: int, scratch: Path) -> tuple[Fig
 def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, ...]:
     mesh = _open(path)
     scene = bpy.context.scene
-    evaluate.set_frame(scene, scene.frame_start)
-    rest = evaluate.world_points([mesh])
+    characters.set_frame(scene, scene.frame_start)
+    rest = characters.world_points([mesh])
     triangles = mesh_io.read_surface(mesh.data).triangles
     groups = mesh_io.read_group_weights(mesh.data)
     skin = meshes.Skin(
@@ -139,21 +139,21 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
         posed = _pose(armature, bones, frame)
         degrees[frame] = meshes.joint_degrees(_parents(armature, bones), at_rest, at_rest, posed)
         for method in meshes.SKINS:
-            evaluate.use_method(mesh, method)
-            of_methods[method] = evaluate.world_points([mesh])
+            characters.use_method(mesh, method)
+            of_methods[method] = characters.world_points([mesh])
     studio = _studio(mesh, engine, size)
     pictures: dict[int, list[Picture]] = {}
     labels = {method.name: method.label for method in sinew.methods()}
     for frame, of_methods in shapes.items():
-        evaluate.set_frame(scene, frame)
+        characters.set_frame(scene, frame)
         view = whole_view([seen_extent(shape) for shape in of_methods.values()])
         pictures[frame] = []
         for number, method in enumerate(meshes.SKINS):
-            evaluate.use_method(mesh, method)
+            characters.use_method(mesh, method)
             letter = f"({'abc'[number]}) " if number < 3 else ""
             pictures[frame].append(Picture(letter + labels[method], _draw(studio, view, scratch)))
         pictures[frame] = meshes.trimmed(pictures[frame])
-    evaluate.set_frame(scene, scene.frame_start)
+    characters.set_frame(scene, scene.frame_start)
     view = whole_view([seen_extent(rest)])
     drawn = Picture("At rest: links, each with a bone", _draw(studio, view, scratch))
     return (

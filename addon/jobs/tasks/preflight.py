@@ -12,7 +12,7 @@ import bpy
 from ...attach import attach, properties, stack, upstream_proxy
 from ...attach.updates import updates_suspended
 from ...core.errors import SinewError
-from ...deform import apply_plan, evaluate
+from ...deform import apply_plan, characters
 from ...io import files
 
 
@@ -76,9 +76,9 @@ def _not_deformable(objects: list[bpy.types.Object]) -> Iterator[str]:
         if not here:
             continue
         bpy.context.window.scene = scene
-        evaluate.show(here)
+        characters.show(here)
         wanted = [(obj, properties.of(obj).method) for obj in here]
-        yield from (str(error) for error in evaluate.use_methods(wanted) if error is not None)
+        yield from (str(error) for error in characters.use_methods(wanted) if error is not None)
 
 
 def _is_missing(library: bpy.types.Library) -> bool:

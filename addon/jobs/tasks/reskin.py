@@ -21,7 +21,7 @@ from ...core.frames import parse_frames
 from ...core.names import fits
 from ...core.output import remove
 from ...core.views import seen_extent, whole_view
-from ...deform import apply_plan, evaluate, session
+from ...deform import apply_plan, characters, session
 from ...features.bake import bake_copy
 from ...features.compare import comparison
 from ...features.pages import render
@@ -135,7 +135,7 @@ def _use_sinew(
     values = {obj: _parameters_of(obj, settings) for obj in objects}
     skinned, left_out = [], []
     for (obj, method), (way, had_sinew), error in zip(
-        wanted, before, evaluate.use_methods_for_file(wanted, scales, values), strict=True
+        wanted, before, characters.use_methods_for_file(wanted, scales, values), strict=True
     ):
         if error is not None:
             left_out.append(str(error))
@@ -250,10 +250,10 @@ def _compare(task: dict, skinned: list[tuple[bpy.types.Object, dict]], outcome: 
     objects = [obj for obj, _mesh in shown]
     with clock.doing("comparing"):
         session.resume_after_save(bpy.context)
-        evaluate.show(objects)
+        characters.show(objects)
         frames = _frames(task["frames"], scene)
         ours = [_points(scene, objects, frame) for frame in frames]
-        evaluate.use_methods([(obj, evaluate.BLENDER) for obj in objects])
+        characters.use_methods([(obj, characters.BLENDER) for obj in objects])
         theirs = [_points(scene, objects, frame) for frame in frames]
         worst = max(
             _deviation(mesh, frames, [p[i] for p in ours], [p[i] for p in theirs])
@@ -289,8 +289,8 @@ def _frames(wanted: str, scene: bpy.types.Scene) -> list[float]:
 
 
 def _points(scene: bpy.types.Scene, objects: list[bpy.types.Object], frame: float) -> list[np.ndarray]:
-    evaluate.set_frame(scene, frame)
-    return [evaluate.final_points(obj) for obj in objects]
+    characters.set_frame(scene, frame)
+    return [characters.final_points(obj) for obj in objects]
 
 
 def _draw(
@@ -302,15 +302,15 @@ def _draw(
 ) -> dict:
     """Draws the meshes under their Armature modifiers, which deform now, and under Sinew."""
     objects = [obj for obj, _mesh in shown]
-    evaluate.set_frame(scene, frame)
-    before = evaluate.world_points(objects)
-    evaluate.use_methods([(obj, mesh["method"]) for obj, mesh in shown])
-    view = whole_view([seen_extent(before), seen_extent(evaluate.world_points(objects))])
+    characters.set_frame(scene, frame)
+    before = characters.world_points(objects)
+    characters.use_methods([(obj, mesh["method"]) for obj, mesh in shown])
+    view = whole_view([seen_extent(before), seen_extent(characters.world_points(objects))])
     stem.parent.mkdir(parents=True, exist_ok=True)
     paths = {name: stem.with_name(f"{stem.name}-{name}.png") for name in ("after", "before")}
     studio = render.Studio(scene, objects, engine, PICTURE_SIZE, halved=True)
     studio.picture(view, paths["after"])
-    evaluate.use_methods([(obj, evaluate.BLENDER) for obj in objects])
+    characters.use_methods([(obj, characters.BLENDER) for obj in objects])
     studio.picture(view, paths["before"])
     return {"frame": frame, **{name: path.name for name, path in paths.items()}}
 

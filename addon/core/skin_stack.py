@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One skinned mesh between frames: its bound deformers, their last inputs, and the result."""
+"""A mesh's Armature modifiers and stages, one after the other: what they computed last, and from what."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Frame:
     bones_from_model  float64 [4, 4], from the mesh's object space to armature space
     rest_points       float32 [vertices, 3], object space, shape keys applied
     scale_rule        name of a scale rule
-    mix               name of the second method, mixed in by the binding's mix weights; empty for none
+    mix               name of the second method, mixed in by the mix weights; empty for none
     parameters        values of parameters of both methods, by their full names
     """
 
@@ -49,7 +49,7 @@ class Frame:
 
 
 @dataclass(slots=True)
-class _Bound:
+class _MethodDeformer:
     """A deformer, what it was made for, and its rest points.
 
     method, mix  as in Frame: reading the deformer's own takes longer
@@ -61,7 +61,7 @@ class _Bound:
     rest_points: np.ndarray
 
 
-class Binding:
+class SkinDeformer:
     """A mesh bound to bones. It computes only frames that differ from the last.
 
     mix_weights  float32 [vertices] from 0 to 1: the share of a frame's second method; None for no share
@@ -82,7 +82,7 @@ class Binding:
         # The packed mesh with its rest points, for each purpose and set of methods with vertex data; the
         # deformer for each purpose.
         self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
-        self._bound: dict[str, _Bound] = {}
+        self._deformers: dict[str, _MethodDeformer] = {}
         # Skinned normals, with the deformer and the rest normals that they were made for.
         self._skinned: tuple[sinew.SkinnedNormals, sinew.Deformer, np.ndarray] | None = None
         self._last: Frame | None = None
@@ -92,9 +92,9 @@ class Binding:
         # The last frame was written to another array than _points.
         self._points_outdated = False
 
-    def another(self) -> Binding:
+    def another(self) -> SkinDeformer:
         """Returns a copy with results of its own."""
-        return Binding(self.weighting, self.mix_weights, self.vertex_data)
+        return SkinDeformer(self.weighting, self.mix_weights, self.vertex_data)
 
     @cached_property
     def moving_bones(self) -> list[str]:
@@ -147,7 +147,7 @@ class Binding:
         frame = self._last
         if frame is None or frame.scale_rule != BLENDER_4.name:
             return False
-        deformer = self._bound[MOTION].deformer
+        deformer = self._deformers[MOTION].deformer
         if self._skinned is None or not (self._skinned[1] is deformer and self._skinned[2] is rest_normals):
             packed, _points = self._packed[MOTION, frozenset(self._vertex_data_of(frame))]
             mixed = deformer.mixed_method
@@ -169,7 +169,7 @@ class Binding:
 
     def _shape(self, frame: Frame, out: np.ndarray) -> None:
         if self._weights_changed(frame):
-            self._bound.clear()
+            self._deformers.clear()
             self._packed.clear()
         weights = self.mix_weights
         if frame.mix and (weights is None or frame.mix == frame.method):
@@ -211,7 +211,7 @@ class Binding:
         out: np.ndarray,
     ) -> None:
         """Deforms `rest_points` with the deformer of `purpose`, which is made again where it does not fit."""
-        bound = self._bound.get(purpose)
+        bound = self._deformers.get(purpose)
         if bound is None or bound.method != frame.method or bound.mix != frame.mix:
             data = self._vertex_data_of(frame)
             key = (purpose, frozenset(data))
@@ -220,7 +220,7 @@ class Binding:
             packed, points = self._packed[key]
             mix = (frame.mix, self.mix_weights) if frame.mix and self.mix_weights is not None else None
             deformer = sinew.Deformer(packed, frame.method, mix=mix)
-            bound = self._bound[purpose] = _Bound(deformer, frame.method, frame.mix, points)
+            bound = self._deformers[purpose] = _MethodDeformer(deformer, frame.method, frame.mix, points)
         if bound.rest_points is not rest_points:
             bound.deformer.set_rest_points(rest_points)
             bound.rest_points = rest_points
@@ -244,7 +244,7 @@ class Binding:
             return False
         self._data_version = version
         self._packed.clear()
-        self._bound.clear()
+        self._deformers.clear()
         return True
 
     def _weights_changed(self, frame: Frame) -> bool:
@@ -300,7 +300,7 @@ class SkinStage:
     multi  a Multi Modifier: it has the same input as the modifier before it
     """
 
-    binding: Binding
+    deformer: SkinDeformer
     mask: np.ndarray | None = None
     multi: bool = False
 
@@ -332,7 +332,7 @@ class SkinStack:
         self.skin_stages = skin_stages
         self.stages_after = stages_after
         # The last active skin stage, if it has no mask: its points are the result.
-        self._end: Binding | None = None
+        self._end: SkinDeformer | None = None
         self._points: np.ndarray | None = None
         self._rest_points: np.ndarray | None = None
         self._active: list[int] = []
@@ -360,7 +360,7 @@ class SkinStack:
 
     def another(self) -> SkinStack:
         """Returns a copy with results of its own."""
-        stages = [SkinStage(one.binding.another(), one.mask, one.multi) for one in self.skin_stages]
+        stages = [SkinStage(one.deformer.another(), one.mask, one.multi) for one in self.skin_stages]
         return SkinStack(stages, None if self.stages_after is None else self.stages_after.another())
 
     def set_stage_mesh(self, mesh: StageMesh) -> None:
@@ -379,7 +379,7 @@ class SkinStack:
 
         rest_points  float32 [vertices, 3], object space
         frames       one for each skin stage, None for one that is switched off or has no pose
-        out          see Binding.deform
+        out          see SkinDeformer.deform
         values       the parameters of the stages that follow
         """
         if self.stages_after is None:
@@ -396,7 +396,7 @@ class SkinStack:
     def write_skinned_normals(
         self, points: np.ndarray, rest_normals: np.ndarray, vertices: np.ndarray | None, out: np.ndarray
     ) -> bool:
-        """As Binding's; also returns False where several skin stages, a mask or stages made the shape."""
+        """As SkinDeformer's; also returns False for several skin stages, a mask or stages after them."""
         is_one = self._end is not None and sum(frame is not None for frame in self._frames) == 1
         if self._values or self._end is None or not is_one:
             return False
@@ -436,7 +436,7 @@ class SkinStack:
         last, last_frame = self.skin_stages[active[-1]], frames[active[-1]]
         assert last_frame is not None
         is_whole = last.mask is None and last_frame.model_from_bones is None
-        self._end = last.binding if is_whole else None
+        self._end = last.deformer if is_whole else None
         for number in active:
             skin_stage, frame = self.skin_stages[number], frames[number]
             assert frame is not None
@@ -450,18 +450,18 @@ class SkinStack:
                 result = start = np.zeros_like(result)
                 before = self._frames[number] if number < len(self._frames) else None
                 changed |= before is None or not are_equal(back, before.model_from_bones)
-            is_end = skin_stage.binding is self._end
+            is_end = skin_stage.deformer is self._end
             own = (frame.scale_rule, frame.mix, frame.parameters)
-            changed |= skin_stage.binding.deform(
+            changed |= skin_stage.deformer.deform(
                 Frame(frame.method, frame.pose, frame.bones_from_model, start, *own),
                 out if is_end else None,
             )
             if skin_stage.mask is not None:
-                result = result + skin_stage.mask[:, None] * (skin_stage.binding.points - result)
+                result = result + skin_stage.mask[:, None] * (skin_stage.deformer.points - result)
             elif not is_end:
                 # A copy, as the next skin stage compares its input with the last one: the array must not be
                 # overwritten.
-                result = skin_stage.binding.points.copy()
+                result = skin_stage.deformer.points.copy()
             if back is not None:
                 result = transformed(result, back).astype(np.float32)
         self._points = result
