@@ -19,8 +19,8 @@ from .prepare import leave_blender, prepare_blender
 if TYPE_CHECKING:
     from .commands.console import Console
 
-# Batches start Blenders of their own, or prepare this one later; a report without Blender has no pictures.
-WITHOUT_BLENDER = ("methods", "check", "report", "reskin", "restore")
+# Batches start Blenders of their own, or prepare this one later.
+WITHOUT_BLENDER = ("methods", "check", "reskin", "restore")
 
 _commands: list[object] = []
 
@@ -47,7 +47,6 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
         methods,
         points,
         render,
-        report,
         reskin,
         restore,
     )
@@ -66,7 +65,6 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
         "export": export,
         "compare": compare,
         "render": render,
-        "report": report,
     }
     parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")
     parser.add_argument("--verbose", action="store_true", help="show what Blender prints")

@@ -19,7 +19,6 @@ NAMES = (
         "centres_of_rotation",
         "direct_delta_mush",
         "dual_quat",
-        "fit",
         "ik",
         "interpolate",
     ),

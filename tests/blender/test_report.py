@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 3.6 to 3.11 of `sinew report`: pictures of deformed meshes, and measurements of them."""
+"""Figures 3.6 to 3.11 of `./dev report`: pictures of deformed meshes, and measurements of them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY
 from PIL import Image
-from sinew_addon.core.report import meshes
-from sinew_addon.features.pages import render, report_figures
+from sinew_addon.features.pages import render
+from smith_2013 import figures as report_figures
+from smith_2013 import meshes
 
 SIZE = 96
 

@@ -64,7 +64,7 @@ def test_nothing_of_a_checkout_is_in_reach():
     assert not any((folder / ".git").exists() for folder in (HERE, *HERE.parents))
     assert not list(Path(sys.prefix).rglob("__editable__*"))
     assert importlib.util.find_spec("sinew_addon") is not None
-    assert "report" in [found.name for found in pkgutil.iter_modules([_package("commands")])]
+    assert "reskin" in [found.name for found in pkgutil.iter_modules([_package("commands")])]
 
 
 def _package(name: str) -> str:

@@ -218,7 +218,7 @@ def test_an_import_of_blender_is_seen(text):
         ("core/rig.py", "from ..io.mesh_io import read_points"),
         ("core/rig.py", "from .. import cli"),
         ("core/rig.py", "from ... import other"),
-        ("core/report/page.py", "from ...deform import handlers"),
+        ("core/motion/blend.py", "from ...deform import handlers"),
         ("attach/attach.py", "def f():\n    from ..features.heat import heat_view"),
         ("deform/handlers.py", "from ..ui import operators"),
         ("deform/handlers.py", "import sinew_addon.features.heat"),
@@ -234,7 +234,7 @@ def test_a_wrong_room_is_seen(path, text):
     [
         ("core/rig.py", "import sinew"),
         ("core/rig.py", "from . import errors"),
-        ("core/report/page.py", "from ..errors import SinewError"),
+        ("core/motion/blend.py", "from ..errors import SinewError"),
         ("features/heat/live.py", "from ...deform import handlers"),
         ("features/bake/bake_apart.py", "from ...blender_process import BlenderProcess"),
     ],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of `sinew report`, made in quick mode: it needs no other files, and agrees with report.json.
+"""The page of `./dev report`, made in quick mode: it needs no other files, and agrees with report.json.
 
 SINEW_EXPERIMENTS is the folder of the built programs of experiments/; without it the page has no times.
 """
@@ -10,11 +10,13 @@ import re
 import subprocess
 import sys
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
-from sinew_addon.core.report import measure, meshes, orders, tables
-from sinew_addon.core.report.page import format_numbers
+from smith_2013 import measure, meshes, orders, tables
+from smith_2013.page import format_numbers
 
+EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 PROGRAMS = os.environ.get("SINEW_EXPERIMENTS")
 TABLES = [f"3.{number}" for number in range(1, 11)]
 FIGURES = [f"3.{number}" for number in range(3, 12)]
@@ -58,9 +60,14 @@ class Reader(HTMLParser):
 
 
 def run_report(folder, *options, status=0):
-    command = [sys.executable, "-c", "from sinew_addon.cli import run; run()", "report", "--out", folder]
+    command = [sys.executable, "-m", "smith_2013", "--out", folder]
     done = subprocess.run(
-        [*map(str, command), *map(str, options)], capture_output=True, text=True, timeout=300, check=False
+        [*map(str, command), *map(str, options)],
+        cwd=EXPERIMENTS,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
     assert done.returncode == status, done.stdout + done.stderr
     assert "Traceback" not in done.stderr, done.stderr
@@ -156,7 +163,7 @@ def test_quick_mode_warns(made):
 
 def test_a_folder_that_is_not_there_is_said_to_be(tmp_path):
     done = run_report(tmp_path / "out", "--programs", tmp_path / "none", status=1)
-    assert done.stderr == f"sinew: {tmp_path / 'none'}: no such folder\n"
+    assert done.stderr == f"report: {tmp_path / 'none'}: no such folder\n"
     done = run_report(tmp_path / "out", "--programs", tmp_path, status=1)
     assert "has no program operation_counts; ./dev report builds it" in done.stderr
     assert not (tmp_path / "out").exists()
@@ -179,7 +186,7 @@ def test_a_program_that_fails_is_said_to(tmp_path):
 
 
 def test_without_matplotlib_the_numbers_are_there(monkeypatch):
-    from sinew_addon.core.report import paths
+    from smith_2013 import paths
 
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     figure = paths.figure_3_4()
@@ -198,8 +205,6 @@ def test_missing_figures_have_the_titles_of_drawn_ones():
 def measurements():
     if not PROGRAMS:
         pytest.skip("SINEW_EXPERIMENTS is not set: programs of experiments/ are not run")
-    from pathlib import Path
-
     return measure.measure(Path(PROGRAMS), True, lambda what: None)
 
 

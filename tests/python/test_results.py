@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 from sinew_addon.core.errors import SinewError
-from sinew_addon.core.report import paper
+from smith_2013 import paper
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+EXPERIMENTS = DOCS.parent / "experiments"
 CONTENT = json.loads((DOCS / "results.json").read_text(encoding="utf-8"))
 
 
@@ -107,13 +108,13 @@ def test_what_is_not_whole_makes_no_page(content, tmp_path):
 
 
 def run(*options):
-    command = [sys.executable, "-c", "from sinew_addon.cli import run; run()", "report", *map(str, options)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    command = [sys.executable, "-m", "smith_2013", *map(str, options)]
+    return subprocess.run(command, cwd=EXPERIMENTS, capture_output=True, text=True, timeout=120, check=False)
 
 
 def test_the_command_says_what_it_wants(tmp_path):
     assert "--out FOLDER is missing" in run().stderr
     assert "--from takes --results FOLDER" in run("--from", tmp_path / "report.json").stderr
     done = run("--from", tmp_path / "none.json", "--results", tmp_path)
-    assert "none.json: no report.json of sinew report" in done.stderr
+    assert "none.json: no report.json of ./dev report" in done.stderr
     assert done.returncode == 1

@@ -47,7 +47,7 @@ PICTURES = {
     r"cost-of-\w+\.svg": ("bench/plots.py", "cost-of-"),
     r"fits\.svg": ("bench/fits.py", None),
     r"ik\.svg": ("bench/ik.py", None),
-    r"results-\w+\.svg": ("addon/core/report/paper.py", None),
+    r"results-\w+\.svg": ("experiments/smith_2013/paper.py", None),
 }
 
 

@@ -12,15 +12,15 @@ from pathlib import Path
 import bpy
 import numpy as np
 import sinew
+from sinew_addon.attach import attach
+from sinew_addon.core.metrics import volume
+from sinew_addon.core.views import View, seen_extent, whole_view
+from sinew_addon.deform import characters
+from sinew_addon.features.pages.render import Studio
+from sinew_addon.io import armature_io, files, mesh_io
 
-from ...attach import attach
-from ...core.metrics import volume
-from ...core.report import meshes
-from ...core.report.model import Figure, Picture
-from ...core.views import View, seen_extent, whole_view
-from ...deform import characters
-from ...io import armature_io, files, mesh_io
-from .render import Studio
+from . import meshes
+from .model import Figure, Picture
 
 LINKS, MESH = "report_links.blend", "report_mesh.blend"
 # Keyframes of LINKS, and the frames of MESH where it is bent and where it is twisted most.

@@ -1,37 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew report`: repeats the experiments of Smith 2013, on one page."""
+"""Repeats the experiments of Smith 2013, on one page: `./dev report`."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
-from ..core.errors import SinewError, WrongUse
-from ..core.output import folder_to_write
-from ..core.report.model import Figure, Page
-from ..core.scratch import scratch_folder
-from .arguments import add_engine
-from .console import Console
+import sinew
+from sinew_addon.commands.arguments import add_engine
+from sinew_addon.core.errors import SinewError, WrongUse
+from sinew_addon.core.output import folder_to_write
+from sinew_addon.core.scratch import scratch_folder
+from sinew_addon.prepare import leave_blender, prepare_blender
+
+from . import answers, joints, measure, meshes, page, paper, paths, studies, tables
+from .model import Figure, Page
 
 PICTURE_SIZE, QUICK_PICTURE_SIZE = 520, 64
-NO_FILES = (
-    "Not drawn in this installation: it takes Sinew's example rigs report_links.blend and "
-    "report_mesh.blend. ./dev report passes them on in a checkout; elsewhere, give their folder: sinew "
-    "report --blend-files FOLDER."
-)
+NO_FILES = "Not drawn: it takes report_links.blend and report_mesh.blend, which ./dev report passes on."
 
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "report",
-        help="do the experiments of Smith 2013 again and write them as one page",
+def parse(argv: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="./dev report",
         description="Writes FOLDER/report.html, which needs no other file, and report.json: Tables 3.1 "
         "to 3.10 and Figures 3.3 to 3.11 of Smith 2013, each with the printed values, Sinew's and whether "
-        "they agree. An installed Sinew computes Tables 3.1 and 3.6 to 3.8 and, with matplotlib, Figures "
-        "3.3 to 3.5. Operation counts and times (Tables 3.2 to 3.5, 3.9, 3.10) take programs that are "
-        "built against GLM and Eigen, and pictures (Figures 3.6 to 3.11) Sinew's example rigs: ./dev report "
-        "in a checkout builds the programs and passes on both. The page says what was left out and why. "
-        "--results also writes its best five results as a short page for a site, of a whole report.json.",
+        "they agree. The page says what was left out and why. --results also writes the best five results "
+        "as a short page for a site, of a whole report.json.",
     )
     parser.add_argument(
         "--out", type=folder_to_write, metavar="FOLDER", help="of report.html and report.json"
@@ -64,42 +60,35 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         action="store_true",
         help="seconds instead of minutes: times that say nothing, small pictures",
     )
-    return parser
+    return parser.parse_args(argv)
 
 
-def run(args: argparse.Namespace, console: Console) -> int:
-    from ..core.report import paper
-
+def run(args: argparse.Namespace) -> None:
     made = args.made
     if made is not None and (args.out is not None or args.results is None):
         raise WrongUse("--from takes --results FOLDER, and no --out")
     if made is None:
         if args.out is None:
             raise WrongUse("--out FOLDER is missing: where to write report.html and report.json")
-        _make(args, console)
+        _make(args)
         made = args.out / "report.json"
     if args.results is not None:
         content = paper.read(made)
         for path in paper.write(content, args.results):
-            console.say(str(path))
-    return 0
+            print(path)
 
 
-def _make(args: argparse.Namespace, console: Console) -> None:
+def _make(args: argparse.Namespace) -> None:
     """Writes report.html and report.json."""
-    import sinew
-
-    from ..core.report import answers, joints, measure, meshes, page, paths, studies, tables
-
     for folder in (args.programs, args.blend_files):
         if folder is not None and not folder.is_dir():
             raise SinewError(f"{folder}: no such folder")
     measurements = None
     if args.programs is not None:
-        measurements = measure.measure(args.programs, args.quick, console.note)
-    console.note("Computing Figures 3.3 to 3.5")
+        measurements = measure.measure(args.programs, args.quick, _note)
+    _note("Computing Figures 3.3 to 3.5")
     plots = (joints.figure_3_3(), paths.figure_3_4(), paths.figure_3_5())
-    pictures = meshes.missing(NO_FILES) if args.blend_files is None else _draw(args, console)
+    pictures = meshes.missing(NO_FILES) if args.blend_files is None else _draw(args)
     figures = (*plots, *pictures)
     build = {} if measurements is None else measurements.build
     content = Page(
@@ -115,27 +104,45 @@ def _make(args: argparse.Namespace, console: Console) -> None:
     missing += [(f"Figure {figure.number}", figure.missing) for figure in content.figures]
     for name, reason in missing:
         if reason is not None:
-            console.note(f"{name}: {reason}")
+            _note(f"{name}: {reason}")
     for path in page.write(content, args.out):
-        console.say(str(path))
+        print(path)
 
 
-def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
-    """Returns figures 3.6 to 3.11, or the reason why this installation cannot draw them."""
-    from ..core.report import meshes
-    from ..prepare import prepare_blender
-
+def _draw(args: argparse.Namespace) -> tuple[Figure, ...]:
+    """Returns figures 3.6 to 3.11, or the reason why they cannot be drawn here."""
     try:
         import PIL  # noqa: F401
 
         prepare_blender()
     except (ImportError, SinewError) as error:
-        return meshes.missing(
-            f"Not drawn in this installation: {error}. Install bpy and pillow and try again."
-        )
-    from ..features.pages import render, report_figures
+        return meshes.missing(f"Not drawn: {error}. Install bpy and pillow and try again.")
+    from sinew_addon.features.pages.render import chosen_engine
 
-    engine = render.chosen_engine(args.engine)
+    from . import figures
+
+    engine = chosen_engine(args.engine)
     size = QUICK_PICTURE_SIZE if args.quick else PICTURE_SIZE
     with scratch_folder() as scratch:
-        return report_figures.figures(args.blend_files, engine, size, scratch, console.note)
+        return figures.figures(args.blend_files, engine, size, scratch, _note)
+
+
+def _note(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def main(argv: list[str]) -> int:
+    """Returns the exit status: 0 all went well, 1 something did not, 2 wrong use."""
+    try:
+        run(parse(argv))
+    except SinewError as error:
+        _note(f"report: {error}")
+        return 2 if isinstance(error, WrongUse) else 1
+    return 0
+
+
+if __name__ == "__main__":
+    status = main(sys.argv[1:])
+    if "bpy" in sys.modules:
+        leave_blender(status)
+    sys.exit(status)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import sinew
+from sinew_addon.core.metrics import volume
 
-from ..metrics import volume
 from .model import Fact, Figure, Picture
 
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)

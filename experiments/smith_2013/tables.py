@@ -22,9 +22,8 @@ CHAIN_TOLERANCE = 1e-5
 # The number of neighbouring angles that are tried, any of which can have given the printed numbers.
 ANGLES = 2000
 HOW_TO_MEASURE = (
-    "Not measured in this installation: it takes programs that are built against GLM and Eigen. In a "
-    "checkout of Sinew, ./dev report builds them and passes them on; sinew report --programs FOLDER takes "
-    "those that are built already."
+    "Not measured: it takes programs that are built against GLM and Eigen, which ./dev report builds and "
+    "passes on."
 )
 
 

@@ -10,7 +10,8 @@ from dataclasses import asdict
 from html import escape
 from pathlib import Path
 
-from ..output import write_text
+from sinew_addon.core.output import write_text
+
 from .model import Answer, Fact, Figure, Page, Picture, Row, Table
 
 TITLE = "Dual quaternions in transformation and interpolation: the report's experiments, done again"

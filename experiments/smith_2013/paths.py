@@ -8,9 +8,9 @@ from types import ModuleType
 
 import numpy as np
 import sinew
+from sinew_addon.core.errors import SinewError
+from sinew_addon.core.plots import new_figure, to_svg
 
-from ..errors import SinewError
-from ..plots import new_figure, to_svg
 from . import printed
 from .model import Fact, Figure, Picture
 
@@ -99,7 +99,7 @@ def figure_3_4() -> Figure:
             ),
         )
     except SinewError as error:
-        return Figure("3.4", title, (), facts, notes, f"Not drawn in this installation: {error}.")
+        return Figure("3.4", title, (), facts, notes, f"Not drawn: {error}.")
     return Figure("3.4", title, pictures, facts, notes)
 
 
@@ -116,7 +116,7 @@ def figure_3_5() -> Figure:
             ),
         )
     except SinewError as error:
-        return Figure("3.5", title, (), facts, (), f"Not drawn in this installation: {error}.")
+        return Figure("3.5", title, (), facts, (), f"Not drawn: {error}.")
     return Figure("3.5", title, pictures, facts)
 
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from ..errors import SinewError
+from sinew_addon.core.errors import SinewError
 
 PROGRAMS = ("operation_counts", "timings_optimised", "timings_unoptimised")
 # The extension of programs.
@@ -82,7 +81,7 @@ def measure(programs: Path, quick: bool, step: Callable[[str], None]) -> Measure
     found = {name: programs.resolve() / f"{name}{SUFFIX}" for name in PROGRAMS}
     for name, program in found.items():
         if not program.is_file():
-            raise SinewError(f"{programs}: has no program {name}; ./dev report builds it in a checkout")
+            raise SinewError(f"{programs}: has no program {name}; ./dev report builds it")
     step("Counting operations")
     counts = json.loads(_output([found["operation_counts"]]))
     step("Timing the report's loops, optimised")

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 import sinew
+from sinew_addon.core.errors import SinewError
+from sinew_addon.core.plots import new_figure, to_svg
 
-from ..errors import SinewError
-from ..plots import new_figure, to_svg
 from .model import Fact, Figure, Picture
 from .paths import in_layout, layout
 
@@ -70,7 +70,7 @@ def figure_3_3() -> Figure:
             )
         )
     except SinewError as error:
-        return Figure("3.3", TITLE, (), (fact,), (), f"Not drawn in this installation: {error}.")
+        return Figure("3.3", TITLE, (), (fact,), (), f"Not drawn: {error}.")
     return Figure("3.3", TITLE, pictures, (fact,))
 
 

@@ -17,7 +17,7 @@ WORTH = 3.0
 
 
 def answers(measurements: Measurements | None, figures: tuple[Figure, ...]) -> tuple[Answer, ...]:
-    """Returns an answer to each question. Answers say what is not measured in this installation."""
+    """Returns an answer to each question. Answers say what is not measured."""
     return (
         _matrices(measurements),
         _worth(measurements, figures),
@@ -49,7 +49,7 @@ def _matrices(measurements: Measurements | None) -> Answer:
         "and 5)"
     )
     if measurements is None:
-        return Answer(question, "Not measured in this installation; see Table 3.4.")
+        return Answer(question, "Not measured; see Table 3.4.")
     held = {table: orders.facts(measurements, table)[:2] for table in orders.TIMED}
     as_reported, fastest = ([table for table, of in held.items() if of[i].agrees] for i in range(2))
     parts = [
@@ -84,7 +84,7 @@ def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> An
     )
     sentences = []
     if measurements is None:
-        sentences.append("What they cost is not measured in this installation; see Table 3.10.")
+        sentences.append("What they cost is not measured; see Table 3.10.")
     else:
         kernels = {
             name: orders.nanoseconds(measurements, "3.10", f"kernel_{name}") for name in ("lbs", "qv", "dq")
@@ -114,7 +114,7 @@ def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> An
     drift = _fact(figures, "3.10", "drift, in widths")
     kept = _fact(figures, "3.11", "radius, dq")
     if thin is None or drift is None or kept is None:
-        sentences.append("What it looks like is not drawn in this installation; see Figures 3.10 and 3.11.")
+        sentences.append("What it looks like is not drawn; see Figures 3.10 and 3.11.")
     else:
         sentences.append(
             f"What it buys: a joint twisted by 170 degrees keeps {kept:.0%} of its radius, {thin:.0%} with "

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import SinewError
-from ..output import write_text
-from ..plots import COLOURS, new_figure, to_svg
+from sinew_addon.core.errors import SinewError
+from sinew_addon.core.output import write_text
+from sinew_addon.core.plots import COLOURS, new_figure, to_svg
 
 NAMES = {"affine": "matrices", "quat_vec": "pairs", "dual_quat": "dual quaternions"}
 _COLOUR = dict(zip(NAMES, COLOURS, strict=False))
@@ -58,7 +58,7 @@ def read(path: Path) -> dict[str, Any]:
     try:
         return digest(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError) as error:
-        raise SinewError(f"{path}: no report.json of sinew report: {error}") from None
+        raise SinewError(f"{path}: no report.json of ./dev report: {error}") from None
     except SinewError as error:
         raise SinewError(f"{path}: {error}") from None
 
@@ -111,7 +111,7 @@ def page(content: Content) -> str:
         "\n\n".join(
             [
                 "# Five results",
-                "<!-- Made by sinew report --results from results.json; edit addon/core/report/paper.py. -->",
+                "<!-- Made by ./dev report --results; edit experiments/smith_2013/paper.py. -->",
                 "M. Smith, *Applications of Dual Quaternions in Three Dimensional Transformation and "
                 "Interpolation* (University of Canterbury, 2013), asks which representation of rigid "
                 "transforms suits animation best: matrices, pairs of a quaternion and a vector, or dual "
@@ -128,9 +128,8 @@ def page(content: Content) -> str:
                 f"{machine.get('optimised', '')} and {machine.get('without optimisation', '')}; load average "
                 f"{machine.get('load average', 'unknown')}. Times are processor times, medians of "
                 "interleaved runs. Random chains have fixed seeds. Every number on this page comes from "
-                "[the measurements](results.json), none is typed by hand: `./dev report` measures, "
-                "and `sinew report --from build/report/report.json --results docs` writes this page and its "
-                "plots.",
+                "[the measurements](results.json), none is typed by hand: `./dev report --results docs` "
+                "measures, and writes this page and its plots.",
                 "To cite this page, use CITATION.cff of the repository and the version above.",
             ]
         )
