@@ -11,13 +11,12 @@ from __future__ import annotations
 import argparse
 import datetime
 import hashlib
-import os
 import re
 import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -177,17 +176,8 @@ def release_folder(root: Path, version: str) -> Path:
 
 
 def write_texts(root: Path, texts: Texts) -> None:
-    """Writes all new files completely before it replaces any old one: a full disk changes none."""
-    unfinished = {name: (root / name).with_name(f".{Path(name).name}.{os.getpid()}") for name in texts}
-    try:
-        for name, path in unfinished.items():
-            path.write_text(texts[name], encoding="utf-8", newline="")
-            shutil.copymode(root / name, path)
-        for name, path in unfinished.items():
-            os.replace(path, root / name)
-    finally:
-        for path in unfinished.values():
-            path.unlink(missing_ok=True)
+    for name, text in texts.items():
+        (root / name).write_text(text, encoding="utf-8", newline="")
 
 
 def build_packages(root: Path) -> list[Path]:
@@ -195,45 +185,30 @@ def build_packages(root: Path) -> list[Path]:
     done = subprocess.run([root / "dev", "package"], cwd=root, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:
         raise fail("./dev package failed; the files have their old text again.")
-    packages = [root / line for line in done.stdout.splitlines() if line.endswith(".zip")]
-    if not packages:
-        raise fail("./dev package named no zip; the files have their old text again.")
-    return packages
+    return [root / line for line in done.stdout.splitlines() if line.endswith(".zip")]
 
 
 def wheels_in(package: Path) -> dict[str, bytes]:
-    try:
-        with zipfile.ZipFile(package) as archive:
-            return {
-                entry.removeprefix("wheels/"): archive.read(entry)
-                for entry in archive.namelist()
-                if re.fullmatch(r"wheels/[^/\\]+\.whl", entry)
-            }
-    except zipfile.BadZipFile:
-        raise fail(
-            f"./dev package made {package.name}, which is no zip; the files have their old text again."
-        ) from None
-
-
-def bill_beside(package: Path) -> Path:
-    """The bill of materials that tools/sbom.py wrote."""
-    path = package.with_suffix(".cdx.json")
-    if not path.exists():
-        raise fail(f"./dev package made no {path.name}; the files have their old text again.")
-    return path
+    with zipfile.ZipFile(package) as archive:
+        return {
+            entry.removeprefix("wheels/"): archive.read(entry)
+            for entry in archive.namelist()
+            if re.fullmatch(r"wheels/[^/\\]+\.whl", entry)
+        }
 
 
 def write_release(folder: Path, packages: list[Path], notes: str) -> None:
     """Writes the zips, their bills of materials, their wheels, the notes, and SHA256SUMS for sha256sum
     --check."""
-    unfinished = folder.with_name(f".{folder.name}.{os.getpid()}")
+    unfinished = folder.with_name(f".{folder.name}.unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
     try:
         unfinished.mkdir(parents=True)
         for package in packages:
             for name, data in wheels_in(package).items():
                 (unfinished / name).write_bytes(data)
-            for path in (package, bill_beside(package)):
+            # The bill of materials is that of tools/sbom.py.
+            for path in (package, package.with_suffix(".cdx.json")):
                 shutil.copyfile(path, unfinished / path.name)
         (unfinished / "NOTES.md").write_text(notes, encoding="utf-8", newline="")
         sums = [
@@ -246,9 +221,7 @@ def write_release(folder: Path, packages: list[Path], notes: str) -> None:
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def prepare(
-    root: Path, version: str, date: str, build: Callable[[Path], list[Path]] = build_packages
-) -> Path:
+def prepare(root: Path, version: str, date: str) -> Path:
     """Makes the release's folder and returns it; after an error, everything is as before."""
     before = read_texts(root)
     obstacles = obstacles_in_checkout(root, version) + obstacles_in_texts(before, version)
@@ -256,9 +229,12 @@ def prepare(
         raise fail(" ".join(obstacles))
     try:
         write_texts(root, edited(before, version, date))
-        write_release(release_folder(root, version), build(root), notes_of(before[CHANGELOG], UNRELEASED))
+        write_release(
+            release_folder(root, version), build_packages(root), notes_of(before[CHANGELOG], UNRELEASED)
+        )
     except BaseException:
-        write_texts(root, before)
+        # The checkout had no changes.
+        git(root, "restore", *FILES)
         raise
     return release_folder(root, version)
 

@@ -13,6 +13,7 @@ import itertools
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -304,7 +305,9 @@ def main() -> None:
     sinew_addon.register()
     for set_up in CASES:
         about, arrays = make(set_up)
-        (folder / f"{set_up.__name__}.json").write_text(json.dumps(about, indent=2) + "\n")
+        # A line for each result and array.
+        text = re.sub(r"\n {6,}|\n {4}(?=})", " ", json.dumps(about, indent=2))
+        (folder / f"{set_up.__name__}.json").write_text(text + "\n")
         np.savez_compressed(folder / f"{set_up.__name__}.npz", **arrays)
         print(f"{folder / set_up.__name__}.npz")
 

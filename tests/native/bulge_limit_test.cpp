@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Protects the kernels of the stage `bulge_limit` on each instruction set against the definition in double,
+// its threads and options.
 #include "sinew/deform/bulge_limit.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,6 @@ namespace {
 
 using test::deformed;
 using test::distance;
-using test::is_finite;
 using test::kTolerance;
 using test::Random;
 using test::random_scene;
@@ -125,22 +125,6 @@ TEST_P(LimitBulge, threads_change_no_bit_and_the_rest_pose_stays) {
     }
 }
 
-TEST(BulgeLimit, what_it_was_made_of_makes_it_anew) {
-    const Scene scene = scene_of_sets(5);
-    const auto segments = segments_of(scene);
-    std::vector<float> weights(scene.rest_points.size(), 0.5f);
-    weights[3] = 7.0f;
-    const BulgeLimit limit({scene.data(), segments, {}, weights});
-    const BulgeLimit::Parts parts = limit.parts();
-    const BulgeLimit again({parts.mesh.data(), parts.segments, parts.bones_from_model, parts.weights});
-    EXPECT_EQ(again.bone_count(), limit.bone_count());
-    auto points = bulging(scene);
-    auto others = points;
-    EXPECT_TRUE(limit.apply(points, scene.posed_from_rest));
-    EXPECT_TRUE(again.apply(others, scene.posed_from_rest));
-    EXPECT_TRUE(points == others);
-}
-
 TEST(BulgeLimit, options_become_valid_and_points_of_another_number_stay) {
     const Scene scene = scene_of_sets(6);
     const auto segments = segments_of(scene);
@@ -157,30 +141,6 @@ TEST(BulgeLimit, options_become_valid_and_points_of_another_number_stay) {
     std::vector<Vec3<float>> few(3, Vec3<float>(9.0f));
     EXPECT_FALSE(limit.apply(few, scene.posed_from_rest));
     EXPECT_TRUE(few == std::vector<Vec3<float>>(3, Vec3<float>(9.0f)));
-}
-
-TEST(BulgeLimit, wrong_data_is_refused) {
-    const Scene scene = scene_of_sets(7);
-    auto segments = segments_of(scene);
-    const auto refused = [&](const BulgeLimitData& data) -> std::string {
-        try {
-            const BulgeLimit limit(data);
-        } catch (const std::invalid_argument& error) {
-            return error.what();
-        }
-        return "";
-    };
-    EXPECT_EQ(refused({scene.data(), std::span(segments).first(2)}),
-              "segments: expected at least 12 bones, got 2");
-    segments[1].tail.y = std::numeric_limits<float>::infinity();
-    EXPECT_EQ(refused({scene.data(), segments}),
-              "segments: expected finite values, got NaN or infinity at bone 1");
-    segments = segments_of(scene);
-    EXPECT_EQ(refused({scene.data(), segments, {Mat3<float>(0.0f), Vec3<float>(0.0f)}}),
-              "bones_from_model: expected an invertible transform, got one of determinant 0");
-    const std::vector<float> weights(3);
-    EXPECT_EQ(refused({scene.data(), segments, {}, weights}),
-              "weights: expected none, or one for each of the 700 vertices, got 3");
 }
 
 }  // namespace

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <atomic>
+// Protects centres of rotation at any size and the cancelling of their computation on threads, and checks of
+// vertex data.
 #include <cmath>
 #include <numbers>
-#include <set>
 #include <stdexcept>
-#include <thread>
 
 #include "scene.h"
 #include "sinew/deform/centres_of_rotation.h"
@@ -13,7 +12,6 @@ namespace sinew {
 namespace {
 
 using test::distance;
-using test::same_bits;
 using test::Scene;
 
 /// A tube of radius 0.5 along x, from 0 to `bones`, with a bone for each unit of length.
@@ -48,57 +46,6 @@ struct Tube {
     }
 };
 
-TEST(Centres, of_a_tube_are_on_its_axis) {
-    const Tube tube(4, 61, 24);
-    for (const bool exact : {false, true}) {
-        const auto centres = tube.centres({0, {}, exact});
-        std::size_t found = 0;
-        for (std::size_t vertex = 0; vertex < centres.size(); ++vertex) {
-            const auto count = tube.scene.offsets[vertex + 1] - tube.scene.offsets[vertex];
-            if (count < 2) continue;
-            ++found;
-            EXPECT_LT(std::hypot(centres[vertex].y, centres[vertex].z), 1e-4) << exact;
-        }
-        EXPECT_GT(found, 500u);
-    }
-}
-
-TEST(Centres, by_cells_are_near_to_those_of_the_definition) {
-    const Tube tube(4, 61, 24);
-    const auto exact = tube.centres({0, {}, true});
-    const auto by_cells = tube.centres();
-    double worst = 0.0;
-    for (std::size_t vertex = 0; vertex < exact.size(); ++vertex) {
-        worst = std::max(worst, distance(exact[vertex], by_cells[vertex]));
-    }
-    RecordProperty("worst", std::to_string(worst * 1e6) + "e-6");
-    EXPECT_LT(worst, 1e-3);  // of the diameter, which is 1
-}
-
-TEST(Centres, of_vertices_of_one_bone_are_these) {
-    Tube tube(3, 31, 12);
-    const auto centres = tube.centres();
-    std::size_t found = 0;
-    for (std::size_t vertex = 0; vertex < centres.size(); ++vertex) {
-        if (tube.scene.offsets[vertex + 1] - tube.scene.offsets[vertex] > 1) continue;
-        ++found;
-        EXPECT_TRUE(same_bits(centres[vertex], tube.scene.rest_points[vertex]));
-    }
-    EXPECT_GT(found, 10u);
-    // Without triangles no two bones have one in common.
-    tube.triangles.clear();
-    EXPECT_TRUE(std::ranges::equal(tube.centres(), tube.scene.rest_points, same_bits<float>));
-}
-
-TEST(Centres, threads_change_no_bit) {
-    const Tube tube(5, 101, 40);
-    const auto expected = tube.centres({1, {}, false});
-    for (const std::size_t threads : {2, 3, 7}) {
-        EXPECT_TRUE(std::ranges::equal(tube.centres({threads, {}, false}), expected, same_bits<float>))
-            << threads;
-    }
-}
-
 TEST(Centres, size_and_origin_go_with_the_mesh) {
     const Tube tube(4, 41, 16);
     const auto expected = tube.centres();
@@ -111,24 +58,6 @@ TEST(Centres, size_and_origin_go_with_the_mesh) {
                       1e-5 * size);
         }
     }
-}
-
-TEST(Centres, progress_rises_on_the_calling_thread) {
-    const Tube tube(5, 201, 40);
-    std::vector<double> shares;
-    std::set<std::thread::id> threads;
-    tube.centres({4,
-                  [&](double done) {
-                      shares.push_back(done);
-                      threads.insert(std::this_thread::get_id());
-                      return true;
-                  },
-                  false});
-    EXPECT_EQ(threads, std::set{std::this_thread::get_id()});
-    ASSERT_GE(shares.size(), 2u);
-    EXPECT_TRUE(std::ranges::is_sorted(shares));
-    EXPECT_EQ(shares.front(), 0.0);
-    EXPECT_EQ(shares.back(), 1.0);
 }
 
 TEST(Centres, progress_cancels_and_throws) {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Protects the kernels of ddm on each instruction set against the definition in double, and the moments that
+// it keeps.
 #if SINEW_WITH_DDM
 
 #include "sinew/skinning/ddm.h"

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The stage `delta_mush` on whole meshes, compared with its definition in double.
+// Protects the stage `delta_mush` on each instruction set against its definition in double, its radius,
+// threads and degenerate meshes.
 #include "sinew/deform/delta_mush.h"
 
 #include <algorithm>
-#include <array>
-#include <limits>
-#include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "polygons.h"
 #include "scene.h"
@@ -190,19 +187,6 @@ TEST_P(Mushes, agree_where_an_edge_of_the_smoothed_points_has_no_length) {
     EXPECT_GT(glm::length(expected[0]), 0.1);
 }
 
-TEST_P(Mushes, keep_faces_at_rest) {
-    Mesh mesh = random_mesh(4, 30);
-    const auto result =
-        mushed(DeltaMush(mesh.topology(), mesh.rest_points, {.iterations = 10}), mesh.rest_points);
-    std::vector<bool> has_face(result.size());
-    for (const std::int32_t vertex : mesh.corners) has_face[static_cast<std::size_t>(vertex)] = true;
-    for (std::size_t v = 0; v < result.size(); ++v) {
-        if (has_face[v]) {
-            ASSERT_LT(distance(result[v], mesh.rest_points[v]), 1e-6f) << v;
-        }
-    }
-}
-
 TEST_P(Mushes, threads_change_no_bit) {
     const Mesh mesh = random_mesh(5, 150);
     const auto points = bent(mesh, 6);
@@ -213,27 +197,6 @@ TEST_P(Mushes, threads_change_no_bit) {
             EXPECT_TRUE(same(mushed(mush, points, 1.0f, threads), expected)) << threads;
         }
     }
-}
-
-TEST_P(Mushes, bound_again_are_as_made_so) {
-    const Mesh mesh = random_mesh(7, 25);
-    const auto points = bent(mesh, 8);
-    const auto weights = weights_of(mesh, 9);
-    DeltaMushSettings other{8, 0.0f, 0.8f, SmoothType::length_weighted, true, weights};
-    auto moved = mesh.rest_points;
-    for (Vec3<float>& point : moved) point = 2.0f * point;
-    DeltaMush mush(mesh.topology(), mesh.rest_points, {.radius = 0.2f});
-    const auto before = mushed(mush, points);
-    mush.bind(moved, other);
-    EXPECT_FALSE(same(mushed(mush, points), before));
-    EXPECT_TRUE(same(mushed(mush, points), mushed(DeltaMush(mesh.topology(), moved, other), points)));
-    mush.bind(mesh.rest_points, {.radius = 0.2f});
-    EXPECT_TRUE(same(mushed(mush, points), before));
-    // An invalid setting changes nothing.
-    EXPECT_THROW(mush.bind(moved, {.factor = 2.0f}), std::invalid_argument);
-    EXPECT_TRUE(same(mushed(mush, points), before));
-    const DeltaMush::Parts parts = mush.parts();
-    EXPECT_TRUE(same(mushed(DeltaMush(parts.topology, parts.rest_points, parts.settings), points), before));
 }
 
 /// A flat square of `size` by `size` vertices with side 1.
@@ -273,20 +236,6 @@ TEST(Radius, is_the_width_of_a_Gaussian_however_dense_the_mesh_is) {
     }
 }
 
-TEST(Radius, says_how_often_it_smooths) {
-    const Mesh mesh = sheet(41);
-    const auto iterations = [&](float radius, float factor) {
-        return DeltaMush(mesh.topology(), mesh.rest_points, {.radius = radius, .factor = factor})
-            .iterations();
-    };
-    // 2 radius^2 / (h^2 factor), h = 1 / 40.
-    EXPECT_EQ(iterations(0.0999f, 0.5f), 64u);
-    EXPECT_EQ(iterations(0.0999f, 1.0f), 32u);
-    EXPECT_EQ(iterations(0.001f, 0.5f), 1u);
-    EXPECT_EQ(iterations(100.0f, 0.5f), 1000u);
-    EXPECT_EQ(iterations(0.1f, 0.0f), 0u);
-}
-
 TEST(DeltaMush, takes_meshes_without_faces_and_without_vertices) {
     std::vector<Vec3<float>> none;
     EXPECT_TRUE(DeltaMush({std::vector<std::int32_t>{0}, {}, {}}, none, {}).apply(none));
@@ -314,50 +263,6 @@ TEST(DeltaMush, has_no_NaN_where_faces_are_degenerate) {
             }
         }
     }
-}
-
-std::string refusal(const auto& make) {
-    try {
-        make();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "nothing thrown";
-}
-
-TEST(DeltaMush, says_what_it_refuses) {
-    const Mesh mesh = sheet(3);
-    const auto with = [&](const DeltaMushSettings& settings) {
-        return refusal([&] { const DeltaMush mush(mesh.topology(), mesh.rest_points, settings); });
-    };
-    EXPECT_EQ(with({}), "nothing thrown");
-    EXPECT_EQ(with({.iterations = 1001}), "iterations: expected at most 1000, got 1001");
-    EXPECT_EQ(with({.radius = -1.0f}), "radius: expected 0 or more, got -1.000000");
-    EXPECT_EQ(with({.factor = 1.5f}), "factor: expected a number from 0 to 1, got 1.500000");
-    const std::array<float, 2> two{};
-    EXPECT_EQ(with({.weights = two}), "weights: expected none, or one for each of the 9 vertices, got 2");
-    std::array<float, 9> weights{};
-    weights[4] = std::numeric_limits<float>::quiet_NaN();
-    EXPECT_EQ(with({.weights = weights}), "weights: expected weights from 0 to 1, got NaN at vertex 4");
-
-    const auto of = [&](const auto& change) {
-        Mesh changed = mesh;
-        change(changed);
-        return refusal([&] { const DeltaMush mush(changed.topology(), changed.rest_points, {}); });
-    };
-    EXPECT_EQ(of([](Mesh& m) { m.offsets.back() = 15; }),
-              "face_offsets: expected to rise from 0 to the 16 corner_vertices, got 0 to 15");
-    EXPECT_EQ(of([](Mesh& m) { m.offsets.clear(); }),
-              "face_offsets: expected to rise from 0 to the 16 corner_vertices, got none");
-    EXPECT_EQ(of([](Mesh& m) { m.corners[3] = 9; }),
-              "corner_vertices: expected vertices from 0 to 8, got 9 at index 3");
-    EXPECT_EQ(of([](Mesh& m) { m.edges[2] = -1; }),
-              "edges: expected vertices from 0 to 8, got -1 at index 2");
-    EXPECT_EQ(of([](Mesh& m) { m.edges.pop_back(); }), "edges: expected two vertices each, got 23 vertices");
-    EXPECT_EQ(of([](Mesh& m) { m.edges.resize(22); }),
-              "edges: expected every edge of each face, got none from vertex 7 to 8");
-    EXPECT_EQ(of([](Mesh& m) { m.rest_points[1].y = std::numeric_limits<float>::infinity(); }),
-              "rest_points: expected finite values, got NaN or infinity at vertex 1");
 }
 
 }  // namespace

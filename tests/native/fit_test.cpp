@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Protects fits of nothing and of what does not decide them, in float and double; tests/python has the
+// oracles.
 #include <vector>
 
 #include "sinew/fit/average.h"
-#include "sinew/fit/hand_eye.h"
 #include "sinew/fit/rigid.h"
 #include "support.h"
 
@@ -20,35 +21,6 @@ protected:
 
 using Scalars = testing::Types<float, double>;
 TYPED_TEST_SUITE(Fit, Scalars);
-
-TYPED_TEST(Fit, every_solver_finds_the_motion_of_points_and_directions) {
-    using T = TypeParam;
-    Random random(1);
-    for (int i = 0; i < 50; ++i) {
-        const QuatVec<double> motion = random.motion(3.0);
-        std::vector<Vec3<T>> source, target;
-        for (int point = 0; point < 5; ++point) {
-            const Vec3<double> at = random.vector(2.0);
-            source.emplace_back(at);
-            target.emplace_back(transform_point(motion, at));
-        }
-        const std::vector<Vec3<T>> from{Vec3<T>(random.vector(1.0))};
-        const std::vector<Vec3<T>> onto{Vec3<T>(rotate(motion.rotation, Vec3<double>(from[0])))};
-        const Pairs<T> pairs{source, target, {}, from, onto, {}};
-        std::apply(
-            [&](auto... solver) {
-                const auto check = [&](const auto& found) {
-                    EXPECT_LT(distance(to_affine(found.transform), cast<T>(to_affine(motion))),
-                              this->kTolerance);
-                    EXPECT_LT(found.error, this->kTolerance);
-                    EXPECT_TRUE(found.is_defined);
-                    EXPECT_FALSE(found.is_mirrored);
-                };
-                (check(decltype(solver)::template fit<T>(pairs)), ...);
-            },
-            RigidFits{});
-    }
-}
 
 TYPED_TEST(Fit, what_does_not_decide_a_rotation_is_finite_and_said) {
     using T = TypeParam;
@@ -69,25 +41,6 @@ TYPED_TEST(Fit, what_does_not_decide_a_rotation_is_finite_and_said) {
             (check(solver), ...);
         },
         RigidFits{});
-}
-
-TYPED_TEST(Fit, hand_eye_finds_where_the_eye_is) {
-    using T = TypeParam;
-    Random random(2);
-    for (int i = 0; i < 50; ++i) {
-        const DualQuat<double> x = to_dual_quat(random.motion(3.0));
-        std::vector<DualQuat<T>> a, b;
-        for (const Vec3<double>& angles : {Vec3<double>(1, 0.2, 0), {0, 0.8, 0.3}, {-0.4, 0.1, 1.5}}) {
-            const DualQuat<double> hand =
-                to_dual_quat(QuatVec<double>{quat_from_rotation_vector(angles), random.vector(2.0)});
-            a.push_back(cast<T>(hand));
-            b.push_back(cast<T>(-(inverse(x) * hand * x)));
-        }
-        const auto found = hand_eye<T>(a, b);
-        EXPECT_TRUE(found.is_defined);
-        EXPECT_LT(distance(to_affine(found.transform), cast<T>(to_affine(x))), this->kTolerance);
-        EXPECT_FALSE(hand_eye<T>(std::span(a).first(1), std::span(b).first(1)).is_defined);
-    }
 }
 
 TYPED_TEST(Fit, averages_leave_outliers_out_where_asked) {

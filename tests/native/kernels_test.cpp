@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Protects the kernels of each method on each instruction set: against the definition in double, in any order
+// of vertices, to the bit where they must agree.
 #include <algorithm>
 #include <cmath>
 #include <numeric>

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Deformers that share a binding, and the stage `mix`.
+// Protects the stage `mix` of each two methods on each instruction set.
 #include "sinew/skinning/mix.h"
 
 #include <algorithm>
 #include <limits>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <tuple>
 
@@ -144,83 +143,6 @@ TEST(Mix, weights_beyond_0_to_1_are_clamped) {
     for (std::size_t v = 0; v < points.size(); ++v) {
         ASSERT_TRUE(same_bits(points[v], v < 100 ? dq[v] : lbs[v])) << v;
     }
-}
-
-TEST(Mix, says_what_it_was_made_of) {
-    const Scene scene = random_scene(10, 3, 1.0);
-    const std::vector<float> weights(3, 0.5f);
-    const Binding binding(scene.data());
-    EXPECT_EQ(Deformer(binding, Lbs::info).mixed_method(), nullptr);
-    const Deformer deformer(binding, Lbs::info, MixData{Dq::info, weights});
-    EXPECT_EQ(deformer.method(), Lbs::info);
-    EXPECT_EQ(*deformer.mixed_method(), Dq::info);
-}
-
-template <class Call>
-std::string refusal(const Call& call) {
-    try {
-        call();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "nothing thrown";
-}
-
-TEST(Mix, refuses_what_it_can_not_mix) {
-    const Scene scene = random_scene(11, 3, 1.0);
-    const Binding binding(scene.data());
-    const auto with = [&](const MethodInfo& method, const std::vector<float>& weights) {
-        return refusal([&] { const Deformer deformer(binding, Lbs::info, MixData{method, weights}); });
-    };
-    EXPECT_EQ(with(Dq::info, {0, 1, 0}), "nothing thrown");
-    EXPECT_EQ(with(Dq::info, {0, 1}), "mix: expected a weight for each of the 3 vertices, got 2");
-    EXPECT_EQ(with(Dq::info, {0, std::numeric_limits<float>::quiet_NaN(), 0}),
-              "mix: expected weights from 0 to 1, got NaN at vertex 1");
-    std::string names;
-    for (const MethodInfo& method : kMethods) names += (names.empty() ? "" : ", ") + std::string(method.name);
-    const std::string message = ": expected one of " + names + ", got a method of number 1000";
-    const MethodInfo unknown{1000, "none", "", MethodGroup::blender, "", "", Needs::nothing};
-    EXPECT_EQ(with(unknown, {0, 1, 0}), "mix" + message);
-    EXPECT_EQ(refusal([&] { const Deformer deformer(binding, unknown); }), "method" + message);
-}
-
-TEST(Bindings, are_shared_by_deformers_that_differ_in_nothing_from_others) {
-    const Scene scene = random_scene(12, 700, 1.0);
-    const Binding binding(scene.data());
-    EXPECT_EQ(binding.vertex_count(), 700u);
-    EXPECT_EQ(binding.bone_count(), 12u);
-    EXPECT_EQ(binding.influence_count(), scene.bones.size());
-    for (const MethodInfo& method : kMethods) {
-        const auto points = deformed(Deformer(binding, method), scene);
-        const auto expected = deformed(Deformer(scene.data(), method), scene);
-        EXPECT_TRUE(std::ranges::equal(points, expected, same_bits<float>)) << method.name;
-    }
-}
-
-TEST(Bindings, outlive_their_own_name) {
-    const Scene scene = random_scene(13, 100, 1.0);
-    const auto make = [&] {
-        const Binding binding(scene.data());
-        return Deformer(binding, Dq::info);
-    };
-    const Deformer deformer = make();
-    const auto expected = deformed(Deformer(scene.data(), Dq::info), scene);
-    EXPECT_TRUE(std::ranges::equal(deformed(deformer, scene), expected, same_bits<float>));
-}
-
-TEST(Bindings, new_rest_points_are_those_of_one_deformer) {
-    const Scene scene = random_scene(14, 300, 1.0);
-    Scene other = scene;
-    for (Vec3<float>& point : other.rest_points) point = 0.5f * point + Vec3<float>(0, 1, 0);
-    const Binding binding(scene.data());
-    Deformer changed(binding, Dq::info);
-    const Deformer unchanged(binding, Dq::info);
-    const auto before = deformed(unchanged, scene);
-    changed.set_rest_points(other.rest_points);
-    EXPECT_TRUE(std::ranges::equal(deformed(unchanged, scene), before, same_bits<float>));
-    EXPECT_TRUE(std::ranges::equal(deformed(Deformer(binding, Dq::info), scene), before, same_bits<float>));
-    const auto expected = deformed(Deformer(other.data(), Dq::info), other);
-    EXPECT_TRUE(std::ranges::equal(deformed(changed, scene), expected, same_bits<float>));
 }
 
 }  // namespace

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Normals of whole meshes, compared with their definition in double.
+// Protects normals of whole meshes on each instruction set and on threads: all have the same bits, which
+// tests/python/test_normals.py compares with the definition.
 #include "sinew/deform/normals.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <numeric>
-#include <stdexcept>
 #include <string>
 
 #include "polygons.h"
 #include "scene.h"
 #include "sinew/deform/simd.h"
-#include "sinew/skinning/delta_mush.h"
 
 namespace sinew {
 namespace {
@@ -27,11 +24,6 @@ using test::same_bits;
 using Point = Vec3<double>;
 
 constexpr NormalDomain kDomains[] = {NormalDomain::vertex, NormalDomain::corner, NormalDomain::face};
-
-Point unit(const Point& v) {
-    const double length = glm::length(v);
-    return length > 0.0 ? v / length : Point(0.0);
-}
 
 struct Flags {
     std::vector<std::uint8_t> edges;
@@ -61,90 +53,6 @@ Flags with_custom(Flags flags, const Mesh& mesh) {
     }
     return flags;
 }
-
-/// The normals by the definition, in double, one face and corner after the other.
-class Reference {
-public:
-    Reference(const Mesh& mesh, const Flags& flags) : mesh_(mesh), fans_(mesh.corners.size()) {
-        std::iota(fans_.begin(), fans_.end(), std::size_t{0});
-        std::map<std::pair<std::int32_t, std::int32_t>, std::vector<std::size_t>> users;
-        std::set<std::pair<std::int32_t, std::int32_t>> sharp;
-        for (std::size_t edge = 0; edge < flags.edges.size(); ++edge) {
-            if (flags.edges[edge] != 0)
-                sharp.insert(std::minmax(mesh.edges[2 * edge], mesh.edges[2 * edge + 1]));
-        }
-        for_each_corner([&](std::size_t face, std::size_t, std::size_t corner, std::size_t after) {
-            const auto edge = std::minmax(mesh.corners[corner], mesh.corners[after]);
-            users[edge].push_back(corner);
-            if (!flags.faces.empty() && flags.faces[face] != 0) sharp.insert(edge);
-            next_.push_back(after);
-        });
-        for (const auto& [edge, corners] : users) {
-            if (corners.size() != 2 || sharp.contains(edge)) continue;
-            if (mesh.corners[corners[0]] == mesh.corners[corners[1]]) continue;
-            join(corners[0], next_[corners[1]]);
-            join(next_[corners[0]], corners[1]);
-        }
-    }
-
-    [[nodiscard]] std::vector<Point> compute(NormalDomain domain, std::span<const Vec3<float>> points) const {
-        std::vector<Point> faces(mesh_.offsets.size() - 1, Point(0.0));
-        const auto at = [&](std::size_t corner) {
-            return Point(points[static_cast<std::size_t>(mesh_.corners[corner])]);
-        };
-        // This sum of cross products equals Newell's; relative to a corner of the face it loses fewer digits.
-        for_each_corner([&](std::size_t face, std::size_t, std::size_t corner, std::size_t after) {
-            const Point origin = at(static_cast<std::size_t>(mesh_.offsets[face]));
-            faces[face] += glm::cross(at(corner) - origin, at(after) - origin);
-        });
-        for (Point& normal : faces) normal = normal == Point(0.0) ? Point(0.0, 0.0, 1.0) : unit(normal);
-        if (domain == NormalDomain::face) return faces;
-        std::vector<Point> sums(domain == NormalDomain::vertex ? points.size() : fans_.size(), Point(0.0));
-        std::vector<int> counts(sums.size());
-        const auto group = [&](std::size_t corner) {
-            return domain == NormalDomain::vertex ? static_cast<std::size_t>(mesh_.corners[corner])
-                                                  : fans_[corner];
-        };
-        for_each_corner([&](std::size_t face, std::size_t before, std::size_t corner, std::size_t after) {
-            const double cosine = glm::dot(unit(at(before) - at(corner)), unit(at(after) - at(corner)));
-            sums[group(corner)] += DeltaMushStage::angle(cosine) * faces[face];
-            ++counts[group(corner)];
-        });
-        for (std::size_t i = 0; i < points.size() && domain == NormalDomain::vertex; ++i) {
-            if (counts[i] == 0) sums[i] = Point(points[i]);
-        }
-        std::vector<Point> normals(domain == NormalDomain::vertex ? points.size() : mesh_.corners.size());
-        for (std::size_t i = 0; i < points.size() && domain == NormalDomain::vertex; ++i)
-            normals[i] = unit(sums[i]);
-        if (domain == NormalDomain::vertex) return normals;
-        for_each_corner([&](std::size_t face, std::size_t, std::size_t corner, std::size_t) {
-            normals[corner] = counts[fans_[corner]] == 1 ? faces[face] : unit(sums[fans_[corner]]);
-        });
-        return normals;
-    }
-
-private:
-    /// Calls call(face, the corner before, the corner, the one after it).
-    template <class Call>
-    void for_each_corner(const Call& call) const {
-        for (std::size_t face = 0; face + 1 < mesh_.offsets.size(); ++face) {
-            const auto begin = static_cast<std::size_t>(mesh_.offsets[face]);
-            const auto count = static_cast<std::size_t>(mesh_.offsets[face + 1]) - begin;
-            for (std::size_t i = 0; i < count; ++i) {
-                call(face, begin + (i + count - 1) % count, begin + i, begin + (i + 1) % count);
-            }
-        }
-    }
-
-    void join(std::size_t a, std::size_t b) {
-        const std::size_t from = fans_[a], to = fans_[b];
-        std::ranges::replace(fans_, from, to);
-    }
-
-    const Mesh& mesh_;
-    std::vector<std::size_t> fans_;  // for each corner, one of its fan's corners
-    std::vector<std::size_t> next_;
-};
 
 std::vector<Vec3<float>> computed(const Normals& normals, NormalDomain domain,
                                   std::span<const Vec3<float>> points, std::size_t threads = 0) {
@@ -188,26 +96,6 @@ protected:
 INSTANTIATE_TEST_SUITE_P(every, NormalKernels, testing::ValuesIn(simd_targets()),
                          [](const auto& info) { return std::string(info.param); });
 
-TEST_P(NormalKernels, agree_with_the_definition_in_double) {
-    for (const Mesh& mesh : {random_mesh(1, 20), mesh_with_large_faces()}) {
-        for (const Flags& flags : {Flags{}, random_flags(mesh, 0.1, 0.05), random_flags(mesh, 0.5, 0.3),
-                                   random_flags(mesh, 0.0, 1.0)}) {
-            const Reference reference(mesh, flags);
-            const Normals normals = normals_of(mesh, flags);
-            for (const NormalDomain domain : kDomains) {
-                // If nothing is sharp, corners have the normals of their vertices, which may have several fans.
-                if (domain == NormalDomain::corner && normals.domain() == NormalDomain::vertex) continue;
-                const auto expected = reference.compute(domain, mesh.rest_points);
-                const auto result = computed(normals, domain, mesh.rest_points);
-                ASSERT_EQ(result.size(), expected.size());
-                for (std::size_t i = 0; i < result.size(); ++i) {
-                    ASSERT_LT(distance(Point(result[i]), expected[i]), 2e-5) << i;
-                }
-            }
-        }
-    }
-}
-
 TEST_P(NormalKernels, have_the_bits_of_any_other) {
     const Mesh mesh = mesh_with_large_faces();
     // With nearly all edges sharp, most corners are fans by themselves.
@@ -230,16 +118,6 @@ TEST_P(NormalKernels, threads_change_no_bit) {
         for (const std::size_t threads : {0, 2, 3, 8}) {
             EXPECT_TRUE(same(computed(normals, domain, mesh.rest_points, threads), expected)) << threads;
         }
-    }
-}
-
-TEST_P(NormalKernels, corners_of_a_smooth_mesh_have_the_normals_of_their_vertices) {
-    const Mesh mesh = random_mesh(6, 30);
-    const Normals normals = normals_of(mesh);
-    const auto vertices = computed(normals, NormalDomain::vertex, mesh.rest_points);
-    const auto corners = computed(normals, NormalDomain::corner, mesh.rest_points);
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-        ASSERT_TRUE(same_bits(corners[i], vertices[static_cast<std::size_t>(mesh.corners[i])])) << i;
     }
 }
 
@@ -369,34 +247,6 @@ TEST(Normals, write_nothing_where_sizes_do_not_fit) {
     EXPECT_FALSE(normals.compute(NormalDomain::vertex, std::span(mesh.rest_points).first(3), result));
     EXPECT_FALSE(normals.compute(NormalDomain::corner, mesh.rest_points, result));
     for (const auto& normal : result) ASSERT_EQ(normal, Vec3<float>(7.0f));
-}
-
-TEST(Normals, say_what_they_were_made_of) {
-    const Mesh mesh = random_mesh(8, 20);
-    const Normals normals = normals_of(mesh, with_custom(random_flags(mesh, 0.1, 0.1), mesh));
-    const Normals::Parts parts = normals.parts();
-    const Normals copy(parts.topology, parts.vertex_count, parts.sharpness);
-    for (const NormalDomain domain : kDomains) {
-        EXPECT_TRUE(
-            same(computed(copy, domain, mesh.rest_points), computed(normals, domain, mesh.rest_points)));
-    }
-}
-
-TEST(Normals, refuse_what_does_not_fit) {
-    const Mesh mesh = random_mesh(8, 6);
-    const std::vector<std::uint8_t> one{1};
-    const std::size_t count = mesh.rest_points.size();
-    const std::vector<std::uint8_t> faces(mesh.offsets.size() - 1, 0);
-    auto one_flat = faces;
-    one_flat[0] = 1;
-    EXPECT_THROW(Normals(mesh.topology(), count - 30), std::invalid_argument);
-    EXPECT_THROW(Normals(mesh.topology(), count, {one, {}}), std::invalid_argument);
-    EXPECT_THROW(Normals(mesh.topology(), count, {{}, one}), std::invalid_argument);
-    const std::vector<std::int16_t> numbers(mesh.corners.size());
-    EXPECT_THROW(Normals(mesh.topology(), count, {{}, {}, numbers}), std::invalid_argument);
-    EXPECT_NO_THROW(Normals({mesh.offsets, mesh.corners, {}}, count, {{}, faces}));
-    // Fans need the edges.
-    EXPECT_THROW(Normals({mesh.offsets, mesh.corners, {}}, count, {{}, one_flat}), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Meshes of polygons for tests of stages that need faces.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Meshes and poses for tests of kernels, and the definition of each method in any scalar, their oracle.
 #pragma once
 
 #include <cstddef>

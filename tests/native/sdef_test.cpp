@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Spherical deform, and parameters of methods, since it has one.
+// Protects the kernels of sdef on each instruction set, its definition against that of mmd_tools, and
+// parameters of methods.
 #include "sinew/skinning/sdef.h"
 
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "scene.h"
@@ -12,11 +12,9 @@
 namespace sinew {
 namespace {
 
-using test::about;
 using test::deformed;
 using test::distance;
 using test::in_double;
-using test::is_finite;
 using test::kTolerance;
 using test::Random;
 using test::random_scene;
@@ -77,44 +75,6 @@ TEST_P(EveryTarget, kernel_agrees_with_the_definition) {
     }
 }
 
-TEST_P(EveryTarget, bones_may_have_another_space) {
-    const Scene scene = scene_of_pairs(7, true);
-    Random random(8);
-    const Affine<double> bones_from_model = to_affine(random.motion(1.0)) * test::scaling<double>({2, 2, 2});
-    Scene moved = scene;
-    moved.transform(cast<float>(inverse(bones_from_model)));
-    const auto points =
-        deformed(Deformer(moved.data(), Sdef::info), moved, {cast<float>(bones_from_model), 0, kSlerp});
-    auto expected = in_double(Sdef::info, scene, kSlerp);
-    for (Vec3<double>& point : expected) point = transform_point(inverse(bones_from_model), point);
-    EXPECT_LT(largest_error(points, expected), 4.0 * kTolerance);
-}
-
-TEST_P(EveryTarget, opposite_quaternions_and_half_turns_are_finite) {
-    Scene scene;
-    scene.posed_from_rest = {Affine<float>{}};
-    for (const double degrees : {179.999, 180.0, 180.001, 359.999, 360.0}) {
-        scene.posed_from_rest.push_back(
-            cast<float>(to_affine(QuatVec<double>{about<double>({1, 2, 3}, degrees), {1, 2, 3}})));
-    }
-    scene.rest_bones.resize(scene.posed_from_rest.size());
-    Random random(9);
-    for (std::int32_t bone = 1; bone < 6; ++bone) {
-        for (int i = 0; i <= 20; ++i) {
-            const float weight = 0.05f * static_cast<float>(i);
-            scene.add_vertex(Vec3<float>(random.vector(1.0)), {{0, 1.0f - weight}, {bone, weight}});
-        }
-    }
-    const Deformer deformer(scene.data(), Sdef::info);
-    for (const std::span<const double> by : {std::span(kNlerp), std::span(kSlerp)}) {
-        for (const Vec3<float>& point : deformed(deformer, scene, {{}, 0, by})) {
-            ASSERT_TRUE(is_finite(point));
-            // The bound for rotations about points within 1 of the origin, which move by at most (1, 2, 3).
-            EXPECT_LT(glm::length(point), 10.0f);
-        }
-    }
-}
-
 // mmd_tools: R(v - C) + w0 M0 cr0 + w1 M1 cr1 with matrices of whole motions.
 TEST(Sdef, definition_is_that_of_mmd_tools) {
     Random random(10);
@@ -141,40 +101,6 @@ TEST(Sdef, definition_is_that_of_mmd_tools) {
     }
 }
 
-TEST(Sdef, slerp_is_at_even_speed) {
-    const Quat<double> turn = about<double>({0, 0, 1}, 160.0);
-    const std::vector<Sdef::Bone<double>> bones{{{}, {}, false}, {{turn, Vec3<double>(0.0)}, {}, false}};
-    const double spheres[] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 1.0};
-    for (const double weight : {0.1, 0.25, 0.7}) {
-        const std::vector<Influence<double>> influences{{0, 1.0 - weight}, {1, weight}};
-        const auto point = Sdef::deform_vertex<double>(bones, influences, {1, 0, 0}, spheres, kSlerp);
-        EXPECT_NEAR(glm::degrees(std::atan2(point.y, point.x)), 160.0 * weight, 1e-9);
-        const auto by_nlerp = Sdef::deform_vertex<double>(bones, influences, {1, 0, 0}, spheres, kNlerp);
-        EXPECT_GT(distance(point, by_nlerp), 0.02);
-    }
-}
-
-TEST(Sdef, vertices_without_data_or_of_other_numbers_of_bones_are_blended_linearly) {
-    Scene scene = scene_of_pairs(11, true);
-    const auto linear = in_double(Lbs::info, scene);
-    const auto points = deformed(Deformer(scene.data(), Sdef::info), scene);
-    std::size_t spherical = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        const bool has_two = scene.offsets[i + 1] - scene.offsets[i] == 2;
-        const bool is_used = scene.vertex_numbers[Scene::kVertexNumbers * i + 9] != 0.0f;
-        const double difference = distance(Vec3<double>(points[i]), linear[i]);
-        if (has_two && is_used) {
-            spherical += difference > 0.01 ? 1 : 0;
-        } else {
-            EXPECT_LT(difference, 4.0 * kTolerance);
-        }
-    }
-    EXPECT_GT(spherical, 300u);
-    BindData without = scene.data();
-    without.vertex_data = {};
-    EXPECT_LT(largest_error(deformed(Deformer(without, Sdef::info), scene), linear), 4.0 * kTolerance);
-}
-
 TEST(Parameters, those_not_given_or_out_of_range_have_valid_values) {
     const Scene scene = scene_of_pairs(12, false);
     const Deformer deformer(scene.data(), Sdef::info);
@@ -189,24 +115,6 @@ TEST(Parameters, those_not_given_or_out_of_range_have_valid_values) {
     EXPECT_TRUE(by({-5.0}) == nlerp);
     EXPECT_TRUE(by({std::nan("")}) == nlerp);
     EXPECT_TRUE(by({99.0, 3.0}) == slerp);
-}
-
-TEST(Parameters, the_method_of_the_mix_has_its_own) {
-    const Scene scene = scene_of_pairs(13, false);
-    const std::vector<float> all(scene.rest_points.size(), 1.0f);
-    const std::vector<float> half(scene.rest_points.size(), 0.5f);
-    const Binding binding(scene.data());
-    const Deformer alone(binding, Sdef::info);
-    const auto slerp = deformed(alone, scene, {{}, 0, kSlerp});
-    const Deformer taken_over(binding, Dq::info, MixData{Sdef::info, all});
-    EXPECT_TRUE(deformed(taken_over, scene, {{}, 0, {}, kSlerp}) == slerp);
-    EXPECT_TRUE(deformed(taken_over, scene, {{}, 0, kSlerp}) != slerp);
-    const Deformer both(binding, Sdef::info, MixData{Sdef::info, half});
-    const auto nlerp = deformed(alone, scene);
-    const auto between = deformed(both, scene, {{}, 0, kNlerp, kSlerp});
-    for (std::size_t i = 0; i < between.size(); ++i) {
-        ASSERT_LT(distance(between[i], 0.5f * (nlerp[i] + slerp[i])), 1e-6f);
-    }
 }
 
 }  // namespace

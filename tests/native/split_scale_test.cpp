@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Protects the split of a bone's motion into a rotation and its scale, by Blender's rules, for every
+// degenerate scale.
 #include "sinew/transform/split_scale.h"
 
 #include <string>
@@ -45,14 +47,6 @@ TEST(SplitScale, rigid_stays_rigid_to_the_bit) {
     }
 }
 
-TEST(SplitScale, rigid_in_float_stays_rigid) {
-    Random random(2);
-    for (int i = 0; i < 50; ++i) {
-        const Affine<float> motion = to_affine(cast<float>(random.motion(3.0)));
-        EXPECT_FALSE(split_scale(motion, to_affine(cast<float>(random.motion(3.0)))).has_scale);
-    }
-}
-
 TEST(SplitScale, small_stretch_is_a_scale) {
     const Affine<double> bone = tilted_bone();
     EXPECT_TRUE(split_scale(posed({}, scaling<double>({1.001, 1, 1}), bone), bone).has_scale);
@@ -89,13 +83,6 @@ TEST(SplitScale, scale_along_the_axes_is_found_again) {
     EXPECT_LT(distance(split.scale, bone * scale * inverse(bone)), 1e-14);
 }
 
-TEST(SplitScale, the_bones_head_does_not_move_by_its_scale) {
-    const Affine<double> bone = tilted_bone();
-    const Affine<double> motion = to_affine(QuatVec<double>{about<double>({3, -1, 2}, 130.0), {1, 2, 3}});
-    const ScaleSplit<double> split = split_scale(posed(motion, scaling<double>({0.5, 3, -2}), bone), bone);
-    EXPECT_LT(distance(transform_point(split.scale, bone.translation), bone.translation), 1e-14);
-}
-
 TEST(SplitScale, shear_keeps_the_direction_of_y) {
     const Affine<double> bone = tilted_bone();
     Affine<double> shear;
@@ -123,15 +110,6 @@ TEST(SplitScale, zero_axes_give_a_rotation_and_no_nan) {
             expect_good_split(posed(motion, scale, bone), bone, label);
             expect_good_split(posed({}, scale, bone), bone, label + ", unmoved");
         }
-    }
-}
-
-TEST(SplitScale, quat_of_columns_is_that_of_a_rotation) {
-    Random random(5);
-    for (int i = 0; i < 200; ++i) {
-        const Quat<double> expected = random.motion(1.0).rotation;
-        const Quat<double> got = quat_of_columns(to_mat3(expected));
-        EXPECT_NEAR(std::abs(glm::dot(expected, got)), 1.0, 1e-14) << i;
     }
 }
 

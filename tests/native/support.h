@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Random numbers, distances and checks that all C++ tests use.
 #pragma once
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <random>
-#include <utility>
 #include <vector>
 
 #include "sinew/skinning/influence.h"

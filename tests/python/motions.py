@@ -31,9 +31,6 @@ LAYOUT_OF = {
     "dib": "dual_quat",
 }
 
-# Rotations and translations for which quotients of small numbers, or signs, fail first.
-ANGLES = [0.0, 1e-30, 1e-12, 1e-7, 1e-4, 0.0199, 0.0201, 1.0, 3.0, np.pi - 1e-5, np.pi]
-
 
 def rigid(rng, count=None, extent=2.0):
     """A RigidTransform of scipy, one or `count`."""
@@ -66,26 +63,6 @@ def matrix(array, name):
     else:
         result = RigidTransform.from_dual_quat(flat, scalar_first=True).as_matrix()
     return result.reshape(*array.shape[:-1], 4, 4)
-
-
-def hat(twist):
-    """The 4x4 matrix of an element of se(3)."""
-    x, y, z, *linear = twist
-    result = np.zeros((4, 4))
-    result[:3, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
-    result[:3, 3] = linear
-    return result
-
-
-def edge_motions():
-    """RigidTransforms by every angle in ANGLES about five axes, each with two translations and without."""
-    rotations, translations = [], []
-    for angle in ANGLES:
-        for axis in ([1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, -0.8, 0], [0.48, 0.6, -0.64]):
-            for translation in ([0, 0, 0], [1, 2, 3], [0.96, 1.2, -1.28]):
-                rotations.append(angle * np.array(axis, np.float64))
-                translations.append(translation)
-    return RigidTransform.from_components(np.array(translations, np.float64), Rotation.from_rotvec(rotations))
 
 
 def numbers(extent):

@@ -67,18 +67,6 @@ def test_every_form_of_the_same_numbers_gives_the_same_bits(form):
     )
 
 
-def test_halves_and_integers_are_numbers():
-    points = np.float16([[0, 1, 2], [0.5, 0.25, 8]])
-    for given in (points, points.astype(np.float32), points.tolist()):
-        deformer = sinew.Deformer(given, [0, 0, 1], [True], [3])
-        np.testing.assert_array_equal(deformer.deform(np.int8([np.eye(4)] * 2)), points)
-
-
-def test_a_mesh_without_influences_may_be_of_empty_lists():
-    deformer = sinew.Deformer([[1, 2, 3]], [0, 0], [], [])
-    np.testing.assert_array_equal(deformer.deform(np.zeros((0, 4, 4))), [[1, 2, 3]])
-
-
 @pytest.mark.parametrize(
     ("dtypes", "promoted"),
     [

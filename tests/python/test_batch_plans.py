@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from sinew_addon.core.errors import SinewError, WrongUse
-from sinew_addon.core.names import fits
 from sinew_addon.jobs.inputs import plan_jobs
 from sinew_addon.jobs.job_file import ObjectRule, Settings, read_job_file
 from sinew_addon.jobs.job_schema import job_schema, markdown
@@ -129,13 +128,6 @@ def test_bakes_beside_copies_are_not_inputs(studio):
     (studio / NAME).touch()
     assert set(planned(["chars"])) == set(planned(["chars/**/*.blend"])) == found
     assert set(planned(["chars/hero.baked.blend"])) == {"chars/hero.baked.blend"}
-
-
-def test_names_and_patterns_of_names():
-    assert fits("Cape.001", "Cape*")
-    assert fits("Arm[1]", "Arm[1]")
-    assert fits("Arm1", "Arm[1]")
-    assert not fits("cape", "Cape")
 
 
 def test_copies_of_an_earlier_run_are_not_inputs(studio):

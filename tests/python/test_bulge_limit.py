@@ -58,18 +58,6 @@ def test_bones_may_have_another_space(form):
 
 
 @every_form
-def test_other_rest_points_are_as_if_bound_to_them(form):
-    rig = random_rig(4)
-    heads, tails = bones_of(rig)
-    points = rig.deform("dq") * np.float32(1.3)
-    other = rig.rest_points * np.float32(0.5)
-    limit = sinew.BulgeLimit(*rig.mesh, heads, tails)
-    limit.set_rest_points(other)
-    expected = sinew.BulgeLimit(other, *rig.mesh[1:], heads, tails).apply(points, rig.transforms, form=form)
-    np.testing.assert_array_equal(limit.apply(points, rig.transforms, form=form), expected)
-
-
-@every_form
 def test_rest_poses_and_rigid_motions_change_nothing(form):
     rig = random_rig(5)
     limit = sinew.BulgeLimit(*rig.mesh, *bones_of(rig))

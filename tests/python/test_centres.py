@@ -8,9 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import reference
 import sinew
-from rigs import about, translation
 from tube import TABLE, Tube, numbers, three_bones
 
 SIGMA = 0.1
@@ -73,25 +71,6 @@ def test_centres_are_those_of_the_definition(tube):
     # Relative to the diameter, which is 1.
     assert np.linalg.norm(tube.centres(exact=True) - expected, axis=1).max() < 1e-5
     assert np.linalg.norm(tube.centres() - expected, axis=1).max() < 0.005
-
-
-def test_points_are_those_of_the_definition():
-    tube, rng = three_bones(), np.random.default_rng(1)
-    motions = []
-    for joint in (0.0, 1.4, 2.8):
-        axis, degrees = rng.normal(size=3), rng.uniform(-100.0, 100.0)
-        motions.append(translation([0, 0, joint]) @ about(axis, degrees) @ translation([0, 0, -joint]))
-    motions = np.array(motions, np.float32)
-    centres = tube.centres(exact=True)
-    points = sinew.Deformer(*tube.mesh, "cor", vertex_data={"cor": centres}).deform(motions)
-    weights = tube.weights / tube.weights.sum(axis=1, keepdims=True)
-    defined = defined_centres(tube.points, weights, tube.triangles)
-    rigid = np.isnan(defined[:, 0])
-    defined[rigid] = tube.points[rigid]
-    expected, margins = reference.deform("cor", *tube.mesh, motions, vertex_data={"cor": defined})
-    assert (margins > 1e-3).all()
-    diagonal = np.linalg.norm(np.ptp(tube.points, axis=0))
-    assert np.linalg.norm(points - expected, axis=1).max() < 1e-5 * diagonal
 
 
 def test_bones_of_a_vertex_may_come_twice_and_in_any_order():

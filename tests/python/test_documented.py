@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every command in the documents exists and is run by a test, most of them here, as written."""
+"""Protects the commands of `sinew` in the documents: each exists with its options, and runs as written."""
 
 from __future__ import annotations
 
@@ -26,21 +26,6 @@ DOCUMENTS = [
 ]
 PROGRAMS = Path(sys.executable).parent
 
-# For commands that this file can not run: the test that runs them, which must contain the command. Every
-# other command must be in a block, or be run by ./dev test.
-ELSEWHERE = {
-    "sinew reskin --scheduler": "tests/blender/test_cluster.py",
-    "sinew check --blender": "tests/blender/test_check.py",
-    "sinew ik": "tests/blender/test_ik.py",
-    "dask scheduler": "tests/blender/test_cluster.py",
-    "dask worker": "tests/blender/test_cluster.py",
-    "pytest --sinew-update": "tests/blender/test_compare.py",
-    "./dev test": ".ci/run",
-    "./dev fuzz": "tests/blender/test_fuzz.py",
-    "./dev walk": "tests/blender/test_walk.py",
-    "./dev soak": "tests/blender/test_soak.py",
-}
-
 
 class Command(NamedTuple):
     """words: the command without prompt, preceding pipe and description; whole: with arguments, so that
@@ -51,25 +36,19 @@ class Command(NamedTuple):
     words: tuple[str, ...]
     whole: bool
 
-    @property
-    def name(self) -> str:
-        return " ".join(self.words[:2])
-
 
 def commands_in(path: Path) -> list[Command]:
     found = []
     # A line that ends with a backslash continues.
     text = re.sub(r" *\\\n *", " ", path.read_text(encoding="utf-8"))
     for line in text.splitlines():
-        block = re.match(r" {4,}(?:find .*\| )?((?:sinew|\./dev|dask) .*)", line)
+        block = re.match(r" {4,}(?:find .*\| )?(sinew .*)", line)
         if block:
             # A description follows after two spaces.
             text = re.split(r"\s{2,}", block[1])[0]
             found.append(Command(path.name, line.strip(), tuple(shlex.split(text)), whole=True))
             continue
-        for text in re.findall(
-            r"`((?:\.venv/bin/)?(?:sinew|\./dev|dask|pytest|blender --command sinew)(?: [^`]+)?)`", line
-        ):
+        for text in re.findall(r"`((?:\.venv/bin/)?(?:blender --command )?sinew(?: [^`]+)?)`", line):
             words = text.replace(".venv/bin/", "").replace("blender --command ", "").split()
             if len(words) > 1 and words[1] != "…":
                 found.append(Command(path.name, text, tuple(words), whole=False))
@@ -80,23 +59,10 @@ COMMANDS = [command for path in DOCUMENTS for command in commands_in(path)]
 WHOLE = [command for command in COMMANDS if command.whole]
 
 
-def test_there_are_commands():
-    assert len(WHOLE) > 25
-    assert {command.document for command in COMMANDS} >= {
-        "README.md",
-        "CONTRIBUTING.md",
-        "command-line.md",
-        "batch.md",
-        "bake.md",
-    }
-
-
 def test_every_command_of_sinew_is_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     parser, modules = cli.make_parser()
     for command in COMMANDS:
-        if command.words[0] != "sinew":
-            continue
         assert command.words[1] in modules, command
         help_of_it = subparser(parser, command.words[1]).format_help()
         for word in command.words[2:]:
@@ -112,79 +78,12 @@ def subparser(parser, name):
 
 def test_every_subcommand_is_documented():
     _parser, modules = cli.make_parser()
-    said = {
-        command.words[1]
-        for command in WHOLE
-        if command.words[0] == "sinew" and command.document == "command-line.md"
-    }
+    said = {command.words[1] for command in WHOLE if command.document == "command-line.md"}
     assert said == set(modules)
 
 
-# --- ./dev
-
-DEV = (ROOT / "dev").read_text(encoding="utf-8")
-
-
-def commands_of_dev() -> set[str]:
-    helped = subprocess.run([ROOT / "dev", "help"], capture_output=True, text=True, check=True).stdout
-    return set(re.findall(r"^\./dev (\w+)", helped, re.MULTILINE))
-
-
-def run_by_dev_test() -> set[str]:
-    body = re.search(r"^own_commands\(\) \{\n(.*?)^\}", DEV, re.MULTILINE | re.DOTALL)[1]
-    return set(re.findall(r"^    small (\w+)", body, re.MULTILINE))
-
-
-def test_every_command_of_dev_is_run():
-    in_program = set(re.search(r"^    ([a-z |]+)\) \"command_\$command\"", DEV, re.MULTILINE)[1].split(" | "))
-    named = {command.words[1] for command in COMMANDS if command.words[0] == "./dev"}
-    assert named <= commands_of_dev()
-    assert commands_of_dev() == in_program | {"help"}
-    elsewhere = {name.split()[1] for name in ELSEWHERE if name.startswith("./dev")}
-    assert commands_of_dev() == run_by_dev_test() | elsewhere
-
-
-def test_options_of_dev_are_there():
-    sources = DEV + "".join(
-        path.read_text(encoding="utf-8") for path in (ROOT / "tests/blender").glob("*.py")
-    )
-    for command in COMMANDS:
-        if command.words[0] == "./dev":
-            for word in command.words[2:]:
-                if word.startswith("--"):
-                    assert word.partition("=")[0] in sources, command
-
-
-def test_what_is_run_elsewhere_is():
-    for command, place in ELSEWHERE.items():
-        text = (ROOT / place).read_text(encoding="utf-8")
-        last = command.split()[-1]
-        assert last in text or "./dev" in command, (command, place)
-
-
-# --- Runs each line
-
-
-def key_of(command: Command) -> str | None:
-    """Its entry in ELSEWHERE."""
-    for known in ELSEWHERE:
-        program, *rest = known.split()
-        if command.words[0] == program and all(word in command.words for word in rest):
-            return known
-    return None
-
-
-def test_every_command_is_known():
-    runs = run_by_dev_test()
-    for command in COMMANDS:
-        is_run = command in RUN_HERE or key_of(command) is not None
-        is_run = is_run or (command.words[0] == "./dev" and command.words[1] in runs)
-        # A command in a sentence: it is enough that one of its subcommands is run.
-        named = not command.whole and any(command.name == other.name for other in RUN_HERE)
-        assert is_run or named, f"no test runs {' '.join(command.words)} of {command.document}"
-
-
-RUN_HERE = [command for command in WHOLE if command.words[0] == "sinew" and key_of(command) is None]
+# Tests of Blender run those that need a cluster, another Blender or a character.
+RUN_HERE = [command for command in WHOLE if not {"--scheduler", "--blender", "ik"} & set(command.words)]
 
 
 @pytest.fixture(scope="module")

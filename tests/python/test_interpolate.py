@@ -1,133 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.interpolate compared with scipy and with float64 code written from the papers."""
+"""Protects sinew.interpolate where results broadcast, are not defined, depend on the order or are huge.
+exact_interpolation.py has the oracles."""
 
 import numpy as np
 import pytest
 import sinew
-from hypothesis import assume, given
-from hypothesis import strategies as st
-from motions import LAYOUT_OF, LAYOUTS, hat, layout, matrix, rigid, rigid_motions
-from scipy.linalg import expm
-from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+from hypothesis import given
+from motions import LAYOUT_OF, LAYOUTS, layout, matrix, rigid, rigid_motions
+from scipy.spatial.transform import RigidTransform, Rotation
 from sinew.interpolate import METHODS, between, blend
 
 ALL = pytest.mark.parametrize("method", METHODS)
-TIMES = [0.0, 0.1, 0.5, 0.8, 1.0]
 
 
 def close(got, wanted, tolerance=1e-13):
     np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance)
-
-
-def nearest_rotation(linear):
-    u, _, vt = np.linalg.svd(linear)
-    return u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
-
-
-def one_side(quaternions, weights):
-    pivot = quaternions[np.argmax(weights)]
-    return quaternions * np.where(quaternions @ pivot < 0, -1.0, 1.0)[:, None]
-
-
-def mean_rotation(rotations, weights):
-    """The fixed point: the weighted logarithms from it to the rotations sum to 0."""
-    quaternions = one_side(rotations.as_quat(), weights)
-    mean = Rotation.from_quat(weights @ quaternions)
-    for _ in range(60):
-        step = weights @ (mean.inv() * rotations).as_rotvec()
-        mean = mean * Rotation.from_rotvec(step)
-        if np.abs(step).max() < 1e-14:
-            break
-    return mean
-
-
-def mean_motion(motions, weights):
-    start = one_side(motions.as_dual_quat()[:, :4], weights)  # scalar last: x, y, z, w, then the dual part
-    signs = np.where((start * motions.as_dual_quat()[:, :4]).sum(axis=1) < 0, -1.0, 1.0)
-    mean = RigidTransform.from_dual_quat((signs * weights) @ motions.as_dual_quat())
-    for _ in range(60):
-        step = weights @ (mean.inv() * motions).as_exp_coords()
-        mean = mean * RigidTransform.from_exp_coords(step)
-        if np.abs(step).max() < 1e-14:
-            break
-    return mean
-
-
-def expected(method, motions, weights):
-    """float64 [4, 4] of the blend, from the papers."""
-    matrices = motions.as_matrix()
-    result = np.tensordot(weights, matrices, axes=1)
-    if method == "matrix_polar":
-        result[:3, :3] = nearest_rotation(result[:3, :3])
-    elif method == "matrix_log":
-        result = expm(hat(weights @ motions.as_exp_coords()))
-    elif method == "qv_nlerp":
-        quaternions = one_side(motions.rotation.as_quat(), weights)
-        result[:3, :3] = Rotation.from_quat(weights @ quaternions).as_matrix()
-    elif method == "qv_slerp":
-        result[:3, :3] = mean_rotation(motions.rotation, weights).as_matrix()
-    elif method == "dlb":
-        dual = motions.as_dual_quat(scalar_first=True)
-        signs = np.where(dual[:, :4] @ dual[np.argmax(weights), :4] < 0, -1.0, 1.0)
-        result = RigidTransform.from_dual_quat((signs * weights) @ dual, scalar_first=True).as_matrix()
-    elif method in ("sclerp", "dib"):
-        result = mean_motion(motions, weights).as_matrix()
-    return result
-
-
-@ALL
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_between_agrees_with_the_papers(method, dtype):
-    rng = np.random.default_rng(0)
-    name = LAYOUT_OF[method]
-    for _ in range(20):
-        ends = rigid(rng, 2)
-        a, b = layout(ends, name, dtype)
-        result = between(a, b, np.array(TIMES, dtype), method)
-        assert result.transforms.dtype == dtype
-        assert result.is_defined.all()
-        for t, transform in zip(TIMES, result.transforms, strict=True):
-            # Almost 180 degrees apart, the rounding of float32 changes the result.
-            far = (
-                ends[0].inv() * ends[1]
-            ).rotation.magnitude() > 3.1 or ends.rotation.magnitude().max() > 3.1
-            tolerance = 1e-12 if dtype == np.float64 else 1e-3 if far else 3e-5
-            want = expected(method, ends, np.array([1 - t, t]))
-            close(matrix(transform, name), want, tolerance)
-
-
-@ALL
-def test_blend_of_many_agrees_with_the_papers(method):
-    rng = np.random.default_rng(1)
-    name = LAYOUT_OF[method]
-    for count in (1, 2, 3, 5, 8):
-        for _ in range(8):
-            # Within 115 degrees of each other, the mean on the sphere is unique nearby.
-            middle = rigid(rng)
-            spread = RigidTransform.from_exp_coords(
-                np.column_stack([rng.uniform(-1, 1, (count, 3)) / 1.8, rng.uniform(-2, 2, (count, 3))])
-            )
-            motions = middle * spread
-            weights = rng.uniform(0.05, 1.0, count)
-            result = blend(layout(motions, name), 3 * weights, method)
-            assert result.is_defined
-            close(matrix(result.transforms, name), expected(method, motions, weights / weights.sum()), 1e-12)
-
-
-def test_qv_slerp_is_scipys_slerp_and_sclerp_its_screw():
-    rng = np.random.default_rng(2)
-    for _ in range(20):
-        ends = rigid(rng, 2)
-        rotation = Slerp([0, 1], ends.rotation)(TIMES).as_matrix()
-        pair = layout(ends, "quat_vec")
-        slerp = matrix(between(pair[0], pair[1], np.array(TIMES), "qv_slerp").transforms, "quat_vec")
-        close(slerp[:, :3, :3], rotation)
-        dual = layout(ends, "dual_quat")
-        screw = matrix(between(dual[0], dual[1], np.array(TIMES), "sclerp").transforms, "dual_quat")
-        close(screw[:, :3, :3], rotation)
-        for t, got in zip(TIMES, screw, strict=True):
-            screw_part = expm(t * hat((ends[0].inv() * ends[1]).as_exp_coords()))
-            close(got, ends[0].as_matrix() @ screw_part)
 
 
 @ALL
@@ -170,111 +57,6 @@ def test_not_defined_is_said_and_finite(method, dtype):
     nothing = blend(array, np.zeros(3, dtype), method)
     np.testing.assert_array_equal(matrix(nothing.transforms, name), matrix(array[0], name))
     assert not nothing.is_defined
-
-
-def in_space(method, ends, t, left, right):
-    """[4, 4] of left^-1 between(left a right, left b right) right^-1: between(a, b) if it is invariant."""
-    name = LAYOUT_OF[method]
-    moved = left * ends * right
-    result = between(*layout(moved, name), t, method)
-    return left.inv().as_matrix() @ matrix(result.transforms, name) @ right.inv().as_matrix()
-
-
-BELOW_180_DEGREES = rigid_motions(angle=1.5)
-PARTS = st.floats(0.0, 1.0)
-
-
-@pytest.mark.parametrize("method", ["dlb", "sclerp", "dib", "matrix_linear"])
-@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, left=rigid_motions(), right=rigid_motions(), t=PARTS)
-def test_independent_of_coordinates_on_both_sides(method, a, b, left, right, t):
-    ends = RigidTransform.concatenate([a, b])
-    plain = matrix(between(*layout(ends, LAYOUT_OF[method]), t, method).transforms, LAYOUT_OF[method])
-    close(in_space(method, ends, t, left, right), plain, 1e-12)
-
-
-@pytest.mark.parametrize("method", ["qv_nlerp", "qv_slerp", "matrix_polar"])
-@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, left=rigid_motions(), t=PARTS)
-def test_independent_of_coordinates_on_the_left(method, a, b, left, t):
-    ends = RigidTransform.concatenate([a, b])
-    plain = matrix(between(*layout(ends, LAYOUT_OF[method]), t, method).transforms, LAYOUT_OF[method])
-    close(in_space(method, ends, t, left, RigidTransform.identity()), plain, 1e-12)
-
-
-@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, change=rigid_motions(), t=PARTS)
-def test_matrix_log_is_independent_of_a_change_of_coordinates(a, b, change, t):
-    ends = RigidTransform.concatenate([a, b])
-    plain = matrix(between(*layout(ends, "affine"), t, "matrix_log").transforms, "affine")
-    close(in_space("matrix_log", ends, t, change, change.inv()), plain, 1e-12)
-
-
-def test_matrix_log_depends_on_what_the_identity_is():
-    ends = RigidTransform.from_rotation(Rotation.from_euler("z", [[0], [90]], degrees=True))
-    plain = matrix(between(*layout(ends, "affine"), 0.25, "matrix_log").transforms, "affine")
-    left = RigidTransform.from_rotation(Rotation.from_euler("x", 90, degrees=True))
-    moved = in_space("matrix_log", ends, 0.25, left, RigidTransform.identity())
-    assert np.abs(moved - plain).max() > 0.05
-
-
-# Smith 2013, section 3.5.2: the translation of a pair interpolated after a change of the origin differs by
-# (1-t) q1 v q1* + t q2 v q2* - q(t) v q(t)*.
-@pytest.mark.parametrize("method", ["qv_nlerp", "qv_slerp"])
-@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, right=rigid_motions(), t=PARTS)
-def test_pairs_depend_on_the_origin_as_the_report_says(method, a, b, right, t):
-    ends = RigidTransform.concatenate([a, b])
-    plain = matrix(between(*layout(ends, "quat_vec"), t, method).transforms, "quat_vec")
-    moved = in_space(method, ends, t, RigidTransform.identity(), right) @ right.as_matrix()
-    difference = moved[:3, 3] - (plain @ right.as_matrix())[:3, 3]
-    v = right.translation
-    rotated = (1 - t) * a.rotation.apply(v) + t * b.rotation.apply(v)
-    close(difference, rotated - plain[:3, :3] @ v, 1e-12)
-
-
-def test_pairs_fail_where_dual_quaternions_hold():
-    a = RigidTransform.identity()
-    b = RigidTransform.from_rotation(Rotation.from_euler("z", 90, degrees=True))
-    right = RigidTransform.from_translation([1.0, 0, 0])
-    ends = RigidTransform.concatenate([a, b])
-    nothing = RigidTransform.identity()
-    error = {}
-    for method in METHODS:
-        name = LAYOUT_OF[method]
-        plain = matrix(between(*layout(ends, name), 0.5, method).transforms, name)
-        error[method] = np.abs(in_space(method, ends, 0.5, nothing, right) - plain).max()
-    # The midpoint of a chord compared with the midpoint of its arc.
-    assert error["qv_nlerp"] > 0.2
-    assert error["qv_slerp"] > 0.2
-    assert error["matrix_polar"] > 0.2
-    for method in ("dlb", "sclerp", "dib", "matrix_linear"):
-        assert error[method] < 1e-14
-
-
-@given(rigid_motions(), rigid_motions(), st.floats(0.05, 0.95))
-def test_sclerp_and_dlb_are_on_one_screw(a, b, t):
-    assume((a.inv() * b).rotation.magnitude() < 3.0)
-    x, y = layout(a, "dual_quat"), layout(b, "dual_quat")
-    whole = sinew.dual_quat.to_screw(sinew.dual_quat.compose(sinew.dual_quat.inverse(x), y))
-    assume(whole.angle > 0.1)
-    for method in ("dlb", "sclerp"):
-        step = sinew.dual_quat.compose(sinew.dual_quat.inverse(x), between(x, y, t, method).transforms)
-        part = sinew.dual_quat.to_screw(step)
-        close(part.axis, whole.axis, 1e-11)
-        if method == "sclerp":
-            close(part.moment, whole.moment, 1e-10)
-            close([part.angle, part.translation], [t * whole.angle, t * whole.translation], 1e-12)
-
-
-@given(st.lists(rigid_motions(angle=1.0), min_size=2, max_size=5), st.randoms(use_true_random=False))
-def test_signs_and_order_change_no_blend(motions, random):
-    weights = np.array([1.0 + i for i in range(len(motions))])
-    together = RigidTransform.concatenate(motions)
-    order = random.sample(range(len(motions)), len(motions))
-    for method in ("qv_nlerp", "qv_slerp", "dlb", "dib"):
-        name = LAYOUT_OF[method]
-        array = layout(together, name)
-        plain = blend(array, weights, method).transforms
-        array[:, : 4 if name == "quat_vec" else 8] *= [[random.choice([-1, 1])] for _ in motions]
-        other = blend(array[order], weights[order], method).transforms
-        close(matrix(other, name), matrix(plain, name), 1e-12)
 
 
 @given(rigid_motions(), rigid_motions())

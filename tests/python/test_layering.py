@@ -118,11 +118,6 @@ def test_native_layers_include_only_those_below(path):
     assert wrong_includes(folder, path.read_text(encoding="utf-8")) == []
 
 
-@pytest.mark.parametrize("path", LIBRARY_FILES, ids=lambda path: path.relative_to(LIBRARY).as_posix())
-def test_library_knows_nothing_of_python(path):
-    assert python_headers(path.read_text(encoding="utf-8")) == []
-
-
 def test_only_bindings_include_pybind11():
     suffixes = (".h", ".hpp", ".cpp", ".cc")
     folders = ("native", "tests", "bench", "experiments")
@@ -174,73 +169,6 @@ def test_jobs_hand_tasks_out_without_importing_them():
         for room in rooms_used(path.read_text(encoding="utf-8"), path.relative_to(ROOT / "addon"))
     }
     assert rooms <= {"core", "jobs"} | FOR_ALL
-
-
-# The tests above only see good sources: these show that they would detect bad ones.
-@pytest.mark.parametrize(
-    ("folder", "line"),
-    [
-        ("transform", '#include "sinew/skeleton/skeleton.h"'),
-        ("skeleton", '#include "sinew/skinning/lbs.h"'),
-        ("skinning", '#include "sinew/deform/deformer.h"'),
-        ("skinning", "  #  include <sinew/deform/deformer.h>"),
-        ("transform", '#include "../skeleton/skeleton.h"'),
-        ("transform", '#include "quat.h"'),
-        ("deform", '#include "native/sinew/transform/quat.h"'),
-    ],
-)
-def test_a_wrong_include_is_seen(folder, line):
-    assert len(wrong_includes(folder, f"#pragma once\n{line}\n")) == 1
-
-
-@pytest.mark.parametrize("header", ["pybind11/numpy.h", "Python.h", "python3.11/Python.h"])
-def test_a_python_header_is_seen(header):
-    assert python_headers(f"#include <{header}>\n") == [header]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "import bpy",
-        "import numpy, bpy.types as t",
-        "from mathutils import Matrix",
-        "def f():\n    import bmesh",
-    ],
-)
-def test_an_import_of_blender_is_seen(text):
-    assert len(of_blender(text)) == 1
-
-
-@pytest.mark.parametrize(
-    ("path", "text"),
-    [
-        ("core/rig.py", "from ..io import mesh_io"),
-        ("core/rig.py", "from ..io.mesh_io import read_points"),
-        ("core/rig.py", "from .. import cli"),
-        ("core/rig.py", "from ... import other"),
-        ("core/motion/blend.py", "from ...deform import handlers"),
-        ("attach/attach.py", "def f():\n    from ..features.heat import heat_view"),
-        ("deform/handlers.py", "from ..ui import operators"),
-        ("deform/handlers.py", "import sinew_addon.features.heat"),
-        ("io/mesh_io.py", "from addon.attach import stack"),
-    ],
-)
-def test_a_wrong_room_is_seen(path, text):
-    assert len(wrong_rooms(text, Path(path))) == 1
-
-
-@pytest.mark.parametrize(
-    ("path", "text"),
-    [
-        ("core/rig.py", "import sinew"),
-        ("core/rig.py", "from . import errors"),
-        ("core/motion/blend.py", "from ..errors import SinewError"),
-        ("features/heat/live.py", "from ...deform import handlers"),
-        ("features/bake/bake_apart.py", "from ...blender_process import BlenderProcess"),
-    ],
-)
-def test_a_right_room_is_let_through(path, text):
-    assert wrong_rooms(text, Path(path)) == set()
 
 
 def test_what_the_extension_uses_of_the_library_is_looked_for_when_it_starts():

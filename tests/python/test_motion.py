@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import sinew
 import walks
-from scipy.linalg import expm, logm
 from sinew import affine, dual_quat, quat_vec
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.inbetween import Poses
@@ -21,7 +20,6 @@ from sinew_addon.core.motion.root import grounded, main_root
 from sinew_addon.core.motion.timing import Weights
 
 UP = walks.UP
-ROOT_MOTIONS = (TRAVEL, IN_PLACE, KEYED)
 
 
 def matrices(rigid):
@@ -77,16 +75,6 @@ def test_a_clip_that_is_none_of_the_cycles_is_itself_too(method, root_motion):
         assert np.abs(made.poses.scale - clips[1].poses.scale).max() < 1e-9
 
 
-@pytest.mark.parametrize("root_motion", [TRAVEL, KEYED])
-@pytest.mark.parametrize("method", METHODS)
-def test_equal_clips_give_the_clip(method, root_motion):
-    for clip in (walks.walk(turn=0.4), *pair()[:1]):
-        settings = Settings(method=method, root_motion=root_motion)
-        made = blend([clip, replace(clip, name="again"), clip], (0.2, 0.5, 0.3), settings)
-        assert apart(made.poses.rigid, clip.poses.rigid) < 1e-9
-        assert np.abs(made.poses.scale - clip.poses.scale).max() < 1e-9
-
-
 def test_signs_of_quaternions_and_the_sum_of_weights_do_not_matter():
     a, b = pair(3)
     flipped = a.poses.rigid.copy()
@@ -95,24 +83,6 @@ def test_signs_of_quaternions_and_the_sum_of_weights_do_not_matter():
         one = blend([a, b], (1, 3), plain(method))
         other = blend([replace(a, poses=Poses(flipped, a.poses.scale)), b], (0.25, 0.75), plain(method))
         assert apart(one.poses.rigid, other.poses.rigid) < 1e-12
-
-
-@pytest.mark.parametrize("method", sorted(set(METHODS) - {"matrix_log"}))
-def test_a_rigid_motion_of_all_clips_goes_through(method):
-    """Composing from the left moves the whole motion; matrix_log does not allow it."""
-    clips = pair(5)
-    moved, x = [], quat_vec.from_twist(np.array([0.4, -0.8, 0.3, 1.0, 2.0, -0.5]))
-    for clip in clips:
-        rig, rigid = clip.rig, clip.poses.rigid.copy()
-        rest = rig.rest[0]
-        there = quat_vec.compose(x, quat_vec.compose(rest, rigid[:, 0]))
-        rigid[:, 0] = quat_vec.compose(quat_vec.inverse(rest), there)
-        moved.append(replace(clip, poses=Poses(rigid, clip.poses.scale)))
-    for space in ("relative", ARMATURE):
-        settings = plain(method, space=space)
-        one, other = blend(clips, (0.3, 0.7), settings), blend(moved, (0.3, 0.7), settings)
-        posed = quat_vec.compose(x, clips[0].rig.to_armature(one.poses.rigid))
-        assert apart(posed, clips[0].rig.to_armature(other.poses.rigid)) < 1e-9
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -130,65 +100,6 @@ def test_where_on_the_ground_clips_are_does_not_matter(method):
     one = blend([walk, run], (0.6, 0.4), settings)
     other = blend([walk, elsewhere], (0.6, 0.4), settings)
     assert apart(one.poses.rigid, other.poses.rigid) < 1e-9
-
-
-# --- The formulas
-
-
-def test_dlb_is_the_normalised_sum():
-    a, b = pair()
-    made = blend([a, b], (0.35, 0.65), plain("dlb"))
-    left, right = dual_quat_of(a), dual_quat_of(b)
-    right = np.where((left[..., :4] * right[..., :4]).sum(-1, keepdims=True) < 0, -right, right)
-    total = 0.35 * left + 0.65 * right
-    real, dual = total[..., :4], total[..., 4:]
-    norm = np.linalg.norm(real, axis=-1, keepdims=True)
-    slope = (real * dual).sum(-1, keepdims=True) / norm
-    # q| of a dual quaternion is a dual number, with the inverse 1 / n - e s / n^2.
-    unit = np.concatenate([real / norm, dual / norm - real * slope / norm**2], axis=-1)
-    assert np.abs(dual_quat.to_affine(unit) - matrices(made.poses.rigid)).max() < 1e-12
-
-
-def dual_quat_of(clip):
-    """By the definition: the real part, and half the translation times it."""
-    q, t = clip.poses.rigid[..., :4], clip.poses.rigid[..., 4:]
-    w, v = q[..., :1], q[..., 1:]
-    return np.concatenate([q, -0.5 * (t * v).sum(-1, keepdims=True), 0.5 * (t * w + np.cross(t, v))], axis=-1)
-
-
-@pytest.mark.parametrize("method", ["sclerp", "dib"])
-def test_sclerp_of_two_is_the_screw_from_one_to_the_other(method):
-    a, b = pair(7)
-    made = matrices(blend([a, b], (0.3, 0.7), plain(method)).poses.rigid)
-    left, right = matrices(a.poses.rigid), matrices(b.poses.rigid)
-    for frame in (0, 7):
-        for bone in (1, 4, 6):
-            screw = logm(np.linalg.inv(left[frame, bone]) @ right[frame, bone]).real
-            assert np.abs(left[frame, bone] @ expm(0.7 * screw) - made[frame, bone]).max() < 1e-9
-
-
-def test_matrices_by_their_definitions():
-    a, b = pair(8)
-    left, right = matrices(a.poses.rigid), matrices(b.poses.rigid)
-    mean = 0.4 * left + 0.6 * right
-    u, _s, vt = np.linalg.svd(mean[..., :3, :3])
-    assert np.linalg.det(u @ vt).min() > 0
-    for method in ("matrix_linear", "matrix_polar"):
-        made = matrices(blend([a, b], (0.4, 0.6), plain(method)).poses.rigid)
-        assert np.abs(made[..., :3, :3] - u @ vt).max() < 1e-9
-        assert np.abs(made[..., :3, 3] - mean[..., :3, 3]).max() < 1e-12
-    made = matrices(blend([a, b], (0.4, 0.6), plain("matrix_log")).poses.rigid)
-    for bone in (0, 3, 5):
-        wanted = expm(0.4 * logm(left[4, bone]).real + 0.6 * logm(right[4, bone]).real)
-        assert np.abs(made[4, bone] - wanted).max() < 1e-9
-
-
-def test_pairs_have_the_mean_location():
-    a, b = pair(9)
-    wanted = 0.4 * a.poses.rigid[..., 4:] + 0.6 * b.poses.rigid[..., 4:]
-    for method in ("qv_nlerp", "qv_slerp"):
-        made = blend([a, b], (0.4, 0.6), plain(method))
-        assert np.abs(made.poses.rigid[..., 4:] - wanted).max() < 1e-12
 
 
 def test_linear_matrices_shrink_and_no_other_method_does():
@@ -211,23 +122,6 @@ def test_linear_matrices_shrink_and_no_other_method_does():
             assert (made.volume == 1.0).all()
             assert np.abs(made.poses.scale - scale).max() < 1e-12
         assert np.abs(np.linalg.norm(made.poses.rigid[..., :4], axis=-1) - 1.0).max() < 1e-9
-
-
-def test_a_half_turn_apart_a_matrix_is_flat_and_the_blend_is_not_defined():
-    """Smith 2013, section 3.5.2: halfway to a rotation by 180 degrees about z, a matrix collapses to a
-    line."""
-    a = walks.walk()
-    rest = Poses(np.broadcast_to(quat_vec.identity(), a.poses.rigid.shape).copy(), a.poses.scale)
-    still = replace(a, poses=rest)
-    rigid = rest.rigid.copy()
-    rigid[:, 3] = quat_vec.from_axis_angle([0.0, 0.0, 1.0], np.pi)
-    made = blend([still, replace(a, poses=Poses(rigid, a.poses.scale))], (1, 1), plain("matrix_linear"))
-    assert np.abs(made.volume[:, 3]).max() < 1e-12
-    assert np.abs(made.volume[:, 2] - 1.0).max() < 1e-12
-    assert np.abs(made.poses.scale[:, 3] - (0.0, 0.0, 1.0)).max() < 1e-9
-    flipped = blend([still, replace(a, poses=Poses(rigid, a.poses.scale))], (1, 1), plain("dlb"))
-    assert flipped.undefined[:, 3].all()
-    assert not flipped.undefined[:, :3].any()
 
 
 def test_armature_space_is_the_blend_of_what_algorithm_1_gives():
@@ -412,18 +306,6 @@ def test_two_straight_walks_move_at_the_blended_speed(method):
             speed = np.diff(place[:, 1])
             assert speed.mean() == pytest.approx(-((1 - share) * 0.6 + share * 1.1) / 20)
         assert np.abs(place[:, 0]).max() < 1e-9
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_three_walks_move_at_the_mean_of_their_speeds(method):
-    clips = [walks.walk(stride=0.6), walks.walk("b", 24, 0.8, start=0.7), walks.walk("c", 30, 1.1, start=0.2)]
-    weights = (0.2, 0.5, 0.3)
-    made = blend(clips, weights, Settings(method=method))
-    place = made.clip("x").rig.to_armature(made.poses.rigid)[:, 0, 4:]
-    assert len(place) - 1 == 25
-    assert place[-1, 1] - place[0, 1] == pytest.approx(-np.dot(weights, (0.6, 0.8, 1.1)))
-    assert made.is_cyclic
-    assert apart(made.poses.rigid[0, 1:], made.poses.rigid[-1, 1:]) < 1e-9
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import pytest
-import sinew
 from sinew_addon.core.errors import WrongUse
 from sinew_addon.core.parameters import as_texts, by_full_name, parse
 
@@ -35,8 +34,3 @@ def test_every_parameter_has_a_name_that_parses_back():
 def test_wrong_ones_get_a_sentence(text, sentence):
     with pytest.raises(WrongUse, match=sentence):
         parse([text])
-
-
-def test_methods_names_are_those_of_the_library():
-    for method in sinew.methods():
-        assert parse([f"mix={method.name}"]) == {"mix.method": method.name}

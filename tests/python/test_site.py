@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The site: broken links fail its build, nothing is missing, and generated pages are complete."""
+"""Protects the site: broken links fail its build, and generated pages have all that they describe."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
 
 import pytest
 import sinew
@@ -68,12 +66,7 @@ def site(checkout, tmp_path_factory) -> Path:
 @pytest.mark.parametrize(
     ("document", "text", "complaint"),
     [
-        ("docs/tour.md", "[a page](nothing.md)", "nothing.md"),
-        ("docs/tour.md", "![a picture](nothing.png)", "nothing.png"),
-        ("docs/tour.md", "[a document](../NOTHING.md)", "NOTHING.md"),
-        ("docs/tour.md", "[a section](../CONTRIBUTING.md#nothing)", "#nothing"),
         ("CONTRIBUTING.md", "[a section](docs/tour.md#nothing)", "#nothing"),
-        ("README.md", "![a picture](docs/nothing.png)", "nothing.png"),
         ("docs/nothing.md", "# A page that the navigation does not have", "nothing.md"),
     ],
 )
@@ -93,38 +86,8 @@ def test_what_is_broken_fails_the_build(document, text, complaint, site, checkou
     assert "1 warnings in strict mode" in done.stderr + done.stdout
 
 
-# --- The result
-
-
-class Page(HTMLParser):
-    """What a page refers to, as (tag, address); its anchors; its text."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.refers: list[tuple[str, str]] = []
-        self.anchors: set[str] = set()
-        self.words: list[str] = []
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag, attrs):
-        values = dict(attrs)
-        if values.get("id"):
-            self.anchors.add(values["id"])
-        address = values.get("href") or values.get("src")
-        if address:
-            self.refers.append((tag, address))
-
-    def handle_data(self, data):
-        self.words.append(data)
-
-    @property
-    def text(self) -> str:
-        return "".join(self.words)
-
-
-@pytest.fixture(scope="module")
-def pages(site) -> dict[Path, Page]:
-    return {path: Page(path) for path in site.rglob("*.html") if path.name != "404.html"}
+def text_of(path: Path) -> str:
+    return html.unescape(re.sub(r"<[^>]*>", "", path.read_text(encoding="utf-8")))
 
 
 def test_every_document_is_a_page(site):
@@ -135,26 +98,8 @@ def test_every_document_is_a_page(site):
     assert {path.parent.name for path in site.rglob("*.py")} == {"shaders"}
 
 
-def test_all_that_pages_refer_to_is_there(pages):
-    images = 0
-    for path, page in pages.items():
-        for tag, address in page.refers:
-            parts = urlsplit(address)
-            if parts.scheme or parts.netloc:
-                # Links may lead elsewhere; a page loads nothing from elsewhere.
-                assert tag == "a", (path.name, address)
-                continue
-            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
-            assert target.exists(), (path.name, address)
-            if parts.fragment and target in pages:
-                assert unquote(parts.fragment) in pages[target].anchors, address
-            images += tag == "img"
-    documents = [*(ROOT / "docs").glob("*.md"), *(ROOT / name for name in DOCUMENTS)]
-    assert images == sum(path.read_text(encoding="utf-8").count("![") for path in documents) > 30
-
-
-def test_the_command_line_is_whole(pages, site):
-    text = pages[site / "commands.html"].text
+def test_the_command_line_is_whole(site):
+    text = text_of(site / "commands.html")
     parser, modules = cli.make_parser()
     subparsers = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction)).choices
     assert set(subparsers) == set(modules)
@@ -169,8 +114,8 @@ def test_the_command_line_is_whole(pages, site):
                 assert action.help.replace("`", "").split("%(")[0].strip() in said, (name, action)
 
 
-def test_the_python_package_is_whole(pages, site):
-    headings = re.findall(r"^([\w.]+)¶", pages[site / "python.html"].text, flags=re.MULTILINE)
+def test_the_python_package_is_whole(site):
+    headings = re.findall(r"^([\w.]+)¶", text_of(site / "python.html"), flags=re.MULTILINE)
     wanted = set()
     for name in sinew.__all__:
         value = getattr(sinew, name)
@@ -189,16 +134,8 @@ def test_the_python_package_is_whole(pages, site):
     assert len(headings) == len(set(headings))
 
 
-def test_properties_of_python_are_there(pages, site):
-    text = pages[site / "python.html"].text
-    for name in sinew.__all__:
-        value = getattr(sinew, name)
-        for member, found in vars(value).items() if isinstance(value, type) else ():
-            assert not isinstance(found, property) or re.search(rf"^{member}$", text, re.MULTILINE), member
-
-
-def test_what_the_library_exports_to_cpp_is_there(pages, site):
-    text = pages[site / "cpp.html"].text
+def test_what_the_library_exports_to_cpp_is_there(site):
+    text = text_of(site / "cpp.html")
     exported = 0
     for name in make_reference.public_headers():
         assert f"sinew/{name}¶" in text
@@ -208,21 +145,6 @@ def test_what_the_library_exports_to_cpp_is_there(pages, site):
             exported += 1
     assert exported > 12
     assert "private:" not in text
-
-
-# --- Text
-
-
-def test_arguments_become_a_list_and_what_is_aligned_stays():
-    text = (
-        "It has *no* `a_b`, a_b.\n\nout: written,\n    then returned.\nvalue, other: numbers.\n\n"
-        "one  first\ntwo  second"
-    )
-    assert make_reference.said(text) == (
-        "It has \\*no\\* `a_b`, a\\_b.\n\n- `out`: written, then returned.\n- `value, other`: numbers.\n\n"
-        "```text\none  first\ntwo  second\n```"
-    )
-    assert html.unescape(make_reference.escaped("a < b > c & d")) == "a < b > c & d"
 
 
 def test_declarations_have_no_bodies():

@@ -24,7 +24,7 @@
 #include "sinew/base/forks.h"
 
 // Without a futex, as under mingw, this libstdc++'s std::atomic::wait compares the value before it locks the
-// mutex that it sleeps under, and can miss a wake-up (tests/python/test_pool_model.py; docs/install.md).
+// mutex that it sleeps under, and can miss a wake-up (docs/install.md).
 #if defined(_GLIBCXX_RELEASE) && _GLIBCXX_RELEASE <= 12 && !defined(_GLIBCXX_HAVE_LINUX_FUTEX)
 #error "std::atomic::wait of this libstdc++ can hang: use one of LLVM's libc++, such as zig's, or MSVC."
 #endif
