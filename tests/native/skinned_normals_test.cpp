@@ -3,7 +3,6 @@
 // oracle.
 #include "sinew/deform/skinned_normals.h"
 
-
 #include "scene.h"
 
 namespace sinew {
