@@ -68,6 +68,9 @@ def test_no_job_runs_for_hours_or_writes_unasked(path):
     for name, job in workflow["jobs"].items():
         assert "uses" in job or 0 < job["timeout-minutes"] <= 180, name
         assert "permissions" not in job or path.stem == "release", name
+        for step in job.get("steps", []):
+            if step.get("uses", "").startswith("actions/checkout@"):
+                assert step["with"]["persist-credentials"] is False
 
 
 @every_workflow
