@@ -267,6 +267,12 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
     _set_icons(obj, Situation.BUILT_IN if settings.enabled else Situation.OFF)
 
 
+def is_off(obj: bpy.types.Object) -> bool:
+    """Whether its modifiers are as they have to be while Sinew is off."""
+    settings = properties.of(obj)
+    return not settings.enabled and Situation(settings.situation) is Situation.OFF
+
+
 def follow_icons(obj: bpy.types.Object) -> None:
     """Takes over what the artist or a tool did to the icons since they were set."""
     _follow_ended_keys(obj)

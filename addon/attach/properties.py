@@ -44,7 +44,7 @@ class Listeners:
     themselves."""
 
     method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
-    enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    error_requested: Callable[[bpy.types.Object], str] | None = None
     object_requested: Callable[[bpy.types.Object], None] | None = None
     mesh_requested: Callable[[bpy.types.Mesh], None] | None = None
     heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
@@ -67,9 +67,8 @@ def _object_method_changed(settings: SinewSettings, context: bpy.types.Context) 
     _method_changed(settings, context)
 
 
-def _enabled_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
-    if listeners.enabled_changed is not None:
-        listeners.enabled_changed(settings.id_data, context)
+def _error(settings: SinewSettings) -> str:
+    return "" if listeners.error_requested is None else listeners.error_requested(settings.id_data)
 
 
 def _object_requested(settings: SinewSettings) -> float:
@@ -199,7 +198,7 @@ class SinewSettings(bpy.types.PropertyGroup):
         "Blender's Armature modifier deforms, to compare the two",
         default=True,
         options=set(),
-        update=_enabled_changed,
+        update=_method_changed,
         override=OVERRIDABLE,
     )
     is_own: bpy.props.BoolProperty(
@@ -321,7 +320,9 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         description="Read by pose_driver's driver, to request points",
     )
-    error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    error: bpy.props.StringProperty(
+        description="Why Sinew can not deform it; empty where it can", options={"HIDDEN"}, get=_error
+    )
     modifier_name: bpy.props.StringProperty(
         description="How Sinew's modifier was called when it had to let go of its node group",
         options={"HIDDEN", "SKIP_SAVE"},

@@ -86,7 +86,7 @@ def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: b
 
     Raises SinewError where the mesh has become one that cannot be deformed.
     """
-    if not skinned.uses_builtin:
+    if not skinned.plan.uses_builtin:
         return
     if skinned.needs_recheck:
         changes = Changes(meshes={obj.data.session_uid})

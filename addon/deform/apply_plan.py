@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -21,49 +22,53 @@ from ..attach import (
 from ..core.errors import SinewError
 from ..core.icons import RENDER, VIEWPORT, VIEWS
 from . import safe_mode, small_meshes
-from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State, plan
+from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State
 
 log = logging.getLogger("sinew")
 
 
-def plan_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> Plan:
-    """Returns the plan for a skinned object as it is now.
+def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
+    """Returns the facts by which nothing of an object is read; others do not matter then.
+
+    error  why Sinew can not deform it; empty where it can
+    """
+    settings, is_linked = properties.of(obj), obj.library is not None
+    if attach.is_off(obj):
+        # What the artist does to its modifiers meanwhile is taken over when it is switched on.
+        return ObjectFacts(enabled=False)
+    if not is_linked:
+        attach.follow_icons(obj)
+    return ObjectFacts(
+        enabled=settings.enabled,
+        error=error,
+        is_linked=is_linked,
+        mode=mode_of(obj),
+        has_upstream=upstream_proxy.is_needed(obj),
+        visibility_is_keyed=stack.visibility_is_animated(obj),
+        viewport=attach.deformer(obj, VIEWPORT),
+        render=attach.deformer(obj, RENDER),
+    )
+
+
+def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFacts:
+    """Returns all facts of an object that is read.
 
     failure    the error when Sinew deformed it within Blender's evaluation
     waits_for  what its method needs and is not computed yet
     """
-    return plan(facts_of(obj, failure, waits_for))
-
-
-def plan_of_icons(obj: bpy.types.Object) -> Plan:
-    """Returns the plan as far as the object's mode and its modifiers' icons make it. Changes nothing."""
-    viewport, render = attach.deformer(obj, VIEWPORT), attach.deformer(obj, RENDER)
-    return plan(
-        ObjectFacts(is_linked=obj.library is not None, mode=obj.mode, viewport=viewport, render=render)
-    )
-
-
-def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> ObjectFacts:
-    attach.follow_icons(obj)
     settings, mesh = properties.of(obj), obj.data
     gives_normals = normals.are_given(settings)
     domain = normals.domain_of(mesh) if gives_normals else ""
     obstacle = normals.obstacle(obj) if domain else ""
     given = normals.kind_of(mesh, "" if obstacle else domain)
-    return ObjectFacts(
-        enabled=settings.enabled,
-        is_linked=obj.library is not None,
-        mode=_mode_of(obj),
+    return replace(
+        first_facts(obj, error=""),
         builtin_is_faster=small_meshes.is_builtin_faster(obj, given),
-        has_upstream=upstream_proxy.is_needed(obj),
         upstream_changes_weights=upstream_proxy.changes_weights(obj),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
         mesh_is_editable=mesh.is_editable,
         is_comparison_copy=properties.is_copy(obj),
         has_heat_map=settings.heat,
-        visibility_is_keyed=stack.visibility_is_animated(obj),
-        viewport=attach.deformer(obj, VIEWPORT),
-        render=attach.deformer(obj, RENDER),
         views_differ=attach.do_views_differ(obj),
         safe_mode=safe_mode.is_on(),
         failure=failure,
@@ -76,19 +81,27 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
     )
 
 
-def apply(obj: bpy.types.Object, wanted: Plan) -> None:
+def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
     """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
+    if wanted.state is State.LINKED:
+        # Its own file was saved so that its Armature modifier deforms it.
+        return
     if wanted.uses_builtin:
+        is_given_up = wanted.state in (State.OFF, State.REFUSED)
+        is_same = old.state is wanted.state and not properties.of(obj).replaces_modifiers
+        if attach.is_off(obj) or (wanted.state is State.REFUSED and is_same):
+            attach.position_modifier(obj)
+            return
         attach.switch(obj, on=wanted.state is State.ASIDE)
         if wanted.state is State.ASIDE:
             attach.restore_builtin(obj)
         attach.position_modifier(obj)
         attach.adopt_pointers(obj)
-        if wanted.state is State.OFF:
+        if is_given_up:
             point_store.remove_point_attributes(obj)
         elif obj.mode not in ARMATURE_MODIFIER_MODES:
             point_store.remove(obj)
-        if wanted.state is State.BUILT_IN and _shows_nearest_volume(obj):
+        if wanted.state is State.EDITING and _shows_nearest_volume(obj):
             attach.use_nearest_volume(obj)
         else:
             attach.restore_volume(obj)
@@ -99,7 +112,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
     attach.restore_pointers(obj)
 
 
-def _mode_of(obj: bpy.types.Object) -> str:
+def mode_of(obj: bpy.types.Object) -> str:
     """Returns its mode. Edit mode counts also where another object with the same mesh is in it."""
     return "EDIT" if obj.data.is_editmode else obj.mode
 
@@ -107,19 +120,19 @@ def _mode_of(obj: bpy.types.Object) -> str:
 def _shows_nearest_volume(obj: bpy.types.Object) -> bool:
     """Whether its mode uses the Armature modifiers, and these can give the shape that Sinew is set to, by
     Preserve Volume."""
-    is_used = _mode_of(obj) in ARMATURE_MODIFIER_MODES and attach.deforms(obj)
+    is_used = mode_of(obj) in ARMATURE_MODIFIER_MODES and attach.deforms(obj)
     return is_used and small_meshes.has_builtin_shape(obj)
 
 
-def has_lost_modifier(obj: bpy.types.Object) -> bool:
+def has_lost_modifier(obj: bpy.types.Object, plan: Plan) -> bool:
     """Whether Sinew's modifier is gone, or the Armature modifier that deforms in its place."""
     if obj.data.is_editmode:
         return False
-    settings = properties.of(obj)
-    # An object that was switched off because its Armature modifier is gone stays, with the error that says
-    # so.
-    uses_builtin = not (settings.replaces_modifiers or settings.error)
-    return stack.sinew_modifier(obj) is None or (uses_builtin and stack.armature_modifier(obj) is None)
+    if stack.sinew_modifier(obj) is None:
+        return True
+    # Where Sinew deforms, or an error says that it is gone, the object stays.
+    stays = properties.of(obj).replaces_modifiers or plan.state is State.REFUSED
+    return not stays and stack.armature_modifier(obj) is None
 
 
 def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> None:

@@ -140,8 +140,8 @@ def _use_methods(
             except SinewError as error:
                 errors.append(error)
     for index, (obj, method) in enumerate(wanted):
-        if errors[index] is None and method != BLENDER and properties.of(obj).error:
-            errors[index] = SinewError(properties.of(obj).error)
+        if errors[index] is None and method != BLENDER and session.error_of(obj):
+            errors[index] = SinewError(session.error_of(obj))
     return errors
 
 

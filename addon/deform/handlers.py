@@ -420,7 +420,7 @@ def register() -> None:
     subscribers.before_removal.append(session.forget_object)
     session.forget()
     properties.listeners.method_changed = session.setting_changed
-    properties.listeners.enabled_changed = session.enabled_changed
+    properties.listeners.error_requested = session.error_of
     properties.listeners.object_requested = session.requests.object_requested
     properties.listeners.mesh_requested = session.requests.mesh_requested
     events.subscribe_all(_HANDLERS)

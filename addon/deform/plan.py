@@ -15,12 +15,20 @@ ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})
 class State(Enum):
     """Who deforms an object, and when."""
 
-    OFF = "off"  # the user switched Sinew off, or Sinew failed
-    BUILT_IN = "built-in"  # the Armature modifier deforms, while Sinew is on
+    OFF = "off"  # the Armature modifier: the artist switched Sinew off
+    REFUSED = "refused"  # the Armature modifier: an error prevents Sinew
+    LINKED = "linked"  # the Armature modifier: the object belongs to another file
+    EDITING = "editing"  # the Armature modifier: tools of the object's mode need it
+    BUILT_IN = "built-in"  # the Armature modifier: it has the same shape in less time, or the mode needs it
     ASIDE = "aside"  # the Armature modifier or nothing, in both views, as the modifiers' icons say
+    WAITING_UPSTREAM = "waiting upstream"  # Sinew, once Blender has evaluated what it deforms
     WAITING = "waiting"  # Sinew, with the Armature modifier's method until the chosen one's data is computed
     IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the usual case
     AFTER_UPDATE = "after update"  # Sinew, after the evaluation; Blender then evaluates once more
+
+
+# Nothing of the object is read then.
+_UNREAD = (State.OFF, State.REFUSED, State.LINKED, State.EDITING)
 
 
 @dataclass(frozen=True)
@@ -55,7 +63,8 @@ _IN_RENDERS = {
 class Plan:
     """Who deforms an object, when, and where its points and normals are stored.
 
-    reason          one clause for the panel; empty for the usual case and for what the user chose
+    reason          one clause for the panel; the error of REFUSED; empty for the usual case and for what the
+                    user chose
     in_buffer       a separate object stores the points (point_buffer.py), not an attribute of the mesh
     after_update    Sinew deforms after Blender's evaluation, not within it
     normals         the normals given along with the points
@@ -75,7 +84,13 @@ class Plan:
 
     @property
     def uses_builtin(self) -> bool:
-        return self.state in (State.OFF, State.BUILT_IN, State.ASIDE)
+        """Whether Sinew does not deform it: its Armature modifiers do, where their icons are on."""
+        return not self.is_read or self.state in (State.BUILT_IN, State.ASIDE)
+
+    @property
+    def is_read(self) -> bool:
+        """Whether mesh, weights and bones are read."""
+        return self.state not in _UNREAD
 
     @property
     def view_reasons(self) -> list[str]:
@@ -92,10 +107,15 @@ class Plan:
         return not (self.uses_builtin or self.after_update)
 
 
+# That of an object before its first evaluation.
+UNSEEN = Plan(State.WAITING_UPSTREAM)
+
+
 @dataclass(frozen=True)
 class ObjectFacts:
     """What plan() has to know about an object.
 
+    error                       why Sinew can not deform it, as a sentence; empty where it can
     is_linked                   it belongs to another file, without a library override
     builtin_is_faster           its Armature modifiers give the same shape in less time
     has_upstream                modifiers, absolute shape keys or a parent change the mesh before Sinew
@@ -119,6 +139,7 @@ class ObjectFacts:
     """
 
     enabled: bool = True
+    error: str = ""
     is_linked: bool = False
     mode: str = "OBJECT"
     builtin_is_faster: bool = False
@@ -153,13 +174,16 @@ def _plan(facts: ObjectFacts) -> Plan:
         reason = (
             "Linked from another file: its Armature modifier deforms it; make a library override to use Sinew"
         )
-        return Plan(State.BUILT_IN, reason)
+        return Plan(State.LINKED, reason)
+    if facts.error:
+        return Plan(State.REFUSED, facts.error)
     if facts.mode in ARMATURE_MODIFIER_MODES:
-        return Plan(State.BUILT_IN, "In this mode the Armature modifier deforms it")
+        return Plan(State.EDITING, "In this mode the Armature modifier deforms it")
     # Weight Paint finds bones through an Armature modifier that is on, and here the animation switches it.
     if facts.mode == "WEIGHT_PAINT" and facts.visibility_is_keyed:
         reason = "The visibility of its Armature modifier is animated: in this mode that shows its own shape"
-        return Plan(State.BUILT_IN, reason)
+        # What comes from upstream is not evaluated then.
+        return Plan(State.EDITING if facts.has_upstream else State.BUILT_IN, reason)
     views = {facts.viewport, facts.render}
     if facts.builtin_is_faster and Deformer.ARMATURE not in views:
         reason = "Small: the Armature modifier has the same shape in less time, and deforms it"

@@ -27,14 +27,13 @@ from ..attach import (
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
-from ..io.animation_paths import animated_paths
 from . import after_update, apply_plan, events, precomputing, undo
 from .bound import uid
 from .changes import GONE, Changes
 from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
 from .originals import Find
-from .plan import Plan, State
+from .plan import UNSEEN, Plan, State
 from .skinned_object import SkinnedObject
 from .update import update
 
@@ -50,8 +49,11 @@ class Session:
 
     objects           the objects that have Sinew; None where they have to be found again
     objects_seen      what _objects_now() was then
-    skinned           what is known of those that are on, by session_uid
-    pairs             these objects, each with what is known of it
+    skinned           what was read of those that are read, by session_uid
+    pairs             these objects, each with what was read of it
+    plans             the plans of the others, by session_uid
+    told              the error that was reported last for an object, by its session_uid
+    unsaved           what failed for an object when the file was saved, by its session_uid
     depsgraph         the address of the depsgraph last seen
     view_layers       those whose evaluation was seen, as from identity_of_layer()
     waiting           the objects that wait for another evaluation, as from waiting()
@@ -71,6 +73,9 @@ class Session:
     objects_seen: tuple[int, int] = (0, 0)
     skinned: dict[int, SkinnedObject] = field(default_factory=dict)
     pairs: Pairs = field(default_factory=list)
+    plans: dict[int, Plan] = field(default_factory=dict)
+    told: dict[int, str] = field(default_factory=dict)
+    unsaved: dict[int, str] = field(default_factory=dict)
     depsgraph: int = 0
     view_layers: set[tuple[int, str]] = field(default_factory=set)
     waiting: set[tuple[int, int]] = field(default_factory=set)
@@ -116,12 +121,13 @@ def forget() -> None:
     current.expected = set()
     current.is_after_step = False
     current.skinned.clear()
+    current.plans.clear()
     _set_pairs([])
 
 
 def forget_object(obj: bpy.types.Object) -> None:
     """Forgets an object that Sinew is taken off; others stay bound."""
-    gone = current.skinned.pop(obj.session_uid, None)
+    gone = _forget_known(obj)
     current.objects = None
     _set_pairs([(other, state) for other, state in current.pairs if state is not gone])
     subscribe_to_frames()
@@ -161,8 +167,31 @@ def name_requests() -> None:
     requests.set_objects(by_name)
 
 
+def _forget_known(obj: bpy.types.Object) -> SkinnedObject | None:
+    """Returns what was read of the object."""
+    current.plans.pop(obj.session_uid, None)
+    return current.skinned.pop(obj.session_uid, None)
+
+
+def plan_of(obj: bpy.types.Object) -> Plan:
+    """Returns who deforms an object that has Sinew, and when, as of the last event."""
+    state = state_of(obj)
+    return current.plans.get(obj.session_uid, UNSEEN) if state is None else state.plan
+
+
+def error_of(obj: bpy.types.Object) -> str:
+    """Returns why Sinew can not deform it; empty where it can."""
+    plan = plan_of(obj)
+    return plan.reason if plan.state is State.REFUSED else ""
+
+
+def failure_of_saving(obj: bpy.types.Object) -> str:
+    """Returns what failed for it when the file was saved last, as a sentence; empty for nothing."""
+    return current.unsaved.get(obj.session_uid, "")
+
+
 def state_of(obj: bpy.types.Object) -> SkinnedObject | None:
-    """Returns what is known of an object; None before its first frame, and without Sinew."""
+    """Returns what was read of an object; None for nothing, as plan_of() says."""
     return current.skinned.get(obj.session_uid)
 
 
@@ -278,7 +307,10 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
 
 
 def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Called when one of an object's Sinew settings was changed: its shape may differ."""
+    """Called when one of an object's Sinew settings was changed: its shape may differ, and what prevented it
+    may be gone."""
+    if plan_of(obj).state is State.REFUSED:
+        _forget_known(obj)
     refresh(context)
     # Blender then touches the object's mesh. In a window that is a separate evaluation; a script may change
     # weights before it.
@@ -286,21 +318,11 @@ def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
         _expect_mesh_update(obj)
 
 
-def enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Called when Sinew was switched on or off for an object."""
-    settings = properties.of(obj)
-    if not settings.enabled and not is_rendering_in_window():
-        apply_plan.apply(obj, apply_plan.plan_of(obj))
-    settings.error = ""
-    setting_changed(obj, context)
-
-
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Reads mesh, weights and bones of the object again. Switches it on again after an error."""
-    current.skinned.pop(obj.session_uid, None)
+    """Reads mesh, weights and bones of the object again, also after an error, and switches it on."""
+    _forget_known(obj)
     precomputing.forget_stopped()
     settings = properties.of(obj)
-    settings.error = ""
     if not settings.enabled:
         settings.enabled = True  # refreshes
     else:
@@ -312,14 +334,15 @@ def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 def prepare_for_save() -> None:
     """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has.
-    Raises nothing: what fails is logged, and the rest of the file is prepared."""
+    Raises nothing: what fails is reported, and the rest of the file is prepared."""
     current.gate.restore()
     objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
     # Known before anything can fail, so that resume_after_save() reverses all of it.
     current.on_before_saving = {obj.session_uid for obj in objects if properties.of(obj).replaces_modifiers}
+    current.unsaved.clear()
     with updates_suspended():
         for obj in objects:
-            with _logging_failure(f"{obj.name}: a Blender without Sinew will not show it posed"):
+            with _logging_failure("A Blender without Sinew will not show it posed", obj):
                 attach.prepare_for_save(obj)
                 overrides.store(obj)
         with _logging_failure("What the methods need is not in the file, and is computed again"):
@@ -329,12 +352,17 @@ def prepare_for_save() -> None:
 
 
 @contextlib.contextmanager
-def _logging_failure(consequence: str) -> Iterator[None]:
-    """Logs an error instead of passing it on: what is next to be saved is in the same file."""
+def _logging_failure(consequence: str, obj: bpy.types.Object | None = None) -> Iterator[None]:
+    """Logs an error instead of passing it on: what is next to be saved is in the same file. The panel shows
+    that of an object."""
     try:
         yield
     except Exception as error:
-        log.error("%s: %s: %s", consequence, type(error).__name__, error, exc_info=error)
+        text = f"{consequence}: {type(error).__name__}: {error}"
+        if obj is not None:
+            current.unsaved[obj.session_uid] = text
+            text = f"{obj.name}: {text}"
+        log.error("%s", text, exc_info=error)
 
 
 def resume_after_save(context: bpy.types.Context) -> None:
@@ -346,7 +374,7 @@ def resume_after_save(context: bpy.types.Context) -> None:
             _expect_mesh_update(obj)
             if not obj.is_editable:
                 continue
-            with _logging_failure(f"{obj.name}: not as before it was saved; press Rebind"):
+            with _logging_failure("Not as before it was saved; press Rebind", obj):
                 attach.restore_volume(obj)
                 if stack.sinew_modifier(obj) is not None:
                     attach.switch(obj, on=obj.session_uid in current.on_before_saving)
@@ -376,7 +404,7 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
             state = state_of(obj)
             if state is not None:
                 state.needs_recheck |= changes.lost
-            _update_or_switch_off(obj, depsgraph, changes)
+            _update(obj, depsgraph, changes)
             state = state_of(obj)
             if state is not None and obj.data.session_uid in read_later:
                 state.needs_recheck = True
@@ -406,10 +434,10 @@ def needs_first_evaluations() -> bool:
     """Whether an object needs handlers to be deformed in an evaluation, not only the driver."""
     with contextlib.suppress(ReferenceError):
         return any(
-            (state := state_of(obj)) is None or state.plan.after_update
+            plan_of(obj).state is State.WAITING_UPSTREAM or plan_of(obj).after_update
             # After undo and redo the objects have to be found again.
             for obj in (bpy.data.objects if current.objects is None else current.objects)
-            if properties.has_sinew(obj) and properties.of(obj).enabled
+            if properties.has_sinew(obj)
         )
     # The object was deleted since the list was made: an event follows.
     return False
@@ -425,18 +453,19 @@ def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
         notify(subscribers.objects_changed, current.objects)
         point_store.unshare(current.objects)
         uids = {obj.session_uid for obj in current.objects}
-        current.skinned = {uid: state for uid, state in current.skinned.items() if uid in uids}
+        for known in (current.skinned, current.plans):
+            for uid in known.keys() - uids:
+                del known[uid]
     return current.objects
 
 
 def waiting() -> set[tuple[int, int]]:
     """Returns the objects that wait for Blender to evaluate their upstream proxy, each by its session_uid and
     that of the proxy, which may be made anew meanwhile."""
-    unknown = [(obj, properties.of(obj)) for obj in objects_with_sinew(Changes()) if state_of(obj) is None]
     return {
-        (obj.session_uid, uid(settings.upstream_proxy))
-        for obj, settings in unknown
-        if settings.enabled and settings.replaces_modifiers
+        (obj.session_uid, uid(properties.of(obj).upstream_proxy))
+        for obj in objects_with_sinew(Changes())
+        if plan_of(obj).state is State.WAITING_UPSTREAM and properties.of(obj).replaces_modifiers
     }
 
 
@@ -466,12 +495,11 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
 
 def _was_deformed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, meshes: set[int] | None) -> bool:
     state = state_of(obj)
-    if state is None:
-        return not properties.of(obj).enabled
-    if state.plan.state is State.OFF:
+    if not plan_of(obj).is_read:
         return True
     return (
-        state.was_deformed(obj, depsgraph)
+        state is not None
+        and state.was_deformed(obj, depsgraph)
         and state.is_untouched_by_frame(obj, meshes)
         # Up to Blender 5.1 the points are requested also for a modifier without its node group.
         and state.is_attached(obj)
@@ -481,84 +509,77 @@ def _was_deformed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, meshes:
 def _do_all_use_builtin() -> bool:
     """Whether Sinew has nothing to do in a frame, as long as nothing but poses changes."""
     try:
-        on = [obj for obj in current.objects or () if properties.of(obj).enabled]
         return all(
-            (state := state_of(obj)) is not None and state.uses_builtin and obj.animation_data is None
-            for obj in on
+            plan_of(obj).state in (State.OFF, State.REFUSED)
+            or (plan_of(obj).uses_builtin and obj.animation_data is None)
+            for obj in current.objects or ()
         )
     except ReferenceError:
         return False
 
 
-def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
+def _update(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
+    old, known = plan_of(obj), state_of(obj)
     try:
-        if _follow_removal(obj, changes):
+        if _follow_removal(obj, old, changes):
             return
-        if _is_refused(obj):
-            return
-        if not properties.of(obj).enabled:
-            _update_switched_off(obj, changes)
-        else:
-            state = update(obj, state_of(obj), depsgraph, changes)
-            if state is None:
-                current.skinned.pop(obj.session_uid, None)
-            else:
-                current.skinned[obj.session_uid] = state
+        found = update(obj, old, known, depsgraph, changes)
     except ReferenceError:
         # The object was deleted since the list was made.
         current.objects = None
-    except Exception as error:
-        _switch_off(obj, properties.of(obj), error)
-
-
-def _is_refused(obj: bpy.types.Object) -> bool:
-    """Whether its method is one that this Sinew does not know. Its Armature modifiers then deform it, and its
-    settings stay in the file as a newer Sinew left them."""
-    settings = properties.of(obj)
-    reason = "its method is of a newer Sinew; update Sinew, or choose another method"
-    # A driver that gives a number without a method has a sentence of its own.
-    if properties.has_known_methods(settings) or "sinew.method" in animated_paths(obj):
-        if reason in settings.error:
-            settings.error = ""
-        return False
-    error = f"{obj.name}: {reason}"
-    if settings.error != error and obj.is_editable and not is_rendering_in_window():
-        current.skinned.pop(obj.session_uid, None)
-        attach.switch(obj, on=False)
-        settings.error = error
-        log.error("%s", error)
-    return True
-
-
-def _update_switched_off(obj: bpy.types.Object, changes: Changes) -> None:
-    """Handles an object that is switched off."""
-    state = state_of(obj)
-    if state is not None:
-        state.plan, state.needs_apply = Plan(State.OFF), True
-    if not obj.is_editable or is_rendering_in_window():
         return
-    if properties.of(obj).replaces_modifiers:
-        # It was switched off while a window rendered.
-        apply_plan.apply(obj, apply_plan.plan_of(obj))
-    elif _is_named(obj, changes):
-        attach.position_modifier(obj)
+    except Exception as error:
+        found = _refuse(obj, old, error)
+    _forget_known(obj)
+    if isinstance(found, Plan):
+        current.plans[obj.session_uid] = found
+        if found.state is State.REFUSED:
+            _tell(obj, found.reason)
+    else:
+        current.skinned[obj.session_uid] = found
+        current.told.pop(obj.session_uid, None)
 
 
-def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
+def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
+    """Gives a failing object back to its Armature modifier. Returns its plan."""
+    if is_rendering_in_window():
+        log.error("%s: %s; the last shape stays until the end of the render", obj.name, error)
+        current.must_refresh = True
+        return UNSEEN
+    if isinstance(error, SinewError):
+        refused = Plan(State.REFUSED, str(error))
+    else:
+        text = f"{obj.name}: {type(error).__name__}: {error}; press Rebind, or Remove"
+        refused = Plan(State.REFUSED, text)
+        log.error("%s", text, exc_info=error)
+        current.told[obj.session_uid] = text
+    with _logging_failure(f"{obj.name}: its Armature modifier may not deform it"):
+        apply_plan.apply(obj, old, refused)
+    return refused
+
+
+def _tell(obj: bpy.types.Object, error: str) -> None:
+    """Reports an error once."""
+    if current.told.get(obj.session_uid) != error:
+        log.error("%s", error)
+        current.told[obj.session_uid] = error
+
+
+def _follow_removal(obj: bpy.types.Object, plan: Plan, changes: Changes) -> bool:
     """Whether the object has lost Sinew's modifier; Sinew is then taken off it."""
     state = state_of(obj)
     if not _is_named(obj, changes) and (state is None or state.is_attached(obj)):
         return False
     if not obj.is_editable or is_rendering_in_window():
         return False
-    if not apply_plan.has_lost_modifier(obj):
+    if not apply_plan.has_lost_modifier(obj, plan):
         return False
     # The last shape is computed only here, not at each pose.
     rest, shown = (None, None) if state is None else (state.bound.source.points, state.points)
     apply_plan.follow_removal(obj, rest, shown)
     if state is not None:
         state.take_off_normals(obj.data)
-    current.skinned.pop(obj.session_uid, None)
+    _forget_known(obj)
     current.objects = None
     return True
 
@@ -566,22 +587,6 @@ def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
 def _is_named(obj: bpy.types.Object, changes: Changes) -> bool:
     """Whether the object's modifiers may have changed."""
     return changes.structure or obj.session_uid in changes.objects or not changes.complete
-
-
-def _switch_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: Exception) -> None:
-    """Gives a failing object back to its Armature modifier, and reports the reason once."""
-    current.skinned.pop(obj.session_uid, None)
-    if is_rendering_in_window():
-        log.error("%s: %s; the last shape stays until the end of the render", obj.name, error)
-        current.must_refresh = True
-        return
-    settings.enabled = False
-    if isinstance(error, SinewError):
-        settings.error = str(error)
-        log.error("%s", error)
-    else:
-        settings.error = f"{obj.name}: {type(error).__name__}: {error}; press Rebind, or Remove"
-        log.error("%s", settings.error, exc_info=error)
 
 
 def _remove_groups_taken_apart(changes: Changes) -> None:

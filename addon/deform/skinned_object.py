@@ -19,7 +19,7 @@ from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
 from .changes import Changes
-from .plan import Plan, State
+from .plan import UNSEEN, Plan
 
 
 @dataclass
@@ -118,7 +118,7 @@ class SkinnedObject:
     shown: Shown = field(default_factory=Shown)
     evaluation: Evaluation = field(default_factory=Evaluation)
     lock: threading.Lock = field(default_factory=threading.Lock)
-    plan: Plan = field(default_factory=lambda: Plan(State.OFF))
+    plan: Plan = UNSEEN
     needs_apply: bool = True
     modifier: str = ""
     attribute: str = ""
@@ -164,11 +164,6 @@ class SkinnedObject:
         self.dependencies = own | set(self.bound.armatures)
 
     @property
-    def uses_builtin(self) -> bool:
-        """Whether its Armature modifiers deform it, though Sinew is on."""
-        return bool(self.builtin_fingerprint)
-
-    @property
     def points(self) -> np.ndarray:
         """The skin stack's points of the last frame, float32 [vertices, 3], object space."""
         with self.lock:
@@ -203,7 +198,7 @@ class SkinnedObject:
         """
         if meshes is None:
             return not self.needs_recheck
-        if self.uses_builtin:
+        if self.plan.uses_builtin:
             self.needs_recheck = True
             return True
         if self.needs_recheck or obj.data.session_uid in meshes:
@@ -217,7 +212,7 @@ class SkinnedObject:
 
     def was_deformed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the last evaluation gave the object its shape."""
-        if self.uses_builtin:
+        if self.plan.uses_builtin:
             return self.builtin_fingerprint == small_meshes.fingerprint(obj)
         given = self.evaluation.mesh
         return given != 0 and given == obj.data.evaluated_get(depsgraph).as_pointer()
@@ -226,7 +221,7 @@ class SkinnedObject:
         """Whether Sinew's modifier is there, with its node group where that is needed. Another add-on's
         handler can remove them without any event."""
         modifier = obj.modifiers.get(self.modifier)
-        if self.uses_builtin:
+        if self.plan.uses_builtin:
             return modifier is not None
         return getattr(modifier, "node_group", None) is not None
 

@@ -4,15 +4,18 @@ it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
-from ..attach import attach, normals, point_store, pose_driver, properties, stack, upstream_proxy
+from ..attach import attach, normals, point_store, pose_driver, properties, stack
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..io import armature_io
+from ..io.animation_paths import animated_paths
 from . import after_update, apply_plan, bound, precomputing, source
 from .changes import Changes
-from .plan import ARMATURE_MODIFIER_MODES, Plan, State
+from .plan import Plan, State, plan
 from .skinned_object import SkinnedObject
 
 # How often the node group is restored after another add-on removed it.
@@ -24,53 +27,79 @@ NOT_REQUESTED = "Blender did not request the points"
 
 
 def update(
-    obj: bpy.types.Object, skinned: SkinnedObject | None, depsgraph: bpy.types.Depsgraph, changes: Changes
-) -> SkinnedObject | None:
-    """Deforms an object that is on, or has Blender do so with the next evaluation, if anything changed.
+    obj: bpy.types.Object,
+    old: Plan,
+    skinned: SkinnedObject | None,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+) -> SkinnedObject | Plan:
+    """Deforms an object, or has Blender do so with the next evaluation, if anything changed.
 
-    Returns what is known of it from now on; None where it waits for another evaluation, or is in a mode of
-    the Armature modifier. Raises SinewError with a sentence for the user where Sinew cannot deform it.
+    old      its plan until now
+    skinned  what was read of it; None for nothing
+
+    Returns what is known of it from now on; its plan where nothing is read. Raises SinewError with a sentence
+    for the user where Sinew cannot deform it.
     """
-    if obj.library is not None:
-        # Its Armature modifier deforms it, as its own file was saved that way.
-        return None
-    if skinned is not None and _is_unchanged(obj, skinned, changes):
+    error = old.reason if old.state is State.REFUSED else _unknown_method(obj)
+    inspect = skinned is None or bool(error) or not properties.of(obj).enabled
+    if not inspect and _is_unchanged(obj, skinned, changes):
         return skinned
-    if _is_in_armature_modifier_mode(obj):
-        apply_plan.apply(obj, apply_plan.plan_of(obj))
-        return None
-    inspect = skinned is None or _needs_inspection(obj, skinned, depsgraph, changes)
+    inspect = inspect or _needs_inspection(obj, skinned, depsgraph, changes)
     if not inspect and _has_shape(obj, skinned, depsgraph, changes):
         skinned.dirtied_by_frames = False
         return skinned
     if inspect and is_rendering_in_window():
         # This is done when the render has ended.
         if skinned is None:
-            return None
+            return old
         skinned.needs_apply, inspect = True, False
+        if error or not properties.of(obj).enabled:
+            return skinned
+    return _react(obj, old, skinned, depsgraph, changes, inspect, error)
+
+
+def _react(
+    obj: bpy.types.Object,
+    old: Plan,
+    skinned: SkinnedObject | None,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    inspect: bool,
+    error: str,
+) -> SkinnedObject | Plan:
+    """inspect: the object itself may have changed; error: why it can not be deformed."""
     before, known = (None, None) if skinned is None else (skinned.plan, skinned.bound)
     was_on = properties.of(obj).replaces_modifiers
-    plan = _apply_plan(obj, skinned, changes) if inspect else before
+    new = _apply_plan(obj, old, skinned, changes, error) if inspect else old
+    if not new.is_read:
+        if skinned is None or new.state is not State.OFF:
+            return new
+        # So that it need not be read again when it is switched on.
+        skinned.plan, skinned.needs_apply = new, True
+        return skinned
     # Before anything else, as groups are renamed along with bones.
     bones_changed = skinned is not None and _have_bones_changed(obj, skinned, depsgraph, changes)
     # While Sinew's modifier was off, nothing made Blender evaluate the upstream proxy.
     if not source.is_ready(obj, depsgraph, was_on):
         # What is hidden, or in another scene, stays as it is.
         is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
-        return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
+        if skinned is not None and not (is_shown and obj.evaluated_get(depsgraph).is_evaluated):
+            return skinned
+        return replace(new, state=State.WAITING_UPSTREAM)
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
-    plan = _with_data(obj, skinned, plan, depsgraph)
+    new = _with_data(obj, skinned, new, depsgraph)
     if inspect or skinned.bound.is_of_another_stack(known):
-        _note_applied(obj, skinned, plan, in_render_frame=changes.frame and depsgraph.mode == "RENDER")
-    skinned.plan = plan
+        _note_applied(obj, skinned, new, in_render_frame=changes.frame and depsgraph.mode == "RENDER")
+    skinned.plan = new
     # A render lists everything as new with each frame. Tagging the object makes Blender (4.2 to 5.2) copy it
     # again, without what animation had set.
     is_same = not skinned.bound.is_of_another_stack(known) and skinned.bound.source.equals(known.source)
     is_same &= not skinned.has_new_data
     skinned.data_versions = skinned.bound.data_versions
-    if plan.is_in_depsgraph:
-        _request_points(obj, skinned, depsgraph, changes, is_new_plan=plan != before, is_same=is_same)
-    elif plan.after_update:
+    if new.is_in_depsgraph:
+        _request_points(obj, skinned, depsgraph, changes, is_new_plan=new != before, is_same=is_same)
+    elif new.after_update:
         is_first = before is None or not before.after_update
         with skinned.lock:
             after_update.deform(obj, skinned, depsgraph, changes, inspect, is_first or not is_same)
@@ -97,7 +126,9 @@ def _lacks_points(
     evaluation = skinned.evaluation
     if not skinned.plan.is_in_depsgraph or skinned.needs_apply or evaluation.mesh or evaluation.skip_reason:
         return False
-    is_known = skinned.mode == obj.mode and not skinned.needs_recheck and skinned.is_as_noted(obj)
+    is_known = (
+        skinned.mode == apply_plan.mode_of(obj) and not skinned.needs_recheck and skinned.is_as_noted(obj)
+    )
     is_hidden = depsgraph.mode == "VIEWPORT" and not obj.visible_get(view_layer=depsgraph.view_layer)
     if not is_known or is_hidden or not obj.evaluated_get(depsgraph).is_evaluated:
         return False
@@ -115,15 +146,6 @@ def _have_bones_changed(
     # While it was off, changes were not recorded.
     are_unknown = skinned.plan.state is State.OFF or changes.after_step
     return bound.have_bones_changed(obj, skinned.bound, depsgraph, changes, are_unknown)
-
-
-def _is_in_armature_modifier_mode(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifier deforms it because of its mode, and nothing has to be known of it. In
-    Weight Paint that is so where the upstream proxy is then not evaluated."""
-    if obj.mode in ARMATURE_MODIFIER_MODES or obj.data.is_editmode:
-        return True
-    is_painted = obj.mode == "WEIGHT_PAINT" and stack.visibility_is_animated(obj)
-    return is_painted and upstream_proxy.is_needed(obj)
 
 
 def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
@@ -156,7 +178,7 @@ def _is_unchanged(obj: bpy.types.Object, skinned: SkinnedObject, changes: Change
         changes.meshes.add(obj.data.session_uid)
         changes.touched.add(obj.data.session_uid)
     return (
-        skinned.mode == obj.mode
+        skinned.mode == apply_plan.mode_of(obj)
         and not (skinned.needs_apply or skinned.evaluation.skip_reason)
         and skinned.is_untouched_by(changes)
     )
@@ -171,7 +193,7 @@ def _needs_inspection(
     is_skipped = bool(skinned.evaluation.skip_reason)
     if is_skipped:
         skinned.evaluation.failures_in_a_row += 1
-    if skinned.mode != obj.mode or skinned.needs_apply or is_skipped or changes.structure:
+    if skinned.mode != apply_plan.mode_of(obj) or skinned.needs_apply or is_skipped or changes.structure:
         return True
     keys = obj.data.shape_keys
     is_touched = obj.session_uid in changes.objects or uid_in(keys, changes.touched)
@@ -200,12 +222,17 @@ def _has_shape(
     )
 
 
-def _apply_plan(obj: bpy.types.Object, skinned: SkinnedObject | None, changes: Changes) -> Plan:
+def _apply_plan(
+    obj: bpy.types.Object, old: Plan, skinned: SkinnedObject | None, changes: Changes, error: str
+) -> Plan:
     """Raises SinewError where the modifiers that Sinew works with are gone."""
-    _check_modifiers(obj, changes)
-    plan = apply_plan.plan_of(obj, _failure_of(skinned), precomputing.waits_for(obj, skinned))
-    apply_plan.apply(obj, plan)
-    return plan
+    wanted = plan(apply_plan.first_facts(obj, error))
+    if wanted.is_read:
+        _check_modifiers(obj, changes)
+        waits_for = precomputing.waits_for(obj, skinned)
+        wanted = plan(apply_plan.all_facts(obj, _failure_of(skinned), waits_for))
+    apply_plan.apply(obj, old, wanted)
+    return wanted
 
 
 def _failure_of(skinned: SkinnedObject | None) -> str:
@@ -216,20 +243,28 @@ def _failure_of(skinned: SkinnedObject | None) -> str:
 
 
 def _with_data(
-    obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan, depsgraph: bpy.types.Depsgraph
+    obj: bpy.types.Object, skinned: SkinnedObject, wanted: Plan, depsgraph: bpy.types.Depsgraph
 ) -> Plan:
     """Requests the data that the methods need and returns the resulting plan. A plan that waits needs the
     same modifiers and storage as one that does not, so it need not be applied again."""
-    if plan.uses_builtin:
-        return plan
-    if plan.normals.domain:
+    if wanted.uses_builtin:
+        return wanted
+    if wanted.normals.domain:
         # Not within Blender's evaluation: it takes as long as several frames.
         skinned.bound.source.make_normals()
     precomputing.request(obj, skinned, depsgraph)
     waits_for = precomputing.waits_for(obj, skinned)
-    if waits_for == (plan.reason if plan.state is State.WAITING else ""):
-        return plan
-    return apply_plan.plan_of(obj, _failure_of(skinned), waits_for)
+    if waits_for == (wanted.reason if wanted.state is State.WAITING else ""):
+        return wanted
+    return plan(apply_plan.all_facts(obj, _failure_of(skinned), waits_for))
+
+
+def _unknown_method(obj: bpy.types.Object) -> str:
+    """Returns a sentence where a method is one that this Sinew does not know."""
+    # A driver that gives a number without a method has a sentence of its own.
+    if properties.has_known_methods(properties.of(obj)) or "sinew.method" in animated_paths(obj):
+        return ""
+    return f"{obj.name}: its method is of a newer Sinew; update Sinew, or choose another method"
 
 
 def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:

@@ -114,7 +114,7 @@ def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
             ("Bones", tr("{bones}, {weighted} with weights", bones=facts.bones, weighted=weighted)),
             ("Influences", tr("{mean} a vertex, at most {most}", mean=mean, most=facts.most_influences)),
         ]
-        if not state.uses_builtin:
+        if not state.plan.uses_builtin:
             rows.append(("Last frame", f"{state.shown.milliseconds:.2f} ms"))
     column = layout.column(align=True)
     for name, value in rows:

@@ -7,6 +7,8 @@ from __future__ import annotations
 import bpy
 
 from ..attach import properties
+from ..deform import session
+from ..deform.plan import State
 from . import state_text
 from .sidebar import draw_text
 
@@ -23,7 +25,8 @@ def _draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
     row.label(text="Sinew", icon=state_text.icon_of(obj))
     row.prop(settings, "enabled", text=state_text.switch_text([obj]), toggle=True)
     row.operator("sinew.open_tab", text="", icon="MENU_PANEL")
-    draw_text(box, context, state_text.sentence_of(obj), alert=bool(settings.error))
+    is_refused = session.plan_of(obj).state is State.REFUSED
+    draw_text(box, context, state_text.sentence_of(obj), alert=is_refused)
 
 
 def register() -> None:

@@ -8,16 +8,20 @@ from collections.abc import Sequence
 import bpy
 
 from ..attach import attach, behind_nodes, properties
-from ..core.icons import RENDER, VIEWPORT, Deformer
-from ..deform import apply_plan, session, small_meshes
+from ..core.icons import Deformer
+from ..deform import session, small_meshes
 from ..deform.plan import ARMATURE_MODIFIER_MODES, State
 from .sidebar import draw_text, names_text
 from .translations import tr
 
 ICONS = {
     State.OFF: "MODIFIER_OFF",
+    State.REFUSED: "ERROR",
+    State.LINKED: "MOD_ARMATURE",
+    State.EDITING: "MOD_ARMATURE",
     State.BUILT_IN: "MOD_ARMATURE",
     State.ASIDE: "HIDE_ON",
+    State.WAITING_UPSTREAM: "SORTTIME",
     State.WAITING: "SORTTIME",
     State.IN_DEPSGRAPH: "CHECKMARK",
     State.AFTER_UPDATE: "RECOVER_LAST",
@@ -25,68 +29,64 @@ ICONS = {
 
 
 def reasons_of(obj: bpy.types.Object) -> list[str]:
-    """Returns why it is not deformed as usual, and what deforms instead in each view; empty where it is, or
-    is off."""
-    if not properties.of(obj).enabled:
+    """Returns why it is not deformed as usual, and what deforms instead in each view; empty where it is, is
+    off or has an error."""
+    plan = session.plan_of(obj)
+    if plan.state in (State.OFF, State.REFUSED):
         return []
-    state, views = session.state_of(obj), apply_plan.plan_of_icons(obj)
-    reason = views.reason or (state.plan.reason if state is not None else "")
-    return [each for each in (reason, *views.view_reasons) if each]
+    return [each for each in (plan.reason, *plan.view_reasons) if each]
 
 
 def sentence_of(obj: bpy.types.Object) -> str:
     """Returns who deforms the mesh, by which method, and why if not as usual."""
-    settings, state = properties.of(obj), session.state_of(obj)
+    plan, settings = session.plan_of(obj), properties.of(obj)
     replaced = names_text([each.name for each in settings.replaced_modifiers])
-    if settings.error:
-        return settings.error
-    if not settings.enabled:
+    if plan.state is State.REFUSED:
+        return plan.reason
+    if plan.state is State.OFF:
         text = "Off: {modifiers} deforms it"
         if not any(modifier.show_viewport for modifier, _replaced in attach.replaced_modifiers(obj)):
             text = "Off, and so is {modifiers} in the viewport"
         return tr(text, modifiers=replaced)
     method = tr(properties.method_label(settings.method))
-    views = ". ".join(map(tr, apply_plan.plan_of_icons(obj).view_reasons))
-    if state is None or uses_builtin(obj) or state.plan.state is State.WAITING:
+    if plan.uses_builtin or plan.state in (State.WAITING, State.WAITING_UPSTREAM):
         until = tr("{modifiers} deforms it until the next frame", modifiers=replaced)
         return ". ".join((method, *map(tr, reasons_of(obj) or (until,))))
     text = tr("{method} in the place of {modifiers}", method=method, modifiers=replaced)
-    if state.plan.reason:
-        reason = tr(state.plan.reason)
-        text = tr("{text}, after Blender's evaluation: {reason}", text=text, reason=reason)
-    return f"{text}. {views}" if views else text
+    if plan.reason:
+        text = tr("{text}, after Blender's evaluation: {reason}", text=text, reason=tr(plan.reason))
+    return ". ".join((text, *map(tr, plan.view_reasons)))
 
 
 def switch_text(objects: Sequence[bpy.types.Object]) -> str:
     """Returns what the switch of these meshes shows."""
-    on = [obj for obj in objects if properties.of(obj).enabled]
+    plans = [session.plan_of(obj) for obj in objects if properties.of(obj).enabled]
+    on = [plan for plan in plans if plan.state is not State.REFUSED]
     if not on:
-        return "Off"
-    views = {attach.deformer(obj, name) for obj in on for name in (VIEWPORT, RENDER)}
-    if views == {Deformer.SINEW}:
+        return "On, but not possible" if plans else "Off"
+    if {view for plan in on for view in (plan.viewport, plan.render)} == {Deformer.SINEW}:
         return "On"
-    shown = {attach.deformer(obj, VIEWPORT) for obj in on}
-    return "On, hidden" if shown == {Deformer.NOTHING} else "On, in part"
+    return "On, hidden" if {plan.viewport for plan in on} == {Deformer.NOTHING} else "On, in part"
 
 
 def icon_of(obj: bpy.types.Object) -> str:
-    settings, state = properties.of(obj), session.state_of(obj)
-    if settings.error or (settings.enabled and problems_of(obj)):
-        return "ERROR"
-    if not settings.enabled or state is None:
-        return ICONS[State.OFF]
-    if attach.deformer(obj, VIEWPORT) is Deformer.NOTHING:
+    plan = session.plan_of(obj)
+    if plan.state is not State.OFF and problems_of(obj):
+        return ICONS[State.REFUSED]
+    if plan.is_read and plan.viewport is Deformer.NOTHING:
         return ICONS[State.ASIDE]
-    is_built_in = uses_builtin(obj) or attach.deformer(obj, VIEWPORT) is Deformer.ARMATURE
-    return ICONS[State.BUILT_IN if is_built_in else state.plan.state]
+    if plan.is_read and plan.viewport is Deformer.ARMATURE:
+        return ICONS[State.BUILT_IN]
+    return ICONS[plan.state]
 
 
 def problems_of(obj: bpy.types.Object) -> list[str]:
-    """Returns what the artist should fix, apart from an error that switched it off."""
-    settings, state = properties.of(obj), session.state_of(obj)
+    """Returns what the artist should fix, apart from what prevents Sinew."""
+    settings, state, failed = properties.of(obj), session.state_of(obj), session.failure_of_saving(obj)
+    found = [failed] if failed else []
     if state is None:
-        return []
-    found = list(state.bound.lacks((settings.method, settings.mix.method)))
+        return found
+    found += state.bound.lacks((settings.method, settings.mix.method))
     if state.evaluation.failures:
         found.append(
             tr(
@@ -103,7 +103,7 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
 def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
     """For modes whose tools work through the Armature modifier: draws whether its shape is Sinew's, and the
     switch that makes it so if the artist has changed it."""
-    if obj.mode not in ARMATURE_MODIFIER_MODES or not properties.of(obj).enabled or obj.library is not None:
+    if session.plan_of(obj).state is not State.EDITING or obj.mode not in ARMATURE_MODIFIER_MODES:
         return
     sentence, modifiers = shape_in_mode(obj)
     draw_text(layout, context, sentence, icon="INFO")
@@ -134,14 +134,14 @@ def shape_in_mode(obj: bpy.types.Object) -> tuple[str, list[bpy.types.ArmatureMo
 
 def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
     """Draws everything about one mesh."""
-    if properties.of(obj).error:
-        draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
+    plan = session.plan_of(obj)
+    if plan.state is State.REFUSED:
+        draw_text(layout, context, plan.reason, icon="ERROR", alert=True)
     for sentence in (*reasons_of(obj), *attach.notes(obj)):
         draw_text(layout, context, sentence, icon="INFO")
     draw_in_mode(layout, context, obj)
-    state = session.state_of(obj)
-    if state is not None and state.plan.normals_reason:
-        text = tr("Blender computes normals: {reason}", reason=tr(state.plan.normals_reason))
+    if plan.normals_reason:
+        text = tr("Blender computes normals: {reason}", reason=tr(plan.normals_reason))
         draw_text(layout, context, text, icon="INFO")
     for sentence in problems_of(obj):
         draw_text(layout, context, sentence, icon="ERROR")
@@ -155,13 +155,15 @@ def draw_character(
     if len(meshes) == 1:
         draw_mesh(layout, context, meshes[0])
         return
-    for obj in meshes:
-        if properties.of(obj).error:
-            draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
+    plans = {obj: session.plan_of(obj) for obj in meshes}
+    for plan in plans.values():
+        if plan.state is State.REFUSED:
+            draw_text(layout, context, plan.reason, icon="ERROR", alert=True)
     by_reason: dict[str, list[str]] = {}
-    for obj in meshes:
-        views = apply_plan.plan_of_icons(obj).view_reasons if properties.of(obj).enabled else []
-        for reason in (*(reasons_of(obj) if uses_builtin(obj) else views), *attach.notes(obj)):
+    for obj, plan in plans.items():
+        is_off = plan.state in (State.OFF, State.REFUSED)
+        views = reasons_of(obj) if plan.uses_builtin else plan.view_reasons
+        for reason in (*(() if is_off else views), *attach.notes(obj)):
             by_reason.setdefault(reason, []).append(obj.name)
     for reason, names in by_reason.items():
         who = names_text(names, most=2)
@@ -170,15 +172,7 @@ def draw_character(
         draw_text(layout, context, f"{who}: {tr(reason)}", icon="INFO")
     if context.active_object in meshes:
         draw_in_mode(layout, context, context.active_object)
-    warned = [obj.name for obj in meshes if not properties.of(obj).error and problems_of(obj)]
+    warned = [obj.name for obj in meshes if problems_of(obj)]
     if warned:
         text = tr("{names}: warnings, see Meshes", names=names_text(warned))
         draw_text(layout, context, text, icon="ERROR")
-
-
-def uses_builtin(obj: bpy.types.Object) -> bool:
-    """Whether its Armature modifiers deform it, though Sinew is on."""
-    settings, state = properties.of(obj), session.state_of(obj)
-    if not settings.enabled or state is None:
-        return False
-    return obj.mode in ARMATURE_MODIFIER_MODES or state.plan.state in (State.BUILT_IN, State.ASIDE)

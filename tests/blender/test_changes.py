@@ -12,7 +12,7 @@ import scenes
 import sinew_addon
 import walk_sides
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import apply_plan, characters, safe_mode, session, update
+from sinew_addon.deform import characters, safe_mode, session, update
 from sinew_addon.deform.plan import State
 from sinew_addon.io import animation_paths, mesh_io
 from sinew_addon.ui import state_text
@@ -429,7 +429,7 @@ def test_linked_characters_say_so_and_keep_moving(tmp_path):
         bpy.context.scene.collection.objects.link(linked)
     obj = bpy.data.objects["Arm"]
     assert scenes.worst(scenes.shapes(obj, [1, 11]), expected) <= 1e-5
-    assert "make a library override" in apply_plan.plan_of(obj).reason
+    assert "make a library override" in session.plan_of(obj).reason
     # A library override made later would inherit what is written into linked data.
     assert properties.of(obj).enabled
     assert not properties.of(obj).error
@@ -480,7 +480,8 @@ def test_a_driver_that_gives_no_method_is_said_so():
         bpy.context.scene.frame_set(11)
         bpy.context.view_layer.update()
         assert error in properties.of(obj).error
-    assert not properties.of(obj).enabled
+    assert properties.of(obj).enabled
+    assert session.plan_of(obj).state is State.REFUSED
 
 
 def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkeypatch):

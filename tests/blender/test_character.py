@@ -265,9 +265,9 @@ def test_what_is_at_work_is_said_above_the_modifiers(armature, monkeypatch):
     shared().enabled = False
     assert state_text.sentence_of(body) == "Off: Armature deforms it"
     shared().enabled = True
-    body.modifiers["Armature"].object = None
-    properties.of(body).error = "Body: no armature"
-    assert state_text.sentence_of(body) == "Body: no armature"
+    body.modifiers.remove(body.modifiers["Armature"])
+    bpy.context.view_layer.update()
+    assert "its Armature modifier was deleted" in state_text.sentence_of(body)
     assert state_text.icon_of(body) == "ERROR"
 
 

@@ -11,6 +11,7 @@ import snapshot
 from sinew_addon.attach import attach, behind_nodes, point_store, properties
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import safe_mode, session, survey
+from sinew_addon.deform.plan import State
 from sinew_addon.io import armature_io
 from sinew_addon.ui import state_text
 
@@ -270,14 +271,14 @@ def test_append_from_a_saved_file(tmp_path):
     assert_follows(appended)
 
 
-def test_deleted_armature_turns_the_mesh_off_with_a_sentence():
+def test_deleted_armature_is_refused_with_a_sentence():
     obj, armature = scenes.make_arm()
     other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(obj)
     scenes.add_sinew(other)
     bpy.data.objects.remove(armature)
     bpy.context.scene.frame_set(6)
-    assert not properties.of(obj).enabled
+    assert session.plan_of(obj).state is State.REFUSED
     assert "armature was deleted" in properties.of(obj).error
     assert_follows(other)
     attach.remove(obj)
@@ -411,7 +412,7 @@ def test_another_armature_chosen_in_the_modifier_is_taken_over():
     assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
 
 
-def test_an_error_turns_one_object_off_once_and_no_other(monkeypatch, caplog):
+def test_an_error_refuses_one_object_once_and_no_other(monkeypatch, caplog):
     obj, armature = scenes.make_arm()
     other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(obj)
@@ -425,8 +426,10 @@ def test_an_error_turns_one_object_off_once_and_no_other(monkeypatch, caplog):
 
     monkeypatch.setattr(armature_io, "read_pose", fail_for_one)
     scenes.shapes(obj, [4, 5, 6])
-    assert not properties.of(obj).enabled
+    assert properties.of(obj).enabled
+    assert session.plan_of(obj).state is State.REFUSED
     assert "disk on fire" in properties.of(obj).error
+    assert obj.modifiers["Armature"].show_viewport
     assert sum("disk on fire" in record.getMessage() for record in caplog.records) == 1
     assert properties.of(other).enabled
     monkeypatch.undo()
@@ -473,7 +476,7 @@ def test_options_of_the_modifier_changed_while_at_work():
     assert_follows(obj)
 
 
-def test_deleted_armature_modifier_turns_the_mesh_off_with_a_sentence():
+def test_deleted_armature_modifier_is_refused_with_a_sentence():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)
     obj.modifiers.remove(obj.modifiers["Armature"])

@@ -15,6 +15,8 @@ import pytest
 import scenes
 from sinew_addon.attach import attach, node_group, note, properties, stack
 from sinew_addon.deform import exporters, safe_mode, session, small_meshes
+from sinew_addon.io import armature_io
+from sinew_addon.ui import state_text
 
 FRAMES = [1, 6, 11]
 
@@ -238,6 +240,49 @@ def test_a_save_that_fails_ends_as_one_that_does_not(tmp_path):
         save(tmp_path / "no such folder" / "saved.blend")
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
     assert not session.current.is_saving
+
+
+def test_what_fails_for_an_object_while_saving_is_in_its_panel(tmp_path, monkeypatch, caplog):
+    obj, _armature = scenes.make_arm()
+    other, _rig = scenes.make_arm(name="Other")
+    for each in (obj, other):
+        scenes.add_sinew(each, "dq")
+    expected = scenes.shapes(obj, FRAMES)
+    prepare = attach.prepare_for_save
+
+    def fail_for_one(each):
+        if each == obj:
+            raise RuntimeError("disk on fire")
+        return prepare(each)
+
+    monkeypatch.setattr(attach, "prepare_for_save", fail_for_one)
+    save(tmp_path / "saved.blend")
+    monkeypatch.undo()
+    assert "Arm: A Blender without Sinew will not show it posed: RuntimeError: disk on fire" in caplog.text
+    assert "disk on fire" in " ".join(state_text.problems_of(obj))
+    assert state_text.problems_of(other) == []
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
+    save(tmp_path / "saved.blend")
+    assert state_text.problems_of(obj) == []
+
+
+def test_an_error_is_not_saved_as_the_artists_choice(tmp_path, monkeypatch):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    expected = scenes.shapes(obj, FRAMES)
+
+    def fail(*_args: object) -> None:
+        raise RuntimeError("disk on fire")
+
+    monkeypatch.setattr(armature_io, "read_pose", fail)
+    scenes.shapes(obj, FRAMES)
+    assert "disk on fire" in properties.of(obj).error
+    save(tmp_path / "saved.blend")
+    monkeypatch.undo()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    obj = bpy.data.objects["Arm"]
+    assert (properties.of(obj).enabled, properties.of(obj).error) == (True, "")
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
 
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])

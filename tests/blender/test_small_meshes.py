@@ -39,7 +39,7 @@ def deformer(obj: bpy.types.Object) -> str:
     assert by_blender != by_sinew
     settings, state = properties.of(obj), session.state_of(obj)
     assert (settings.enabled, settings.error) == (True, "")
-    assert state.uses_builtin == by_blender
+    assert state.plan.uses_builtin == by_blender
     drivers = obj.animation_data.drivers if obj.animation_data else []
     assert (len(drivers) == 0) == by_blender
     for frame in FRAMES:
@@ -122,7 +122,7 @@ def test_something_in_front_is_taken_up(arm):
     mirror = obj.modifiers.new("Mirror", "MIRROR")
     obj.modifiers.move(2, 0)
     bpy.context.view_layer.update()
-    assert not session.state_of(obj).uses_builtin
+    assert not session.plan_of(obj).uses_builtin
     expected = scenes.final_points(obj)
     properties.of(obj).enabled = False
     assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5 * scenes.diagonal(obj)
@@ -270,10 +270,10 @@ def test_chained_modifiers_each_by_its_own():
     second.object, second.use_deform_preserve_volume = armature, True
     expected = scenes.shapes(obj, FRAMES)
     scenes.add_sinew(obj)
-    assert session.state_of(obj).uses_builtin
+    assert session.plan_of(obj).uses_builtin
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
     properties.of(obj).replaced_modifiers[1].method = "SAME"
-    assert not session.state_of(obj).uses_builtin
+    assert not session.plan_of(obj).uses_builtin
 
 
 def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):

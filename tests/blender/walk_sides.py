@@ -41,8 +41,8 @@ STAGES: tuple[dict[str, dict[str, object]], ...] = (
 DRIVEN, ON, KEYED, ADOPTED, CHANGED = 1, 2, 4, 8, 16
 # Numbers in the bits above: indices into METHODS and STAGES, four bits each.
 METHOD, STAGE, FIELD = 32, 512, 15
-# Above these: it has its own settings within its character.
-OWN = 8192
+# Above these: it has its own settings within its character; an error prevents Sinew.
+OWN, REFUSED = 8192, 16384
 
 
 def whole_stages(number: int) -> dict[str, dict[str, object]]:
@@ -184,7 +184,7 @@ class BlenderSide:
         return bool(obj.pass_index & DRIVEN)
 
     def is_on(self, obj: bpy.types.Object) -> bool:
-        return bool(obj.pass_index & ON)
+        return bool(obj.pass_index & ON) and not obj.pass_index & REFUSED
 
     def method(self, obj: bpy.types.Object) -> str:
         return METHODS[self._field(obj, METHOD)]
@@ -453,8 +453,8 @@ class BlenderSide:
                 continue
             if obj.pass_index & ADOPTED:
                 self._adopt(obj, claim)
-            elif claim is not None and claim["error"] and not claim["on"]:
-                self._set(obj, ON, False)
+            elif claim is not None:
+                self._set(obj, REFUSED, bool(claim["error"]))
 
     def _adopt(self, obj: bpy.types.Object, claim: dict | None) -> list[str]:
         if obj.pass_index & ADOPTED:
@@ -462,6 +462,7 @@ class BlenderSide:
                 self.unkey_method(obj, self.method(obj))
             self._set(obj, DRIVEN, claim is not None)
             self._set(obj, ON, claim is not None and claim["on"])
+            self._set(obj, REFUSED, claim is not None and bool(claim["error"]))
             self._set(obj, OWN, claim is not None and claim["own"])
             if claim is not None:
                 self.set_method(obj, claim["method"])
@@ -471,9 +472,8 @@ class BlenderSide:
             return [f"{obj.name_full} is{'' if claim else ' not'} Sinew's, against the walk's list"]
         if claim is None:
             return []
-        if claim["error"] and not claim["on"]:
-            self._set(obj, ON, False)
-        if self.is_on(obj) != claim["on"]:
+        self._set(obj, REFUSED, bool(claim["error"]))
+        if bool(obj.pass_index & ON) != claim["on"]:
             return [f"{obj.name_full}: Sinew is {'on' if claim['on'] else 'off'} against the walk's list"]
         if not self.is_method_keyed(obj) and claim["method"] != self.method(obj):
             return [f"{obj.name_full}: method {claim['method']}, the walk's list has {self.method(obj)}"]
@@ -546,7 +546,7 @@ class SinewSide:
         return self._properties.has_sinew(obj)
 
     def is_on(self, obj: bpy.types.Object) -> bool:
-        return self.has_sinew(obj) and obj.sinew.enabled
+        return self.has_sinew(obj) and obj.sinew.enabled and not obj.sinew.error
 
     def has_other_shape(self, obj: bpy.types.Object) -> bool:
         return self.is_on(obj) and (obj.sinew.method not in OF_BLENDER or bool(self._stages(obj)))

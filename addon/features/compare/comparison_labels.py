@@ -66,7 +66,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
 
 def _method_label(obj: bpy.types.Object) -> str:
     settings = properties.of(obj)
-    by_sinew = settings.enabled and session.state_of(obj) is not None
+    by_sinew = session.plan_of(obj).is_read
     return tr(properties.method_label(settings.method if by_sinew else characters.BLENDER))
 
 

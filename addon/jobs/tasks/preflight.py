@@ -12,7 +12,7 @@ import bpy
 from ...attach import attach, properties, stack, upstream_proxy
 from ...attach.updates import updates_suspended
 from ...core.errors import SinewError
-from ...deform import apply_plan, characters
+from ...deform import characters, session
 from ...io import files
 
 
@@ -46,7 +46,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
         f"{obj.name}: {sentence}"
         for obj in skinned
         if properties.of(obj).enabled
-        for sentence in (*apply_plan.plan_of_icons(obj).view_reasons, *attach.notes(obj))
+        for sentence in (*session.plan_of(obj).view_reasons, *attach.notes(obj))
     ]
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
     problems += _not_deformable(skinned)

@@ -21,7 +21,7 @@ from ...core.frames import parse_frames
 from ...core.names import fits
 from ...core.output import remove
 from ...core.views import seen_extent, whole_view
-from ...deform import apply_plan, characters, session
+from ...deform import characters, session
 from ...features.bake import bake_copy
 from ...features.compare import comparison
 from ...features.pages import render
@@ -157,7 +157,7 @@ def _use_sinew(
 
 def _told(obj: bpy.types.Object) -> list[str]:
     """Returns what else deforms the mesh than Sinew, and what was found switched off."""
-    return [*apply_plan.plan_of_icons(obj).view_reasons, *attach.notes(obj)]
+    return [*session.plan_of(obj).view_reasons, *attach.notes(obj)]
 
 
 def _meant(settings: dict, source: Path) -> list[bpy.types.Object]:
