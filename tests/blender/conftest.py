@@ -14,6 +14,7 @@ os.environ["SINEW_CACHE"] = "0"
 import bpy
 import numpy as np
 import pytest
+import routes
 import scenes
 import sinew_addon
 from sinew_addon.attach import normals
@@ -108,6 +109,14 @@ def nothing_of_commands(monkeypatch):
 def none_left_to_blender(monkeypatch):
     """Tests have small meshes, and Sinew must deform them."""
     monkeypatch.setattr(small_meshes, "is_used", False)
+
+
+@pytest.fixture(params=routes.ROUTES)
+def route(request):
+    """Each test that has it runs by both routes."""
+    routes.force(request.param)
+    yield request.param
+    routes.release()
 
 
 @pytest.fixture

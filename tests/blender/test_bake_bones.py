@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import bmesh
 import bpy
@@ -14,7 +12,7 @@ import other_gltf
 import pytest
 import read_glb
 import scenes
-from program import run_sinew
+from program import checked, run_sinew, without_sinew
 from pygltflib import GLTF2
 from scipy.spatial import cKDTree
 from sinew_addon.core.errors import SinewError
@@ -32,16 +30,7 @@ import sys, bpy
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 assert not hasattr(bpy.types.Object, "sinew")
 bpy.ops.export_scene.gltf(filepath=sys.argv[2])
-sys.stdout.flush()
-__import__("os")._exit(0)
 """
-
-
-def run_blender(script, *files):
-    """The result in a process without Sinew, which writes the last of the files."""
-    command = [sys.executable, "-c", script, *map(str, files)]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert files[-1].exists(), ran.stdout + ran.stderr
 
 
 def baked(path, out, *options, method=METHOD):
@@ -164,23 +153,6 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
     assert found[file] < 0.5 * found[keyed]
 
 
-@pytest.mark.slow
-@pytest.mark.once
-@pytest.mark.parametrize(("method", "share"), [(METHOD, 0.15), ("cor", 0.25)])
-def test_a_character_in_frames_that_it_was_not_baked_from(real_rig, tmp_path, method, share):
-    path, frames = real_rig("human.blend"), (28, 36, 44)
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects["Human"]
-    scenes.add_sinew(obj, method)
-    expected = world_shapes([obj], frames)[0]
-    obj.sinew.method = "lbs"
-    linear = rms_and_worst(world_shapes([obj], frames)[0], expected)[0]
-    out, options = tmp_path / "out", ("--to", "bones", "--motion", "pose", "--frames", "1-24", "--step", "2")
-    run_sinew("bake", path, "--method", method, *options, "--out", out)
-    played = read_elsewhere(out / path.name, frames, tmp_path)["Human"]
-    assert rms_and_worst(played, expected)[0] < share * linear
-
-
 def test_pose_helpers_in_the_file(arm, tmp_path):
     """They have no action of their own, no driver, and constraints that refer to the rig's own bones."""
     obj, path = arm
@@ -281,7 +253,7 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     expected = world_shapes([obj], FRAMES)[0]
     file, (report,) = baked(path, tmp_path / "out", "--motion", motion, method=method)
     glb = tmp_path / "arm.glb"
-    run_blender(EXPORT, file, glb)
+    checked(without_sinew.run(EXPORT, file, glb), 0)
     played = skinned_by_gltf(glb, FRAMES, bpy.context.scene.render.fps)
     # Vertices are split at seams.
     nearest = np.linalg.norm(played[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
@@ -308,7 +280,7 @@ def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
     said = run_sinew("bake", path, "--method", METHOD, "--to", "bones", *options, "--out", out).stdout
     (report,) = json.loads(said)[0]["bones"]
     glb = tmp_path / "human.glb"
-    run_blender(EXPORT, out / path.name, glb)
+    checked(without_sinew.run(EXPORT, out / path.name, glb), 0)
     rate = bpy.context.scene.render.fps
     (name,) = (each.name for each in GLTF2().load(str(glb)).animations if each.name.endswith("Helpers"))
     read_rest, played = other_gltf.points_at(glb, np.array(frames) / rate, name)
@@ -411,8 +383,6 @@ played.action = next(action for action in bpy.data.actions if "Helpers" in actio
 if hasattr(played, "action_slot"):
     played.action_slot = played.action.slots[0]
 bpy.ops.wm.save_as_mainfile(filepath=fbx + ".blend")
-sys.stdout.flush()
-__import__("os")._exit(0)
 """
 
 
@@ -423,7 +393,7 @@ def test_fbx_plays_to_the_stated_error_once_it_is_imported(arm, tmp_path):
     expected = world_shapes([obj], FRAMES)[0]
     file, (report,) = baked(path, tmp_path / "out")
     fbx = tmp_path / "arm.fbx"
-    run_blender(FBX, file, fbx)
+    checked(without_sinew.run(FBX, file, fbx), 0)
     played = read_elsewhere(f"{fbx}.blend", FRAMES, tmp_path)["Arm"]
     assert_states(report, played, expected)
 

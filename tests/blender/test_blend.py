@@ -195,16 +195,6 @@ def test_blender_plays_the_blend(method):
             assert np.abs(volume - blend.volume[:, order]).max() < 5e-5
 
 
-def test_the_root_travels_at_the_blended_speed():
-    armature, chosen, _pair = make_walks()
-    made = finished(blend_actions.make(armature, chosen, (1, 1), Settings(cycles=2)))
-    shown = played(armature, made.action, (1, made.frames))
-    assert made.frames == 51
-    hips = made.blend.rig.names.index("hips")
-    assert np.abs(shown[1, hips, :3, 3] - shown[0, hips, :3, 3] - (0, -1.9, 0)).max() < CLOSE
-    assert made.blend.root == "hips"
-
-
 def test_an_armature_turned_in_the_world_travels_over_the_worlds_ground():
     armature, _chosen, _pair = make_walks()
     armature.rotation_euler.x = 0.4
@@ -265,17 +255,6 @@ def test_a_blend_leaves_no_trace_once_it_is_empty():
         bpy.ops.sinew.blend_remove_clip(index=1)
     bpy.ops.sinew.blend_remove_clip(index=0)
     assert not armature.is_property_set("sinew_blend")
-
-
-def test_weights_change_from_first_to_last():
-    armature, chosen, _pair = make_walks()
-    for action, start, end in zip(chosen, (1.0, 0.0), (0.0, 1.0), strict=True):
-        clip = armature.sinew_blend.clips.add()
-        clip.action, clip.weight_from, clip.weight = action, start, end
-    armature.sinew_blend.changes = True
-    first = played(armature, chosen[0], [1])[0]
-    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
-    assert np.abs(film(armature, [1])[0] - first).max() < CLOSE
 
 
 def test_weights_change_between_two_shares_of_the_motion():

@@ -15,7 +15,6 @@ from conftest import REPOSITORY
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.bulge_limit import segments
 from sinew_addon.deform import session
-from sinew_addon.io import files
 
 sys.path.append(str(REPOSITORY / "tests" / "python"))
 import bulge_limit_reference
@@ -66,13 +65,6 @@ def assert_limited(obj: bpy.types.Object, before: np.ndarray, **options: object)
     found, expected = scenes.final_points(obj), expected_points(obj, before, **options)
     assert np.abs(expected - before).max() > 0.005
     assert scenes.worst(found, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.fixture(params=routes.ROUTES)
-def route(request):
-    routes.force(request.param)
-    yield request.param
-    routes.release()
 
 
 def bent_arm(method: str = "dq") -> tuple[bpy.types.Object, np.ndarray]:
@@ -192,63 +184,3 @@ def test_bendy_bones_are_limited_along_their_curve():
     armature.pose.bones[0].bbone_curveoutx = 0.0
     bpy.context.view_layer.update()
     assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) < 1e-5
-
-
-def elbow_bulge(obj: bpy.types.Object, points: np.ndarray) -> float:
-    """How much farther the vertices of two bones are, at most, from the nearest posed bone of the arms
-    than from the nearest one at rest; in radii of the elbow."""
-    armature = attach.armature_of(obj)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
-    worst = 0.0
-    offsets, bones, weights = scenes.weights_of(obj)
-    names = [bone.name for bone in armature.data.bones]
-    rest = scenes.rest_points(obj) @ to_armature[:3, :3].T + to_armature[:3, 3]
-    posed = points @ to_armature[:3, :3].T + to_armature[:3, 3]
-    for upper, lower in elbows(armature):
-        pair = [names.index(upper), names.index(lower)]
-        chosen = [
-            v
-            for v in range(len(rest))
-            if {
-                b
-                for b, w in zip(
-                    bones[offsets[v] : offsets[v + 1]], weights[offsets[v] : offsets[v + 1]], strict=True
-                )
-                if w > 0.05
-            }
-            == set(pair)
-        ]
-        apart = []
-        for ends, at in (
-            ([(b.head_local, b.tail_local) for b in (armature.data.bones[i] for i in pair)], rest),
-            ([(b.head, b.tail) for b in (evaluated.pose.bones[names[i]] for i in pair)], posed),
-        ):
-            lines = [(np.array(head), np.array(tail)) for head, tail in ends]
-            apart.append(
-                [
-                    min(np.linalg.norm(at[v] - bulge_limit_reference.nearest(*line, at[v])) for line in lines)
-                    for v in chosen
-                ]
-            )
-        worst = max(worst, max(apart[1]) / max(apart[0]))
-    return float(worst)
-
-
-def elbows(armature: bpy.types.Object) -> list[tuple[str, str]]:
-    """The upper and lower arm bones, found by their names."""
-    lower = [b for b in armature.data.bones if "forearm" in b.name.lower() or "lowerarm" in b.name.lower()]
-    return [(bone.parent.name, bone.name) for bone in lower if bone.parent is not None]
-
-
-def test_no_elbow_of_a_real_rig_bulges(real_rig):
-    files.open_file(real_rig("human.blend"))
-    (obj,) = attach.deformed_meshes(list(bpy.context.scene.objects))
-    scenes.add_sinew(obj, "cor")
-    bpy.context.scene.frame_set(16)
-    assert elbows(attach.armature_of(obj))
-    before = elbow_bulge(obj, scenes.final_points(obj))
-    limit(obj)
-    after = elbow_bulge(obj, scenes.final_points(obj))
-    print(f"elbows of {real_rig('human.blend').name}: {before:.3f} without, {after:.3f} with the limit")
-    assert after <= 1.03

@@ -7,7 +7,6 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-import routes
 import scenes
 import sinew_addon
 import walk_sides
@@ -17,13 +16,6 @@ from sinew_addon.deform.plan import State
 from sinew_addon.io import animation_paths, mesh_io
 from sinew_addon.ui import state_text
 from test_editing import assert_follows
-
-
-@pytest.fixture(params=routes.ROUTES)
-def by_each_route(request):
-    routes.force(request.param)
-    yield
-    routes.release()
 
 
 @pytest.fixture
@@ -130,7 +122,7 @@ def test_a_bone_renamed_and_another_made_in_one_edit():
     assert_follows(obj)
 
 
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 def test_a_bone_made_while_sinew_is_off():
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj)
@@ -159,7 +151,7 @@ def test_bones_are_edited_on_the_rest_shape():
     assert_follows(obj)
 
 
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 def test_bones_that_another_armature_object_shares_are_in_edit_mode_after_undo():
     """In edit mode Blender then only shows the object that the artist edits, and the bones of both."""
     obj, armature = scenes.make_arm()
@@ -256,7 +248,7 @@ def _mute_drivers(obj: bpy.types.Object) -> None:
     ],
     ids=["group", "nodes", "links", "interface", "driver"],
 )
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 def test_what_is_taken_of_sinews_is_made_again(take):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
@@ -283,7 +275,7 @@ def test_points_that_blender_never_requests_are_counted_and_come_after_the_updat
     assert any(update.NOT_REQUESTED in each for each in state_text.problems_of(obj))
 
 
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 def test_a_character_takes_the_place_of_two_other_objects(tmp_path):
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
@@ -305,7 +297,7 @@ def test_a_character_takes_the_place_of_two_other_objects(tmp_path):
     assert np.array_equal(scenes.shapes(target.objects[0], [11]), expected)
 
 
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 def test_two_objects_swap_their_names():
     obj, armature = scenes.make_arm()
     other, other_armature = scenes.make_arm(name="Other")
@@ -343,7 +335,7 @@ def test_one_user_of_a_shared_mesh_in_edit_mode():
     assert_follows(other)
 
 
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 @pytest.mark.parametrize("which", ["armature", "mesh", "both"])
 def test_an_object_without_size_is_as_blender_shows_it(rendered_points, which):
     obj, armature = scenes.make_arm()
@@ -573,7 +565,7 @@ def test_keys_of_visibility_go_and_leave_the_modifier_as_they_set_it(then):
         assert not modifier.show_viewport
 
 
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 def test_keys_of_visibility_go_where_the_modifier_is_on():
     obj, _armature = scenes.make_arm()
     expected = scenes.modifier_shapes(obj, [8], True)
@@ -628,7 +620,7 @@ def test_a_render_of_a_hidden_mesh_has_its_weights_and_its_keyed_method(rendered
     assert scenes.worst(got, rendered_points(obj)) > 0.01
 
 
-@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.usefixtures("route")
 def test_visibility_that_is_keyed_while_sinew_is_on():
     obj, armature = scenes.make_arm()
     scenes.forget_keys(armature)

@@ -23,7 +23,7 @@ import pytest
 import scenes
 from conftest import REPOSITORY
 from distributed.utils import get_ip
-from program import run_sinew
+from program import run_program
 from sinew_addon.attach import properties
 
 pytestmark = pytest.mark.skipif(
@@ -120,7 +120,7 @@ def assert_done(out: Path) -> None:
 @pytest.mark.slow
 def test_as_documented_it_listens_on_this_machine_alone(rig, tmp_path):
     with cluster(tmp_path, "127.0.0.1", {}) as (address, processes):
-        done = run_sinew(*arguments(rig, tmp_path / "out", address))
+        done = run_program(*arguments(rig, tmp_path / "out", address))
         assert "can run programs" not in done.stderr
         # Scheduler, worker, its nanny, and the pages of both.
         assert addresses(processes) <= {"127.0.0.1", "::1"}
@@ -136,7 +136,7 @@ def test_one_that_is_open_to_others_is_named(rig, tmp_path):
         running(tmp_path, "scheduler", "--host", "0.0.0.0", "--port", port, *pages),
         running(tmp_path, "worker", f"tcp://127.0.0.1:{port}", "--host", "127.0.0.1", *pages),
     ):
-        done = run_sinew(*arguments(rig, tmp_path / "out", f"tcp://127.0.0.1:{port}"))
+        done = run_program(*arguments(rig, tmp_path / "out", f"tcp://127.0.0.1:{port}"))
     if get_ip().startswith("127."):
         pytest.skip("this machine has no address that others reach")
     assert "whoever reaches this scheduler can run programs as you" in done.stderr
@@ -169,13 +169,13 @@ def certificates(tmp_path_factory):
 def test_tls_as_documented(rig, tmp_path, certificates):
     with_config = {"DASK_CONFIG": str(certificates)}
     with cluster(tmp_path, "10.0.0.5", {}, with_config) as (address, processes):
-        done = run_sinew(*arguments(rig, tmp_path / "out", address), env_more=with_config)
+        done = run_program(*arguments(rig, tmp_path / "out", address), env_more=with_config)
         assert "can run programs" not in done.stderr
         assert addresses(processes) <= {"127.0.0.1", "::1"}
         # A client without a key is refused with one sentence.
-        without = run_sinew(*arguments(rig, tmp_path / "out 2", address), status=1)
+        without = run_program(*arguments(rig, tmp_path / "out 2", address), status=1)
         assert "how to set up TLS" in without.stderr
-        plain = run_sinew(*arguments(rig, tmp_path / "out 3", address.replace("tls", "tcp")), status=1)
+        plain = run_program(*arguments(rig, tmp_path / "out 3", address.replace("tls", "tcp")), status=1)
         assert "no dask scheduler answers at this address" in plain.stderr
     assert_done(tmp_path / "out")
 
@@ -234,7 +234,7 @@ def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
             (tmp_path / place).mkdir()
             stack.enter_context(running(tmp_path / place, *words, environment=with_config, within=machine))
         words = arguments(folder, tmp_path / "out", "tls://10.0.0.5:8786")
-        done = run_sinew(*words, env_more=with_config, within=client)
+        done = run_program(*words, env_more=with_config, within=client)
     assert f"{len(names)} of {len(names)} files" in done.stdout
     assert "can run programs" not in done.stderr
     for name in names:
@@ -248,7 +248,7 @@ def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
 @pytest.mark.slow
 @pytest.mark.parametrize("address", ["tls://127.0.0.1:1", "http://127.0.0.1:1", "nonsense", "tcp://[::1"])
 def test_what_is_no_scheduler(address, rig, tmp_path):
-    failed = run_sinew(*arguments(rig, tmp_path / "out", address), status=1)
+    failed = run_program(*arguments(rig, tmp_path / "out", address), status=1)
     assert [line for line in failed.stderr.splitlines() if line.startswith(f"sinew: {address}: ")]
 
 
@@ -261,5 +261,5 @@ def test_the_addresses_of_a_scheduler_file_are_taken(rig, tmp_path):
         end = time.monotonic() + 60
         while not file.exists() and time.monotonic() < end:
             time.sleep(0.1)
-        run_sinew(*arguments(rig, tmp_path / "out", json.loads(file.read_text())["address"]))
+        run_program(*arguments(rig, tmp_path / "out", json.loads(file.read_text())["address"]))
     assert_done(tmp_path / "out")

@@ -15,12 +15,9 @@ import program
 import pytest
 import scenes
 import sinew
-import test_bulge_limit
-import test_delta_mush
-import test_mix
 from conftest import REPOSITORY
-from program import run_sinew
-from sinew_addon.attach import attach, properties
+from program import run_program, run_sinew
+from sinew_addon.attach import properties
 from sinew_addon.cli import make_parser
 from sinew_addon.features.action_copy import action_copy
 from sinew_addon.features.inbetween import inbetween_bake
@@ -42,7 +39,7 @@ def arm_file(tmp_path):
 @pytest.mark.slow
 @pytest.mark.once
 def test_help_everywhere():
-    assert "reskin" in run_sinew("--help").stdout
+    assert "reskin" in run_program("--help").stdout
     # tests/python/test_documented.py checks that docs/command-line.md names all of them.
     _parser, commands = make_parser()
     assert "check" in commands
@@ -133,73 +130,6 @@ def test_points(arm_file, tmp_path):
 
 
 @pytest.mark.slow
-def test_parameters_are_set_by_name(tmp_path):
-    """Mixes like two Armature modifiers, in points, copies, bakes and pages."""
-    obj, _armature = scenes.make_arm()
-    test_mix.paint(obj)
-    other, _rig = scenes.make_arm(name="Plain")
-    expected = test_mix.by_two_modifiers(obj)
-    plain = scenes.modifier_shapes(other, test_mix.FRAMES, preserve_volume=False)
-    path, out = tmp_path / "arm.blend", tmp_path / "points.npz"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    mix = ("--method", "lbs", "--set", "mix=dq", "--set", f"mix.group={test_mix.GROUP}")
-    frames = ",".join(map(str, test_mix.FRAMES))
-    run_sinew("points", path, *mix, "--frames", frames, "--out", out)
-    with np.load(out) as points:
-        assert scenes.worst(points["Arm"], expected) <= 1e-5
-        # Without the group, nothing is mixed.
-        assert scenes.worst(points["Plain"], plain) <= 1e-5
-    run_sinew("reskin", path, *mix, "--frames", "none", "--out", tmp_path / "out")
-    files.open_file(tmp_path / "out" / "arm.blend")
-    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_mix.FRAMES), expected) <= 1e-5
-    run_sinew("bake", path, *mix, "--to", "shape-keys", "--frames", frames, "--out", tmp_path / "baked")
-    files.open_file(tmp_path / "baked" / "arm.blend")
-    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_mix.FRAMES), expected) <= 1e-5
-
-
-@pytest.mark.slow
-def test_a_stage_is_set_by_name(tmp_path):
-    """Smooths like Corrective Smooth, in points, copies and bakes."""
-    obj = test_delta_mush.make_rough_arm()
-    expected = test_delta_mush.by_corrective_smooth(
-        obj, iterations=20, smooth_type="LENGTH_WEIGHTED", vertex_group=test_delta_mush.GROUP
-    )
-    path, out = tmp_path / "arm.blend", tmp_path / "points.npz"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    values = ("=on", ".iterations=20", ".smooth_type=length_weighted", f".group={test_delta_mush.GROUP}")
-    stage = ["--method", "lbs", *(text for value in values for text in ("--set", f"delta_mush{value}"))]
-    frames = ",".join(map(str, test_delta_mush.FRAMES))
-    run_sinew("points", path, *stage, "--frames", frames, "--out", out)
-    with np.load(out) as points:
-        assert scenes.worst(points["Arm"], expected) <= 1e-5
-    job = tmp_path / "job.toml"
-    job.write_text(f'method = "lbs"\nset = {stage[3::2]}\nbake = ["shape-keys"]\nbake_frames = "{frames}"\n')
-    run_sinew("reskin", path, "--job", job, "--frames", "none", "--out", tmp_path / "out")
-    files.open_file(tmp_path / "out" / "arm.blend")
-    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_delta_mush.FRAMES), expected) <= 1e-5
-
-
-@pytest.mark.slow
-def test_limit_bulge_is_set_by_name(tmp_path):
-    """Equals the reference, in points, job files, copies and bakes."""
-    obj, before = test_bulge_limit.bent_arm()
-    expected = test_bulge_limit.expected_points(obj, before, strength=0.5, form="kim_han")
-    attach.remove(obj)
-    path, out = tmp_path / "arm.blend", tmp_path / "points.npz"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    values = ["bulge_limit=on", "bulge_limit.strength=0.5", "bulge_limit.form=kim_han"]
-    options = [text for value in values for text in ("--set", value)]
-    run_sinew("points", path, "--method", "dq", *options, "--frames", "11", "--out", out)
-    with np.load(out) as points:
-        assert scenes.worst(points["Arm"][0], expected) <= 3e-5
-    job = tmp_path / "job.toml"
-    job.write_text(f'method = "dq"\nset = {values}\nbake = ["shape-keys"]\nbake_frames = "11"\n')
-    run_sinew("reskin", path, "--job", job, "--frames", "none", "--out", tmp_path / "out")
-    files.open_file(tmp_path / "out" / "arm.blend")
-    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], [11])[0], expected) <= 3e-5
-
-
-@pytest.mark.slow
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("given", "status", "sentence"),
@@ -272,28 +202,20 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
 def test_bad_input_is_one_sentence(arm_file, tmp_path):
     path, _expected = arm_file
     (tmp_path / "empty.blend").touch()
+    (tmp_path / "none").mkdir()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "nothing.blend"))
-    out = tmp_path / "points.npz"
+    out, one = tmp_path / "points.npz", ("--method", "dq", "--frames", "1")
     cases = [
-        (["points", tmp_path / "no.blend", "--method", "dq", "--frames", "1", "--out", out], "no such file"),
-        (["points", tmp_path / "empty.blend", "--method", "dq", "--frames", "1", "--out", out], "is empty"),
-        (["points", tmp_path, "--method", "dq", "--frames", "1", "--out", out], "is a folder"),
-        (
-            ["points", tmp_path / "nothing.blend", "--method", "dq", "--frames", "1", "--out", out],
-            "no mesh is deformed",
-        ),
+        (["points", tmp_path / "no.blend", *one, "--out", out], "no such file"),
+        (["points", tmp_path / "empty.blend", *one, "--out", out], "is empty"),
+        (["points", tmp_path, *one, "--out", out], "is a folder"),
+        (["points", tmp_path / "nothing.blend", *one, "--out", out], "no mesh is deformed"),
         (["points", path, "--method", "best", "--frames", "1", "--out", out], "expected one of"),
         (["points", path, "--method", "dq", "--frames", "9-3", "--out", out], "backwards"),
         (["points", path, "--method", "dq", "--frames", "one", "--out", out], "expected frames"),
-        (
-            ["points", path, "--method", "dq", "--frames", "1", "--object", "Leg", "--out", out],
-            "no mesh called 'Leg'",
-        ),
-        (
-            ["compare", path, "--methods", "lbs,x", "--frame", "1", "--out", tmp_path / "a.png"],
-            "expected one of",
-        ),
+        (["points", path, *one, "--object", "Leg", "--out", out], "no mesh called 'Leg'"),
+        (["compare", path, "--methods", "lbs,x", "--out", tmp_path], "expected one of"),
         (["compare", path, "--frame", "1,2", "--out", tmp_path / "a.png"], "expected one frame"),
         (["compare", path, "--frame", "1", "--out", tmp_path / "a.jpg"], "ending in .png"),
         (["compare", path, path, "--frame", "1", "--out", tmp_path / "a.png"], "a sheet shows one file"),
@@ -303,7 +225,7 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["compare", path, "--frames", "", "--out", tmp_path], "expected frames"),
         (["compare", path, "--out", path], "is a file"),
         (["compare", path, "--frame", "1", "--out", path / "a.png"], "is a file"),
-        (["render", path, "--method", "dq", "--frames", "1", "--out", path / "golden"], "is a file"),
+        (["render", path, *one, "--out", path / "golden"], "is a file"),
         (["compare", path, "--reference", "best", "--out", tmp_path], "expected one of"),
         (["compare", path, "--pictures", "-1", "--out", tmp_path], "expected 0 or more"),
         (["compare", path, "--influences", "-1", "--out", tmp_path], "expected 0 or more"),
@@ -312,6 +234,10 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["compare", tmp_path / "no.blend", "--out", tmp_path], "no such file"),
         (["render", path, "--out", tmp_path], "are needed"),
         (["render", path, "--tolerance", "-1", "--out", tmp_path], "a percentage"),
+        (["render", path, "--against", tmp_path / "none", "--out", tmp_path / "o"], "make golden pictures"),
+        (["render", path, "--against", tmp_path, "--out", tmp_path], "would replace the golden pictures"),
+        (["render", path, *one, "--own-look", "--out", tmp_path / "o"], "no camera"),
+        (["render", path, *one, "--size", "9", "--out", tmp_path / "o"], "64 to 4096"),
         (["info", tmp_path / "no.blend"], "no such file"),
     ]
     of_files = {
@@ -321,6 +247,8 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         "is a folder",
         "no mesh is deformed",
         "no mesh called 'Leg'",
+        "make golden pictures",
+        "no camera",
     }
     for arguments, sentence in cases:
         result = run_sinew(*arguments, status=1 if sentence in of_files else 2)
@@ -337,20 +265,8 @@ def test_compare_draws_a_sheet(tmp_path, engine):
 
     out = tmp_path / "sheet.png"
     rig = REPOSITORY / "blend_files" / "wrist.blend"
-    run_sinew(
-        "compare",
-        rig,
-        "--methods",
-        "blender,lbs,dq",
-        "--frame",
-        24,
-        "--size",
-        128,
-        "--engine",
-        engine,
-        "--out",
-        out,
-    )
+    options = ("--methods", "blender,lbs,dq", "--frame", 24, "--size", 128, "--engine", engine)
+    run_sinew("compare", rig, *options, "--out", out)
     with Image.open(out) as image:
         pixels = np.asarray(image.convert("L"), dtype=np.float64)
     assert pixels.shape[1] > 3 * 128

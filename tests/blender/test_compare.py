@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
-import io
 import json
 import os
 import re
@@ -21,12 +19,8 @@ import pytest
 import scenes
 import trimesh
 from conftest import REPOSITORY
-from sinew_addon.commands import compare, render
-from sinew_addon.commands.console import Console
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.golden import RenderSettings
+from program import run_sinew
 from sinew_addon.features.pages import pictures, video
-from test_command_line import run_sinew
 
 # Pictures take a third of a second each, and are almost the same in all versions.
 NEWEST = bpy.app.version >= (5, 2)
@@ -36,13 +30,6 @@ newest_only = pytest.mark.skipif(not NEWEST, reason="drawn with the newest Blend
 def save(path):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
-
-
-def triangles_of(obj):
-    obj.data.calc_loop_triangles()
-    triangles = np.empty((len(obj.data.loop_triangles), 3), dtype=np.int32)
-    obj.data.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return triangles
 
 
 def test_numbers_are_those_of_the_shapes(tmp_path):
@@ -55,21 +42,11 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
     frames = [1, 6, 11]
     linear = scenes.modifier_shapes(obj, frames, preserve_volume=False)
     dual = scenes.modifier_shapes(obj, frames, preserve_volume=True)
-    rest, triangles = scenes.rest_points(obj), triangles_of(obj)
+    rest, triangles = scenes.rest_points(obj), scenes.triangles_of(obj)
     obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
     path = save(tmp_path / "arm.blend")
-    run_sinew(
-        "compare",
-        path,
-        "--methods",
-        "blender,lbs,dq",
-        "--frames",
-        "1,6,11",
-        "--pictures",
-        0,
-        "--out",
-        tmp_path,
-    )
+    options = ("--methods", "blender,lbs,dq", "--frames", "1,6,11", "--pictures", 0)
+    run_sinew("compare", path, *options, "--out", tmp_path)
     with open(tmp_path / "arm" / "metrics.csv", newline="", encoding="utf-8") as file:
         rows = {(row["method"], int(row["frame"])): row for row in csv.DictReader(file)}
     assert set(rows) == {(method, frame) for method in ("blender", "lbs", "dq") for frame in frames}
@@ -124,18 +101,6 @@ def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     assert dual["distance_max"] > 0.02
     assert linear["bulge_min"] < -0.02
     assert ((tmp_path / "two.html").read_text(encoding="utf-8").count("<img") > 2) == NEWEST
-
-
-@pytest.mark.slow
-@pytest.mark.once
-def test_frames_below_zero(tmp_path):
-    scenes.make_arm()
-    path = save(tmp_path / "arm.blend")
-    for number, frames in enumerate(("-2-0", "-2--1,0.5", "-1")):
-        out = tmp_path / str(number)
-        run_sinew("compare", path, "--methods", "dq", "--frames", frames, "--pictures", 0, "--out", out)
-    found = [json.loads((tmp_path / f"{n}/arm/metrics.json").read_text(encoding="utf-8")) for n in range(3)]
-    assert [each["frames"] for each in found] == [[-2, -1, 0], [-2, -1, 0.5], [-1]]
 
 
 @newest_only
@@ -238,22 +203,6 @@ def test_a_video_shows_one_picture_after_the_other(tmp_path):
         np.testing.assert_allclose(shown, colour, atol=0.05)
 
 
-@pytest.mark.slow
-@pytest.mark.once
-def test_golden_pictures_keep_their_parameters(tmp_path):
-    scenes.make_arm()
-    path, golden, now = save(tmp_path / "arm.blend"), tmp_path / "golden", tmp_path / "now"
-    mix = ("--set", "mix=dq", "--set", "mix.group=bone.1")
-    run_sinew("render", path, "--method", "lbs", "--frames", "11", "--size", 128, *mix, "--out", golden)
-    result = run_sinew("render", path, "--against", golden, "--out", now)
-    assert "1 of 1 pictures within" in result.stdout
-    # Given values win, and are written to the new pictures' settings.
-    off = ("--set", "mix=off")
-    run_sinew("render", path, *off, "--against", golden, "--out", now, status=1)
-    settings = RenderSettings.read(now)
-    assert settings.set == ["mix.method=off", "mix.group=bone.1"]
-
-
 def test_golden_pictures(tmp_path):
     _obj, armature = scenes.make_arm()
     path = save(tmp_path / "arm.blend")
@@ -284,48 +233,6 @@ def test_golden_pictures(tmp_path):
     assert "0011.png: can not be read as a picture" in result.stderr
 
 
-def test_wrong_use_is_one_sentence(tmp_path):
-    scenes.make_arm()
-    path = save(tmp_path / "arm.blend")
-    (tmp_path / "other").mkdir()
-    out = tmp_path / "out"
-    cases = [
-        (["compare", path, tmp_path / "other" / "arm.glb", "--out", out], "would both be written"),
-        (["compare", path, "--reference", "best", "--out", out], "expected one of"),
-        (["compare", path, path, "--frame", "1", "--out", tmp_path / "a.png"], "a sheet shows one file"),
-        (["compare", path, "--pictures", "-1", "--out", out], "expected 0 or more"),
-        (["render", path, "--method", "dq", "--out", out], "--method and --frames are needed"),
-        (["render", path, "--against", tmp_path / "other", "--out", out], "sinew render"),
-        (["render", path, "--against", out, "--out", out], "would replace the golden pictures"),
-        (["render", path, "--method", "dq", "--frames", "1", "--own-look", "--out", out], "no camera"),
-        (["render", path, "--method", "dq", "--frames", "1", "--size", 9, "--out", out], "64 to 4096"),
-    ]
-    parser = argparse.ArgumentParser()
-    subparsers = parser.add_subparsers(dest="command")
-    for module in (compare, render):
-        module.add_parser(subparsers)
-    for arguments, sentence in cases:
-        args = parser.parse_args([*map(str, arguments)])
-        with pytest.raises(SinewError, match=re.escape(sentence)) as error:
-            {"compare": compare, "render": render}[args.command].run(
-                args, Console(io.StringIO(), io.StringIO())
-            )
-        assert "\n" not in str(error.value)
-    assert not out.exists()
-
-
-TESTS = """
-def test_same(sinew_render):
-    sinew_render("arm.blend", "golden", method="dq", frames="1,11", size=96)
-
-def test_other_method(sinew_render):
-    sinew_render("arm.blend", "golden", method="lbs", frames=11, size=96)
-
-def test_tolerant(sinew_render):
-    sinew_render("arm.blend", "golden", method="lbs", frames=11, size=96, tolerance=60)
-"""
-
-
 def run_pytest(folder, *options):
     # The installed plugin would be loaded a second time under its own name.
     environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
@@ -342,23 +249,6 @@ def run_pytest(folder, *options):
 
 @pytest.mark.slow
 @newest_only
-def test_the_pytest_fixture(tmp_path):
-    scenes.make_arm()
-    save(tmp_path / "arm.blend")
-    (tmp_path / "test_rig.py").write_text(TESTS)
-    without = run_pytest(tmp_path, "-k", "same")
-    assert "no golden pictures; make them with pytest --sinew-update" in without.stdout
-    assert without.returncode == 1
-    assert run_pytest(tmp_path, "-k", "same", "--sinew-update").returncode == 0
-    result = run_pytest(tmp_path)
-    assert "1 failed, 2 passed" in result.stdout, result.stdout
-    assert "FAILED" in result.stdout
-    assert "test_other_method" in result.stdout
-    assert "0011.difference.png" in result.stdout
-
-
-@pytest.mark.slow
-@newest_only
 def test_the_example_of_a_repository_of_rigs(tmp_path):
     page = (REPOSITORY / "docs" / "render-tests.md").read_text(encoding="utf-8")
     layout, tests = re.findall(r"```(?:text|python)\n(.*?)```", page, re.DOTALL)
@@ -368,6 +258,9 @@ def test_the_example_of_a_repository_of_rigs(tmp_path):
     for name in re.findall(r"\w+\.blend", layout):
         save(tmp_path / "rigs" / name)
     (tmp_path / "tests" / "test_rigs.py").write_text(tests)
+    without = run_pytest(tmp_path)
+    assert without.returncode == 1
+    assert "no golden pictures; make them with pytest --sinew-update" in without.stdout
     made = run_pytest(tmp_path, "--sinew-update")
     assert made.returncode == 0, made.stdout
     pictures = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.png"))
@@ -380,6 +273,7 @@ def test_the_example_of_a_repository_of_rigs(tmp_path):
     compared = run_pytest(tmp_path)
     assert "1 failed, 1 passed" in compared.stdout, compared.stdout
     assert "test_rig[sidekick]" in compared.stdout
+    assert "0011.difference.png" in compared.stdout
 
 
 def test_pytest_is_told_of_the_fixture():

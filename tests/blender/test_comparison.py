@@ -10,7 +10,6 @@ import scenes
 import sinew_addon
 import test_restore
 import whole_file
-from conftest import BLEND_FILES
 from program import run_sinew
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import characters
@@ -105,13 +104,6 @@ def content() -> dict[str, object]:
 def assert_ends_without_trace(before: dict[str, object]) -> None:
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
     assert whole_file.differences(before, content()) == []
-
-
-@pytest.mark.parametrize("path", BLEND_FILES, ids=lambda path: path.stem)
-def test_samples(path):
-    files.open_file(path)
-    (obj,) = (o for o in bpy.data.objects if attach.armature_of(o) is not None)
-    assert_compared(obj, [1, 12, 24])
 
 
 def test_a_real_character(real_rig):
@@ -607,15 +599,6 @@ def test_simulations_stay_with_the_original():
         assert {m.type for m in copy.modifiers} == {"ARMATURE", "SUBSURF", "NODES"}
 
 
-def test_subdivision_stays_last():
-    for set_up, behind in ((subdivided_last, ["Last"]), (subdivided_behind, [])):
-        obj, armature = scenes.make_arm(name=set_up.__name__)
-        set_up(obj, armature)
-        compare(obj, {"dq"})
-        names = [m.name for m in copies(obj)["dq"].modifiers]
-        assert names[names.index("Offset") + 1 :] == behind
-
-
 def test_what_can_not_be_compared():
     obj, _armature = scenes.make_arm()
     obj.modifiers.new("Cloth", "CLOTH")
@@ -671,15 +654,6 @@ def test_without_sinew_the_file_opens(tmp_path):
         sinew_addon.register()
     bpy.ops.sinew.end_comparison()
     assert [o.name for o in bpy.data.objects if o.type == "MESH"] == ["Arm"]
-
-
-def test_pinned_modifiers_stay_behind_sinew():
-    obj, _armature = scenes.make_arm()
-    subdivided_behind(obj, _armature)
-    expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)
-    scenes.add_sinew(obj, "dq")
-    assert [m.name for m in obj.modifiers] == ["Armature", "Sinew", "Behind", "Pinned"]
-    assert scenes.worst(scenes.shapes(obj, [11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_commands_leave_copies_out(tmp_path):

@@ -10,11 +10,9 @@ import time
 import bpy
 import numpy as np
 import pytest
-import routes
 import scenes
 import sinew
 from conftest import REPOSITORY
-from program import run_sinew
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.precompute import precomputations
 from sinew_addon.deform import precompute_watch, session
@@ -27,13 +25,6 @@ if "ddm" not in {method.name for method in sinew.methods()}:
     pytest.skip("built without ddm", allow_module_level=True)
 
 FRAME = 8
-
-
-@pytest.fixture(params=routes.ROUTES)
-def route(request):
-    routes.force(request.param)
-    yield request.param
-    routes.release()
 
 
 @pytest.fixture
@@ -144,22 +135,3 @@ def test_it_is_kept_in_the_file(tmp_path, monkeypatch):
     obj = bpy.data.objects[name]
     bpy.context.scene.frame_set(FRAME)
     np.testing.assert_array_equal(scenes.final_points(obj), before)
-
-
-def test_commands_take_its_parameters(tmp_path):
-    obj, _armature = scenes.make_arm(bones=3)
-    path, name = tmp_path / "arm.blend", obj.name
-    scenes.add_sinew(obj, "ddm")
-    bpy.context.scene.frame_set(FRAME)
-    expected = {}
-    for radius in (0.02, 0.3):
-        properties.of(obj).ddm.radius = radius
-        bpy.context.view_layer.update()
-        expected[radius] = scenes.final_points(obj)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    assert scenes.worst(expected[0.02], expected[0.3]) > 0.01
-    for radius, points in expected.items():
-        out, setting = tmp_path / "points.npz", f"ddm.radius={radius}"
-        run_sinew("points", path, "--method", "ddm", "--set", setting, "--frames", FRAME, "--out", out)
-        with np.load(out) as found:
-            assert scenes.worst(found[name][0], points) <= 1e-5

@@ -10,7 +10,7 @@ import pytest
 import scenes
 import whole_file
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import safe_mode, session, small_meshes
+from sinew_addon.deform import safe_mode, session
 from sinew_addon.deform.plan import State
 from sinew_addon.features.heat import live
 
@@ -235,17 +235,6 @@ def test_settings_paint_and_edits_are_seen():
     assert same(expected(iterations=9))
     properties.of(obj).delta_mush.group = "none such"
     assert any("none such" in text for text in session.state_of(obj).bound.facts.warnings)
-
-
-def test_a_small_mesh_is_not_left_to_blender(monkeypatch):
-    obj = make_rough_arm()
-    expected = by_corrective_smooth(obj)
-    monkeypatch.setattr(small_meshes, "is_used", True)
-    scenes.add_sinew(obj, "lbs")
-    assert session.state_of(obj).plan.state is State.BUILT_IN
-    properties.of(obj).delta_mush.enabled = True
-    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
 
 
 def narrowest(obj: bpy.types.Object, rings: int, sides: int) -> float:

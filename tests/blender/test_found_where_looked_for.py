@@ -13,7 +13,6 @@ import pytest
 from bl_operators.wm import WM_OT_doc_view_manual
 from sinew_addon.attach import properties
 from sinew_addon.ui import character, manual, menus
-from sinew_addon.ui.preferences import SinewPreferences
 
 
 def operator_types() -> Iterator[tuple[type, bpy.types.Struct]]:
@@ -94,39 +93,6 @@ def test_the_manual_has_a_section_for_every_operator_and_property(monkeypatch):
     manual.unregister()
     assert WM_OT_doc_view_manual._lookup_rna_url("bpy.ops.sinew.compare", verbose=False) is None
     manual.register()
-
-
-def test_the_manual_opens_at_the_section_of_what_is_pointed_at():
-    def section(cls: type, name: str) -> str:
-        found = WM_OT_doc_view_manual._lookup_rna_url(f"bpy.types.{cls.__name__}.{name}", verbose=False)
-        return found.partition("#")[2]
-
-    for groups_of, wanted in ((properties.STAGE_GROUPS, "stages"), (properties.METHOD_GROUPS, "method")):
-        for group, cls in groups_of.items():
-            of_character = type(getattr(character.of(bpy.context.scene), group))
-            for each in (cls, of_character):
-                for name in cls.__annotations__:
-                    assert section(each, name) == wanted, (each, name)
-    for cls in (properties.SinewSettings, character.SinewCharacter):
-        assert section(cls, "enabled") == "character"
-        assert section(cls, "method") == "method"
-    assert section(properties.SinewReplacedModifier, "method") == "meshes"
-
-
-def test_the_manual_names_all_that_a_bake_writes_and_all_preferences():
-    page = manual.PAGE.read_text()
-
-    def of(section: str) -> str:
-        return page.partition(f'id="{section}"')[2].partition("<h2")[0]
-
-    bake = bpy.ops.sinew.bake.get_rna_type().properties
-    for item in bake["kind"].enum_items:
-        assert item.name.removesuffix(" Cache").lower() in of("bake").lower()
-    for name in ("motion", "helpers", "error", "influences"):
-        assert f"<b>{bake[name].name}</b>" in of("bake")
-    assert len(SinewPreferences.__annotations__) == 4
-    for name in SinewPreferences.__annotations__:
-        assert f"<b>{SinewPreferences.bl_rna.properties[name].name}</b>" in of("preferences")
 
 
 def test_a_preset_has_method_and_parameters_for_another_character(tmp_path, monkeypatch):

@@ -6,7 +6,6 @@ from __future__ import annotations
 import bpy
 import pytest
 import scenes
-from sinew_addon.attach import properties
 from sinew_addon.deform import session, survey
 from sinew_addon.features.diagnose import diagnose
 from sinew_addon.features.pages import measure
@@ -52,11 +51,6 @@ def dynamic_paint(obj, armature):
     bpy.context.view_layer.objects.active = obj
     bpy.ops.dpaint.type_toggle(type="CANVAS")
     made.canvas_settings.canvas_surfaces[0].output_name_a = GROUP
-
-
-def sinews_mix(obj, armature):
-    scenes.add_sinew(obj)
-    properties.of(obj).mix.group = GROUP
 
 
 def shape_key(obj, armature):

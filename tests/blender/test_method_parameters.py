@@ -8,7 +8,6 @@ import json
 import bpy
 import numpy as np
 import pytest
-import routes
 import scenes
 import sinew
 from program import run_sinew
@@ -19,13 +18,6 @@ from test_sdef import make_model
 
 FRAME = 9
 CHOICES = ("nlerp", "slerp")
-
-
-@pytest.fixture(params=routes.ROUTES)
-def route(request):
-    routes.force(request.param)
-    yield request.param
-    routes.release()
 
 
 def skinned_model() -> bpy.types.Object:

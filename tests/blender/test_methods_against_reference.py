@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Methods that Blender lacks, except qv: the oracle is the float64 reference, with Blender's own poses."""
+"""Methods that Blender lacks: the oracle is the float64 reference, with Blender's own poses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import sys
 import bpy
 import numpy as np
 import pytest
-import routes
 import scenes
 import sinew
 from conftest import REPOSITORY
@@ -18,7 +17,7 @@ from sinew_addon.io import files
 sys.path.append(str(REPOSITORY / "tests" / "python"))
 import reference
 
-METHODS = ("cor", "sbs", "dib")
+METHODS = ("qv", "cor", "sbs", "dib")
 STEP = 7
 
 
@@ -67,13 +66,6 @@ def assert_equal_to_reference(
     found = scenes.final_points(obj)[::STEP]
     # Larger meshes compute centres by cells, in both.
     assert scenes.worst(found[decided], expected[decided]) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.fixture(params=routes.ROUTES)
-def route(request):
-    routes.force(request.param)
-    yield request.param
-    routes.release()
 
 
 @pytest.mark.slow

@@ -8,9 +8,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-import whole_file
-from sinew_addon.attach import attach, properties
-from sinew_addon.deform import safe_mode, session, small_meshes
+from sinew_addon.attach import properties
+from sinew_addon.deform import safe_mode, session
 from sinew_addon.deform.plan import State
 
 FRAMES = [1, 4, 7, 11]
@@ -130,38 +129,6 @@ def test_under_other_scale_rules_it_is_between_its_two(rule):
     got = scenes.shapes(obj, [8])[0]
     assert scenes.worst(got, first + shares * (second - first)) < 1e-5
     assert scenes.worst(first, second) > 1e-3
-
-
-def test_a_small_mesh_with_a_mix_is_not_left_to_blender(monkeypatch):
-    obj, _armature = scenes.make_arm()
-    paint(obj)
-    expected = by_two_modifiers(obj)
-    monkeypatch.setattr(small_meshes, "is_used", True)
-    mixed(obj)
-    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
-
-
-def test_saved_copied_and_removed(tmp_path):
-    obj, _armature = scenes.make_arm()
-    paint(obj)
-    whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
-    before = whole_file.of_open_file()
-    mixed(obj)
-    expected = scenes.shapes(obj, FRAMES)
-    path = tmp_path / "mixed.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-    copy = obj.copy()
-    bpy.context.scene.collection.objects.link(copy)
-    assert scenes.worst(scenes.shapes(copy, FRAMES), expected) < 1e-6
-    attach.remove(copy)
-    bpy.data.objects.remove(copy)
-    bpy.context.scene.frame_set(1)
-    attach.remove(obj)
-    bpy.context.view_layer.update()
-    assert whole_file.differences(before, whole_file.of_open_file()) == []
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], FRAMES), expected) < 1e-6
 
 
 @pytest.mark.parametrize("name", ["", "not there"])

@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from program import disk, run_sinew, start_sinew
+from program import disk, run_program, run_sinew, start_sinew
 from sinew_addon import cli
 from sinew_addon.core import output
 from sinew_addon.core.errors import SinewError, WrongUse
@@ -444,5 +444,5 @@ def test_a_batch_clears_away_after_one_that_was_killed(tmp_path, inputs):
     process.kill()
     process.wait()
     assert list(temporary.glob("sinew-*"))
-    run_sinew(*command, "--overwrite", env_more={"TMPDIR": str(temporary)})
+    run_program(*command, "--overwrite", env_more={"TMPDIR": str(temporary)})
     assert list(temporary.glob("sinew-*")) == []

@@ -12,7 +12,6 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-import routes
 import scenes
 from program import run_sinew
 from sinew_addon.attach import attach, properties, stored_vertex_data
@@ -69,13 +68,6 @@ def gate(monkeypatch, tmp_path):
 def in_window():
     """As in an interactive session: nothing waits."""
     precomputations.waits = False
-
-
-@pytest.fixture(params=routes.ROUTES)
-def route(request):
-    routes.force(request.param)
-    yield request.param
-    routes.release()
 
 
 def forget_made() -> None:

@@ -86,20 +86,6 @@ def test_background_animation_equals_the_modifier(tmp_path, method, preserve_vol
     assert np.abs(got - expected).mean() < 2e-4
 
 
-def test_motion_blur_blurs(tmp_path):
-    """The check above would pass if neither picture were blurred."""
-    obj, _armature = scenes.make_arm()
-    scene = bpy.context.scene
-    prepare(scene, motion_blur=False)
-    scenes.add_sinew(obj, "dq")
-    (tmp_path / "sharp").mkdir()
-    (tmp_path / "blurred").mkdir()
-    sharp = render_animation(scene, tmp_path / "sharp", (6, 6))
-    scene.render.use_motion_blur = True
-    blurred = render_animation(scene, tmp_path / "blurred", (6, 6))
-    assert np.abs(sharp - blurred).mean() > 0.002
-
-
 def test_hidden_rig_renders_like_the_modifier(tmp_path):
     obj, armature = scenes.make_arm()
     scene = bpy.context.scene

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from program import checked, without_sinew
 from sinew_addon.attach import attach, node_group, note, properties, stack
 from sinew_addon.deform import exporters, safe_mode, session, small_meshes
 from sinew_addon.io import armature_io
@@ -49,17 +50,10 @@ print("FACTS " + json.dumps({
 """
 
 
-def without_sinew(path: Path) -> tuple[np.ndarray, dict]:
+def played_without_sinew(path: Path) -> tuple[np.ndarray, dict]:
     """The shapes at FRAMES in a Blender without Sinew, and the file's message there."""
     result = path.with_suffix(".npy")
-    run = subprocess.run(
-        [sys.executable, "-c", READ, str(path), str(result), json.dumps(FRAMES)],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert run.returncode == 0, run.stdout + run.stderr
+    run = checked(without_sinew.run(READ, path, result, json.dumps(FRAMES)), 0)
     facts = json.loads(next(line for line in run.stdout.splitlines() if line.startswith("FACTS "))[6:])
     return np.load(result), facts
 
@@ -88,7 +82,7 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
     assert obj.modifiers["Armature"].use_deform_preserve_volume is not preserve_volume
     assert not [text for text in bpy.data.texts if text.get(note.MARK)]
-    shapes, facts = without_sinew(path)
+    shapes, facts = played_without_sinew(path)
     assert np.array_equal(shapes, expected)
     assert any("Arm" in text and "Sinew" in text for text in facts["texts"])
     assert any("Sinew" in label for label in facts["labels"])
@@ -297,7 +291,7 @@ def test_saved_in_a_mode_of_the_modifier(tmp_path, mode):
     bpy.ops.object.mode_set(mode="OBJECT")
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
     assert not obj.modifiers["Armature"].use_deform_preserve_volume
-    shapes, _facts = without_sinew(tmp_path / "saved.blend")
+    shapes, _facts = played_without_sinew(tmp_path / "saved.blend")
     assert scenes.worst(shapes, expected) <= 1e-6
 
 
@@ -320,7 +314,7 @@ def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
 
     monkeypatch.setattr(attach, "prepare_for_save", throw)
     save(tmp_path / "saved.blend")
-    shapes, _facts = without_sinew(tmp_path / "saved.blend")
+    shapes, _facts = played_without_sinew(tmp_path / "saved.blend")
     assert np.array_equal(shapes, expected)
     if what != "throws":
         assert small.modifiers["Armature"].object == armature

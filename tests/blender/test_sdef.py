@@ -7,7 +7,6 @@ import sys
 
 import bpy
 import numpy as np
-import pytest
 import routes
 import scenes
 from conftest import REPOSITORY
@@ -85,13 +84,6 @@ def moved(matrix: np.ndarray, point: np.ndarray) -> np.ndarray:
 def assert_as_expected(obj: bpy.types.Object, rest: np.ndarray | None = None) -> None:
     worst = scenes.worst(scenes.final_points(obj), expected_points(obj, rest))
     assert worst <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.fixture(params=routes.ROUTES)
-def route(request):
-    routes.force(request.param)
-    yield request.param
-    routes.release()
 
 
 def test_a_model_has_the_shape_of_mmd_tools(route):

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import scenes
 import test_bake
-import test_compare
 import test_comparison
 import test_heat_map
 import trimesh

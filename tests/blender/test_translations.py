@@ -1,34 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's texts in other languages. Blender as a module has no languages: language_in_window.py tests
-what is shown in a whole Blender."""
+"""Protects texts in other languages: the values that they name, and what a whole Blender shows
+(language_in_window.py), as Blender as a module has no languages."""
 
 from __future__ import annotations
 
-import warnings
+import ast
+import string
+from pathlib import Path
 
 import in_window
-import messages
 import pytest
-from messages import names_in_braces
+import sinew_addon
 from sinew_addon.ui import translations
 
 LANGUAGES = list(translations.LANGUAGES)
 
 
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_a_missing_translation_warns(language):
-    """It fails nothing, as Blender shows the English text."""
-    shown = messages.shown()
-    assert len(shown) > 300
-    missing = [text for text in shown if text not in translations.LANGUAGES[language]]
-    if missing:
-        warnings.warn(f"{language}: {len(missing)} texts are not translated: {missing}", stacklevel=1)
+def names_in_braces(text: str) -> set[str]:
+    fields = (name for _before, name, _format, _conversion in string.Formatter().parse(text))
+    return {name for name in fields if name is not None}
 
 
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_no_translation_is_left_over(language):
-    used = messages.shown().keys() | messages.literals()
-    assert [text for text in translations.LANGUAGES[language] if text not in used] == []
+def texts_of(node: ast.expr) -> list[str]:
+    """A string, or both of a conditional expression."""
+    if isinstance(node, ast.IfExp):
+        return texts_of(node.body) + texts_of(node.orelse)
+    return [node.value] if isinstance(node, ast.Constant) and isinstance(node.value, str) else []
+
+
+def test_texts_are_given_the_values_that_they_name():
+    wrong, count = [], 0
+    for path in sorted(Path(sinew_addon.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "phrase"):
+                texts = texts_of(node.args[0])
+                count += len(texts)
+                given = {keyword.arg for keyword in node.keywords}
+                wrong += [f"{path}:{node.lineno}: {text}" for text in texts if names_in_braces(text) != given]
+    assert count > 100
+    assert wrong == []
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -53,15 +63,6 @@ def test_translations_end_as_their_texts_do(language):
     allowed = {"Rebound"}
     texts = translations.LANGUAGES[language].items()
     assert [text for text, other in texts if end(text) != end(other) and text not in allowed] == []
-
-
-def test_texts_are_given_the_values_that_they_name():
-    assert messages.wrong_values() == []
-
-
-def test_texts_put_together_are_translated_as_a_whole():
-    """No text with words is assembled in a panel's code, where it would stay English."""
-    assert messages.joined_in_code() == []
 
 
 @pytest.fixture(scope="module")

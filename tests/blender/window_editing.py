@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
-
 import bpy
 import numpy as np
 import window
@@ -300,52 +298,6 @@ def remove_sinews_modifier(run: Run) -> Steps:
 
 
 @step("modifiers")
-def copy_modifiers(run: Run) -> Steps:
-    """To another mesh of the same armature, which never had Sinew: the result is a working modifier or
-    none."""
-    twin = bpy.data.objects.new("Twin", hero().data.copy())
-    _link_beside(twin)
-    yield from wait()
-    yield from _copy_modifiers(run)
-
-
-@step("modifiers")
-def copy_modifiers_to_a_copy(run: Run) -> Steps:
-    """To one that had Sinew, and whose modifiers were deleted one by one."""
-    twin = hero().copy()
-    twin.data = hero().data.copy()
-    twin.name = "Twin"
-    _link_beside(twin)
-    yield from wait()
-    run.check_copy(twin, "copied by Python")
-    for modifier in list(twin.modifiers):
-        twin.modifiers.remove(modifier)
-        yield from wait()
-    yield from _copy_modifiers(run)
-
-
-def _link_beside(twin: bpy.types.Object) -> None:
-    twin.location = rig().location + Vector((0.0, -4.0, 0.0))
-    bpy.context.window_manager.windows[0].scene.collection.objects.link(twin)
-
-
-def _copy_modifiers(run: Run) -> Steps:
-    choose("Hero", "Twin")
-    execute("object.make_links_data", type="MODIFIERS")
-    yield from wait()
-    twin = bpy.data.objects["Twin"]
-    run.check_copy(twin, "after Copy Modifiers")
-    set_frame(5)
-    yield from wait()
-    run.check_copy(twin, "after Copy Modifiers, at frame 5")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "copied.blend"), copy=True)
-    run.note_saved(FOLDER / "copied.blend")
-    execute("object.delete", "Twin", confirm=False)
-    yield from wait()
-    yield from run.check_frames()
-
-
-@step("modifiers")
 def duplicate(run: Run) -> Steps:
     for linked in (False, True):
         execute("object.duplicate", "Hero", linked=linked)
@@ -416,37 +368,6 @@ def convert_to_mesh(run: Run) -> Steps:
     yield from wait(4)
     run.check_shapes("undone")
     yield from run.check_frames()
-
-
-@step("modifiers")
-def save_as_shape_key(run: Run) -> Steps:
-    set_frame(12)
-    yield from wait()
-    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-    before = shown_points(hero(), depsgraph)
-    # Blender itself refuses it for Geometry Nodes.
-    with contextlib.suppress(RuntimeError):
-        execute("object.modifier_apply_as_shapekey", "Hero", modifier="Sinew", keep_modifier=True)
-    yield from wait()
-    keys = hero().data.shape_keys
-    run.check_shapes("afterwards")
-    if keys is not None:
-        points = before.copy()
-        keys.key_blocks[-1].data.foreach_get("co", points.ravel())
-        off = worst(points, before)
-        run.check(off <= window_scene.TOLERANCE, f"the shape key is off by {off:.4f}")
-        press("Z", ctrl=True)
-        yield from wait(4)
-    yield from run.check_frames()
-
-
-@step("modifiers")
-def no_inert_group_in_the_menu(run: Run) -> Steps:
-    """The Add Modifier menu offers groups that are modifiers; Sinew's would have no effect on another
-    mesh."""
-    offered = [g.name for g in bpy.data.node_groups if g.is_modifier and not g.name.startswith((".", "_"))]
-    run.check(not offered, f"the menu offers {offered}")
-    yield
 
 
 @step("modifiers")

@@ -90,42 +90,6 @@ def scale_and_apply(run: Run) -> Steps:
 
 
 @step("objects")
-def shape_keys(run: Run) -> Steps:
-    """Keys and their values; they change the rest points, which the reference does not support."""
-    for name in ("Basis", "Wide"):
-        execute("object.shape_key_add", "Hero", from_mix=False)
-        hero().data.shape_keys.key_blocks[-1].name = name
-    yield from wait()
-    run.check_shapes("with keys that move nothing")
-    yield from run.check_frames()
-    execute("object.shape_key_remove", "Hero", all=True)
-    yield from wait()
-    run.check_shapes("without keys")
-    yield from run.check_frames()
-
-
-@step("objects")
-def weights_by_operators(run: Run) -> Steps:
-    choose("Hero")
-    for name, arguments in (
-        ("object.vertex_group_normalize_all", {"lock_active": False}),
-        ("object.vertex_group_quantize", {"group_select_mode": "ALL", "steps": 3}),
-        ("object.vertex_group_limit_total", {"limit": 1}),
-    ):
-        execute(name, "Hero", **arguments)
-        yield from wait()
-        run.check_shapes(f"after {name}")
-    set_frame(15)
-    yield from wait()
-    run.check_shapes("after all, at frame 15")
-    for _time in range(3):
-        press("Z", ctrl=True)
-        yield from wait(4)
-        run.check_shapes("undone")
-    yield from run.check_frames()
-
-
-@step("objects")
 def parent_again(run: Run) -> Steps:
     """Ctrl+P, With Empty Groups, while Sinew is on."""
     execute("object.parent_clear", "Hero", type="CLEAR_KEEP_TRANSFORM")
@@ -158,53 +122,6 @@ def join(run: Run) -> Steps:
     press("Z", ctrl=True)
     yield from wait(4)
     run.check_shapes("joined and undone")
-    yield from run.check_frames()
-
-
-@step("objects")
-def another_armature(run: Run) -> Steps:
-    """Chosen in the Armature modifier, while Sinew is on."""
-    hero().modifiers["Armature"].object = bpy.data.objects["Front Rig"]
-    yield from wait()
-    set_frame(16)
-    yield from wait()
-    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-    expected = blender_points(hero(), bpy.data.objects["Front Rig"], "dq", depsgraph)
-    off = worst(shown_points(hero(), depsgraph), expected)
-    run.check(off <= window_scene.TOLERANCE, f"Hero by another armature is off by {off:.4f}")
-    hero().modifiers["Armature"].object = rig()
-    yield from wait()
-    yield from run.check_frames()
-
-
-@step("objects")
-def switch_the_modifiers(run: Run) -> Steps:
-    """The artist switches the Armature modifier on in addition to Sinew's, then Sinew's off and on."""
-    nodes = next(m for m in hero().modifiers if m.type == "NODES")
-    nodes.show_viewport = False
-    yield from wait()
-    nodes.show_viewport = True
-    yield from wait()
-    run.check_shapes("Sinew's modifier off and on")
-    yield from run.check_frames()
-
-
-@step("objects")
-def keyed_method(run: Run) -> Steps:
-    settings = hero().sinew
-    settings.method = "lbs"
-    settings.keyframe_insert("method", frame=1)
-    settings.method = "dq"
-    settings.keyframe_insert("method", frame=10)
-    for frame, method in ((5, "lbs"), (12, "dq"), (9, "lbs"), (20, "dq")):
-        set_frame(frame)
-        run.wanted["Hero"] = method
-        yield from wait()
-        run.check_shapes(f"at frame {frame}")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "keyed.blend"), copy=True)
-    run.note_saved(FOLDER / "keyed.blend")
-    settings.keyframe_delete("method", frame=1)
-    settings.keyframe_delete("method", frame=10)
     yield from run.check_frames()
 
 

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps with other programs and code in Blender: exporters, renders, other add-ons, libraries."""
+"""Steps with other programs and code in Blender: exporters, renders, other add-ons."""
 
 from __future__ import annotations
 
 import contextlib
 import random
-from collections.abc import Callable
 
 import addon_utils
 import bpy
@@ -19,9 +18,7 @@ from window_hand import (
     choose,
     click,
     fresh,
-    hero,
     press,
-    rig,
     set_frame,
     step,
     wait,
@@ -232,169 +229,17 @@ def stop_a_render(run: Run) -> Steps:
     yield from run.check_frames()
 
 
-class Hostile:
-    """A handler of another add-on, before Sinew's own or after them."""
-
-    def __init__(
-        self, what: Callable[[], None], event: str = "frame_change_post", ahead: bool = True
-    ) -> None:
-        self.what, self.functions, self.ahead = what, getattr(bpy.app.handlers, event), ahead
-
-    def __call__(self, *_arguments: object) -> None:
-        self.what()
-
-    def __enter__(self) -> Hostile:
-        self.functions.insert(0 if self.ahead else len(self.functions), self)
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        self.functions.remove(self)
-
-
-def _deforms(run: Run, when: str) -> None:
-    """Deformed by Sinew, or by the Armature modifier with a message; never at rest without a message."""
-    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-    shown = shown_points(hero(), depsgraph)
-    by = {m: worst(shown, blender_points(hero(), rig(), m, depsgraph)) for m in ("dq", "lbs")}
-    told = bool(hero().sinew.error) or not hero().sinew.enabled or not len(hero().sinew.replaced_modifiers)
-    near = {method: off <= window_scene.TOLERANCE for method, off in by.items()}
-    off = f"off by {by['dq']:.4f} from dq and {by['lbs']:.4f} from lbs"
-    run.check(near["dq"] or (near["lbs"] and told), f"Hero {when} is {off}; error: {hero().sinew.error!r}")
-
-
-@step("hostile")
-def node_groups_removed(run: Run) -> Steps:
-    def remove() -> None:
-        for group in [g for g in bpy.data.node_groups if "Sinew" in g.name]:
-            bpy.data.node_groups.remove(group)
-
-    # The others have lost theirs as well, and report it.
-    del run.wanted["Small"], run.wanted["Front"], run.wanted["Late"]
-    for ahead in (True, False):
-        where = "ahead of Sinew" if ahead else "behind Sinew"
-        with Hostile(remove, ahead=ahead):
-            for frame in (5, 6, 18):
-                set_frame(frame)
-                yield from wait()
-                # If removed after Sinew's, it is noticed at the next frame; if repeatedly, at the third.
-                if ahead or frame > 6:
-                    _deforms(run, f"without its node group, removed {where}, at frame {frame}")
-            bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "hostile.blend"), copy=True)
-            yield from wait()
-            _deforms(run, f"after saving, {where}")
-        click("sinew.remove", "Hero")
-        click("sinew.add", "Hero")
-        hero().sinew.method = "dq"
-        yield from run.check_frames()
-    yield from fresh(run)
-
-
-@step("hostile")
-def modifiers_renamed(run: Run) -> Steps:
-    number = 0
-
-    def rename() -> None:
-        nonlocal number
-        number += 1
-        for modifier in hero().modifiers:
-            modifier.name = f"Renamed {number}"
-
-    for event in ("frame_change_pre", "frame_change_post"):
-        for ahead in (True, False):
-            with Hostile(rename, event, ahead):
-                for frame in (5, 6, 18):
-                    set_frame(frame)
-                    yield from wait()
-                    _deforms(run, f"renamed at {event}, ahead {ahead}, frame {frame}")
-    yield from run.check_frames()
-    yield from fresh(run)
-
-
-@step("hostile")
-def modifiers_deleted(run: Run) -> Steps:
-    def delete() -> None:
-        for modifier in [m for m in hero().modifiers if m.type == "NODES"]:
-            hero().modifiers.remove(modifier)
-
-    for ahead in (True, False):
-        with Hostile(delete, ahead=ahead):
-            for frame in (5, 6, 18):
-                set_frame(frame)
-                yield from wait()
-                if ahead or frame > 5:
-                    _deforms(run, f"without its modifier, ahead {ahead}, at frame {frame}")
-        bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "deleted.blend"), copy=True)
-        yield from fresh(run)
-
-
-@step("hostile")
-def suspended_modifiers_renamed_and_deleted(run: Run) -> Steps:
-    """A character with an animation: its other modifiers are suspended between Sinew's two handlers,
-    while another add-on renames, deletes and adds some."""
-    obj = hero()
-    obj.modifiers.new("Behind", "SMOOTH").factor = 0.0
-    obj.modifiers.new("Doomed", "SMOOTH").factor = 0.0
-    obj.keyframe_insert("location", frame=1)
-    obj.location.z += 1.0
-    obj.keyframe_insert("location", frame=20)
-    # So that it is deformed after the update.
-    cast = obj.modifiers.new("Cast", "CAST")
-    cast.factor = 0.0
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
-    yield from wait()
-    for frame in (2, 3):
-        set_frame(frame)
-        yield from wait()
-    number = 0
-
-    def meddle() -> None:
-        nonlocal number
-        number += 1
-        for modifier in hero().modifiers:
-            if modifier.name.startswith("Behind"):
-                modifier.name = f"Behind {number}"
-        doomed = hero().modifiers.get("Doomed")
-        if doomed is not None:
-            hero().modifiers.remove(doomed)
-
-    for ahead in (True, False):
-        with Hostile(meddle, "frame_change_pre", ahead):
-            for frame in (5, 6, 18):
-                set_frame(frame)
-                yield from wait()
-                run.check_shapes(f"at frame {frame}, ahead {ahead}")
-    for modifier in hero().modifiers:
-        if modifier.name.startswith(("Behind", "Cast")):
-            run.check(modifier.show_viewport and modifier.show_render, f"{modifier.name} stays off")
-    yield from fresh(run)
-
-
-@step("hostile")
-def weights_changed_behind_sinew(run: Run) -> Steps:
-    """Blender sends no notification of what a handler changes."""
-    changed = []
-
-    def change() -> None:
-        if not changed:
-            changed.append(True)
-            hero().vertex_groups[0].add(range(3000), 1.0, "REPLACE")
-
-    with Hostile(change, "depsgraph_update_post", ahead=False):
-        window_scene.pose(rig(), 40.0)
-        yield from window.until(lambda: changed, "a change of weights", PATIENCE)
-        yield from wait(20)
-    run.check_shapes("after the change")
-    yield from run.check_frames()
-    yield from fresh(run)
-
-
-@step("hostile")
+@step("exports")
 def others_throw(run: Run) -> Steps:
-    def throw() -> None:
+    """Another add-on's handler fails before Sinew's is called."""
+
+    def throw(*_arguments: object) -> None:
         raise ValueError("another add-on's fault")
 
     for event in ("frame_change_pre", "frame_change_post", "depsgraph_update_post", "save_pre", "save_post"):
-        with Hostile(throw, event):
+        functions = getattr(bpy.app.handlers, event)
+        functions.insert(0, throw)
+        try:
             set_frame(bpy.context.window_manager.windows[0].scene.frame_current % 20 + 1)
             yield from wait()
             run.check_shapes(f"while {event} throws")
@@ -403,24 +248,8 @@ def others_throw(run: Run) -> Steps:
             run.note_saved(path)
             yield from wait()
             run.check_shapes(f"after {event} threw")
-    yield from run.check_frames()
-
-
-@step("hostile")
-def evaluations_within_saving(run: Run) -> Steps:
-    """Another add-on evaluates, and changes the frame, between save_pre and the writing."""
-
-    def evaluate() -> None:
-        scene = bpy.context.window_manager.windows[0].scene
-        scene.frame_set(scene.frame_current)
-        bpy.context.evaluated_depsgraph_get()
-        bpy.context.view_layer.update()
-
-    with Hostile(evaluate, "save_pre"):
-        path = FOLDER / "evaluated.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-        run.note_saved(path)
-        yield from wait()
+        finally:
+            functions.remove(throw)
     yield from run.check_frames()
 
 
@@ -444,76 +273,3 @@ def disable_and_enable(run: Run) -> Steps:
         yield from wait()
         run.check_shapes(f"enabled, turn {turn}")
         yield from run.check_frames()
-
-
-@step("libraries")
-def append(run: Run) -> Steps:
-    source = FOLDER / "library.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(source), copy=True)
-    run.note_saved(source)
-    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "base.blend"))
-    yield from wait()
-    scene = bpy.context.window_manager.windows[0].scene
-    for obj in list(scene.objects):
-        bpy.data.objects.remove(obj)
-    run.wanted = {"Guest": ""}
-    with bpy.data.libraries.load(str(source)) as (_from, to):
-        to.objects = ["Hero", "Hero Rig"]
-    for obj in to.objects:
-        scene.collection.objects.link(obj)
-    yield from wait(4)
-    _deforms(run, "appended")
-    set_frame(4)
-    yield from wait()
-    _deforms(run, "appended at frame 4")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "appended.blend"), copy=True)
-    yield from wait()
-
-
-@step("libraries")
-def link_and_override(run: Run) -> Steps:
-    source = FOLDER / "library.blend"
-    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "base.blend"))
-    yield from wait()
-    scene = bpy.context.window_manager.windows[0].scene
-    for obj in list(scene.objects):
-        bpy.data.objects.remove(obj)
-    run.wanted = {"Guest": ""}
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "links.blend"))
-    with bpy.data.libraries.load(str(source), link=True) as (_from, to):
-        to.objects = ["Hero", "Hero Rig"]
-    for obj in to.objects:
-        scene.collection.objects.link(obj)
-    yield from wait(4)
-    _linked_deforms(run, "linked")
-    set_frame(4)
-    yield from wait()
-    _linked_deforms(run, "linked at frame 4")
-    for obj in list(to.objects):
-        made = obj.override_create(remap_local_usages=True)
-        if made.name not in scene.collection.objects:
-            scene.collection.objects.link(made)
-    yield from wait(4)
-    _linked_deforms(run, "overridden")
-    set_frame(15)
-    yield from wait()
-    _linked_deforms(run, "overridden at frame 15")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "overridden.blend"))
-    yield from wait()
-    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "overridden.blend"))
-    yield from wait(4)
-    _linked_deforms(run, "overridden, opened again")
-
-
-def _linked_deforms(run: Run, when: str) -> None:
-    """Deformed by Sinew or by Blender's most similar method, which is the same here; and animated."""
-    main = bpy.context.window_manager.windows[0]
-    depsgraph = main.view_layer.depsgraph
-    for obj in main.scene.objects:
-        if obj.type == "MESH" and obj.name.startswith("Hero"):
-            armatures = [o for o in main.scene.objects if o.type == "ARMATURE"]
-            armature = next(o for o in armatures if o.library == obj.library)
-            shown = shown_points(obj, depsgraph)
-            off = worst(shown, blender_points(obj, armature, "dq", depsgraph))
-            text = f"{obj.name_full} {when} is off by {off:.4f}: {obj.sinew.error}"
-            run.check(off <= window_scene.TOLERANCE, text)
