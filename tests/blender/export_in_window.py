@@ -33,8 +33,7 @@ def header(path: Path) -> dict:
 def export(path: Path, clicked: tuple[tuple[int, int], ...]) -> Iterator[None]:
     with window.in_view3d("WINDOW"):
         bpy.ops.export_scene.gltf("INVOKE_DEFAULT", filepath=str(path))
-    yield
-    yield
+    yield from window.wait()
     for place in clicked:
         yield from window.click(place)
     window.photograph(path.with_suffix(".png"))
@@ -66,8 +65,7 @@ def steps() -> Iterator[None]:
     for obj in bpy.data.objects:
         if obj.type == "MESH":
             obj.sinew.method = "cor"
-    yield
-    yield
+    yield from window.wait()
     yield from export(FOLDER / "without.glb", ())
     yield from export(FOLDER / "with.glb", (CHECK_BOX,))
     facts = {name: of_sinew(FOLDER / f"{name}.glb") for name in ("without", "with")}

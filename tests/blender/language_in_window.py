@@ -55,11 +55,9 @@ def steps() -> Iterator[None]:
     with window.in_view3d():
         bpy.ops.sinew.add()
     window.open_sidebar()
-    yield
-    yield
+    yield from window.wait()
     window.choose_tab()
-    yield
-    yield
+    yield from window.wait()
     facts = {"german": texts()}
     window.photograph(FOLDER / "german.png")
     view.language = "en_US"

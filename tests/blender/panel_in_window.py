@@ -59,11 +59,15 @@ def scene() -> bpy.types.Scene:
     return main_window().scene
 
 
+def undo() -> Iterator[None]:
+    window.press("Z", VIEW, ctrl=True)
+    yield from window.wait()
+
+
 def search(text: str) -> Iterator[None]:
     """Runs an operator with F3, as without Developer Extras."""
     window.press("F3", VIEW)
-    yield
-    yield
+    yield from window.wait()
     for letter in text:
         key = "SPACE" if letter == " " else letter.upper()
         window.press(key, VIEW, text=letter)
@@ -71,8 +75,7 @@ def search(text: str) -> Iterator[None]:
     yield
     window.photograph(FOLDER / f"search-{text.replace(' ', '-')}.png")
     window.press("RET", VIEW)
-    yield
-    yield
+    yield from window.wait()
 
 
 def start() -> Iterator[None]:
@@ -83,12 +86,10 @@ def start() -> Iterator[None]:
     five_meshes.make(vertices=1200)
     scene().frame_set(12)
     window.open_sidebar()
-    yield
-    yield
+    yield from window.wait()
     window.choose_tab()
     bpy.ops.ed.undo_push(message="made")
-    yield
-    yield
+    yield from window.wait()
 
 
 def one_click_for_a_method() -> Iterator[None]:
@@ -102,26 +103,18 @@ def one_click_for_a_method() -> Iterator[None]:
     facts["chosen"] = methods()
     yield from window.click(SWITCH)
     facts["switched off"] = [obj.sinew.enabled for obj in meshes()]
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
     facts["on again"] = [obj.sinew.enabled for obj in meshes()]
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
     facts["chosen undone"] = methods()
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
     facts["added undone"] = methods()
     preferences = bpy.context.preferences.addons["bl_ext.user_default.sinew"].preferences
     preferences.first_method = "qv"
     yield from window.click(ADD)
     facts["added as preferred"] = methods()
     preferences.first_method = "AS_BEFORE"
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
 
 
 def by_search_and_keys() -> Iterator[None]:
@@ -132,18 +125,14 @@ def by_search_and_keys() -> Iterator[None]:
     yield from search("switch on off")
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.compare("EXEC_DEFAULT", methods={"lbs", "dq"})
-    yield
-    yield
+    yield from window.wait()
     window.press("F", VIEW, alt=True, shift=True)
-    yield
-    yield
+    yield from window.wait()
     facts["flipped"] = [scene().sinew_comparison.arrangement, scene().sinew_comparison.shows_second]
     yield from search("flip comparison")
     facts["flipped by search"] = scene().sinew_comparison.shows_second
     window.press("Y", VIEW, alt=True, shift=True)
-    yield
-    yield
-    yield
+    yield from window.wait()
     window.photograph(FOLDER / "pie.png")
     window.press("ESC", VIEW)
     yield
@@ -173,18 +162,15 @@ def comparison_by_clicks() -> Iterator[None]:
     with window.in_view3d("WINDOW"):
         bpy.ops.view3d.view_selected()
     window.move(DIALOG)
-    yield
-    yield
+    yield from window.wait()
     with window.in_view3d():
         bpy.ops.sinew.compare("INVOKE_DEFAULT")
-    yield
-    yield
+    yield from window.wait()
     yield from window.click(QUATERNION_VECTOR)
     yield from window.click(LOG_MATRIX)
     window.photograph(FOLDER / "compare.png")
     window.press("RET", LOG_MATRIX)
-    for _tick in range(4):
-        yield
+    yield from window.wait(4)
     state = scene().sinew_comparison
     facts["compared"] = sorted({obj.sinew.copied_for for obj in state.collection.objects})
     facts["copies in view"] = copies_in_view()
@@ -192,8 +178,7 @@ def comparison_by_clicks() -> Iterator[None]:
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
         bpy.ops.view3d.view_all()
-    yield
-    yield
+    yield from window.wait()
 
 
 def pixels_of(picture: str) -> np.ndarray:
@@ -232,9 +217,7 @@ def progress_in_the_status_bar() -> Iterator[None]:
     yield from window.until(lambda: share_shown() > 0.02, "progress")
     window.photograph(FOLDER / "progress.png")
     window.press("ESC", VIEW)
-    yield
-    yield
-    yield
+    yield from window.wait()
     window.photograph(FOLDER / "stopped.png")
     facts["progress"] = [filled("progress"), filled("stopped"), share_shown()]
 
@@ -255,12 +238,9 @@ def suggested_by_click() -> Iterator[None]:
     facts["suggestion used"] = methods()
     with window.in_view3d():
         bpy.ops.sinew.suggestions_by(measure="crossings")
-    for _redraw in range(3):
-        yield
+    yield from window.wait(4)
     window.photograph(FOLDER / "suggest-order.png")
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
     facts["suggestion undone"] = methods()
     yield from window.click(SUGGEST)
     yield from window.click(HEADER)
@@ -295,9 +275,7 @@ def mends_by_clicks() -> Iterator[None]:
     yield from window.click(MEND)
     window.photograph(FOLDER / "mended.png")
     facts["weights mended"] = without_weights()
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
     facts["mending undone"] = without_weights()
     yield from window.click(DIAGNOSTICS)
     yield from window.click(HEADER)
@@ -316,9 +294,7 @@ def corrective_keys() -> Iterator[None]:
     """Made with F3, and driven by a bone; with it the Armature modifier alone has Sinew's shape."""
     yield from search("corrective shape key")
     facts["corrective"] = key_blocks()
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
     facts["corrective undone"] = key_blocks()
     rig, body = bpy.data.objects["Hero Rig"], bpy.data.objects["Body"]
     window.select_only(rig)
@@ -380,8 +356,7 @@ def menus() -> Iterator[None]:
     window.photograph(FOLDER / "no-menu.png")
     with window.in_view3d("WINDOW"):
         bpy.ops.wm.call_menu(name="SINEW_MT_menu")
-    yield
-    yield
+    yield from window.wait()
     window.photograph(FOLDER / "menu.png")
     facts["menu height"] = height_of_change("no-menu", "menu")
     window.press("ESC", VIEW)
@@ -396,13 +371,11 @@ def modifiers() -> Iterator[None]:
     area.spaces[0].context = "MODIFIER"
     view = window.area_of("VIEW_3D")
     view.spaces[0].show_region_ui = False
-    yield
-    yield
+    yield from window.wait()
     window.photograph(FOLDER / "modifiers.png")
     with bpy.context.temp_override(window=main_window(), area=area, region=area.regions[-1]):
         bpy.ops.sinew.open_tab("INVOKE_DEFAULT")
-    for _tick in range(4):
-        yield
+    yield from window.wait(4)
     region = next(region for region in view.regions if region.type == "UI")
     facts["tab"] = [view.spaces[0].show_region_ui, region.active_panel_category]
 
@@ -419,9 +392,7 @@ def bake_error() -> Iterator[None]:
         bpy.ops.view3d.view_selected()
         bpy.ops.ed.undo_push(message="baked")
     yield from search("show bake error")
-    window.press("Z", VIEW, ctrl=True)
-    yield
-    yield
+    yield from undo()
     facts["bake error undone"] = shading.color_type
     yield from search("show bake error")
     shown = shading.color_type
@@ -444,16 +415,13 @@ def goes_without_a_trace() -> Iterator[None]:
     facts["shortcuts"] = shortcuts()
     bpy.context.preferences.active_section = "ADDONS"
     bpy.ops.preferences.addon_show(module="bl_ext.user_default.sinew")
-    yield
-    yield
-    yield
+    yield from window.wait()
     window.photograph(FOLDER / "preferences.png")
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.sinew")
     facts["shortcuts afterwards"] = shortcuts()
     functions = [*bpy.types.VIEW3D_MT_object.draw._draw_funcs, *bpy.types.DATA_PT_modifiers.draw._draw_funcs]
     facts["menus afterwards"] = [each.__module__ for each in functions if "sinew" in each.__module__]
-    yield
-    yield
+    yield from window.wait()
 
 
 def steps() -> Iterator[None]:

@@ -142,8 +142,7 @@ def stop_and_go_on() -> Iterator[None]:
     )
     press("ESC")
     yield from window.until(lambda: not sinew("core.precompute").precomputations.running, "its end")
-    yield
-    yield
+    yield from window.wait()
     facts["plan_stopped"] = plan()
     facts["reason_stopped"] = sinew("deform.session").state_of(hero()).plan.reason
     window.photograph(FOLDER / "stopped.png")

@@ -105,8 +105,8 @@ without_sinew, with_sinew = KeptBlender(), KeptBlender()
 RUN = """
 import sys
 from sinew_addon import cli
-from sinew_addon.deform import evaluate
-evaluate.set_parameters({})
+from sinew_addon.deform import characters
+characters.set_parameters({})
 status = cli.main(sys.argv[1:])
 """
 

@@ -191,6 +191,16 @@ def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
     return path
 
 
+def link(path: Path | str, *names: str, link: bool = True) -> list[bpy.types.Object]:
+    """Objects of another file, linked, or appended, into an empty scene."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(path), link=link) as (_there, here):
+        here.objects = list(names)
+    for obj in here.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    return here.objects
+
+
 def weights_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Offsets, bones and weights, read one by one, without Sinew's code."""
     bones = [bone.name for bone in attach.armature_of(obj).data.bones]

@@ -141,11 +141,7 @@ def test_linked_without_an_override(tmp_path):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     library = save(tmp_path / "hero.blend")
-    empty()
-    with bpy.data.libraries.load(str(library), link=True) as (_there, here):
-        here.objects = ["Arm", "Arm Rig"]
-    for linked in here.objects:
-        bpy.context.scene.collection.objects.link(linked)
+    scenes.link(library, "Arm", "Arm Rig")
     (problem,) = check(save(tmp_path / "shot.blend"), status=1)["shot.blend"]["problems"]
     assert "Arm is linked from another file" in problem
     assert "library override" in problem

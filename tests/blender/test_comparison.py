@@ -621,13 +621,8 @@ def test_a_linked_character(tmp_path):
     obj, _armature = scenes.make_arm()
     expected = shapes_of_methods(obj, [1, 11])
     test_restore.save(tmp_path / "library.blend")
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_source, target):
-        target.objects = ["Arm", "Arm Rig"]
-    for linked in target.objects:
-        bpy.context.scene.collection.objects.link(linked)
+    obj, _armature = scenes.link(tmp_path / "library.blend", "Arm", "Arm Rig")
     before = content()
-    obj = target.objects[0]
     compare(obj)
     assert_copies_show(obj, [1, 11], expected)
     bpy.context.scene.frame_set(1)

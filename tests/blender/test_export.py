@@ -170,15 +170,6 @@ def test_other_attributes_are_the_artists_choice(tmp_path):
     assert obj.data.attributes.active_index == active
 
 
-def test_sinew_deforms_on_after_the_export(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
-    before = world_shapes(obj, FRAMES)
-    write(tmp_path / "a.glb")
-    assert np.array_equal(world_shapes(obj, FRAMES), before)
-    assert obj.sinew.enabled
-
-
 def test_an_export_that_fails_ends_as_one_that_does_not(tmp_path):
     obj = make_character()
     use(obj, "cor")

@@ -9,7 +9,6 @@ import re
 import bpy
 import numpy as np
 import pytest
-import routes
 import scenes
 from sinew_addon.attach import attach, node_group, normals, properties, stack
 from sinew_addon.core import opengl
@@ -25,11 +24,7 @@ needs_support = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(params=routes.ROUTES, autouse=True)
-def route(request):
-    routes.force(request.param)
-    yield request.param
-    routes.release()
+pytestmark = pytest.mark.usefixtures("route")
 
 
 def smooth(obj):
@@ -185,21 +180,6 @@ def test_edges_that_are_marked_between_frames_are_followed_at_once():
     given = corners(obj)
     choose(obj, LEAVE)
     np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
-
-
-@needs_support
-def test_shading_operators_are_followed():
-    obj, _armature = make(flat)
-    for operator, domain in (
-        (bpy.ops.object.shade_smooth, "POINT"),
-        (bpy.ops.object.shade_flat, ""),
-        (bpy.ops.object.shade_smooth_by_angle, "CORNER"),
-    ):
-        operator()
-        bpy.context.view_layer.update()
-        assert has_given(obj) == bool(domain)
-        given, left = both(obj)
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
 
 
 @needs_support
@@ -520,19 +500,6 @@ def test_files_keep_the_choice_and_the_normals(tmp_path):
     np.testing.assert_allclose(corners(obj), expected, rtol=0, atol=NEAR)
 
 
-@needs_support
-def test_copied_modifiers_bring_the_choice():
-    obj, _armature = make(smooth)
-    choose(obj, LEAVE)
-    other, _armature = scenes.make_arm(name="Other")
-    bpy.context.view_layer.objects.active = obj
-    obj.select_set(True)
-    other.select_set(True)
-    bpy.ops.object.make_links_data(type="MODIFIERS")
-    bpy.context.view_layer.update()
-    assert properties.of(other).normals == LEAVE
-
-
 def light_scene(obj):
     """A camera and a lamp that see the arm, whose material has a tangent-space map of normals across
     seams."""
@@ -609,48 +576,6 @@ def test_blurred_pictures_are_the_same(shading, tmp_path):
     scene.render.engine, scene.render.use_motion_blur = "CYCLES", True
     scene.render.motion_blur_shutter = 1.5
     assert_same_pictures(obj, tmp_path, shading is custom)
-
-
-@pytest.mark.slow
-@needs_support
-@pytest.mark.once
-def test_pictures_of_eevee_are_the_same(route, tmp_path):
-    if route != routes.EVALUATION:
-        pytest.skip("EEVEE takes long without a graphics card")
-    if not opengl.has_opengl():
-        pytest.skip("EEVEE can not draw here")
-    obj, _armature = make(custom)
-    light_scene(obj)
-    scene = bpy.context.scene
-    scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
-    scene.render.resolution_x, scene.render.resolution_y, scene.eevee.taa_render_samples = 64, 48, 1
-    assert has_given(obj)
-    given, left = both(obj, lambda _obj: pixels(tmp_path / "picture.exr"))
-    assert np.ptp(left) > 0.5
-    np.testing.assert_allclose(given, left, rtol=0, atol=1e-4)
-
-
-@needs_support
-@pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
-def test_baked_normals_are_the_same(shading):
-    obj, _armature = make(shading)
-    light_scene(obj)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    image = bpy.data.images.new("Baked", 64, 64, float_buffer=True)
-    nodes = obj.data.materials[0].node_tree.nodes
-    nodes.active = nodes.new("ShaderNodeTexImage")
-    nodes.active.image = image
-
-    def baked(_obj):
-        bpy.ops.object.bake(type="NORMAL", margin=0)
-        found = np.empty(len(image.pixels), dtype=np.float32)
-        image.pixels.foreach_get(found)
-        return found
-
-    given, left = both(obj, baked)
-    assert np.ptp(left) > 0.5
-    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
 
 
 @needs_support
@@ -770,33 +695,6 @@ def test_objects_with_one_mesh_and_painted_ones():
         check_given(obj)
 
 
-@needs_support
-def test_library_overrides_keep_the_choice(tmp_path):
-    obj, _armature = make(sharp)
-    name = obj.name
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(path, link=True) as (source, target):
-        target.collections, target.objects = source.collections, source.objects
-    linked = next(each for each in target.objects if each.name == name)
-    bpy.context.scene.collection.objects.link(linked)
-    override = linked.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
-    assert override is not None
-    own = next(each for each in bpy.data.objects if each.name == name and each.library is None)
-    choose(own, LEAVE)
-    bpy.context.scene.frame_set(5)
-    assert not has_given(own)
-    user = str(tmp_path / "user.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=user)
-    bpy.ops.wm.open_mainfile(filepath=user)
-    own = next(each for each in bpy.data.objects if each.name == name and each.library is None)
-    assert properties.of(own).normals == LEAVE
-    bpy.context.scene.frame_set(5)
-    given, left = both(own)
-    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-
-
 def test_a_mesh_that_is_not_valid_has_none():
     # Two triangles and no edges.
     topology = Topology(np.int32([0, 3, 6]), np.int32([0, 1, 2, 2, 1, 3]), np.empty((0, 2), np.int32))
@@ -804,20 +702,6 @@ def test_a_mesh_that_is_not_valid_has_none():
     found = np.ones((6, 3), np.float32)
     normals_of_it.write(np.eye(4, 3, dtype=np.float32), "CORNER", found)
     assert not found.any()
-
-
-@needs_support
-def test_undo_brings_the_choice_back():
-    obj, _armature = make(smooth)
-    bpy.ops.ed.undo_push(message="as Blender")
-    properties.of(obj).normals = LEAVE
-    bpy.ops.ed.undo_push(message="left")
-    assert not has_given(obj)
-    bpy.ops.ed.undo()
-    obj = bpy.data.objects["Arm"]
-    bpy.context.view_layer.update()
-    assert properties.of(obj).normals == GIVE
-    assert has_given(obj)
 
 
 def bone_motions(obj, armature):

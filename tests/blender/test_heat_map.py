@@ -4,9 +4,6 @@ it."""
 
 from __future__ import annotations
 
-import argparse
-import io
-
 import bpy
 import numpy as np
 import pytest
@@ -15,8 +12,6 @@ import snapshot
 import test_linked_data
 import whole_file
 from sinew_addon.attach import attach, properties
-from sinew_addon.commands import compare
-from sinew_addon.commands.console import Console
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS
 from sinew_addon.deform import characters, session
@@ -444,30 +439,6 @@ def test_off_it_measures_nothing(monkeypatch):
         bpy.context.scene.frame_set(frame)
     assert not properties.of(obj).error
     assert measures.of(bpy.context.scene) is not None
-
-
-def test_numbers_are_those_that_compare_writes(tmp_path):
-    obj, _armature = scenes.make_arm()
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    parser = compare.add_parser(argparse.ArgumentParser().add_subparsers())
-    out = tmp_path / "page"
-    args = parser.parse_args(
-        [str(path), "--methods", "dq", "--frames", "9", "--pictures", "0", "--out", str(out)]
-    )
-    assert compare.run(args, Console(io.StringIO(), io.StringIO())) == 0
-    header, line = (out / "arm" / "metrics.csv").read_text(encoding="utf-8").splitlines()
-    expected = dict(zip(header.split(","), line.split(","), strict=True))
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects["Arm"]
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(9)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
-    entries = measured.summary().__dict__
-    assert len(entries) == 16
-    for name, value in entries.items():
-        assert value == pytest.approx(float(expected[name]), rel=2e-4, abs=2e-5), name
 
 
 @pytest.mark.parametrize("front", [False, True], ids=["alone", "front"])

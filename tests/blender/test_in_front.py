@@ -13,7 +13,7 @@ import scenes
 import snapshot
 from sinew_addon.attach import attach, properties, upstream_proxy
 from sinew_addon.core.errors import SinewError
-from sinew_addon.deform import safe_mode, session
+from sinew_addon.deform import session
 from test_against_armature_modifier import assert_equal_to_modifier
 
 FRAMES = [1, 4, 8, 11]
@@ -216,7 +216,6 @@ def test_weights_are_painted_where_visibility_is_animated(set_up):
     assert scenes.states_of(obj)
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 @pytest.mark.parametrize("mode", ["WEIGHT_PAINT", "VERTEX_PAINT"])
 @pytest.mark.parametrize("kinds", [("DECIMATE",), ("SUBSURF", "BEVEL")])
 def test_what_blender_leaves_out_while_painting(kinds, mode, route):
@@ -231,22 +230,18 @@ def test_what_blender_leaves_out_while_painting(kinds, mode, route):
     bpy.ops.object.mode_set(mode="OBJECT")
     expected_after = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
     assert expected.shape != expected_after.shape, "nothing is tested"
-    routes.force(route)
-    try:
-        scenes.add_sinew(obj, "dq")
-        bpy.ops.object.mode_set(mode=mode)
-        before = session.state_of(obj).shown.number
-        got = scenes.shapes(obj, FRAMES)
-        assert not properties.of(obj).error
-        # While weights are painted the Armature modifier is on, too, before Sinew's.
-        assert mode == "WEIGHT_PAINT" or routes.taken(obj, before) == route
-        assert session.state_of(obj).shown.number > before
-        assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-        bpy.ops.object.mode_set(mode="OBJECT")
-        got = scenes.shapes(obj, FRAMES)
-        assert scenes.worst(got, expected_after) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    finally:
-        routes.release()
+    scenes.add_sinew(obj, "dq")
+    bpy.ops.object.mode_set(mode=mode)
+    before = session.state_of(obj).shown.number
+    got = scenes.shapes(obj, FRAMES)
+    assert not properties.of(obj).error
+    # While weights are painted the Armature modifier is on, too, before Sinew's.
+    assert mode == "WEIGHT_PAINT" or routes.taken(obj, before) == route
+    assert session.state_of(obj).shown.number > before
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    got = scenes.shapes(obj, FRAMES)
+    assert scenes.worst(got, expected_after) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_parent_that_deforms_is_a_modifier_while_sinew_is_on():
@@ -342,31 +337,26 @@ def test_one_update_is_enough(event):
     assert not properties.of(obj).error
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 @pytest.mark.parametrize("at_a_frame", [False, True])
 def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
     """Objects that wait for upstream modifiers are evaluated again before Blender has finished its
     evaluation, which must not discard the results of others."""
     obj, _armature = scenes.make_arm()
     other, rig = scenes.make_arm(name="Other")
-    routes.force(route)
-    try:
-        scenes.add_sinew(obj)
-        rig.hide_viewport = True
-        bpy.context.scene.frame_set(8)
-        subdivided(obj)
-        rig.hide_viewport = other.hide_viewport = False
-        if at_a_frame:
-            bpy.context.scene.frame_set(9)
-        else:
-            bpy.context.view_layer.update()
-        shown = scenes.final_points(other)
-        other.data.update_tag()
+    scenes.add_sinew(obj)
+    rig.hide_viewport = True
+    bpy.context.scene.frame_set(8)
+    subdivided(obj)
+    rig.hide_viewport = other.hide_viewport = False
+    if at_a_frame:
+        bpy.context.scene.frame_set(9)
+    else:
         bpy.context.view_layer.update()
-        assert scenes.worst(shown, scenes.final_points(other)) <= 1e-6
-        assert scenes.worst(shown, scenes.rest_points(other)) > 0.1, "nothing is tested"
-    finally:
-        routes.release()
+    shown = scenes.final_points(other)
+    other.data.update_tag()
+    bpy.context.view_layer.update()
+    assert scenes.worst(shown, scenes.final_points(other)) <= 1e-6
+    assert scenes.worst(shown, scenes.rest_points(other)) > 0.1, "nothing is tested"
 
 
 @pytest.mark.parametrize("event", ["shown", "shown and changed"])
@@ -392,38 +382,33 @@ def test_an_object_that_gets_sinew_while_it_is_hidden(event, monkeypatch):
     assert len(made) == (1 if event == "shown" else 2)
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_what_is_made_at_the_address_of_a_deleted_object(route):
     """Blender finds evaluated objects by the addresses of their originals: it would return the other's."""
-    routes.force(route)
-    try:
-        obj, _armature = scenes.make_arm()
-        scenes.add_sinew(obj)
-        bpy.context.scene.frame_set(8)
-        mesh = bpy.data.meshes.new_from_object(obj)
-        others = [bpy.data.objects.new("Other", mesh) for _each in range(50)]
-        for other in others:
-            bpy.context.scene.collection.objects.link(other)
-        bpy.context.view_layer.update()
-        addresses = {other.as_pointer() for other in others}
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(8)
+    mesh = bpy.data.meshes.new_from_object(obj)
+    others = [bpy.data.objects.new("Other", mesh) for _each in range(50)]
+    for other in others:
+        bpy.context.scene.collection.objects.link(other)
+    bpy.context.view_layer.update()
+    addresses = {other.as_pointer() for other in others}
 
-        def delete(_scene, _depsgraph):
-            while others:
-                bpy.data.objects.remove(others.pop())
+    def delete(_scene, _depsgraph):
+        while others:
+            bpy.data.objects.remove(others.pop())
 
-        # Like another add-on's handler, before Sinew's.
-        bpy.app.handlers.depsgraph_update_post.insert(0, delete)
-        subdivided(obj)
-        bpy.context.view_layer.update()
-        bpy.app.handlers.depsgraph_update_post.remove(delete)
-        assert properties.of(obj).upstream_proxy.as_pointer() in addresses, "nothing is tested"
-        shown = scenes.final_points(obj)
-        properties.of(obj).enabled = False
-        expected = scenes.final_points(obj)
-        assert shown.shape == expected.shape
-        assert scenes.worst(shown, expected) <= 1e-5
-    finally:
-        routes.release()
+    # Like another add-on's handler, before Sinew's.
+    bpy.app.handlers.depsgraph_update_post.insert(0, delete)
+    subdivided(obj)
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.remove(delete)
+    assert properties.of(obj).upstream_proxy.as_pointer() in addresses, "nothing is tested"
+    shown = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    expected = scenes.final_points(obj)
+    assert shown.shape == expected.shape
+    assert scenes.worst(shown, expected) <= 1e-5
 
 
 def test_removing_leaves_the_file_as_it_was():
@@ -506,7 +491,6 @@ def test_one_view_layer_has_it_for_its_position_alone():
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 @pytest.mark.parametrize("what", ["modifier", "transform"])
 def test_applied_with_something_in_front(what, route):
     """Two objects have the mesh: as with any such mesh, the user must make it single first."""
@@ -515,25 +499,21 @@ def test_applied_with_something_in_front(what, route):
     obj.modifiers.move(1, 0)
     obj.scale = (1.2, 1.1, 0.9)
     scenes.add_sinew(obj)
-    routes.force(route)
-    try:
-        bpy.context.scene.frame_set(8)
-        before = scenes.final_points(obj)
-        if what == "modifier":
-            for name in ("Cast", "Sinew"):
-                bpy.ops.object.modifier_apply(modifier=name, single_user=True)
-            bpy.context.view_layer.update()
-            assert not obj.modifiers
-            assert not properties.has_sinew(obj)
-            assert scenes.worst(scenes.final_points(obj), before) <= 1e-6
-        else:
-            bpy.ops.object.transform_apply(isolate_users=True)
-            bpy.context.view_layer.update()
-            got = scenes.final_points(obj)
-            assert tuple(obj.scale) == (1.0, 1.0, 1.0)
-            assert not properties.of(obj).error
-            attach.remove(obj)
-            tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
-            assert scenes.worst(got, scenes.final_points(obj)) <= tolerance
-    finally:
-        safe_mode.set_forced(None)
+    bpy.context.scene.frame_set(8)
+    before = scenes.final_points(obj)
+    if what == "modifier":
+        for name in ("Cast", "Sinew"):
+            bpy.ops.object.modifier_apply(modifier=name, single_user=True)
+        bpy.context.view_layer.update()
+        assert not obj.modifiers
+        assert not properties.has_sinew(obj)
+        assert scenes.worst(scenes.final_points(obj), before) <= 1e-6
+    else:
+        bpy.ops.object.transform_apply(isolate_users=True)
+        bpy.context.view_layer.update()
+        got = scenes.final_points(obj)
+        assert tuple(obj.scale) == (1.0, 1.0, 1.0)
+        assert not properties.of(obj).error
+        attach.remove(obj)
+        tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+        assert scenes.worst(got, scenes.final_points(obj)) <= tolerance

@@ -8,6 +8,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+import scenes
 import sinew
 from mathutils import Matrix, Quaternion, Vector
 from program import checked, without_sinew
@@ -391,11 +392,8 @@ def test_a_library_override_keeps_copy_and_original(tmp_path):
     played = film(armature)
     restore(armature)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_all, chosen):
-        chosen.objects = ["Rig"]
-    bpy.context.scene.collection.objects.link(chosen.objects[0])
-    armature = chosen.objects[0].override_create(remap_local_usages=True)
+    (linked,) = scenes.link(tmp_path / "library.blend", "Rig")
+    armature = linked.override_create(remap_local_usages=True)
     armature.override_library.is_system_override = False
     assert np.array_equal(film(armature), blender)
     bake(armature)

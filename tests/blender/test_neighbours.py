@@ -261,17 +261,6 @@ def test_an_edit_of_a_mesh_with_shape_keys_before_a_frame_is_seen(route, keyed):
     assert_equals_modifier(obj)
 
 
-def test_an_edit_behind_something_in_front_before_a_frame_is_seen():
-    obj, _armature = scenes.make_arm()
-    obj.modifiers.new("Front", "MIRROR")
-    obj.modifiers.move(1, 0)
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(4)
-    edit_weights(obj)
-    bpy.context.scene.frame_set(5)
-    assert_equals_modifier(obj)
-
-
 @pytest.mark.parametrize("frame", [1, 6])
 def test_applied(arm, frame, capfd):
     """Also at rest, where a deleted modifier leaves the same shape."""

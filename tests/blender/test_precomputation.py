@@ -377,14 +377,10 @@ def test_a_file_has_it(gate, tmp_path):
 
 def test_copies_and_libraries_have_it(gate, tmp_path):
     _points, path = saved(tmp_path)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     forget_made()
-    with bpy.data.libraries.load(path, link=True) as (_there, wanted):
-        wanted.objects = ["Arm", "Arm Rig"]
-    for obj in wanted.objects:
-        bpy.context.scene.collection.objects.link(obj)
-    rig = wanted.objects[1].override_create(remap_local_usages=True)
-    over = next(o for o in wanted.objects if o.type == "MESH").override_create(remap_local_usages=True)
+    obj, armature = scenes.link(path, "Arm", "Arm Rig")
+    rig = armature.override_create(remap_local_usages=True)
+    over = obj.override_create(remap_local_usages=True)
     assert rig is not None
     bpy.context.view_layer.update()
     assert session.state_of(over) is not None

@@ -111,12 +111,7 @@ def test_nothing_is_said_to_be_missing_where_sinew_is_there(tmp_path):
     save(path)
     assert set(stack.sinew_modifier(obj).node_group.nodes.keys()) == nodes
     assert warnings_of(obj) == []
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(path)) as (_, to):
-        to.objects = ["Arm", "Arm Rig"]
-    for each in to.objects:
-        bpy.context.scene.collection.objects.link(each)
-    appended = to.objects[0]
+    appended, _armature = scenes.link(path, "Arm", "Arm Rig", link=False)
     bpy.context.view_layer.update()
     assert stack.sinew_modifier(appended).show_viewport
     assert set(stack.sinew_modifier(appended).node_group.nodes.keys()) == nodes
@@ -397,7 +392,7 @@ def test_an_export_has_blenders_own_modifiers_and_frames(tmp_path):
 def test_fbx_has_the_skin(tmp_path):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
-    ours = scenes.shapes(obj, FRAMES)
+    ours, at_rest = scenes.shapes(obj, FRAMES), np.ptp(scenes.rest_points(obj), axis=0)
     path = tmp_path / "arm.fbx"
     bpy.ops.export_scene.fbx(filepath=str(path))
     # The exporter sets poses and restores them from their matrices.
@@ -408,6 +403,7 @@ def test_fbx_has_the_skin(tmp_path):
     imported = next(o for o in bpy.data.objects if o.type == "MESH")
     assert imported.find_armature() is not None
     assert len(imported.vertex_groups) == 2
+    np.testing.assert_allclose(np.ptp(scenes.rest_points(imported), axis=0), at_rest, rtol=1e-3)
 
 
 def test_an_fbx_export_that_fails_ends_as_one_that_does_not(tmp_path):

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-import pytest
 import routes
 import scenes
 from sinew_addon.attach import attach, properties
@@ -46,7 +45,6 @@ def test_two_scenes_at_different_frames():
         assert scenes.worst(points_in(obj, first), expected[3]) <= 1e-5
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_a_view_layer_is_shown_for_the_first_time(route):
     """Blender sends no notification of its first evaluation, nor of changes by handlers after Sinew's."""
     obj, armature = scenes.make_arm()
@@ -55,7 +53,6 @@ def test_a_view_layer_is_shown_for_the_first_time(route):
     def lift(*_args: object) -> None:
         armature.delta_location.z = 0.5
 
-    routes.force(route)
     try:
         scenes.add_sinew(obj, "lbs")
         scene.frame_set(5)
@@ -73,15 +70,12 @@ def test_a_view_layer_is_shown_for_the_first_time(route):
         assert scenes.worst(shown, expected) <= 1e-5
     finally:
         bpy.context.window.view_layer = first
-        routes.release()
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_a_scene_that_redo_brings_back(route):
     """Blender sends no notification of its first evaluation, and Sinew has just forgotten all objects."""
     scenes.make_arm()
     bpy.ops.ed.undo_push(message="before")
-    routes.force(route)
     try:
         bpy.context.scene.frame_set(8)
         expected = scenes.final_points(bpy.data.objects["Arm"])
@@ -99,10 +93,8 @@ def test_a_scene_that_redo_brings_back(route):
         assert scenes.worst(scenes.final_points(bpy.data.objects["Arm"]), expected) <= 1e-5
     finally:
         bpy.ops.ed.undo()
-        routes.release()
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_path, route):
     obj, armature = scenes.make_arm()
     obj.modifiers.new("Front", "SUBSURF").levels = 1
@@ -115,26 +107,21 @@ def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_pa
         collection.objects.link(each)
     bpy.context.view_layer.layer_collection.children["Character"].exclude = True
     scene.view_layers.new("Second").layer_collection.children["Character"].exclude = False
-    routes.force(route)
-    try:
-        scenes.add_sinew(obj, "lbs")
-        scene.frame_set(9)
-        path = str(tmp_path / "arm.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.open_mainfile(filepath=path)
-        obj = bpy.data.objects["Arm"]
-        bpy.context.window.view_layer = bpy.context.scene.view_layers["Second"]
-        bpy.context.view_layer.update()
-        handlers.check_unannounced()
-        shown = scenes.final_points(obj)
-        properties.of(obj).enabled = False
-        expected = scenes.final_points(obj)
-        assert scenes.worst(shown, expected) <= 1e-5
-    finally:
-        routes.release()
+    scenes.add_sinew(obj, "lbs")
+    scene.frame_set(9)
+    path = str(tmp_path / "arm.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    obj = bpy.data.objects["Arm"]
+    bpy.context.window.view_layer = bpy.context.scene.view_layers["Second"]
+    bpy.context.view_layer.update()
+    handlers.check_unannounced()
+    shown = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    expected = scenes.final_points(obj)
+    assert scenes.worst(shown, expected) <= 1e-5
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_undo_brings_back_what_a_hidden_view_layer_had_evaluated(route):
     """Blender keeps the point buffer's evaluated data from before the step that undo goes back to: points
     of another frame, or as many as another subdivision had."""
@@ -153,7 +140,6 @@ def test_undo_brings_back_what_a_hidden_view_layer_had_evaluated(route):
         bpy.data.texts.remove(bpy.data.texts.new("step"))
         bpy.ops.ed.undo_push(message="step")
 
-    routes.force(route)
     try:
         scenes.add_sinew(obj, "lbs")
         scene.frame_set(4)
@@ -179,7 +165,6 @@ def test_undo_brings_back_what_a_hidden_view_layer_had_evaluated(route):
         assert plan.is_in_depsgraph == (route == routes.EVALUATION), plan.reason
     finally:
         bpy.context.window.view_layer = bpy.context.scene.view_layers[first_name]
-        routes.release()
 
 
 def test_an_instanced_collection():

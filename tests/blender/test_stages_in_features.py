@@ -101,7 +101,7 @@ def test_compare_measures_the_shapes_with_it(arm, stage, tmp_path):
     # The Armature modifier has no stages.
     blender = scenes.shapes(obj, [11])[0]
     for method, shape in (("dq", shapes[-1]), (characters.BLENDER, blender)):
-        mesh = trimesh.Trimesh(shape.astype(np.float64), test_compare.triangles_of(obj), process=False)
+        mesh = trimesh.Trimesh(shape.astype(np.float64), scenes.triangles_of(obj), process=False)
         assert float(rows[method]["volume"]) == pytest.approx(mesh.volume, rel=1e-4)
         assert float(rows[method]["area"]) == pytest.approx(mesh.area, rel=1e-4)
     apart = np.linalg.norm(shapes[-1].astype(np.float64) - blender, axis=1)

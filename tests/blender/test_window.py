@@ -22,7 +22,7 @@ SCRIPTS = (REPOSITORY / "docs" / "window.py", *Path(__file__).parent.glob("windo
 OPTIONS = ("--enable-event-simulate", "--python-exit-code", "3", "--python")
 # Two Blenders at a time. The second one is restarted with what it saved last.
 FIRST = ("files", "undo", "windows", "modes", "modifiers")
-SECOND = ("objects", "exports", "renders", "addon", "quit")
+SECOND = ("objects", "renders", "addon", "quit")
 AGAIN = ("again",)
 # What `./dev test` runs; `./dev test --all` runs every group.
 QUICK = ("files", "undo", "modes", "modifiers")
@@ -125,7 +125,7 @@ def _of(group: str, faults: dict[str, list[str]]) -> dict[str, list[str]]:
 
 
 # Errors of another add-on, and of Blender itself.
-PRINTING = ("exports: others_throw", "files: save_where_it_can_not_be")
+PRINTING = ("renders: others_throw", "files: save_where_it_can_not_be")
 
 
 def _groups(*left_out: str) -> pytest.MarkDecorator:

@@ -254,31 +254,6 @@ def methods_while_it_plays(run: Run) -> Steps:
     yield from run.check_frames()
 
 
-@step("modes")
-def hide_and_show(run: Run) -> Steps:
-    choose("Hero Rig")
-    with window.in_view3d("WINDOW"):
-        bpy.ops.object.hide_view_set("EXEC_DEFAULT", True)
-    yield from wait()
-    run.check_shapes("its armature hidden")
-    yield from run.check_frames()
-    rig().hide_viewport = True
-    yield from wait()
-    run.check_shapes("its armature switched off")
-    yield from run.check_frames()
-    rig().hide_viewport = False
-    with window.in_view3d("WINDOW"):
-        bpy.ops.object.hide_view_clear("EXEC_DEFAULT", True)
-    hero().hide_viewport = True
-    yield from wait()
-    set_frame(3)
-    yield from wait()
-    hero().hide_viewport = False
-    yield from wait()
-    run.check_shapes("shown again")
-    yield from run.check_frames()
-
-
 @step("modifiers")
 def remove_sinews_modifier(run: Run) -> Steps:
     """With the cross in its header: the Armature modifier deforms again."""

@@ -109,10 +109,6 @@ class Run:
             {"path": str(kept), "characters": characters, "in_memory": in_memory, "step": self.step}
         )
 
-    def note_exported(self, path: Path) -> None:
-        """The same for several files."""
-        self.saved.append({"path": str(path), "step": self.step})
-
 
 def wait(ticks: int = 2) -> Steps:
     """Blender redraws in the meantime."""

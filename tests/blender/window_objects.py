@@ -12,11 +12,8 @@ from window_hand import (
     Steps,
     choose,
     click,
-    execute,
     fresh,
     hero,
-    press,
-    push,
     rig,
     set_frame,
     step,
@@ -59,69 +56,6 @@ def written_as_a_library(run: Run) -> Steps:
     wanted, run.wanted = run.wanted, {"Hero": "dq"}
     run.note_saved(path, in_memory=True)
     run.wanted = wanted
-    yield from run.check_frames()
-
-
-@step("objects")
-def purge_orphans(run: Run) -> Steps:
-    for _time in range(2):
-        bpy.ops.outliner.orphans_purge(do_local_ids=True, do_linked_ids=True, do_recursive=True)
-        yield from wait()
-        run.check_shapes("purged")
-        yield from run.check_frames()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "purged.blend"), copy=True)
-    run.note_saved(FOLDER / "purged.blend")
-
-
-@step("objects")
-def scale_and_apply(run: Run) -> Steps:
-    choose("Hero", "Hero Rig")
-    with window.in_view3d("WINDOW"):
-        bpy.ops.transform.resize("EXEC_DEFAULT", True, value=(1.5, 1.5, 1.5))
-    yield from wait()
-    run.check_shapes("scaled")
-    execute("object.transform_apply", "Hero", "Hero Rig", location=False, rotation=False, scale=True)
-    yield from wait()
-    run.check_shapes("scale applied")
-    press("Z", ctrl=True)
-    yield from wait(4)
-    run.check_shapes("scale applied and undone")
-    yield from run.check_frames()
-
-
-@step("objects")
-def parent_again(run: Run) -> Steps:
-    """Ctrl+P, With Empty Groups, while Sinew is on."""
-    execute("object.parent_clear", "Hero", type="CLEAR_KEEP_TRANSFORM")
-    yield from wait()
-    run.check_shapes("without its parent")
-    choose("Hero Rig", "Hero")
-    with window.in_view3d("WINDOW"):
-        bpy.ops.object.parent_set("EXEC_DEFAULT", True, type="OBJECT", keep_transform=True)
-    yield from wait()
-    run.check_shapes("parented")
-    rig().location.y -= 0.5
-    push("Moved")
-    yield from wait()
-    run.check_shapes("its parent moved")
-    yield from run.check_frames()
-
-
-@step("objects")
-def join(run: Run) -> Steps:
-    """Another mesh becomes part of Hero's."""
-    with window.in_view3d("WINDOW"):
-        bpy.ops.mesh.primitive_cube_add("EXEC_DEFAULT", True, size=0.1, location=(0.0, 0.0, 1.0))
-    other = bpy.context.window_manager.windows[0].view_layer.objects.active.name
-    yield from wait()
-    choose("Hero", other)
-    execute("object.join")
-    yield from wait()
-    run.check_shapes("joined")
-    yield from run.check_frames()
-    press("Z", ctrl=True)
-    yield from wait(4)
-    run.check_shapes("joined and undone")
     yield from run.check_frames()
 
 

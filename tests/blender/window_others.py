@@ -15,7 +15,6 @@ from window_hand import (
     PATIENCE,
     Run,
     Steps,
-    choose,
     click,
     fresh,
     press,
@@ -24,50 +23,6 @@ from window_hand import (
     wait,
 )
 from window_scene import blender_points, shown_points, worst
-
-
-@step("exports")
-def gltf(run: Run) -> Steps:
-    for applied in (False, True):
-        path = FOLDER / f"hero-{applied}.glb"
-        choose("Hero", "Hero Rig")
-        with window.in_view3d("WINDOW"):
-            bpy.ops.export_scene.gltf(
-                filepath=str(path), use_selection=True, export_format="GLB", export_apply=applied
-            )
-        data = path.read_bytes()
-        run.check(
-            b'"skins"' in data and b"JOINTS_0" in data, f"glTF has no skin, modifiers applied: {applied}"
-        )
-        run.note_exported(path)
-        run.check_shapes("right after the export")
-        yield from wait()
-        run.check_shapes("after the export")
-    yield from run.check_frames()
-
-
-@step("exports")
-def fbx(run: Run) -> Steps:
-    for applied in (False, True):
-        path = FOLDER / f"hero-{applied}.fbx"
-        choose("Hero", "Hero Rig")
-        with window.in_view3d("WINDOW"):
-            bpy.ops.export_scene.fbx(
-                filepath=str(path), use_selection=True, bake_anim=False, use_mesh_modifiers=applied
-            )
-        run.check(b"SubDeformer" in path.read_bytes(), f"FBX has no skin, modifiers applied: {applied}")
-        run.note_exported(path)
-        run.check_shapes("right after the export")
-        yield from wait()
-        run.check_shapes("after the export")
-    yield from run.check_frames()
-
-
-@step("exports")
-def save_after_exports(run: Run) -> Steps:
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "exported.blend"), copy=True)
-    run.note_saved(FOLDER / "exported.blend")
-    yield from wait()
 
 
 class ComparingEngine(bpy.types.RenderEngine):
@@ -229,7 +184,7 @@ def stop_a_render(run: Run) -> Steps:
     yield from run.check_frames()
 
 
-@step("exports")
+@step("renders")
 def others_throw(run: Run) -> Steps:
     """Another add-on's handler fails before Sinew's is called."""
 

@@ -60,14 +60,6 @@ def save_a_copy(run: Run) -> Steps:
 
 
 @step("files")
-def pack_and_save(run: Run) -> Steps:
-    bpy.ops.file.pack_all()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "packed.blend"), compress=True)
-    run.note_saved(FOLDER / "packed.blend")
-    yield from wait()
-
-
-@step("files")
 def save_where_it_can_not_be(run: Run) -> Steps:
     """Blender fails to save; Sinew continues."""
     with contextlib.suppress(RuntimeError):
@@ -100,43 +92,6 @@ def save_in_modes(run: Run) -> Steps:
         bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
         run.note_saved(path)
         yield
-    yield from run.check_frames()
-
-
-@step("files")
-def save_while_off(run: Run) -> Steps:
-    hero().sinew.enabled = False
-    run.wanted["Hero"] = ""
-    yield from wait()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "off.blend"), copy=True)
-    run.note_saved(FOLDER / "off.blend")
-    run.check_shapes("while off")
-    hero().sinew.enabled = True
-    run.wanted["Hero"] = "dq"
-    yield from run.check_frames()
-
-
-@step("files")
-def save_with_qv(run: Run) -> Steps:
-    hero().sinew.method = "qv"
-    run.wanted["Hero"] = "qv"
-    yield from wait()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "qv.blend"), copy=True)
-    run.note_saved(FOLDER / "qv.blend")
-    hero().sinew.method = "dq"
-    run.wanted["Hero"] = "dq"
-    yield from wait()
-
-
-@step("files")
-def save_with_a_heat_map(run: Run) -> Steps:
-    hero().sinew.heat = True
-    yield from wait()
-    run.check_shapes("with a heat map")
-    yield from run.check_frames()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "heat.blend"), copy=True)
-    run.note_saved(FOLDER / "heat.blend")
-    hero().sinew.heat = False
     yield from run.check_frames()
 
 

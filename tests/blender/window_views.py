@@ -249,16 +249,6 @@ def switch_scenes(run: Run) -> Steps:
 
 
 @step("windows")
-def switch_workspaces(run: Run) -> Steps:
-    main = bpy.context.window_manager.windows[0]
-    for name in ("Animation", "Rendering", "Layout"):
-        main.workspace = bpy.data.workspaces[name]
-        yield from wait(4)
-        run.check_shapes(f"in workspace {name}")
-    yield from run.check_frames()
-
-
-@step("windows")
 def views(run: Run) -> Steps:
     """Quad view, split, local view, rendered shading."""
     main = bpy.context.window_manager.windows[0]
