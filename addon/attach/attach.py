@@ -144,6 +144,7 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
         _make_modifier_of_parent(obj)
     run = stack.armature_modifiers(obj)
     nodes = obj.modifiers.new("Sinew", "NODES")
+    settings.modifier_uid = nodes.persistent_uid
     nodes.show_expanded = False
     nodes.show_in_editmode = False
     _show(nodes, False, False)
@@ -264,6 +265,8 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         return
     if settings.replaces_modifiers:
         restore_builtin(obj)
+    elif settings.enabled:
+        _note_keyed_visibility(obj)
     _set_icons(obj, Situation.BUILT_IN if settings.enabled else Situation.OFF)
 
 

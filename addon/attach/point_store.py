@@ -180,7 +180,6 @@ def clear_references(obj: bpy.types.Object) -> None:
     _forget_helpers(settings)
     if nodes is not None and nodes.node_group is not None:
         node_group.forget_helpers(nodes)
-        settings.modifier_name = nodes.name
         nodes.node_group = None
 
 

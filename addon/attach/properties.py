@@ -323,9 +323,9 @@ class SinewSettings(bpy.types.PropertyGroup):
     error: bpy.props.StringProperty(
         description="Why Sinew can not deform it; empty where it can", options={"HIDDEN"}, get=_error
     )
-    modifier_name: bpy.props.StringProperty(
-        description="How Sinew's modifier was called when it had to let go of its node group",
-        options={"HIDDEN", "SKIP_SAVE"},
+    modifier_uid: bpy.props.IntProperty(
+        description="The persistent_uid of Sinew's modifier, which has no node group while Blender deforms",
+        options={"HIDDEN"},
     )
 
     @property

@@ -38,15 +38,16 @@ def can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
 
 
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    """Returns Sinew's own modifier. One that has lost its node group is recognised by its name."""
+    """Returns Sinew's own modifier. One that has no node group is recognised by its uid, or, without Sinew's
+    settings, by its name."""
     nodes = [m for m in obj.modifiers if m.type == "NODES"]
-    lost = (m for m in nodes if m.node_group is None and _is_name_of_ours(obj, m.name))
-    return next((m for m in nodes if node_group.is_sinew(m)), None) or next(lost, None)
+    bare = (m for m in nodes if m.node_group is None and _is_ours(obj, m))
+    return next((m for m in nodes if node_group.is_sinew(m)), None) or next(bare, None)
 
 
-def _is_name_of_ours(obj: bpy.types.Object, name: str) -> bool:
-    return name.startswith("Sinew") or (
-        properties.has_sinew(obj) and properties.of(obj).modifier_name == name
+def _is_ours(obj: bpy.types.Object, modifier: bpy.types.NodesModifier) -> bool:
+    return modifier.name.startswith("Sinew") or (
+        properties.has_sinew(obj) and properties.of(obj).modifier_uid == modifier.persistent_uid
     )
 
 

@@ -42,6 +42,8 @@ LONG_TERM = {
     *("test_preferences", "test_qv_against_reference", "test_scale_rule", "test_sdef", "test_small_meshes"),
     *("test_suggest", "test_translations", "test_worst_frames"),
 }
+# Run a second time with Sinew's default for small meshes, except for tests marked by_sinew.
+BOTH_WAYS = {"test_changes", "test_editing", "test_in_front", "test_moved_modifiers", "test_several_views"}
 REAL_RIGS = ("human.blend", "CesiumMan.glb", "Fox.glb")
 
 
@@ -106,9 +108,17 @@ def nothing_of_commands(monkeypatch):
 
 
 @pytest.fixture(autouse=True)
-def none_left_to_blender(monkeypatch):
-    """Tests have small meshes, and Sinew must deform them."""
-    monkeypatch.setattr(small_meshes, "is_used", False)
+def small_meshes_as_users_have_them(request, monkeypatch):
+    """Whether Sinew leaves small meshes to their Armature modifiers, as by default. Tests have small meshes,
+    which Sinew deforms unless a test says otherwise, as most tests are about that."""
+    monkeypatch.setattr(small_meshes, "is_used", getattr(request, "param", False))
+
+
+def pytest_generate_tests(metafunc):
+    is_marked = metafunc.definition.get_closest_marker("by_sinew") is not None
+    if metafunc.module.__name__ in BOTH_WAYS and not is_marked and "route" not in metafunc.fixturenames:
+        name = "small_meshes_as_users_have_them"
+        metafunc.parametrize(name, [False, True], indirect=True, ids=["by Sinew", "as users have it"])
 
 
 @pytest.fixture(params=routes.ROUTES)

@@ -215,6 +215,7 @@ def test_while_off_the_mesh_has_no_attribute_of_sinews(heat):
         assert len(ours()) == (not heat)
 
 
+@pytest.mark.by_sinew
 def test_a_deleted_attribute_is_written_again():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)
@@ -568,6 +569,7 @@ def test_keys_of_visibility_of_a_hidden_object_begin_with_what_the_artist_had():
     assert obj.modifiers["Armature"].show_viewport
 
 
+@pytest.mark.by_sinew
 def test_what_is_said_of_a_deleted_modifier_stays():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)

@@ -124,7 +124,7 @@ def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
             "has_nearest_volume",
         ),
         *("replaced_smooth", "parent_type", "attribute"),
-        *("normals_attribute", "point_buffer", "modifier_name"),
+        *("normals_attribute", "point_buffer", "modifier_uid"),
         *(
             "upstream_proxy",
             "upstream_signature",

@@ -301,6 +301,7 @@ def test_another_armature_chosen_in_the_modifier_is_taken_over():
     assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
 
 
+@pytest.mark.by_sinew
 def test_an_error_refuses_one_object_once_and_no_other(monkeypatch, caplog):
     obj, armature = scenes.make_arm()
     other, _rig = scenes.make_arm(name="Other")
@@ -365,6 +366,7 @@ def test_options_of_the_modifier_changed_while_at_work():
     assert_follows(obj)
 
 
+@pytest.mark.by_sinew
 def test_deleted_armature_modifier_is_refused_with_a_sentence():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)
@@ -384,6 +386,7 @@ def test_what_is_missing_in_the_rig_is_warned_of():
     assert "2 of 252 vertices" in " ".join(session.state_of(obj).bound.facts.warnings)
 
 
+@pytest.mark.by_sinew
 @pytest.mark.parametrize("has_group", [True, False])
 def test_hooks_behind_take_a_vertex_group(has_group):
     obj, _armature = scenes.make_arm()

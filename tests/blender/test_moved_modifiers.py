@@ -8,7 +8,7 @@ import bpy
 import pytest
 import scenes
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import session, small_meshes
+from sinew_addon.deform import session
 
 FRAMES = [1, 6, 11]
 
@@ -49,11 +49,9 @@ def check(obj, expected):
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-@pytest.mark.parametrize("is_used", [False, True])
 @pytest.mark.parametrize("volume", [(False, False), (False, True), (True, False)])
 @pytest.mark.parametrize("over_sinew", [False, True])
-def test_chained_modifiers_in_another_order(monkeypatch, is_used, volume, over_sinew):
-    monkeypatch.setattr(small_meshes, "is_used", is_used)
+def test_chained_modifiers_in_another_order(volume, over_sinew):
     obj = make_chained(*volume)
     before = scenes.shapes(obj, FRAMES)
     put(obj, "Second", "Armature")
@@ -74,10 +72,8 @@ def test_chained_modifiers_in_another_order(monkeypatch, is_used, volume, over_s
     check(obj, before)
 
 
-@pytest.mark.parametrize("is_used", [False, True])
 @pytest.mark.parametrize("deleted", ["Armature", "Second"])
-def test_one_of_two_deleted(monkeypatch, is_used, deleted):
-    monkeypatch.setattr(small_meshes, "is_used", is_used)
+def test_one_of_two_deleted(deleted):
     obj = make_chained(False, True)
     obj.modifiers[deleted].show_viewport = False
     expected = scenes.shapes(obj, FRAMES)
@@ -89,6 +85,7 @@ def test_one_of_two_deleted(monkeypatch, is_used, deleted):
     assert len(properties.of(obj).replaced_modifiers) == 1
 
 
+@pytest.mark.by_sinew
 def test_a_third_added():
     obj = make_chained(False, False)
     scenes.add_sinew(obj)

@@ -19,7 +19,7 @@ FRAMES = [1, 6, 11]
 
 
 @pytest.fixture(autouse=True)
-def left_where_faster(none_left_to_blender, monkeypatch):
+def left_where_faster(small_meshes_as_users_have_them, monkeypatch):
     monkeypatch.setattr(small_meshes, "is_used", True)
 
 
@@ -286,6 +286,14 @@ def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
     properties.of(obj).leave_small = True
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
     assert set(obj.data.attributes.keys()) == before
+
+
+def test_without_the_modifier_that_deforms_it_sinew_goes(arm):
+    obj, _armature = arm
+    obj.modifiers.remove(obj.modifiers["Armature"])
+    bpy.context.view_layer.update()
+    assert not obj.modifiers
+    assert not properties.has_sinew(obj)
 
 
 def test_numbers_are_those_of_sinew(arm):
