@@ -482,8 +482,9 @@ def test_frames_before_zero(arm, tmp_path, kind):
     command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", "-5--1", "--out", tmp_path / "out")
     if kind in ("usd", "gltf"):
         assert "Blender exports no frames before 0" in run_sinew(*command, status=1).stderr
-        gaps = run_sinew(*command, "--frames", "1,5", status=1)
-        assert "Blender exports every frame of a range" in gaps.stderr
+        if kind == "usd":
+            gaps = run_sinew(*command, "--frames", "1,5", status=1)
+            assert "Blender exports every frame of a range" in gaps.stderr
         assert not (tmp_path / "out").exists()
         return
     run_sinew(*command)
@@ -597,7 +598,7 @@ def test_a_library_override_whose_library_keys_visibility(arm, tmp_path, kind):
     written = out / f"shot{SUFFIXES.get(kind, '.blend')}"
     read = read_elsewhere(written, FRAMES, tmp_path)["Arm"]
     assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
-    refused = run_sinew("bake", shot, "--method", METHOD, "--to", "shape-keys", "--out", out, status=1)
+    refused = run_sinew("bake", shot, "--method", METHOD, "--to", "shape-keys", "--out", out / "k", status=1)
     assert "a library override can not have shape keys of its own" in refused.stderr
 
 
