@@ -7,8 +7,8 @@
 #include <string>
 
 #include "scenes.h"
-#include "sinew/deform/simd.h"
-#include "sinew/skinning/methods.h"
+#include "sinew/base/simd.h"
+#include "sinew/methods/methods.h"
 
 namespace {
 

@@ -7,10 +7,10 @@
 #include <string>
 
 #include "scenes.h"
+#include "sinew/base/simd.h"
 #include "sinew/base/thread_pool.h"
-#include "sinew/deform/bulge_limit.h"
-#include "sinew/deform/simd.h"
-#include "sinew/skinning/methods.h"
+#include "sinew/bulge_limit.h"
+#include "sinew/methods/methods.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "plain_loops.h"
-#include "sinew/deform/deformer.h"
+#include "sinew/deformer.h"
 
 namespace sinew::bench {
 

@@ -270,7 +270,7 @@ def cpp_api() -> str:
         "# C++",
         "`cmake --install`, then `find_package(sinew)` and `target_link_libraries(… sinew::sinew)`. Here are "
         "the headers, all in namespace `sinew`, without the bodies of functions. The definition of each "
-        "method is in `sinew/skinning/NAME.h`.",
+        "method is in `sinew/methods/NAME/NAME.h`.",
     ]
     for name in public_headers():
         pages += [
@@ -283,13 +283,12 @@ def cpp_api() -> str:
 def public_headers() -> list[str]:
     """Those that are installed, but for the definitions of methods and stages."""
     described = (HEADERS / "CMakeLists.txt").read_text(encoding="utf-8")
-    listed = re.search(r"install\(FILES\s+((?:deform/\w+\.h\s+)+)DESTINATION", described)
+    listed = re.search(r"set\(headers\s+([^)]*)\)", described)
     if listed is None:
         raise ValueError("native/sinew/CMakeLists.txt lists no headers")
     folders = ("transform", "interpolate", "fit", "skeleton", "ik")
     others = [path.relative_to(HEADERS).as_posix() for f in folders for path in (HEADERS / f).glob("*.h")]
-    lists = [f"skinning/{name}.h" for name in ("method_info", "methods", "stages")]
-    return [*listed[1].split(), *lists, *sorted(others)]
+    return [name for name in listed[1].split() if name != "sinew.h"] + sorted(others)
 
 
 def declarations(header: str) -> str:

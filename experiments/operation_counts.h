@@ -7,9 +7,9 @@
 
 #include "experiments/counted.h"
 #include "sinew/interpolate/methods.h"
-#include "sinew/skinning/dq.h"
-#include "sinew/skinning/lbs.h"
-#include "sinew/skinning/qv.h"
+#include "sinew/methods/dq/dq.h"
+#include "sinew/methods/lbs/lbs.h"
+#include "sinew/methods/qv/qv.h"
 #include "sinew/transform/make.h"
 
 namespace experiments {

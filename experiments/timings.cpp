@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "experiments/candidates.h"
-#include "sinew/deform/deformer.h"
+#include "sinew/deformer.h"
 
 namespace {
 

@@ -362,7 +362,7 @@ def skinning_times(measurements: Measurements | None) -> Table:
         {"sinew_qv": "glm_quat_vec", "sinew_dq": "glm_dual_quat"},
         (
             "The report does not say how often; a million times is taken, as in Table 3.5. Sinew without a "
-            "kernel is the one vertex of native/sinew/skinning, written like the paper; a kernel does "
+            "kernel is the one vertex of native/sinew/methods, written like the paper; a kernel does "
             "meshes of 10,000 vertices, a hundred times, on one thread.",
         ),
     )

@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "sinew/deform/deformer.h"
+#include "sinew/deformer.h"
 
 namespace sinew::bindings {
 namespace {

@@ -8,7 +8,7 @@
 #include "gil.h"
 #include "module.h"
 #include "parameters.h"
-#include "sinew/deform/bulge_limit.h"
+#include "sinew/bulge_limit.h"
 
 namespace sinew::bindings {
 namespace {

@@ -11,8 +11,8 @@
 #include "gil.h"
 #include "module.h"
 #include "parameters.h"
-#include "sinew/deform/deformer.h"
-#include "sinew/skinning/methods.h"
+#include "sinew/deformer.h"
+#include "sinew/methods/methods.h"
 
 namespace sinew::bindings {
 namespace {

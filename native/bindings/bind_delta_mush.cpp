@@ -8,8 +8,8 @@
 #include "arrays.h"
 #include "gil.h"
 #include "module.h"
-#include "sinew/deform/delta_mush.h"
-#include "sinew/skinning/delta_mush.h"
+#include "sinew/delta_mush.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
 
 namespace sinew::bindings {
 namespace {

@@ -2,8 +2,8 @@
 #include <string>
 
 #include "module.h"
-#include "sinew/skinning/methods.h"
-#include "sinew/skinning/stages.h"
+#include "sinew/methods/methods.h"
+#include "sinew/stages/stages.h"
 
 namespace sinew::bindings {
 namespace {

@@ -11,7 +11,7 @@
 #include "arrays.h"
 #include "gil.h"
 #include "module.h"
-#include "sinew/deform/normals.h"
+#include "sinew/normals.h"
 
 namespace sinew::bindings {
 namespace {

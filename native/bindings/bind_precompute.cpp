@@ -8,9 +8,9 @@
 #include "arrays.h"
 #include "gil.h"
 #include "module.h"
-#include "sinew/deform/centres_of_rotation.h"
+#include "sinew/methods/cor/centres_of_rotation.h"
 #if SINEW_WITH_DDM
-#include "sinew/deform/direct_delta_mush.h"
+#include "sinew/methods/ddm/direct_delta_mush.h"
 #endif
 
 namespace sinew::bindings {

@@ -5,7 +5,7 @@
 #include "deform_arguments.h"
 #include "gil.h"
 #include "module.h"
-#include "sinew/deform/skinned_normals.h"
+#include "sinew/skinned_normals.h"
 
 namespace sinew::bindings {
 namespace {

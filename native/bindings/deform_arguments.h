@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "arrays.h"
-#include "sinew/deform/deformer.h"
+#include "sinew/deformer.h"
 
 namespace sinew::bindings {
 

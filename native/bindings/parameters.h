@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "sinew/skinning/method_info.h"
+#include "sinew/methods/method_info.h"
 
 namespace sinew::bindings {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the kernels of the stage `bulge_limit` on each instruction set against the definition in double,
 // its threads and options.
-#include "sinew/deform/bulge_limit.h"
+#include "sinew/bulge_limit.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "scene.h"
-#include "sinew/deform/simd.h"
+#include "sinew/base/simd.h"
 
 namespace sinew {
 namespace {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "scene.h"
-#include "sinew/deform/centres_of_rotation.h"
+#include "sinew/methods/cor/centres_of_rotation.h"
 
 namespace sinew {
 namespace {

@@ -3,7 +3,7 @@
 // it keeps.
 #if SINEW_WITH_DDM
 
-#include "sinew/skinning/ddm.h"
+#include "sinew/methods/ddm/ddm.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,9 +13,9 @@
 #include <tuple>
 
 #include "scene.h"
-#include "sinew/deform/deformer.h"
-#include "sinew/deform/direct_delta_mush.h"
-#include "sinew/deform/simd.h"
+#include "sinew/base/simd.h"
+#include "sinew/deformer.h"
+#include "sinew/methods/ddm/direct_delta_mush.h"
 
 namespace sinew {
 namespace {

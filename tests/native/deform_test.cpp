@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "scene.h"
-#include "sinew/deform/deformer.h"
+#include "sinew/deformer.h"
 
 namespace sinew {
 namespace {

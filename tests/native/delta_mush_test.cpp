@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the stage `delta_mush` on each instruction set against its definition in double, its radius,
 // threads and degenerate meshes.
-#include "sinew/deform/delta_mush.h"
+#include "sinew/delta_mush.h"
 
 #include <algorithm>
 #include <string>
 
 #include "polygons.h"
 #include "scene.h"
-#include "sinew/deform/simd.h"
-#include "sinew/skinning/delta_mush.h"
+#include "sinew/base/simd.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
 
 namespace sinew {
 namespace {

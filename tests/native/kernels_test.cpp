@@ -10,8 +10,8 @@
 #include <tuple>
 
 #include "scene.h"
-#include "sinew/deform/simd.h"
-#include "sinew/deform/x86_support.h"
+#include "sinew/base/simd.h"
+#include "sinew/base/x86_support.h"
 
 namespace sinew {
 namespace {
@@ -66,7 +66,7 @@ Scene reordered(const Scene& scene, const std::vector<std::size_t>& order) {
     return other;
 }
 
-/// The distance of each of `points` from the result of skinning/ in double, ascending.
+/// The distance of each of `points` from the method's definition in double, ascending.
 std::vector<double> errors_of(const std::vector<Vec3<float>>& points, const MethodInfo& method,
                               const Scene& scene) {
     const auto expected = in_double(method, scene);

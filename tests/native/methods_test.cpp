@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the lookup of methods, and values of parameters, which become valid.
-#include "sinew/skinning/methods.h"
+#include "sinew/methods/methods.h"
 
 #include <gtest/gtest.h>
 

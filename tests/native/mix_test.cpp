@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the stage `mix` of each two methods on each instruction set.
-#include "sinew/skinning/mix.h"
+#include "sinew/stages/mix/mix.h"
 
 #include <algorithm>
 #include <limits>
@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "scene.h"
-#include "sinew/deform/simd.h"
+#include "sinew/base/simd.h"
 
 namespace sinew {
 namespace {

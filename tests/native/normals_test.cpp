@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects normals of whole meshes on each instruction set and on threads: all have the same bits, which
 // tests/python/test_normals.py compares with the definition.
-#include "sinew/deform/normals.h"
+#include "sinew/normals.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include "polygons.h"
 #include "scene.h"
-#include "sinew/deform/simd.h"
+#include "sinew/base/simd.h"
 
 namespace sinew {
 namespace {

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "sinew/base/thread_pool.h"
-#include "sinew/deform/deformer.h"
+#include "sinew/deformer.h"
 
 extern "C" __attribute__((visibility("default"))) int work_on_threads(int threads) {
     const std::size_t count = 100'000;

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "sinew/deform/mesh_topology.h"
+#include "sinew/mesh/mesh_topology.h"
 #include "support.h"
 
 namespace sinew::test {

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "scene.h"
-#include "sinew/deform/delta_mush.h"
-#include "sinew/deform/normals.h"
-#include "sinew/deform/skinned_normals.h"
+#include "sinew/delta_mush.h"
 #include "sinew/ik/solver.h"
+#include "sinew/normals.h"
+#include "sinew/skinned_normals.h"
 
 #ifdef __GLIBC__
 #include <dlfcn.h>

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "sinew/deform/deformer.h"
-#include "sinew/skinning/methods.h"
+#include "sinew/deformer.h"
+#include "sinew/methods/methods.h"
 #include "support.h"
 
 namespace sinew {
@@ -68,7 +68,7 @@ std::vector<Influence<T>> normalised_influences_of(const Scene& scene, std::size
 std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
                                   const DeformOptions& options = {});
 
-/// The result of skinning/ in T, with weights normalised and bones prepared in double.
+/// The result of the method's definition in T, with weights normalised and bones prepared in double.
 template <class T>
 std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene,
                                  std::span<const double> parameters = {});

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the kernels of sdef on each instruction set, its definition against that of mmd_tools, and
 // parameters of methods.
-#include "sinew/skinning/sdef.h"
+#include "sinew/methods/sdef/sdef.h"
 
 #include <cmath>
 #include <vector>
 
 #include "scene.h"
-#include "sinew/deform/simd.h"
+#include "sinew/base/simd.h"
 
 namespace sinew {
 namespace {

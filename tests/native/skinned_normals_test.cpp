@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects skinned normals on threads, at rest and flattened; tests/python/test_skinned_normals.py has the
 // oracle.
-#include "sinew/deform/skinned_normals.h"
+#include "sinew/skinned_normals.h"
 
 #include "scene.h"
 

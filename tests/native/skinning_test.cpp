@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sinew/skinning/methods.h"
+#include "sinew/methods/methods.h"
 #include "support.h"
 
 namespace sinew {
@@ -58,7 +58,7 @@ Bones<Method> prepared(const Rig& rig) {
     return bones;
 }
 
-/// Moments, as deform/direct_delta_mush.h computes them, of a ball about `centre` with the vertex's weights
+/// Moments, as methods/ddm/direct_delta_mush.h computes them, of a ball about `centre` with the vertex's weights
 /// everywhere.
 std::vector<double> moments(const std::vector<Influence<double>>& influences, const Vec3<double>& centre) {
     std::map<std::int32_t, double> weights;

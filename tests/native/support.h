@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "sinew/skinning/influence.h"
+#include "sinew/mesh/influence.h"
 #include "sinew/transform/convert.h"
 
 namespace sinew::test {

@@ -2,7 +2,7 @@
 """Normals of polygon meshes in float64, by Blender's definition: the oracle for sinew.Normals.
 
 A mesh consists of its points, its faces as lists of vertices, its edges as pairs, and its sharp edges and
-faces. The definitions are those in the header deform/normals.h, computed here one face, vertex and fan at a
+faces. The definitions are those in the header normals.h, computed here one face, vertex and fan at a
 time.
 """
 

@@ -5,16 +5,16 @@
 #include <cstdlib>
 #include <vector>
 
+#include "sinew/base/simd.h"
 #include "sinew/base/thread_pool.h"
-#include "sinew/deform/bulge_limit.h"
-#include "sinew/deform/centres_of_rotation.h"
-#include "sinew/deform/deformer.h"
-#include "sinew/deform/delta_mush.h"
-#include "sinew/deform/normals.h"
-#include "sinew/deform/simd.h"
-#include "sinew/deform/skinned_normals.h"
+#include "sinew/bulge_limit.h"
+#include "sinew/deformer.h"
+#include "sinew/delta_mush.h"
 #include "sinew/interpolate/methods.h"
+#include "sinew/methods/cor/centres_of_rotation.h"
+#include "sinew/normals.h"
 #include "sinew/skeleton/forward_kinematics.h"
+#include "sinew/skinned_normals.h"
 #include "sinew/transform/make.h"
 
 namespace {

@@ -26,7 +26,7 @@ if(GLM)
     set(object o)
   endif()
   run(${CMAKE_COMMAND} --build "${build}"
-    --target "native/sinew/CMakeFiles/sinew.dir/deform/deformer.cpp.${object}")
+    --target "native/sinew/CMakeFiles/sinew.dir/deformer.cpp.${object}")
   file(GLOB built "${BUILD}/native/sinew/*sinew.*")
   file(COPY ${built} DESTINATION "${build}/native/sinew")
 endif()

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sinew/deformer.h"
+#include "sinew/export.h"
+#include "sinew/stages/bulge_limit/bulge_limit.h"
+
+namespace sinew {
+
+/// The data that a BulgeLimit is constructed from. No reference is kept.
+struct BulgeLimitData {
+    BindData mesh;                                 // rest bones and vertex data are not read
+    std::span<const BoneSegment<float>> segments;  // [bones] at rest, in the space of posed_from_rest
+    Affine<float> bones_from_model{};              // maps rest points to that space; invertible
+    std::span<const float> weights{};  // [vertices] of the vertex group, clamped to 0 to 1; empty: all 1
+};
+
+/// How to limit one frame.
+struct BulgeLimitOptions {
+    BulgeForm form = BulgeForm::continuous;
+    float strength = 1.0f;    // clamped to 0 to 1; NaN: 1
+    std::size_t threads = 0;  // at most; 0: as many as useful
+};
+
+/// The stage `bulge_limit` (stages/bulge_limit/bulge_limit.h) for one mesh, applied after Deformer::deform(). A constructed
+/// object is valid; apply() can not fail and does not allocate. Concurrent calls on one object wait for each
+/// other. A moved-from object can only be assigned to or destroyed.
+class SINEW_EXPORT BulgeLimit {
+public:
+    /// Throws std::invalid_argument that names the field, what was expected and what was given: as Binding does,
+    /// and for fewer segments than bones, values that are not finite, a singular transform, weights that are NaN,
+    /// and a number of weights other than that of vertices.
+    explicit BulgeLimit(const BulgeLimitData& data);
+
+    BulgeLimit(BulgeLimit&&) noexcept;
+    BulgeLimit& operator=(BulgeLimit&&) noexcept;
+    ~BulgeLimit();
+
+    /// Sets other rest points [vertices], or the same points with another bones_from_model. Takes about as long
+    /// as apply(). Throws as the constructor does; the object is then unchanged.
+    void set_rest_points(std::span<const Vec3<float>> rest_points,
+                         const Affine<float>& bones_from_model = {});
+
+    [[nodiscard]] std::size_t vertex_count() const noexcept;
+    /// One more than the highest bone index in the influences.
+    [[nodiscard]] std::size_t bone_count() const noexcept;
+
+    /// Limits the points in place.
+    ///
+    /// points           [vertices] deformed, model space
+    /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
+    ///
+    /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. The
+    /// result does not depend on the number of threads. Returns false, and writes nothing, if the number of points is
+    /// wrong.
+    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+                             const BulgeLimitOptions& options = {}) const noexcept;
+
+    /// The data that the object was constructed from. An object made of it gives the same bits.
+    struct Parts {
+        BoundMesh mesh;
+        std::vector<BoneSegment<float>> segments;
+        Affine<float> bones_from_model;
+        std::vector<float> weights;
+    };
+    [[nodiscard]] Parts parts() const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace sinew

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Motions of bones, with one bone in each lane. Compiled once for each instruction set.
+#if defined(SINEW_LANES_BONES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SINEW_LANES_BONES_INL_H_
+#undef SINEW_LANES_BONES_INL_H_
+#else
+#define SINEW_LANES_BONES_INL_H_
+#endif
+
+#include <algorithm>
+
+#include "sinew/lanes/blend-inl.h"
+#include "sinew/transform/split_scale.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+// In double, because digits that a bone loses are lost for each of its vertices.
+using BoneTag = hn::CappedTag<double, 8>;
+using BoneVec = Vec<BoneTag>;
+using BonePoints = Points<BoneTag>;
+
+/// Affine transforms, by columns.
+struct Motions {
+    BonePoints x;
+    BonePoints y;
+    BonePoints z;
+    BonePoints translation;
+};
+
+HWY_INLINE BoneVec dot(const BonePoints& a, const BonePoints& b) {
+    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
+}
+
+/// The motions of the bones `used`, at most as many as there are lanes. Further lanes repeat the last bone.
+HWY_INLINE Motions load_motions(std::span<const Affine<float>> posed_from_rest,
+                                std::span<const std::int32_t> used) {
+    const BoneTag d;
+    alignas(64) double numbers[12][hn::MaxLanes(BoneTag())];
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+        const std::int32_t bone = used[std::min(lane, used.size() - 1)];
+        static_assert(sizeof(Affine<float>) == 12 * sizeof(float));
+        const float* const from = &posed_from_rest[static_cast<std::size_t>(bone)].linear[0].x;
+        for (std::size_t i = 0; i < 12; ++i) numbers[i][lane] = static_cast<double>(from[i]);
+    }
+    const auto column = [&](std::size_t i) HWY_ATTR {
+        return BonePoints{hn::Load(d, numbers[3 * i]), hn::Load(d, numbers[3 * i + 1]),
+                          hn::Load(d, numbers[3 * i + 2])};
+    };
+    return {column(0), column(1), column(2), column(3)};
+}
+
+HWY_INLINE hn::Mask<BoneTag> is_rotation(const Motions& m) {
+    const BoneTag d;
+    const BoneVec one = hn::Set(d, 1.0);
+    const auto is_small = [d](BoneVec v) HWY_ATTR { return hn::Lt(hn::Abs(v), hn::Set(d, kOrthonormal)); };
+    const auto unit =
+        hn::And(is_small(hn::Sub(dot(m.x, m.x), one)),
+                hn::And(is_small(hn::Sub(dot(m.y, m.y), one)), is_small(hn::Sub(dot(m.z, m.z), one))));
+    const auto square =
+        hn::And(is_small(dot(m.x, m.y)), hn::And(is_small(dot(m.y, m.z)), is_small(dot(m.z, m.x))));
+    const auto unmirrored = hn::Ge(dot(m.x, cross<BoneTag>(m.y, m.z)), hn::Zero(d));
+    return hn::And(unmirrored, hn::And(unit, square));
+}
+
+struct Quats {
+    BoneVec w;
+    BonePoints v;
+};
+
+/// to_quat() without branches. The matrix gives four multiples of the quaternion, each by one of its components;
+/// the multiple by the largest component is the most accurate.
+HWY_INLINE Quats rotations(const Motions& m) {
+    const BoneTag d;
+    const BoneVec one = hn::Set(d, 1.0);
+    const BonePoints difference{hn::Sub(m.y.z, m.z.y), hn::Sub(m.z.x, m.x.z), hn::Sub(m.x.y, m.y.x)};
+    const BonePoints sum{hn::Add(m.y.z, m.z.y), hn::Add(m.z.x, m.x.z), hn::Add(m.x.y, m.y.x)};
+    const BoneVec more = hn::Add(one, m.x.x);
+    const BoneVec less = hn::Sub(one, m.x.x);
+    const BoneVec yz = hn::Add(m.y.y, m.z.z);
+    const BoneVec y_z = hn::Sub(m.y.y, m.z.z);
+    const Quats multiples[4] = {{hn::Add(more, yz), difference},
+                                {difference.x, {hn::Sub(more, yz), sum.z, sum.y}},
+                                {difference.y, {sum.z, hn::Add(less, y_z), sum.x}},
+                                {difference.z, {sum.y, sum.x, hn::Sub(less, y_z)}}};
+    const BoneVec by[4] = {multiples[0].w, multiples[1].v.x, multiples[2].v.y, multiples[3].v.z};
+    Quats q = multiples[0];
+    BoneVec largest = by[0];
+    for (int i = 1; i < 4; ++i) {
+        const auto larger = hn::Gt(by[i], largest);
+        largest = hn::Max(by[i], largest);
+        q.w = hn::IfThenElse(larger, multiples[i].w, q.w);
+        q.v.x = hn::IfThenElse(larger, multiples[i].v.x, q.v.x);
+        q.v.y = hn::IfThenElse(larger, multiples[i].v.y, q.v.y);
+        q.v.z = hn::IfThenElse(larger, multiples[i].v.z, q.v.z);
+    }
+    BoneVec scale = hn::Div(one, hn::Sqrt(hn::MulAdd(q.w, q.w, dot(q.v, q.v))));
+    scale = hn::IfThenElse(hn::Lt(q.w, hn::Zero(d)), hn::Neg(scale), scale);
+    return {hn::Mul(scale, q.w), {hn::Mul(scale, q.v.x), hn::Mul(scale, q.v.y), hn::Mul(scale, q.v.z)}};
+}
+
+/// TargetKernel::prepare for a rigid method.
+template <class Rigid>
+void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                   Palette& palette) {
+    const BoneTag d;
+    constexpr std::size_t kMax = hn::MaxLanes(BoneTag());
+    for (std::size_t i = 0; i < used.size(); i += kMax) {
+        const auto bones = used.subspan(i, std::min(kMax, used.size() - i));
+        const Motions motions = load_motions(posed_from_rest, bones);
+        constexpr std::size_t kNumbers = Rigid::kNumbers;
+        BoneVec row[kNumbers];
+        Rigid::write_row(rotations(motions), motions.translation, row);
+        alignas(64) double numbers[kNumbers][kMax];
+        alignas(64) double rigid[kMax];
+        for (std::size_t k = 0; k < kNumbers; ++k) hn::Store(row[k], d, numbers[k]);
+        const BoneVec sizes =
+            hn::Max(dot(motions.translation, motions.translation), hn::Set(d, kMinSize * kMinSize));
+        const hn::Rebind<float, BoneTag> floats;
+        hn::StoreU(hn::DemoteTo(floats, sizes), floats, palette.sizes + i);
+        hn::Store(hn::IfThenElseZero(is_rotation(motions), hn::Set(d, 1.0)), d, rigid);
+        for (std::size_t lane = 0; lane < bones.size(); ++lane) {
+            if (rigid[lane] == 0.0) {
+                palette.scaled[palette.scaled_count++] = static_cast<std::int32_t>(i + lane);
+            }
+            float* const to = palette.bones[kNumbers / 4 * (i + lane)].value.data();
+            for (std::size_t k = 0; k < kNumbers; ++k) to[k] = static_cast<float>(numbers[k][lane]);
+        }
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "sinew/mesh/packed_mesh.h"
+#include "sinew/transform/affine.h"
+
+namespace sinew {
+
+struct alignas(16) Float4 {
+    std::array<float, 4> value;
+};
+
+/// Number of rows of a displacement: the rows x, y, z of an affine transform minus the identity. It maps a point
+/// to what the transform adds to it.
+inline constexpr std::size_t kDisplacementRows = 3;
+
+/// A vertex's bones are summed in one of two ways, which differ only by rounding.
+///
+/// Usually the first bone is taken whole, and the differences of the others from it are added by their weights,
+/// which takes fewer operations. The rounding error is then that of the first bone, whatever its weight. If the
+/// first bone is more than kAlike times as large as another, such as a bone that is far away, every bone is added
+/// by its weight instead: plainly. The choice depends only on the bones.
+inline constexpr float kAlike = 4.0f;
+
+/// Bones smaller than this count as equally large: their rounding errors are far below any mesh's precision.
+inline constexpr float kMinSize = 1e-5f;
+
+/// A linear bone may lengthen vectors much if the squared difference of its columns from the identity's exceeds
+/// this; for a rotation it is at most 8.
+inline constexpr float kLong = 64.0f;
+
+/// Sizes are written in groups of this many; there is room for one less after the last bone.
+inline constexpr std::size_t kSizesAtOnce = 8;
+
+/// The bones of one frame in the form that a kernel reads, indexed as Frame::bones. A PaletteStore owns the
+/// memory.
+struct Palette {
+    Float4* bones = nullptr;  // Kernel::rest_row.size() for each bone
+    // squared lengths of the translations, at least kMinSize squared; infinite beyond kLong
+    float* sizes = nullptr;
+    // Whether some vertex whose first bone is this one may be added plainly.
+    std::uint8_t* may_be_plain = nullptr;
+    Float4* scales = nullptr;           // kDisplacementRows for each bone, valid where it has scale
+    std::uint8_t* has_scale = nullptr;  // not written if no bone has scale
+    std::int32_t* scaled = nullptr;     // indices of bones that are to be prepared one by one
+    std::byte* set_bones = nullptr;     // Kernel::set_bone_size for each bone
+    std::size_t scaled_count = 0;
+    bool any_scale = false;
+};
+
+struct BoneSets;
+
+/// The bones of a mesh in one pose.
+struct Bones {
+    std::span<const std::int32_t> used;  // in the pose's numbering
+    // indices into `used` of bones whose rest axes are not of unit length
+    std::span<const std::int32_t> stretched;
+    std::span<const Affine<float>> posed_from_rest;
+    std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity
+    Affine<float> bones_from_model;
+    const BoneSets* sets;  // null unless the kernel needs them
+};
+
+template <class T>
+[[nodiscard]] Float4 float4(T a, T b, T c, T d) noexcept {
+    return {{static_cast<float>(a), static_cast<float>(b), static_cast<float>(c), static_cast<float>(d)}};
+}
+
+[[nodiscard]] inline Float4 float4(const Quat<double>& q) noexcept { return float4(q.w, q.x, q.y, q.z); }
+
+/// Writes the kDisplacementRows of a transform whose linear part minus the identity is `m`.
+void write_displacement(const Mat3<double>& m, const Vec3<double>& translation, Float4* rows) noexcept;
+void write_displacement(const Affine<double>& a, Float4* rows) noexcept;
+
+/// The Palette::sizes of a bone with this translation and this squared difference of its linear part from the
+/// identity.
+[[nodiscard]] float size_of(const Vec3<double>& translation, double length_squared = 0.0) noexcept;
+
+/// Whether bones are added plainly, given Palette::sizes of the first and of the smallest.
+[[nodiscard]] inline bool is_plain(float first, float least) noexcept {
+    return !(first < kAlike * kAlike * least);
+}
+
+[[nodiscard]] bool is_identity(const Affine<float>& a) noexcept;
+
+}  // namespace sinew

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/lanes/palette_store.h"
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+#include <new>
+#include <numeric>
+#include <thread>
+#include <utility>
+
+namespace sinew {
+namespace {
+
+constexpr std::uint32_t kReaders = (std::uint32_t{1} << PaletteStore::kMax) - 1;
+constexpr std::uint32_t kWriter = kReaders + 1;
+
+static_assert(alignof(Float4) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);
+
+}  // namespace
+
+/// One thread's palettes.
+struct PaletteStore::Palettes {
+    explicit Palettes(const PaletteStore& store) {
+        for (std::size_t k = 0; k < store.kernels_.size() && store.kernels_[k] != nullptr; ++k)
+            add(*store.kernels_[k], store.bones_, store.entries_, k);
+    }
+
+    void add(const Kernel& kernel, std::size_t bones, std::size_t entries, std::size_t k) {
+        const std::size_t rows = kernel.set_bone_size > 0 ? entries : bones;
+        const std::size_t scaled_rows = kernel.is_rigid ? rows : 0;
+        // A bone may be listed twice as scaled: because of its rest axes, and because of its pose.
+        const std::size_t scaled_bones = kernel.is_rigid ? 2 * bones : 0;
+        std::array<std::size_t, 7> sizes{kernel.rest_row.size() * rows * sizeof(Float4),
+                                         kDisplacementRows * scaled_rows * sizeof(Float4),
+                                         kernel.set_bone_size * bones,
+                                         (rows + kSizesAtOnce) * sizeof(float),
+                                         scaled_bones * sizeof(std::int32_t),
+                                         rows,
+                                         scaled_rows};
+        for (std::size_t& size : sizes) size = (size + sizeof(Float4) - 1) / sizeof(Float4) * sizeof(Float4);
+        // Not initialised: what a pose does not need gets no pages of the system.
+        memory[k] = std::make_unique_for_overwrite<std::byte[]>(
+            std::accumulate(sizes.begin(), sizes.end(), std::size_t{0}));
+        std::byte* at = memory[k].get();
+        auto next = [&, part = sizes.begin()]() mutable { return std::exchange(at, at + *part++); };
+        Palette& palette = of_kernels[k];
+        palette.bones = reinterpret_cast<Float4*>(next());
+        palette.scales = reinterpret_cast<Float4*>(next());
+        palette.set_bones = next();
+        palette.sizes = reinterpret_cast<float*>(next());
+        palette.scaled = reinterpret_cast<std::int32_t*>(next());
+        palette.may_be_plain = reinterpret_cast<std::uint8_t*>(next());
+        palette.has_scale = reinterpret_cast<std::uint8_t*>(next());
+    }
+
+    std::array<Palette, kMaxKernels> of_kernels{};
+    std::array<std::unique_ptr<std::byte[]>, kMaxKernels> memory;
+};
+
+PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries)
+    : bones_(bones), entries_(entries) {
+    std::ranges::copy(kernels, kernels_.begin());
+    palettes_[0] = new Palettes(*this);
+}
+
+PaletteStore::~PaletteStore() {
+    for (const std::atomic<Palettes*>& palettes : palettes_) delete palettes.load(std::memory_order_relaxed);
+}
+
+bool PaletteStore::make(std::uint32_t index) noexcept {
+    if (palettes_[index].load(std::memory_order_relaxed) != nullptr) return true;
+    try {
+        // A child that is forked meanwhile finds no palettes, or whole ones.
+        palettes_[index].store(new Palettes(*this), std::memory_order_release);
+    } catch (const std::bad_alloc&) {
+        return false;
+    }
+    return true;
+}
+
+std::uint32_t PaletteStore::start_reading() noexcept {
+    for (;;) {
+        const std::uint32_t before = state_.change([](std::uint32_t state) {
+            const bool is_free = (state & kWriter) == 0 && (state & kReaders) != kReaders;
+            return is_free ? state | (state + 1) : state;  // sets the lowest bit that is not set
+        });
+        const auto index = static_cast<std::uint32_t>(std::countr_one(before));
+        if (make(index)) return index;
+        // Without memory for more, threads take turns.
+        end_reading(index);
+        std::this_thread::yield();
+    }
+}
+
+Palette& PaletteStore::palette(std::size_t kernel, std::uint32_t index) noexcept {
+    return palettes_[index].load(std::memory_order_relaxed)->of_kernels[kernel];
+}
+
+void PaletteStore::end_reading(std::uint32_t index) noexcept { state_.clear(std::uint32_t{1} << index); }
+
+void PaletteStore::start_writing() noexcept {
+    // Set the writer's bit first, so that threads that deform continuously do not keep it waiting.
+    state_.change([](std::uint32_t state) { return state | kWriter; });
+    state_.wait_until_clear(kReaders);
+}
+
+void PaletteStore::end_writing() noexcept { state_.clear(kWriter); }
+
+}  // namespace sinew

@@ -1,0 +1,546 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Deforms blocks with a rigid method. Compiled once for each instruction set.
+#if defined(SINEW_LANES_RIGID_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SINEW_LANES_RIGID_INL_H_
+#undef SINEW_LANES_RIGID_INL_H_
+#else
+#define SINEW_LANES_RIGID_INL_H_
+#endif
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <type_traits>
+
+#include "sinew/lanes/centre-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+/// In this file, Rigid is a method's kernel with these members:
+///
+/// kNumbers        numbers in a bone's row, a multiple of 4; the first four are the quaternion, or numbers
+///                 without a sign. Numbers after the first kRow are the same in all rows of a set of bones,
+///                 except in CentreRows
+/// kSignedFloat4s  how many Float4 of a row change sign with the quaternion: 0 to 2
+/// add_scale       adds the effect of a bone's scale to a sum
+/// finish          the points, from their sum and rest points; for CentreRows as described there
+template <class Rigid>
+inline constexpr std::size_t kRowFloat4s = Rigid::kNumbers / 4;
+
+// Slightly more than the cosine of 45 degrees.
+inline constexpr float kCosine45 = 0.7072f;
+
+// For sets with more influences, signs are found vertex by vertex.
+inline constexpr std::size_t kMaxResolved = 32;
+
+HWY_INLINE float dot(const float* a, const float* b) {
+    return (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3]);
+}
+
+/// Whether each row joins the running sum of the rows before it with the same sign for all weights: it does if it
+/// is in the hemisphere of each of them.
+HWY_INLINE bool signs_agree(const float* rows, std::size_t stride, std::size_t count) {
+    // Far above the rounding error of a sum, so that the result agrees with signs decided by the sum in floats.
+    constexpr float kTie = 1e-5f;
+    for (std::size_t i = 1; i < count; ++i) {
+        for (std::size_t j = 0; j < i; ++j) {
+            if (!(dot(rows + stride * i, rows + stride * j) > kTie)) return false;
+        }
+    }
+    return true;
+}
+
+/// Subtracts the first row from each other row.
+template <std::size_t kNumbers>
+HWY_INLINE void subtract_first(float* rows, std::size_t count) {
+    // Vectors of 8 only if a row's size is a multiple of 8.
+    const hn::CappedTag<float, kNumbers % 8 == 0 ? 8 : 4> d;
+    for (std::size_t i = 0; i < kNumbers; i += hn::Lanes(d)) {
+        const auto first = hn::LoadU(d, rows + i);
+        for (std::size_t k = 1; k < count; ++k) {
+            float* const row = rows + kNumbers * k + i;
+            hn::StoreU(hn::Sub(hn::LoadU(d, row), first), d, row);
+        }
+    }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+
+using Four = hn::CappedTag<float, 4>;
+
+/// The dot product in every lane, rounded as by the scalar dot().
+HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
+    const Vec<Four> product = hn::Mul(a, b);
+    const Vec<Four> pairs = hn::Add(product, hn::Shuffle1032(product));
+    return hn::Add(pairs, hn::Shuffle2301(pairs));
+}
+
+/// Copies rows of the palette, each in the hemisphere of the first. Returns the smallest of their absolute
+/// cosines with the first.
+///
+/// kDifferences  copy the differences from the first row, for all rows but the first
+template <class Rigid, bool kDifferences>
+HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                              float* rows) {
+    const Four d;
+    constexpr std::size_t kFloat4s = kRowFloat4s<Rigid>;
+    const auto float4_of = [&](std::size_t k, std::size_t q) HWY_ATTR {
+        return hn::Load(d, palette.bones[kFloat4s * static_cast<std::size_t>(bones[k]) + q].value.data());
+    };
+    Vec<Four> first[kFloat4s];
+    for (std::size_t q = 0; q < kFloat4s; ++q) {
+        first[q] = float4_of(0, q);
+        hn::Store(first[q], d, rows + 4 * q);
+    }
+    Vec<Four> least = hn::Set(d, 1.0f);
+    for (std::size_t k = 1; k < count; ++k) {
+        Vec<Four> float4 = float4_of(k, 0);
+        const Vec<Four> cosine = dot(float4, first[0]);
+        const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
+        least = hn::Min(least, hn::Abs(cosine));
+        for (std::size_t q = 0; q < kFloat4s; ++q) {
+            if (q > 0) float4 = float4_of(k, q);
+            if (q < Rigid::kSignedFloat4s) float4 = hn::Xor(float4, sign);
+            hn::Store(kDifferences ? hn::Sub(float4, first[q]) : float4, d,
+                      rows + Rigid::kNumbers * k + 4 * q);
+        }
+    }
+    return hn::GetLane(least);
+}
+
+#else
+
+template <class Rigid, bool kDifferences>
+float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
+    float least = 1.0f;
+    for (std::size_t k = 0; k < count; ++k) {
+        float* const row = rows + Rigid::kNumbers * k;
+        std::memcpy(row, &palette.bones[kRowFloat4s<Rigid> * static_cast<std::size_t>(bones[k])],
+                    sizeof(Float4) * kRowFloat4s<Rigid>);
+        const float cosine = dot(row, rows);
+        least = std::min(least, std::abs(cosine));
+        if (cosine < 0.0f) {
+            for (std::size_t i = 0; i < 4 * Rigid::kSignedFloat4s; ++i) row[i] = -row[i];
+        }
+    }
+    if (kDifferences) subtract_first<Rigid::kNumbers>(rows, count);
+    return least;
+}
+
+#endif
+
+/// Copies the first bone of a set to `rows`, and the differences of the others from it or, if plain, the others
+/// themselves, each with the sign with which it is added. Returns false if a sign depends on the weights, or if a
+/// bone has scale and therefore depends on the vertex.
+template <class Rigid, bool kPlain>
+HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                              float* rows) {
+    if (count > kMaxResolved) return false;
+    if (palette.any_scale) {
+        for (std::size_t k = 0; k < count; ++k) {
+            if (palette.has_scale[static_cast<std::size_t>(bones[k])] != 0) return false;
+        }
+    }
+    // Within 45 degrees of the first, all are within 90 degrees of each other.
+    const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
+    if (Rigid::kSignedFloat4s == 0 || least > kCosine45) return true;
+    if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
+    if (!signs_agree(rows, Rigid::kNumbers, count)) return false;
+    if (!kPlain) subtract_first<Rigid::kNumbers>(rows, count);
+    return true;
+}
+
+/// Blends numbers [begin, begin + kSize) of a set's rows for kVectors neighbouring vectors, with resolved signs. With
+/// a fixed kCount the loop is unrolled.
+///
+/// first_weight  of the first influence, only read if plain
+/// weights       of the second influence and those after it
+/// sums          [kVectors][kSize]
+template <std::size_t kNumbers, std::size_t kCount, bool kPlain, std::size_t kSize, std::size_t kVectors,
+          class D>
+HWY_INLINE void blend_numbers(D d, const float* rows, std::size_t begin, std::size_t count,
+                              const float* first_weight, const float* weights, Vec<D>* sums) {
+    const std::size_t step = hn::Lanes(d);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+        for (std::size_t i = 0; i < kSize; ++i) sums[kSize * v + i] = hn::Set(d, rows[begin + i]);
+        if constexpr (kPlain) {
+            const Vec<D> weight = hn::Load(d, first_weight + v * step);
+            for (std::size_t i = 0; i < kSize; ++i) {
+                sums[kSize * v + i] = hn::Mul(weight, sums[kSize * v + i]);
+            }
+        }
+    }
+    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+        const float* const row = rows + kNumbers * k + begin;
+        Vec<D> weight[kVectors];
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            weight[v] = hn::Load(d, weights + kLanes * (k - 1) + v * step);
+        }
+        for (std::size_t i = 0; i < kSize; ++i) {
+            const Vec<D> number = hn::Set(d, row[i]);
+            for (std::size_t v = 0; v < kVectors; ++v) {
+                Vec<D>& sum = sums[kSize * v + i];
+                sum = hn::MulAdd(weight[v], number, sum);
+            }
+        }
+    }
+}
+
+/// Blends the rows of a set of bones for one vector. Arguments as above.
+template <std::size_t kNumbers, std::size_t kCount, bool kPlain, class D>
+HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
+                                       const float* weights) {
+    Sum<D, kNumbers> sum;
+    blend_numbers<kNumbers, kCount, kPlain, kRow, 1>(d, rows, 0, count, first_weight, weights, sum.value);
+    for (std::size_t i = kRow; i < kNumbers; ++i) sum.value[i] = hn::Set(d, rows[i]);
+    return sum;
+}
+
+/// Neighbouring vectors for which a bone's numbers are read once. Short vectors have no operands that repeat a
+/// number, so each takes a load of its own.
+inline constexpr std::size_t kVectorsAtOnce = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
+
+/// Blends CentreRows of a set of bones for kVectors neighbouring vectors, and writes their motions at the points
+/// `p`. Other arguments as above.
+template <std::size_t kVectors, std::size_t kCount, bool kPlain, class D>
+HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const float* first_weights,
+                              const float* weights, const Points<D>* p, Motion<D>* motions) {
+    constexpr std::size_t kNumbers = CentreRows::kNumbers;
+    // As many numbers at once as there are registers for their sums.
+    if constexpr (kVectors == 1) {
+        Sum<D, kNumbers> sum;
+        for (std::size_t i = 0; i < kNumbers; i += kRow) {
+            blend_numbers<kNumbers, kCount, kPlain, kRow, 1>(d, rows, i, count, first_weights, weights,
+                                                             sum.value + i);
+        }
+        motions[0] = motion_at(sum, p[0]);
+    } else {
+        const auto blend = [&](std::size_t begin, Vec<D>* sums) HWY_ATTR {
+            blend_numbers<kNumbers, kCount, kPlain, 4, kVectors>(d, rows, begin, count, first_weights,
+                                                                 weights, sums);
+        };
+        const auto blend_axis = [&](std::size_t begin, Vec<D> Points<D>::*axis) HWY_ATTR {
+            Vec<D> sums[4 * kVectors];
+            blend(begin, sums);
+            for (std::size_t v = 0; v < kVectors; ++v) {
+                motions[v].displacement.*axis = moved_along(sums + 4 * v, p[v]);
+            }
+        };
+        blend_axis(4, &Points<D>::x);
+        blend_axis(8, &Points<D>::y);
+        blend_axis(12, &Points<D>::z);
+        Vec<D> rotations[4 * kVectors];
+        blend(0, rotations);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            for (std::size_t i = 0; i < 4; ++i) motions[v].rotation[i] = rotations[4 * v + i];
+        }
+    }
+}
+
+/// The same for bones with scale, or whose signs depend on the weights.
+template <class Rigid, class D>
+HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, const std::int32_t* bones,
+                                               std::size_t count, bool plain, const float* first_weight,
+                                               const float* weights, const Points<D>& rest) {
+    constexpr std::size_t kNumbers = Rigid::kNumbers;
+    const Vec<D> first = hn::Load(d, first_weight);
+    const float* const base = plain ? kNoBase : row_of<kNumbers>(palette, bones[0]);
+    Blend<D, kNumbers> blend = begin_blend<kNumbers>(d, row_of<kNumbers>(palette, bones[0]), first, plain);
+    Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
+    for (std::size_t k = 1; k < count; ++k) {
+        const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
+        const Vec<D> signed_weight =
+            add_to_blend<Rigid>(d, base, row_of<kNumbers>(palette, bones[k]), weight, blend);
+        Rigid::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
+    }
+    return blend.sum;
+}
+
+/// Displacements between model space and the space of the bones, as in Frame; null if the spaces are the same.
+struct Spaces {
+    const float* bones_from_model;
+    const float* model_from_bones;
+};
+
+HWY_INLINE Spaces spaces_of(const Frame& frame) {
+    if (frame.bones_from_model == nullptr) return {nullptr, nullptr};
+    return {frame.bones_from_model->value.data(), frame.model_from_bones->value.data()};
+}
+
+/// Lanes of the first vertex data number; the others follow, kLanes apart. Null if there are none.
+template <std::size_t kVertexFloats>
+HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t b, std::size_t lane) {
+    if (pointers.vertex_rows == nullptr) return nullptr;
+    return pointers.vertex_rows[kVertexFloats * b].lane.data() + lane;
+}
+
+template <class D>
+HWY_INLINE void map_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                              std::size_t lane, Points<D> points) {
+    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
+    store_points(d, pointers, b, lane, points);
+}
+
+template <class Rigid>
+inline constexpr bool kHasCentre = std::is_base_of_v<CentreRows, Rigid>;
+
+template <class Rigid, class D>
+HWY_INLINE Points<D> centre_of(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                               std::size_t lane, const Points<D>& rest) {
+    return Rigid::centre(d, vertex_rows_of<Rigid::kVertexFloats>(pointers, b, lane), spaces.bones_from_model,
+                         rest);
+}
+
+template <class Rigid, class D>
+HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                                 std::size_t lane, const Sum<D, Rigid::kNumbers>& sum,
+                                 const Points<D>& rest) {
+    Points<D> points;
+    if constexpr (kHasCentre<Rigid>) {
+        const Points<D> centre = centre_of<Rigid>(d, pointers, spaces, b, lane, rest);
+        points = Rigid::finish(d, motion_at(sum, centre), centre, rest);
+    } else {
+        points = Rigid::finish(d, sum, rest);
+    }
+    map_and_store(d, pointers, spaces, b, lane, points);
+}
+
+template <class D>
+HWY_INLINE Points<D> load_rest(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                               std::size_t lane) {
+    const Points<D> rest = load_points(d, pointers, b, lane);
+    return spaces.bones_from_model == nullptr ? rest : displaced(d, spaces.bones_from_model, rest);
+}
+
+/// Deforms lanes [lane, lane + kVectors * N) of a block with resolved signs.
+template <class Rigid, std::size_t kVectors, std::size_t kCount, bool kPlain>
+HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
+                               std::size_t b, std::size_t lane, const float* bone_rows, std::size_t count) {
+    const Full d;
+    const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
+    const float* const weights = weights_of(pointers, b) + lane;
+    if constexpr (kHasCentre<Rigid>) {
+        Points<Full> rest[kVectors];
+        Points<Full> centres[kVectors];
+        Motion<Full> motions[kVectors];
+        const std::size_t step = hn::Lanes(d);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            rest[v] = load_rest(d, pointers, spaces, b, lane + v * step);
+            centres[v] = centre_of<Rigid>(d, pointers, spaces, b, lane + v * step, rest[v]);
+        }
+        blend_motions<kVectors, kCount, kPlain>(d, bone_rows, count, first_weights, weights, centres,
+                                                motions);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            map_and_store(d, pointers, spaces, b, lane + v * step,
+                          Rigid::finish(d, motions[v], centres[v], rest[v]));
+        }
+    } else {
+        const auto sum =
+            blend_rows<Rigid::kNumbers, kCount, kPlain>(d, bone_rows, count, first_weights, weights);
+        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, pointers, spaces, b, lane));
+    }
+}
+
+/// Deforms blocks [begin, end) with the same bones, whose signs are resolved.
+///
+/// kCount  their influences, or 0 for any number
+template <class Rigid, std::size_t kCount, bool kPlain = false>
+void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
+    const Full d;
+    constexpr std::size_t kVectors = kHasCentre<Rigid> ? kVectorsAtOnce : 1;
+    const MeshPointers pointers = pointers_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const std::size_t influences = pointers.blocks[begin].influences;
+    for (std::size_t b = begin; b < end; ++b) {
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
+            if (kVectors > 1 && lane + hn::Lanes(d) >= lanes) {
+                deform_vectors<Rigid, 1, kCount, kPlain>(frame, pointers, spaces, b, lane, bone_rows,
+                                                         influences);
+            } else {
+                deform_vectors<Rigid, kVectors, kCount, kPlain>(frame, pointers, spaces, b, lane, bone_rows,
+                                                                influences);
+            }
+        }
+    }
+}
+
+template <class Rigid>
+void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, bool plain) {
+    const Full d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const std::size_t influences = pointers.blocks[begin].influences;
+    const std::int32_t* const bones = frame.bones + pointers.blocks[begin].first_bone;
+    for (std::size_t b = begin; b < end; ++b) {
+        const float* const weights_of_block = weights_of(pointers, b);
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            const Points<Full> rest = load_rest(d, pointers, spaces, b, lane);
+            const auto sum =
+                blend_bones<Rigid>(d, *frame.palette, bones, influences, plain,
+                                   first_weights_of(frame, b) + lane, weights_of_block + lane, rest);
+            finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
+        }
+    }
+}
+
+/// Deforms blocks [begin, end) with the same bones, which are added plainly.
+template <class Rigid>
+HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
+    const Block& block = frame.mesh->blocks[begin];
+    const std::int32_t* const bones = frame.bones + block.first_bone;
+    if (resolve_signs<Rigid, true>(*frame.palette, bones, block.influences, rows)) {
+        deform_resolved<Rigid, 0, true>(frame, begin, end, rows);
+    } else {
+        deform_unresolved<Rigid>(frame, begin, end, true);
+    }
+}
+
+/// Deforms blocks [begin, end) with the same bones.
+template <class Rigid>
+void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
+    const Block& block = frame.mesh->blocks[begin];
+    const std::int32_t* const bones = frame.bones + block.first_bone;
+    if (is_plain(*frame.palette, bones, block.influences)) return deform_plain_set<Rigid>(frame, begin, end);
+    if (!resolve_signs<Rigid, false>(*frame.palette, bones, block.influences, rows)) {
+        return deform_unresolved<Rigid>(frame, begin, end, false);
+    }
+    switch (block.influences) {
+        case 1: return deform_resolved<Rigid, 1>(frame, begin, end, rows);
+        case 2: return deform_resolved<Rigid, 2>(frame, begin, end, rows);
+        case 3: return deform_resolved<Rigid, 3>(frame, begin, end, rows);
+        case 4: return deform_resolved<Rigid, 4>(frame, begin, end, rows);
+        default: return deform_resolved<Rigid, 0>(frame, begin, end, rows);
+    }
+}
+
+/// Deforms a mixed block vertex by vertex: for bones with scale, or without vectors.
+template <class Rigid>
+void deform_one_by_one(const Frame& frame, std::size_t b) {
+    const One d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const Block& block = pointers.blocks[b];
+    const float* const weights_of_block = weights_of(pointers, b);
+    const std::int32_t* const bones = frame.bones + block.first_bone;
+    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+        const Points<One> rest = load_rest(d, pointers, spaces, b, lane);
+        const std::int32_t* const of_vertex = bones + block.influences * lane;
+        const bool plain = is_plain(*frame.palette, of_vertex, block.influences);
+        const float* const weights = weights_of_block + lane;
+        const auto sum = blend_bones<Rigid>(d, *frame.palette, of_vertex, block.influences, plain, weights,
+                                            weights + kLanes, rest);
+        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
+    }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+
+/// Blends one vertex of a mixed block. A bone's row is added as it is in memory, Float4 by Float4.
+///
+/// weights  of each influence, kLanes apart
+/// sums     receives the sum's Float4s, 4 * kLanes apart
+template <class Rigid, bool kPlain>
+HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                             const float* weights, float* sums) {
+    const Four d;
+    using V4 = Vec<Four>;
+    const auto row_at = [&](std::size_t k) {
+        return &palette.bones[kRowFloat4s<Rigid> * static_cast<std::size_t>(bones[k])];
+    };
+    const Float4* const first = row_at(0);
+    V4 sum[kRowFloat4s<Rigid>];
+    for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) sum[q] = hn::Load(d, first[q].value.data());
+    V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
+    if (kPlain) {
+        for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
+    }
+    for (std::size_t k = 1; k < count; ++k) {
+        const Float4* const row = row_at(k);
+        const V4 weight = hn::Set(d, weights[kLanes * k]);
+        const V4 quaternion = hn::Load(d, row->value.data());
+        const auto below = hn::Lt(dot(quaternion, quaternions), hn::Zero(d));
+        const V4 away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
+        for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
+            V4 by = hn::Load(d, row[q].value.data());
+            if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);
+            if (!kPlain) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
+            sum[q] = hn::MulAdd(weight, by, sum[q]);
+        }
+        quaternions = hn::MulAdd(hn::Xor(weight, away), quaternion, quaternions);
+    }
+    for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
+}
+
+/// Not inlined, so that its registers do not burden the usual case.
+template <class Rigid>
+HWY_NOINLINE void blend_vertex_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                                       const float* weights, float* sums) {
+    blend_vertex<Rigid, true>(palette, bones, count, weights, sums);
+}
+
+/// Deforms a mixed block. The sums of all vertices are transposed into lanes.
+template <class Rigid>
+void deform_mixed(const Frame& frame, std::size_t b) {
+    const MeshPointers pointers = pointers_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const Block& block = pointers.blocks[b];
+    const float* const weights_of_block = weights_of(pointers, b);
+    const std::int32_t* bones = frame.bones + block.first_bone;
+    const Palette palette = *frame.palette;
+    alignas(64) float sums[kRowFloat4s<Rigid>][4 * kLanes];
+    for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
+        const float* const weights = weights_of_block + lane;
+        float* const to = sums[0] + 4 * lane;
+        if (is_plain(palette, bones, block.influences)) {
+            blend_vertex_plainly<Rigid>(palette, bones, block.influences, weights, to);
+        } else {
+            blend_vertex<Rigid, false>(palette, bones, block.influences, weights, to);
+        }
+    }
+    const Full d;
+    for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
+        Sum<Full, Rigid::kNumbers> sum;
+        for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
+            Vec<Full>* const value = sum.value + 4 * q;
+            hn::LoadInterleaved4(d, sums[q] + 4 * lane, value[0], value[1], value[2], value[3]);
+        }
+        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, pointers, spaces, b, lane));
+    }
+}
+
+#else
+
+template <class Rigid>
+void deform_mixed(const Frame& frame, std::size_t b) {
+    deform_one_by_one<Rigid>(frame, b);
+}
+
+#endif
+
+template <class Rigid>
+void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
+    const bool scaled = frame.palette->any_scale;
+    for (std::size_t b = begin; b < end;) {
+        const Block& block = frame.mesh->blocks[b];
+        if (block.mixed) {
+            scaled ? deform_one_by_one<Rigid>(frame, b) : deform_mixed<Rigid>(frame, b);
+            ++b;
+            continue;
+        }
+        const std::size_t after = end_of_set(frame, b, end);
+        block.influences == 0 ? keep_blocks(frame, b, after) : deform_set<Rigid>(frame, b, after);
+        b = after;
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#endif

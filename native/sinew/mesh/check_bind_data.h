@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "sinew/base/fail.h"
+#include "sinew/deformer.h"
+#include "sinew/mesh/influence.h"
+#include "sinew/mesh/packed_mesh.h"
+
+namespace sinew {
+
+/// Throws if a point is not finite.
+void check_points(std::span<const Vec3<float>> points);
+
+/// Throws if there are some but fewer than `bone_count` rest bones, or if one is not finite.
+///
+/// bone_count  one more than the highest bone index in the influences
+void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
+
+/// Throws as Binding does, except for rest bones and vertex data, which are not checked.
+void check(const BindData& data);
+
+/// Influences of positive weight. The weights of each vertex that has any have sum 1.
+struct NormalisedInfluences {
+    std::vector<std::uint32_t> offsets{0};  // [vertices + 1]
+    std::vector<Influence<float>> influences;
+};
+
+/// Throws if `triangles` [3 x any number] has a corner that is no vertex.
+void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);
+
+/// The points and influences that `mesh` was packed from.
+///
+/// rest_points  mesh.rest_points, or others
+/// bone_count   one more than the highest bone index; if only an influence without weight named that bone, the
+///              result has such an influence too
+[[nodiscard]] BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points,
+                                   std::size_t vertex_count, std::size_t bone_count);
+
+/// data  checked
+[[nodiscard]] NormalisedInfluences normalised_influences(const BindData& data);
+
+}  // namespace sinew

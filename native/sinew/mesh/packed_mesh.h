@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sinew/mesh/influence.h"
+#include "sinew/transform/affine.h"
+
+namespace sinew {
+
+/// Vertices of a block: the float lanes of the widest vectors. Narrower vectors process a block in several steps.
+inline constexpr std::size_t kLanes = 16;
+
+/// Lanes of a block's points: x, y and z.
+inline constexpr std::size_t kPointRows = 3;
+
+/// One number for each vertex of a block.
+template <class T>
+struct alignas(kLanes * sizeof(T)) Lanes {
+    std::array<T, kLanes> lane;
+};
+
+/// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
+struct Block {
+    // Into PackedMesh::weights, in the order of the blocks: [influences]; unless mixed, without the first.
+    std::uint32_t first_weight;
+    std::uint32_t first_bone;  // into PackedMesh::bones: [influences], or if mixed [kLanes][influences]
+    std::uint32_t influences;
+    std::uint32_t output;  // if consecutive, the first vertex; otherwise the first run
+    std::uint8_t vertices;
+    std::uint8_t runs;  // 0: too many runs to be worthwhile
+    bool mixed;  // every lane has its own bones; vertices with fewer influences are padded with weight 0
+    bool consecutive;  // kLanes vertices that are consecutive in the mesh as well
+};
+
+/// Lanes of a block whose vertices are consecutive in the mesh.
+struct Run {
+    std::int32_t origin;                  // the vertex of lane 0, extrapolated if the run starts later
+    std::array<std::uint16_t, 3> floats;  // a bit for each of the block's coordinates x y z x y z ...
+};
+
+/// Each pair of a bone that is the first of some vertex, and another bone of that vertex, once. Padded to a
+/// multiple of kLanes with pairs of a bone with itself.
+struct BonePairs {
+    std::vector<std::int32_t> first;
+    std::vector<std::int32_t> later;
+};
+
+/// A bound mesh in the order in which it is deformed: vertices with the same bones in the same order are
+/// adjacent, so that a bone is read once for many vertices.
+struct PackedMesh {
+    std::vector<Block> blocks;
+    // Rest points and weights are stored separately: other rest points may replace these, and a method that keeps
+    // weights of its own reads only the points.
+    std::vector<Lanes<float>> rest_points;      // [blocks][kPointRows]
+    std::vector<Lanes<float>> weights;          // and one more row, which blocks without weights point to
+    std::vector<Lanes<float>> first_weights;    // [blocks] separate, as rarely read; unused for mixed blocks
+    std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the vertex of each lane
+    std::vector<Run> runs;
+    std::vector<std::int32_t> bones;       // indices into used_bones
+    std::vector<std::int32_t> used_bones;  // ascending, each once: bones in the caller's numbering
+    BonePairs pairs;
+};
+
+/// Packs a mesh.
+///
+/// rest_points  [vertices]
+/// offsets      [vertices + 1] into `influences`
+/// influences   of each vertex, possibly none; positive weights with sum 1
+/// more_bones   bones to be among the used bones besides those of the influences, in any order
+[[nodiscard]] PackedMesh pack(std::span<const Vec3<float>> rest_points,
+                              std::span<const std::uint32_t> offsets,
+                              std::span<const Influence<float>> influences,
+                              std::span<const std::int32_t> more_bones = {});
+
+/// The form of PackedMesh::rest_points for other rest points [vertices].
+void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                 std::span<Lanes<float>> packed) noexcept;
+
+/// What a mesh was packed from.
+struct UnpackedMesh {
+    std::vector<Vec3<float>> rest_points;
+    std::vector<std::uint32_t> offsets;
+    std::vector<Influence<float>> influences;
+};
+
+/// The inverse of pack(), without influences of weight 0.
+///
+/// rest_points  mesh.rest_points, or others
+[[nodiscard]] UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points,
+                                  std::size_t vertices);
+
+/// The inverse of pack_values().
+[[nodiscard]] std::vector<float> unpack_values(const PackedMesh& mesh, std::span<const Lanes<float>> packed,
+                                               std::size_t vertices, std::size_t count = 1);
+
+/// Arranges numbers of each vertex [vertices][count] in the order of the mesh's blocks: [blocks][count]. Lanes
+/// without a vertex repeat the last one.
+[[nodiscard]] std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values,
+                                                    std::size_t count = 1);
+
+}  // namespace sinew

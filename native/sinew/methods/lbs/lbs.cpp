@@ -1,0 +1,399 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Linear blending on lanes. A bone is the columns x, y, z and translation of its displacement, each followed by a
+// 0. Bones are summed as described at Palette.
+// This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include "sinew/methods/lbs/lbs.h"
+
+#include <cstring>
+#include <limits>
+
+#include "sinew/base/targets.h"
+#include "sinew/lanes/kernels.h"
+#include "sinew/transform/convert.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sinew/methods/lbs/lbs.cpp"
+#include "hwy/foreach_target.h"
+//
+#include "hwy/highway.h"
+#include "sinew/lanes/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+/// Returns `v`, and keeps GCC from loading it again for each of its uses. On AVX-512, where the kernel is bound
+/// by loads, the reloads cost a tenth of its time.
+template <class V>
+HWY_INLINE V in_register(V v) {
+#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_SCALAR
+    asm("" : "+v"(v.raw));
+#endif
+    return v;
+}
+
+/// Columns of a bone's displacement.
+inline constexpr std::size_t kLbsColumns = 4;
+
+/// The numbers in these columns.
+inline constexpr std::size_t kColumns = 4 * kLbsColumns;
+
+/// Returns `columns`, and hides from the compiler that the numbers are the same for all blocks. It would
+/// otherwise keep each number broadcast to a vector on the stack, which triples the bytes to read.
+HWY_INLINE const float* loaded_anew(const float* columns) {
+#if HWY_COMPILER_GCC || HWY_COMPILER_CLANG
+    asm volatile("" : "+r"(columns) : : "memory");
+#endif
+    return columns;
+}
+
+/// A bone's columns, or stored differences of them.
+struct Columns {
+    const float* columns;
+
+    template <class D>
+    HWY_INLINE Vec<D> at(D d, std::size_t i) const {
+        return hn::Set(d, columns[i]);
+    }
+};
+
+/// The differences of a bone's columns from those of the first bone.
+struct Differences {
+    const float* columns;
+    const float* first;
+
+    template <class D>
+    HWY_INLINE Vec<D> at(D d, std::size_t i) const {
+        return hn::Sub(hn::Set(d, columns[i]), hn::Set(d, first[i]));
+    }
+};
+
+/// add_bone() for one coordinate.
+template <std::size_t kVectors, bool kWeighted, class D, class Bone>
+HWY_INLINE void add_along(D d, const Bone& bone, std::size_t row, Vec<D> Points<D>::*axis,
+                          const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
+    const Vec<D> x = bone.at(d, row);
+    const Vec<D> y = bone.at(d, 4 + row);
+    const Vec<D> z = bone.at(d, 8 + row);
+    const Vec<D> translation = bone.at(d, 12 + row);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+        const Vec<D> moved = hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, translation)));
+        sum[v].*axis = kWeighted ? hn::MulAdd(weight[v], moved, sum[v].*axis) : hn::Add(moved, sum[v].*axis);
+    }
+}
+
+/// Adds to each of kVectors `sum` the displacement of `p` by the bone, times `weight` if kWeighted.
+template <std::size_t kVectors, bool kWeighted, class D, class Bone>
+HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
+    // One coordinate after the other, so that few of the bone's numbers are in registers at once. Not a lambda,
+    // because those are sometimes called instead of inlined.
+    add_along<kVectors, kWeighted>(d, bone, 0, &Points<D>::x, weight, p, sum);
+    add_along<kVectors, kWeighted>(d, bone, 1, &Points<D>::y, weight, p, sum);
+    add_along<kVectors, kWeighted>(d, bone, 2, &Points<D>::z, weight, p, sum);
+}
+
+/// Deforms lanes [lane, lane + kVectors * N) of block `b`, which must not be mixed.
+///
+/// rest      its rest points from these lanes on, kLanes apart
+/// weights   the same for its weights, without those of the first bone
+/// first     columns of the first bone
+/// other_of  other_of(k) is the difference of the k-th bone from the first; if plain, the k-th bone
+/// kCount    the number of influences, or 0 for `count`
+template <std::size_t kCount, std::size_t kVectors, bool kPlain, class D, class OtherOf>
+HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b,
+                             std::size_t lane, const float* rest, const float* weights, std::size_t count,
+                             const float* first, const OtherOf& other_of) {
+    const std::size_t step = hn::Lanes(d);
+    Points<D> p[kVectors];
+    Points<D> sum[kVectors];
+    Vec<D> weight[kVectors];
+    for (std::size_t v = 0; v < kVectors; ++v, rest += step) {
+        sum[v] = p[v] = {hn::Load(d, rest), hn::Load(d, rest + kLanes), hn::Load(d, rest + 2 * kLanes)};
+    }
+    if constexpr (kPlain) {
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            weight[v] = hn::Load(d, first_weights_of(frame, b) + lane + v * step);
+        }
+    }
+    add_bone<kVectors, kPlain>(d, Columns{first}, weight, p, sum);
+    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+        for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
+        weights += kLanes;
+        add_bone<kVectors, true>(d, other_of(k), weight, p, sum);
+    }
+    for (std::size_t v = 0; v < kVectors; ++v) store_points(d, pointers, b, lane + v * step, sum[v]);
+}
+
+HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
+    return frame.palette->bones[kLbsColumns * static_cast<std::size_t>(bone)].value.data();
+}
+
+template <std::size_t kCount, bool kPlain, class OtherOf>
+HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t end, const float* first,
+                            const OtherOf& other_of) {
+    const Full d;
+    // Broadcasting each of a bone's numbers once for two vectors saves a quarter of the time on AVX2.
+    constexpr std::size_t kVectors = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
+    const MeshPointers pointers = pointers_of(frame);
+    const std::size_t count = kCount > 0 ? kCount : pointers.blocks[begin].influences;
+    // The data of these blocks is contiguous. Finding it anew for each takes 3 % more instructions.
+    const float* rest = pointers.rest_points[kPointRows * begin].lane.data();
+    const float* weights = weights_of(pointers, begin);
+    for (std::size_t b = begin; b < end; ++b) {
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
+            deform_lanes<kCount, kVectors, kPlain>(d, frame, pointers, b, lane, rest + lane, weights + lane,
+                                                   count, first, other_of);
+        }
+        rest += kLanes * kPointRows;
+        weights += kLanes * (count - 1);
+    }
+}
+
+/// Deforms blocks [begin, end) with the same bones.
+template <std::size_t kCount>
+void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
+    const float* const first = columns_of_bone(frame, bones[0]);
+    // Stored differences can not be loaded again at once; for a single block this takes longer than it saves.
+    if (kCount == 0 || end - begin == 1) {
+        return deform_each<kCount, false>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
+            return Differences{columns_of_bone(frame, bones[k]), first};
+        });
+    }
+    const hn::CappedTag<float, kColumns> d;
+    alignas(64) float columns[(kCount > 0 ? kCount : 1) * kColumns];
+    for (std::size_t i = 0; i < kColumns; i += hn::Lanes(d)) {
+        for (std::size_t k = 1; k < kCount; ++k) {
+            const float* const bone = columns_of_bone(frame, bones[k]);
+            hn::Store(hn::Sub(hn::LoadU(d, bone + i), hn::LoadU(d, first + i)), d,
+                      columns + kColumns * k + i);
+        }
+    }
+    deform_each<kCount, false>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
+        return Columns{loaded_anew(columns + kColumns * k)};
+    });
+}
+
+/// The same for bones that are added plainly.
+inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
+    deform_each<0, true>(frame, begin, end, columns_of_bone(frame, bones[0]),
+                         [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k])}; });
+}
+
+#if HWY_TARGET != HWY_SCALAR
+
+using Four = hn::CappedTag<float, 4>;
+
+/// Deforms one vertex, with x, y and z in the lanes: the same operations in the same order.
+///
+/// rest     the vertex's rest point: numbers kLanes apart
+/// weights  its weights, likewise
+/// to       the vertex's point
+template <bool kPlain>
+HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
+                              const float* rest, const float* weights, Vec3<float>* to) {
+    const Four four;
+    using V4 = Vec<Four>;
+    const V4 x = hn::Set(four, rest[0]);
+    const V4 y = hn::Set(four, rest[kLanes]);
+    const V4 z = hn::Set(four, rest[2 * kLanes]);
+    const auto moved_by = [&](const V4* columns) HWY_ATTR {
+        return hn::MulAdd(columns[0], x, hn::MulAdd(columns[1], y, hn::MulAdd(columns[2], z, columns[3])));
+    };
+    // Not through memory: a vector load of something just stored in parts has to wait for it.
+    V4 sum = hn::IfThenElse(hn::FirstN(four, 1), x, hn::IfThenElse(hn::FirstN(four, 2), y, z));
+    V4 first[kLbsColumns];
+    const float* const stored_first = columns_of_bone(frame, bones[0]);
+    for (std::size_t c = 0; c < kLbsColumns; ++c) first[c] = hn::Load(four, stored_first + 4 * c);
+    const V4 by_first = moved_by(first);
+    sum = kPlain ? hn::MulAdd(hn::Set(four, weights[0]), by_first, sum) : hn::Add(by_first, sum);
+    for (std::size_t k = 1; k < count; ++k) {
+        const float* const stored = columns_of_bone(frame, bones[k]);
+        V4 columns[kLbsColumns];
+        for (std::size_t c = 0; c < kLbsColumns; ++c) {
+            columns[c] = hn::Load(four, stored + 4 * c);
+            if (!kPlain) columns[c] = hn::Sub(columns[c], first[c]);
+        }
+        sum = hn::MulAdd(hn::Set(four, weights[kLanes * k]), moved_by(columns), sum);
+    }
+    alignas(16) float point[4];
+    hn::Store(sum, four, point);
+    std::memcpy(to, point, sizeof(Vec3<float>));
+}
+
+/// Not inlined, so that its registers do not burden the usual case.
+inline HWY_NOINLINE void deform_plain_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
+                                             const float* rest, const float* weights, Vec3<float>* to) {
+    deform_vertex<true>(frame, bones, count, rest, weights, to);
+}
+
+inline void deform_mixed(const Frame& frame, std::size_t b) {
+    const Block& block = frame.mesh->blocks[b];
+    const float* const rest = frame.rest_points[kPointRows * b].lane.data();
+    const float* const weights = frame.mesh->weights[block.first_weight].lane.data();
+    const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
+    for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
+        Vec3<float>* const to = &frame.points[frame.mesh->vertices[b].lane[lane]];
+        if (is_plain(*frame.palette, bones, block.influences)) {
+            deform_plain_vertex(frame, bones, block.influences, rest + lane, weights + lane, to);
+        } else {
+            deform_vertex<false>(frame, bones, block.influences, rest + lane, weights + lane, to);
+        }
+    }
+}
+
+#else
+
+inline void deform_mixed(const Frame& frame, std::size_t b) {
+    const One d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Block& block = pointers.blocks[b];
+    const float* const weights = weights_of(pointers, b);
+    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+        const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
+        const bool plain = is_plain(*frame.palette, bones, block.influences);
+        const Points<One> p = load_points(d, pointers, b, lane);
+        Points<One> sum = p;
+        const Columns first{columns_of_bone(frame, bones[0])};
+        const Vec<One> weight_of_first = hn::Load(d, weights + lane);
+        plain ? add_bone<1, true>(d, first, &weight_of_first, &p, &sum)
+              : add_bone<1, false>(d, first, &weight_of_first, &p, &sum);
+        for (std::size_t k = 1; k < block.influences; ++k) {
+            const float* const columns = columns_of_bone(frame, bones[k]);
+            const Vec<One> weight = hn::Load(d, weights + kLanes * k + lane);
+            plain ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
+                  : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
+        }
+        store_points(d, pointers, b, lane, sum);
+    }
+}
+
+#endif
+
+void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end;) {
+        const Block& block = frame.mesh->blocks[b];
+        if (block.mixed) {
+            deform_mixed(frame, b++);
+            continue;
+        }
+        const std::size_t after = end_of_set(frame, b, end);
+        if (block.influences > 0 &&
+            is_plain(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
+            deform_plain_set(frame, b, after);
+            b = after;
+            continue;
+        }
+        // With a fixed count the loop is unrolled.
+        switch (block.influences) {
+            case 0: keep_blocks(frame, b, after); break;
+            case 1: deform_set<1>(frame, b, after); break;
+            case 2: deform_set<2>(frame, b, after); break;
+            case 3: deform_set<3>(frame, b, after); break;
+            case 4: deform_set<4>(frame, b, after); break;
+            case 5: deform_set<5>(frame, b, after); break;
+            case 6: deform_set<6>(frame, b, after); break;
+            case 7: deform_set<7>(frame, b, after); break;
+            case 8: deform_set<8>(frame, b, after); break;
+            default: deform_set<0>(frame, b, after); break;
+        }
+        b = after;
+    }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+
+/// Writes the columns of each bone's displacement.
+void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                 Palette& palette) {
+    const hn::CappedTag<float, 4> d;
+    const auto three = hn::FirstN(d, 3);
+    // The identity's columns as whole vectors, so that each takes one load.
+    alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        const float* const from = &posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+        float* const to = palette.bones[kLbsColumns * i].value.data();
+        auto squares = hn::Zero(d);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const auto column = hn::IfThenElseZero(three, hn::LoadU(d, from + 3 * c));
+            const auto displacement = hn::Sub(column, hn::Load(d, kIdentity[c]));
+            squares = hn::MulAdd(displacement, displacement, squares);
+            hn::Store(displacement, d, to + 4 * c);
+        }
+        // Loaded from one number earlier, as there may be none behind the last.
+        const auto translation = hn::ShiftRightLanes<1>(d, hn::LoadU(d, from + 8));
+        hn::Store(translation, d, to + 12);
+        const float size = hn::GetLane(hn::SumOfLanes(d, hn::Mul(translation, translation)));
+        const float length = hn::GetLane(hn::SumOfLanes(d, squares));
+        palette.sizes[i] =
+            length < kLong ? std::max(size, kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
+    }
+}
+
+#else
+
+void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                 Palette& palette) {
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        const Affine<float>& motion = posed_from_rest[static_cast<std::size_t>(used[i])];
+        const Mat3<float> m = motion.linear - Mat3<float>(1.0f);
+        Float4* const to = &palette.bones[kLbsColumns * i];
+        for (int c = 0; c < 3; ++c) to[c] = {{m[c].x, m[c].y, m[c].z, 0.0f}};
+        const Vec3<float>& translation = motion.translation;
+        to[3] = {{translation.x, translation.y, translation.z, 0.0f}};
+        const float length = glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]);
+        palette.sizes[i] = length < kLong ? std::max(glm::dot(translation, translation), kMinSize * kMinSize)
+                                          : std::numeric_limits<float>::infinity();
+    }
+}
+
+#endif
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace sinew {
+namespace {
+
+using HWY_NAMESPACE::kLbsColumns;
+
+constexpr Float4 kRestRow[kLbsColumns] = {};
+
+void prepare_between_spaces(const Bones& bones, Palette& palette) {
+    const auto bones_from_model = cast<double>(bones.bones_from_model);
+    const Affine<double> model_from_bones = inverse(bones_from_model);
+    for (std::size_t i = 0; i < bones.used.size(); ++i) {
+        const Affine<float>& posed = bones.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
+        const Affine<double> motion = model_from_bones * cast<double>(posed) * bones_from_model;
+        const Mat3<double> m = motion.linear - Mat3<double>(1.0);
+        Float4* const columns = &palette.bones[kLbsColumns * i];
+        for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
+        const Vec3<double>& translation = motion.translation;
+        columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
+        palette.sizes[i] =
+            size_of(translation, glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+    }
+}
+
+void prepare_bones(const Kernel& kernel, const Bones& bones, Palette& palette) {
+    if (is_identity(bones.bones_from_model)) {
+        kernel.target().prepare(bones.used, bones.posed_from_rest, palette);
+    } else {
+        prepare_between_spaces(bones, palette);
+    }
+}
+
+constexpr Kernel kKernel{kRestRow, false, 0, prepare_bones, SINEW_TARGETS(deform_lbs, prepare_lbs)};
+
+}  // namespace
+
+const Kernel& Lbs::kernel() noexcept { return kKernel; }
+
+}  // namespace sinew
+
+#endif

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Log-matrix skinning on lanes. A row is the angular and the linear part of a bone's logarithm, each (x, y, z, 0).
+// This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include "sinew/methods/log/log.h"
+
+#include "sinew/base/targets.h"
+#include "sinew/lanes/rigid_bones.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sinew/methods/log/log.cpp"
+#include "hwy/foreach_target.h"
+//
+#include "hwy/highway.h"
+#include "sinew/lanes/bones-inl.h"
+#include "sinew/lanes/exponential-inl.h"
+#include "sinew/lanes/rigid-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+struct LogKernel {
+    static constexpr std::size_t kNumbers = kRow;
+    static constexpr std::size_t kVertexFloats = 0;
+    static constexpr std::size_t kSignedFloat4s = 0;
+
+    /// Adds the change of the linear part by the bone's scale, which Palette::scales holds.
+    template <class D>
+    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
+                                     const Points<D>& rest, Sum<D>& sum) {
+        Points<D> by;
+        if (!scaled(d, palette, bone, rest, by)) return;
+        sum.value[4] = hn::MulAdd(weight, by.x, sum.value[4]);
+        sum.value[5] = hn::MulAdd(weight, by.y, sum.value[5]);
+        sum.value[6] = hn::MulAdd(weight, by.z, sum.value[6]);
+    }
+
+    /// The exponential, as in transform/twist.h.
+    template <class D>
+    static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
+        const Points<D> angular{sum.value[0], sum.value[1], sum.value[2]};
+        const Points<D> linear{sum.value[4], sum.value[5], sum.value[6]};
+        const Vec<D> half = hn::Set(d, 0.5f);
+        const Points<D> by_half{hn::Mul(half, angular.x), hn::Mul(half, angular.y), hn::Mul(half, angular.z)};
+        const Vec<D> y =
+            hn::MulAdd(by_half.x, by_half.x, hn::MulAdd(by_half.y, by_half.y, hn::Mul(by_half.z, by_half.z)));
+        const ExponentialFactors<D> by(d, y);
+        const Vec<D> sinc = by.sinc;
+        const Vec<D> w = by.cosine;
+        const Points<D> axis{hn::Mul(sinc, by_half.x), hn::Mul(sinc, by_half.y), hn::Mul(sinc, by_half.z)};
+        // Dividing by its squared length makes the quaternion a rotation even where rounding changed its length.
+        const Vec<D> squared_norm =
+            hn::MulAdd(w, w, hn::MulAdd(axis.x, axis.x, hn::MulAdd(axis.y, axis.y, hn::Mul(axis.z, axis.z))));
+        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+        const Points<D> inner = add_scaled<D>(cross<D>(axis, p), w, p);
+        const Points<D> rotated = add_scaled<D>(p, scale, cross<D>(axis, inner));
+        // linear + (sinc^2 / 2) angular x linear + rest angular x (angular x linear).
+        const Points<D> across = cross<D>(angular, linear);
+        const Vec<D> first = hn::Mul(half, hn::Mul(sinc, sinc));
+        const Vec<D> second = by.third;
+        const Points<D> terms = add_cross<D>(
+            {hn::Mul(first, across.x), hn::Mul(first, across.y), hn::Mul(first, across.z)}, angular,
+            {hn::Mul(second, across.x), hn::Mul(second, across.y), hn::Mul(second, across.z)});
+        return add<D>(rotated, add<D>(linear, terms));
+    }
+
+    /// The logarithm, as in transform/twist.h.
+    static HWY_INLINE void write_row(const Quats& q, const BonePoints& translation, BoneVec* row) {
+        const BoneTag d;
+        const BoneVec one = hn::Set(d, 1.0);
+        // The angle from the tangent of an eighth of it, which is at most sqrt(2) - 1: the first omitted term of
+        // the arc tangent's series is below 1e-12. As w >= 0, no denominator is small.
+        static constexpr double kArcTangent[] = {
+            1.0,         -1.0 / 3.0, 1.0 / 5.0,   -1.0 / 7.0, 1.0 / 9.0,   -1.0 / 11.0, 1.0 / 13.0,
+            -1.0 / 15.0, 1.0 / 17.0, -1.0 / 19.0, 1.0 / 21.0, -1.0 / 23.0, 1.0 / 25.0,  -1.0 / 27.0};
+        const BoneVec sine_squared = dot(q.v, q.v);
+        const BoneVec more = hn::Add(one, q.w);
+        const BoneVec quarter_squared = hn::Div(sine_squared, hn::Mul(more, more));
+        const BoneVec root = hn::Add(one, hn::Sqrt(hn::Add(one, quarter_squared)));
+        const BoneVec eighth_squared = hn::Div(quarter_squared, hn::Mul(root, root));
+        // The angle over the sine of half the angle.
+        const BoneVec factor = hn::Div(hn::Mul(hn::Set(d, 8.0), polynomial(d, eighth_squared, kArcTangent)),
+                                       hn::Mul(more, root));
+        const BonePoints angular{hn::Mul(factor, q.v.x), hn::Mul(factor, q.v.y), hn::Mul(factor, q.v.z)};
+        // (1 - x cot(x)) / 4 x^2 with x half the angle; the series where the difference would cancel.
+        static constexpr double kSeries[] = {1.0 / 12.0, 1.0 / 720.0, 1.0 / 30240.0};
+        const BoneVec angle_squared = dot(angular, angular);
+        const BoneVec cotangent = hn::Mul(hn::Set(d, 0.5), hn::Mul(factor, q.w));
+        const BoneVec third =
+            hn::IfThenElse(hn::Lt(angle_squared, hn::Set(d, 4e-4)), polynomial(d, angle_squared, kSeries),
+                           hn::Div(hn::Sub(one, cotangent), angle_squared));
+        const BonePoints across = cross<BoneTag>(angular, translation);
+        const BonePoints linear =
+            add_scaled<BoneTag>(add_scaled<BoneTag>(translation, hn::Set(d, -0.5), across), third,
+                                cross<BoneTag>(angular, across));
+        row[0] = angular.x;
+        row[1] = angular.y;
+        row[2] = angular.z;
+        row[3] = hn::Zero(d);
+        row[4] = linear.x;
+        row[5] = linear.y;
+        row[6] = linear.z;
+        row[7] = hn::Zero(d);
+    }
+};
+
+void deform_log(const Frame& frame, std::size_t begin, std::size_t end) {
+    deform_rigid<LogKernel>(frame, begin, end);
+}
+
+void prepare_log(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                 Palette& palette) {
+    prepare_rigid<LogKernel>(used, posed_from_rest, palette);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace sinew {
+namespace {
+
+constexpr Float4 kRestRow[2] = {};
+
+void write_bone(const Log::Bone<double>& bone, Float4* row, Float4* scale) {
+    const Twist<double> twist = to_twist(bone.rigid);
+    row[0] = float4(twist.angular.x, twist.angular.y, twist.angular.z, 0.0);
+    row[1] = float4(twist.linear.x, twist.linear.y, twist.linear.z, 0.0);
+    // The linear part depends linearly on the translation, and thus on what the scale adds to the translation.
+    const auto added = [&bone](const Vec3<double>& displacement) {
+        const Quat<double>& rotation = bone.rigid.rotation;
+        return to_twist(QuatVec<double>{rotation, rotate(rotation, displacement)}).linear;
+    };
+    const Mat3<double> m = bone.scale.linear - Mat3<double>(1.0);
+    write_displacement(Mat3<double>(added(m[0]), added(m[1]), added(m[2])), added(bone.scale.translation),
+                       scale);
+}
+
+constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Log, write_bone>,
+                         SINEW_TARGETS(deform_log, prepare_log)};
+
+}  // namespace
+
+const Kernel& Log::kernel() noexcept { return kKernel; }
+
+}  // namespace sinew
+
+#endif

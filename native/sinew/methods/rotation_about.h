@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+
+#include "sinew/mesh/influence.h"
+#include "sinew/transform/quat_vec.h"
+
+namespace sinew {
+
+/// The displacement of `v` under the rotation by the unit quaternion `q`.
+template <class T>
+[[nodiscard]] Vec3<T> rotation_displacement(const Quat<T>& q, const Vec3<T>& v) noexcept {
+    const Vec3<T> axis = vector_part(q);
+    return T(2) * glm::cross(axis, glm::cross(axis, v) + q.w * v);
+}
+
+/// Rotates `rest` by the blended quaternion about `centre`, which is moved by linear blending of the rigid
+/// motions. The displacements by the bones' scales are rotated by each bone and added.
+///
+/// bones       ScaledRigid<QuatVec<T>, T>, one for each index in `influences`; signs of the quaternions are free
+/// influences  at least one; weights >= 0 with sum 1
+///
+/// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex.
+template <class T, class Bone>
+[[nodiscard]] Vec3<T> rotated_about(const Vec3<T>& centre, std::span<const Bone> bones,
+                                    std::span<const Influence<T>> influences, const Vec3<T>& rest) noexcept {
+    Quat<T> rotation(T(0), T(0), T(0), T(0));
+    // Summing displacements returns the rest pose unchanged to the last bit.
+    Vec3<T> displacement{T(0)};
+    for (const Influence<T>& influence : influences) {
+        const Bone& bone = bones[static_cast<std::size_t>(influence.bone)];
+        const Quat<T>& q = bone.rigid.rotation;
+        const T sign = glm::dot(q, rotation) < T(0) ? T(-1) : T(1);
+        rotation = rotation + (sign * influence.weight) * q;
+        Vec3<T> moved = rotation_displacement(q, centre) + bone.rigid.translation;
+        if (bone.has_scale) moved += rotate(q, bone.scale_displacement(rest));
+        displacement += influence.weight * moved;
+    }
+    const T length = glm::length(rotation);
+    if (length < T(kDegenerateBlend)) {
+        const Bone& bone = bones[static_cast<std::size_t>(heaviest(influences).bone)];
+        return transform_point(bone.rigid, bone.has_scale ? rest + bone.scale_displacement(rest) : rest);
+    }
+    return rest + rotation_displacement(rotation * (T(1) / length), rest - centre) + displacement;
+}
+
+}  // namespace sinew

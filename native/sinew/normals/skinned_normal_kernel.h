@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "sinew/lanes/palette.h"
+
+namespace sinew {
+
+/// The input and output of one frame.
+struct SkinnedNormalFrame {
+    const Vec3<float>* points;  // [vertices] deformed
+    // [vertices] deformed, from rest points one step away along each axis
+    std::array<const Vec3<float>*, 3> moved;
+    float inverse_step;                // 1 over that step, which is the same for all three axes
+    std::array<Float4*, 3> cofactors;  // [vertices] of each vertex's blend, for each axis
+    const Vec3<float>* rest_normals;   // [normals]
+    const std::int32_t* vertices;      // [normals] the vertex of each
+    Vec3<float>* normals;              // [normals]
+};
+
+/// Functions for elements [begin, end). Results do not depend on how the elements are divided.
+struct SkinnedNormalKernel {
+    using Compute = void(const SkinnedNormalFrame& frame, std::size_t begin, std::size_t end);
+
+    Compute* of_vertices;  // one normal for each vertex
+    Compute* cofactors;    // of the vertices
+    Compute* of_frames;    // normals of frames, from the cofactors of their vertices
+};
+
+/// The kernel for the processor's best instruction set.
+SkinnedNormalKernel skinned_normal_kernel() noexcept;
+
+}  // namespace sinew

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/skinned_normals.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "sinew/base/fork_safe.h"
+#include "sinew/base/thread_pool.h"
+#include "sinew/mesh/check_bind_data.h"
+#include "sinew/normals/skinned_normal_kernel.h"
+
+namespace sinew {
+namespace {
+
+constexpr std::size_t kFramesWorthAThread = 8192;
+
+// A vector with a smaller squared length has no direction.
+constexpr float kShortest = 1e-35f;
+
+void check_finite(const char* argument, std::span<const Vec3<float>> vectors) {
+    for (std::size_t i = 0; i < vectors.size(); ++i) {
+        const Vec3<float>& v = vectors[i];
+        if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) {
+            fail(argument, "finite values", "NaN or infinity at index " + std::to_string(i));
+        }
+    }
+}
+
+void check(const RestFrames& rest, std::size_t vertex_count) {
+    const std::size_t count = rest.normals.size();
+    if (rest.vertices.empty() && count != vertex_count) {
+        fail("normals", "one for each of the " + std::to_string(vertex_count) + " vertices",
+             std::to_string(count));
+    }
+    if (!rest.vertices.empty() && rest.vertices.size() != count) {
+        fail("vertices", "none, or one for each of the " + std::to_string(count) + " normals",
+             std::to_string(rest.vertices.size()));
+    }
+    if (!rest.tangents.empty() && rest.tangents.size() != count) {
+        fail("tangents", "none, or one for each of the " + std::to_string(count) + " normals",
+             std::to_string(rest.tangents.size()));
+    }
+    for (std::size_t i = 0; i < rest.vertices.size(); ++i) {
+        if (rest.vertices[i] < 0 || static_cast<std::size_t>(rest.vertices[i]) >= vertex_count) {
+            fail("vertices", "vertices below " + std::to_string(vertex_count),
+                 std::to_string(rest.vertices[i]) + " at index " + std::to_string(i));
+        }
+    }
+    check_finite("normals", rest.normals);
+    check_finite("tangents", rest.tangents);
+}
+
+/// A power of two of about the mesh's size, so that differences of points have as many digits as the points.
+float step_of(std::span<const Vec3<float>> points) {
+    float largest = 0.0f;
+    for (const Vec3<float>& point : points) {
+        const Vec3<float> away = glm::abs(point - points.front());
+        largest = std::max({largest, away.x, away.y, away.z});
+    }
+    if (!(largest > 0.0f) || !std::isfinite(largest)) return 1.0f;
+    return std::clamp(std::exp2(std::ceil(std::log2(largest))), 1e-12f, 1e12f);
+}
+
+Vec3<float> unit(const Vec3<float>& v) {
+    const float squared = glm::dot(v, v);
+    return squared > kShortest && std::isfinite(squared) ? v / std::sqrt(squared) : Vec3<float>(0.0f);
+}
+
+}  // namespace
+
+struct SkinnedNormals::State {
+    State(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
+          const std::optional<MixData>& mix)
+        : deformers{Deformer(binding, method, mix), Deformer(binding, method, mix),
+                    Deformer(binding, method, mix), Deformer(binding, method, mix)},
+          normals(rest.normals.begin(), rest.normals.end()),
+          tangents(rest.tangents.begin(), rest.tangents.end()),
+          vertices(rest.vertices.begin(), rest.vertices.end()) {
+        const std::vector<Vec3<float>> points = binding.unpack().rest_points;
+        const float step = step_of(points);
+        inverse_step = 1.0f / step;
+        for (int axis = 0; axis < 3; ++axis) {
+            std::vector<Vec3<float>> stepped = points;
+            for (Vec3<float>& point : stepped) point[axis] += step;
+            const auto i = static_cast<std::size_t>(axis);
+            deformers[1 + i].set_rest_points(stepped);
+            moved[i].resize(points.size());
+            if (!vertices.empty()) cofactors[i].resize(points.size());
+        }
+    }
+
+    /// Deforms the rest points displaced by a step along each axis.
+    void move_steps(std::span<const Affine<float>> posed_from_rest,
+                    const DeformOptions& options) const noexcept {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            static_cast<void>(deformers[1 + axis].deform(posed_from_rest, options, moved[axis]));
+        }
+    }
+
+    void move_normals(std::span<const Vec3<float>> points, std::span<Vec3<float>> to,
+                      std::size_t threads) const noexcept {
+        SkinnedNormalFrame frame{};
+        frame.points = points.data();
+        frame.inverse_step = inverse_step;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            frame.moved[axis] = moved[axis].data();
+            frame.cofactors[axis] = cofactors[axis].data();
+        }
+        frame.rest_normals = normals.data();
+        frame.vertices = vertices.data();
+        frame.normals = to.data();
+        const SkinnedNormalKernel kernel = skinned_normal_kernel();
+        const auto compute = [&](SkinnedNormalKernel::Compute* function, std::size_t count) {
+            const auto part = [&frame, function](std::size_t begin, std::size_t end) {
+                function(frame, begin, end);
+            };
+            parallel_for(count, useful_threads(threads, count, kFramesWorthAThread), part);
+        };
+        if (vertices.empty()) return compute(kernel.of_vertices, to.size());
+        compute(kernel.cofactors, points.size());
+        compute(kernel.of_frames, to.size());
+    }
+
+    /// Moves the tangents of frames [begin, end).
+    void move_tangents(std::span<const Vec3<float>> points, std::span<Vec3<float>> to, std::size_t begin,
+                       std::size_t end) const noexcept {
+        for (std::size_t i = begin; i < end; ++i) {
+            const std::size_t vertex = vertices.empty() ? i : static_cast<std::size_t>(vertices[i]);
+            const auto column = [&](std::size_t axis) {
+                return inverse_step * (moved[axis][vertex] - points[vertex]);
+            };
+            const Vec3<float>& t = tangents[i];
+            to[i] = unit(t.x * column(0) + t.y * column(1) + t.z * column(2));
+        }
+    }
+
+    // for the rest points, then for these displaced by a step along each axis
+    std::array<Deformer, 4> deformers;
+    float inverse_step = 1.0f;
+    std::vector<Vec3<float>> normals;
+    std::vector<Vec3<float>> tangents;
+    std::vector<std::int32_t> vertices;
+
+    // Scratch for one call at a time.
+    mutable ForkSafeMutex mutex;
+    mutable std::array<std::vector<Vec3<float>>, 3> moved;
+    mutable std::array<std::vector<Float4>, 3> cofactors;
+};
+
+SkinnedNormals::SkinnedNormals(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
+                               const std::optional<MixData>& mix) {
+    check(rest, binding.vertex_count());
+    state_ = std::make_unique<State>(binding, method, rest, mix);
+}
+
+SkinnedNormals::SkinnedNormals(SkinnedNormals&&) noexcept = default;
+SkinnedNormals& SkinnedNormals::operator=(SkinnedNormals&&) noexcept = default;
+SkinnedNormals::~SkinnedNormals() = default;
+
+std::size_t SkinnedNormals::frame_count() const noexcept { return state_->normals.size(); }
+bool SkinnedNormals::has_tangents() const noexcept { return !state_->tangents.empty(); }
+const Deformer& SkinnedNormals::deformer() const noexcept { return state_->deformers[0]; }
+
+bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+                            std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
+                            std::span<Vec3<float>> tangents) const noexcept {
+    const State& state = *state_;
+    const std::size_t most_tangents = state.tangents.size();
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
+    if (!tangents.empty() && tangents.size() != most_tangents) return false;
+    const std::scoped_lock lock(state.mutex);
+    static_cast<void>(state.deformers[0].deform(posed_from_rest, options, points));
+    state.move_steps(posed_from_rest, options);
+    state.move_normals(points, normals, options.threads);
+    if (tangents.empty()) return true;
+    // A single reference: with a larger capture std::function would allocate.
+    struct Work {
+        const State& state;
+        std::span<const Vec3<float>> points;
+        std::span<Vec3<float>> tangents;
+    } const work{state, points, tangents};
+    const auto part = [&work](std::size_t begin, std::size_t end) {
+        work.state.move_tangents(work.points, work.tangents, begin, end);
+    };
+    parallel_for(tangents.size(), useful_threads(options.threads, tangents.size(), kFramesWorthAThread),
+                 part);
+    return true;
+}
+
+bool SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
+                                    const DeformOptions& options, std::span<const Vec3<float>> points,
+                                    std::span<Vec3<float>> normals) const noexcept {
+    const State& state = *state_;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
+    const std::scoped_lock lock(state.mutex);
+    state.move_steps(posed_from_rest, options);
+    state.move_normals(points, normals, options.threads);
+    return true;
+}
+
+}  // namespace sinew

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The stage `bulge_limit` on lanes: see stages/bulge_limit/bulge_limit.h for what it computes.
+// This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include "sinew/stages/bulge_limit/bulge_kernel.h"
+
+#include <array>
+
+#include "sinew/base/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sinew/stages/bulge_limit/bulge_kernel.cpp"
+#include "hwy/foreach_target.h"
+//
+#include "hwy/highway.h"
+#include "sinew/lanes/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+#if HWY_TARGET == HWY_AVX2
+
+/// Loads points of arbitrary vertices, each with a masked load. A gather takes several times as long on some
+/// processors.
+HWY_INLINE Points<Full> load_each(Full d, const std::int32_t* vertices, const Vec3<float>* points) {
+    const hn::CappedTag<float, 4> four;
+    const auto three = hn::FirstN(four, 3);
+    const auto point = [&](std::size_t lane)
+                           HWY_ATTR { return hn::MaskedLoad(three, four, &points[vertices[lane]].x); };
+    const auto pair = [&](std::size_t lane) HWY_ATTR { return hn::Combine(d, point(lane + 4), point(lane)); };
+    const Vec<Full> a = pair(0), b = pair(1), e = pair(2), f = pair(3);
+    const hn::RepartitionToWide<Full> wide;
+    const auto xy_ab = hn::BitCast(wide, hn::InterleaveLower(d, a, b));
+    const auto xy_ef = hn::BitCast(wide, hn::InterleaveLower(d, e, f));
+    const auto z_ab = hn::BitCast(wide, hn::InterleaveUpper(d, a, b));
+    const auto z_ef = hn::BitCast(wide, hn::InterleaveUpper(d, e, f));
+    return {hn::BitCast(d, hn::InterleaveLower(wide, xy_ab, xy_ef)),
+            hn::BitCast(d, hn::InterleaveUpper(wide, xy_ab, xy_ef)),
+            hn::BitCast(d, hn::InterleaveLower(wide, z_ab, z_ef))};
+}
+
+#endif
+
+template <class D>
+HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b, std::size_t lane) {
+    const Block& block = from.blocks[b];
+    const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
+    if constexpr (hn::MaxLanes(D()) == 1) {
+        const Vec3<float>& point = from.points[*vertices];
+        return {hn::Set(d, point.x), hn::Set(d, point.y), hn::Set(d, point.z)};
+    } else {
+        if (block.consecutive) return load_consecutive(d, &from.points[block.output + lane].x);
+#if HWY_TARGET == HWY_AVX3
+        if (block.runs > 0) return load_runs(d, from.runs + block.output, block.runs, &from.points->x);
+#endif
+#if HWY_TARGET == HWY_AVX2
+        return load_each(d, vertices, from.points);
+#else
+        const hn::RebindToSigned<D> integers;
+        const auto vertex = hn::LoadU(integers, vertices);
+        const auto first = hn::Add(vertex, hn::Add(vertex, vertex));
+        const float* const points = &from.points->x;
+        return {hn::GatherIndex(d, points, first), hn::GatherIndex(d, points + 1, first),
+                hn::GatherIndex(d, points + 2, first)};
+#endif
+    }
+}
+
+/// The point of the bone's segment nearest to `p`.
+template <class D>
+HWY_INLINE Points<D> nearest_of_segment(D d, const BulgeBone& bone, const Points<D>& p) {
+    const float* const head = bone.head.value.data();
+    const float* const along = bone.along.value.data();
+    const float* const share = bone.share.value.data();
+    const Vec<D> t = hn::MulAdd(
+        p.x, hn::Set(d, share[0]),
+        hn::MulAdd(p.y, hn::Set(d, share[1]), hn::MulAdd(p.z, hn::Set(d, share[2]), hn::Set(d, share[3]))));
+    const Vec<D> within = hn::Min(hn::Max(t, hn::Zero(d)), hn::Set(d, 1.0f));
+    return {hn::MulAdd(within, hn::Set(d, along[0]), hn::Set(d, head[0])),
+            hn::MulAdd(within, hn::Set(d, along[1]), hn::Set(d, head[1])),
+            hn::MulAdd(within, hn::Set(d, along[2]), hn::Set(d, head[2]))};
+}
+
+template <class D>
+HWY_INLINE Vec<D> squared_length(const Points<D>& v) {
+    return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::Mul(v.z, v.z)));
+}
+
+/// Limits the points of some lanes.
+///
+/// bone_of     bone_of(k) returns the k-th bone
+/// weight_of   weight_of(k) returns its weight in each lane
+/// kStretched  whether a bone may stretch
+template <BulgeForm kForm, bool kStretched, class D, class BoneOf, class WeightOf>
+HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::size_t lane, std::size_t count,
+                             const BoneOf& bone_of, const WeightOf& weight_of, const Points<D>& point,
+                             bool& changes) {
+    Points<D> p = point;
+    if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
+    Points<D> nearest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    Vec<D> stretched = hn::Zero(d);
+    Vec<D> most = hn::Zero(d);
+    for (std::size_t k = 0; k < count; ++k) {
+        const BulgeBone& bone = bone_of(k);
+        const Vec<D> weight = weight_of(k);
+        const Points<D> own = nearest_of_segment(d, bone, p);
+        const Vec<D> stretch = hn::Set(d, bone.head.value[3]);
+        if constexpr (kForm == BulgeForm::continuous) {
+            nearest = add_scaled<D>(nearest, weight, own);
+            if constexpr (kStretched) stretched = hn::MulAdd(weight, stretch, stretched);
+        } else {
+            const auto heavier = hn::Gt(weight, most);
+            most = hn::Max(weight, most);
+            nearest = {hn::IfThenElse(heavier, own.x, nearest.x), hn::IfThenElse(heavier, own.y, nearest.y),
+                       hn::IfThenElse(heavier, own.z, nearest.z)};
+            stretched = hn::IfThenElse(heavier, stretch, stretched);
+        }
+    }
+    const Points<D> to_bones = subtract<D>(nearest, p);
+    const float* const distances = frame.distances[static_cast<std::size_t>(kForm)][b].lane.data() + lane;
+    Vec<D> allowed = hn::Load(d, distances);
+    if constexpr (kStretched) allowed = hn::Mul(allowed, stretched);
+    const Vec<D> squared = squared_length(to_bones);
+    const auto bulges = hn::Gt(squared, hn::Mul(allowed, allowed));
+    changes = !hn::AllFalse(d, bulges);
+    if (!changes) return point;
+    Vec<D> amount = hn::Set(d, frame.strength);
+    if (frame.weights != nullptr) amount = hn::Mul(amount, hn::Load(d, frame.weights[b].lane.data() + lane));
+    const Vec<D> less = hn::NegMulAdd(allowed, inverse_root(d, squared), hn::Set(d, 1.0f));
+    const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
+    if (frame.model_from_bones == nullptr) return add_scaled<D>(point, share, to_bones);
+    const float* const rows = frame.model_from_bones->value.data();
+    // A vector: the translation does not apply.
+    const auto rotated = [&](const float* row, Vec<D> of) HWY_ATTR {
+        return hn::MulAdd(
+            hn::Set(d, row[0]), to_bones.x,
+            hn::MulAdd(hn::Set(d, row[1]), to_bones.y, hn::MulAdd(hn::Set(d, row[2]), to_bones.z, of)));
+    };
+    return add_scaled<D>(
+        point, share,
+        {rotated(rows, to_bones.x), rotated(rows + 4, to_bones.y), rotated(rows + 8, to_bones.z)});
+}
+
+/// Limits blocks [begin, end) with the same bones, two or more.
+///
+/// kCount  their influences, or 0 for any number
+template <BulgeForm kForm, bool kStretched, std::size_t kCount>
+void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t begin, std::size_t end) {
+    const Full d;
+    const Block& first = pointers.blocks[begin];
+    const std::int32_t* const bones = frame.mesh->bones.data() + first.first_bone;
+    const std::size_t count = kCount > 0 ? kCount : first.influences;
+    for (std::size_t b = begin; b < end; ++b) {
+        const float* const weights = weights_of(pointers, b);
+        const float* const first_weights = frame.mesh->first_weights[b].lane.data();
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            bool changes = false;
+            const Points<Full> points = limited<kForm, kStretched>(
+                d, frame, b, lane, count,
+                [&](std::size_t k) -> const BulgeBone& {
+                    return frame.bones[static_cast<std::size_t>(bones[k])];
+                },
+                [&](std::size_t k) HWY_ATTR {
+                    return hn::Load(d, (k == 0 ? first_weights : weights + kLanes * (k - 1)) + lane);
+                },
+                load_deformed(d, pointers, b, lane), changes);
+            if (changes) store_points(d, pointers, b, lane, points);
+        }
+    }
+}
+
+/// Limits a mixed block, vertex by vertex.
+template <BulgeForm kForm, bool kStretched>
+void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t b) {
+    const One d;
+    const Block& block = pointers.blocks[b];
+    if (block.influences < 2) return;
+    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+        const float* const weights = weights_of(pointers, b) + lane;
+        if (!(weights[kLanes] > 0.0f)) continue;
+        const std::int32_t* const bones =
+            frame.mesh->bones.data() + block.first_bone + block.influences * lane;
+        bool changes = false;
+        const Points<One> points = limited<kForm, kStretched>(
+            d, frame, b, lane, block.influences,
+            [&](std::size_t k) -> const BulgeBone& {
+                return frame.bones[static_cast<std::size_t>(bones[k])];
+            },
+            [&](std::size_t k) HWY_ATTR { return hn::Load(d, weights + kLanes * k); },
+            load_deformed(d, pointers, b, lane), changes);
+        if (changes) store_points(d, pointers, b, lane, points);
+    }
+}
+
+std::size_t end_of_same_bones(const PackedMesh& mesh, std::size_t b, std::size_t end) {
+    const Block* const blocks = mesh.blocks.data();
+    std::size_t after = b + 1;
+    while (after < end && !blocks[after].mixed && blocks[after].first_bone == blocks[b].first_bone &&
+           blocks[after].influences == blocks[b].influences) {
+        ++after;
+    }
+    return after;
+}
+
+MeshPointers pointers_of(const BulgeFrame& frame) {
+    const PackedMesh& mesh = *frame.mesh;
+    return {mesh.blocks.data(),   mesh.rest_points.data(), mesh.weights.data(), nullptr,
+            mesh.vertices.data(), mesh.runs.data(),        frame.points};
+}
+
+template <BulgeForm kForm, bool kStretched>
+void limit_blocks(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
+    const MeshPointers pointers = pointers_of(frame);
+    for (std::size_t b = begin; b < end;) {
+        const Block& block = pointers.blocks[b];
+        if (block.mixed) {
+            limit_mixed<kForm, kStretched>(frame, pointers, b++);
+            continue;
+        }
+        const std::size_t after = end_of_same_bones(*frame.mesh, b, end);
+        switch (block.influences) {
+            case 0:
+            case 1: break;
+            case 2: limit_set<kForm, kStretched, 2>(frame, pointers, b, after); break;
+            case 3: limit_set<kForm, kStretched, 3>(frame, pointers, b, after); break;
+            case 4: limit_set<kForm, kStretched, 4>(frame, pointers, b, after); break;
+            default: limit_set<kForm, kStretched, 0>(frame, pointers, b, after);
+        }
+        b = after;
+    }
+}
+
+void limit(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
+    if (frame.form == BulgeForm::kim_han) {
+        limit_blocks<BulgeForm::kim_han, true>(frame, begin, end);
+    } else if (frame.is_stretched) {
+        limit_blocks<BulgeForm::continuous, true>(frame, begin, end);
+    } else {
+        limit_blocks<BulgeForm::continuous, false>(frame, begin, end);
+    }
+}
+
+float length_of(const Points<One>& v) { return hn::GetLane(hn::Sqrt(squared_length(v))); }
+
+void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
+    const One d;
+    const MeshPointers pointers = pointers_of(frame);
+    constexpr auto kAllowance = static_cast<float>(BulgeLimitStage::kAllowance);
+    for (std::size_t b = begin; b < end; ++b) {
+        const Block& block = pointers.blocks[b];
+        const float* const weights = weights_of(pointers, b);
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const std::int32_t* const bones =
+                frame.mesh->bones.data() + block.first_bone + (block.mixed ? block.influences * lane : 0);
+            Points<One> p = load_deformed(d, pointers, b, lane);
+            if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
+            float mean = 0.0f;
+            Points<One> nearest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+            float of_heaviest = 0.0f;
+            float most = 0.0f;
+            for (std::size_t k = 0; k < block.influences; ++k) {
+                const float weight = block.mixed ? weights[kLanes * k + lane]
+                                     : k == 0    ? frame.mesh->first_weights[b].lane[lane]
+                                                 : weights[kLanes * (k - 1) + lane];
+                const auto own = nearest_of_segment(d, frame.bones[static_cast<std::size_t>(bones[k])], p);
+                nearest = add_scaled<One>(nearest, hn::Set(d, weight), own);
+                const float distance = length_of(subtract<One>(own, p));
+                mean += weight * distance;
+                if (weight > most) of_heaviest = distance;
+                most = weight > most ? weight : most;
+            }
+            // Also with limited()'s rounding of the mean vector, so that rest points are not moved where that
+            // vector is as long as the mean distance: for bones in one line.
+            frame.distances[0][b].lane[lane] =
+                kAllowance * HWY_MAX(mean, length_of(subtract<One>(nearest, p)));
+            frame.distances[1][b].lane[lane] = kAllowance * of_heaviest;
+        }
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace sinew {
+namespace {
+
+using OfBlocks = void(const BulgeFrame& frame, std::size_t begin, std::size_t end);
+constexpr std::array<OfBlocks*, kTargetCount> kLimit SINEW_TARGETS_OF(limit);
+constexpr std::array<OfBlocks*, kTargetCount> kMeasure SINEW_TARGETS_OF(measure);
+
+}  // namespace
+
+BulgeKernel bulge_kernel() noexcept {
+    const std::size_t target = target_in_use();
+    return {kLimit[target], kMeasure[target]};
+}
+
+BulgeBone bulge_bone(const BoneSegment<double>& segment, double stretch) noexcept {
+    const Vec3<double>& head = segment.head;
+    const Vec3<double> along = segment.tail - head;
+    const double squared = glm::dot(along, along);
+    const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
+    return {float4(head.x, head.y, head.z, stretch), float4(along.x, along.y, along.z, 0.0),
+            float4(share.x, share.y, share.z, -glm::dot(head, share))};
+}
+
+}  // namespace sinew
+
+#endif

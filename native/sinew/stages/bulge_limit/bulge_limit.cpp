@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/bulge_limit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "sinew/base/fork_safe.h"
+#include "sinew/base/thread_pool.h"
+#include "sinew/mesh/check_bind_data.h"
+#include "sinew/mesh/packed_mesh.h"
+#include "sinew/stages/bulge_limit/bulge_kernel.h"
+#include "sinew/transform/convert.h"
+#include "sinew/transform/split_scale.h"
+
+namespace sinew {
+namespace {
+
+// As in Deformer.
+constexpr std::size_t kVerticesWorthAThread = 32768;
+constexpr std::size_t kBlocksOfAChunk = 256;
+
+bool is_finite(const Vec3<float>& v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+void check_segments(std::span<const BoneSegment<float>> segments, std::size_t bone_count) {
+    if (segments.size() < bone_count) {
+        fail("segments", "at least " + std::to_string(bone_count) + " bones",
+             std::to_string(segments.size()));
+    }
+    for (std::size_t bone = 0; bone < segments.size(); ++bone) {
+        if (!is_finite(segments[bone].head) || !is_finite(segments[bone].tail)) {
+            fail("segments", "finite values", "NaN or infinity at bone " + std::to_string(bone));
+        }
+    }
+}
+
+void check_weights(std::span<const float> weights, std::size_t vertex_count) {
+    if (weights.empty()) return;
+    if (weights.size() != vertex_count) {
+        fail("weights", "none, or one for each of the " + std::to_string(vertex_count) + " vertices",
+             std::to_string(weights.size()));
+    }
+    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
+        if (std::isnan(weights[vertex])) {
+            fail("weights", "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
+        }
+    }
+}
+
+void check_space(const Affine<float>& bones_from_model) {
+    const auto& [linear, translation] = bones_from_model;
+    if (!is_finite(linear[0]) || !is_finite(linear[1]) || !is_finite(linear[2]) || !is_finite(translation)) {
+        fail("bones_from_model", "finite values", "NaN or infinity");
+    }
+    if (glm::determinant(Mat3<double>(linear)) == 0.0) {
+        fail("bones_from_model", "an invertible transform", "one of determinant 0");
+    }
+}
+
+/// Whether a motion preserves lengths.
+bool is_orthonormal(const Mat3<double>& m) {
+    const Mat3<double> products = glm::transpose(m) * m - Mat3<double>(1.0);
+    double largest = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) largest = std::max(largest, std::abs(products[i][k]));
+    }
+    return largest < kOrthonormal;
+}
+
+}  // namespace
+
+struct BulgeLimit::State {
+    explicit State(const BulgeLimitData& data);
+
+    void measure(std::span<const Vec3<float>> rest_points, const Affine<float>& space);
+    [[nodiscard]] BulgeFrame frame(std::span<Vec3<float>> points) const;
+
+    PackedMesh mesh;
+    std::size_t vertex_count = 0;
+    std::size_t bone_count = 0;
+    std::vector<BoneSegment<float>> segments;  // for each of mesh.used_bones
+    std::vector<Lanes<float>> weights;         // [blocks], or empty
+    std::vector<Lanes<float>> distances[2];    // as in BulgeFrame
+    Affine<float> bones_from_model;
+    bool same_space = true;
+    Float4 to_bones[kDisplacementRows];
+    Float4 to_model[kDisplacementRows];
+    mutable std::vector<BulgeBone> bones;  // scratch for one call
+    mutable ForkSafeMutex mutex;
+};
+
+BulgeLimit::State::State(const BulgeLimitData& data) {
+    check(data.mesh);
+    vertex_count = data.mesh.rest_points.size();
+    for (const std::int32_t bone : data.mesh.influence_bones) {
+        bone_count = std::max(bone_count, static_cast<std::size_t>(bone) + 1);
+    }
+    check_segments(data.segments, bone_count);
+    check_weights(data.weights, vertex_count);
+    check_space(data.bones_from_model);
+    const NormalisedInfluences normalised = normalised_influences(data.mesh);
+    mesh = pack(data.mesh.rest_points, normalised.offsets, normalised.influences);
+    for (const std::int32_t bone : mesh.used_bones) {
+        segments.push_back(data.segments[static_cast<std::size_t>(bone)]);
+    }
+    bones.resize(segments.size());
+    for (std::vector<Lanes<float>>& of_form : distances) of_form.resize(mesh.blocks.size());
+    if (!data.weights.empty()) {
+        weights = pack_values(mesh, data.weights);
+        for (Lanes<float>& block : weights) {
+            for (float& weight : block.lane) weight = std::clamp(weight, 0.0f, 1.0f);
+        }
+    }
+    measure(data.mesh.rest_points, data.bones_from_model);
+}
+
+BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
+    // measure() alone writes the distances, and no other call runs at the same time.
+    return {&mesh,
+            bones.data(),
+            {const_cast<Lanes<float>*>(distances[0].data()), const_cast<Lanes<float>*>(distances[1].data())},
+            weights.empty() ? nullptr : weights.data(),
+            BulgeForm::continuous,
+            1.0f,
+            false,
+            same_space ? nullptr : to_bones,
+            same_space ? nullptr : to_model,
+            points.data()};
+}
+
+void BulgeLimit::State::measure(std::span<const Vec3<float>> rest_points, const Affine<float>& space) {
+    bones_from_model = space;
+    same_space = is_identity(space);
+    write_displacement(cast<double>(space), to_bones);
+    write_displacement(inverse(cast<double>(space)), to_model);
+    pack_points(mesh, rest_points, mesh.rest_points);
+    for (std::size_t i = 0; i < bones.size(); ++i) {
+        bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
+    }
+    std::vector<Vec3<float>> points(rest_points.begin(), rest_points.end());
+    const BulgeFrame all = frame(points);
+    parallel_for(
+        mesh.blocks.size(), useful_threads(0, vertex_count, kVerticesWorthAThread),
+        [&all](std::size_t begin, std::size_t end) { bulge_kernel().measure(all, begin, end); },
+        kBlocksOfAChunk);
+}
+
+BulgeLimit::BulgeLimit(const BulgeLimitData& data) : state_(std::make_unique<State>(data)) {}
+
+BulgeLimit::BulgeLimit(BulgeLimit&&) noexcept = default;
+BulgeLimit& BulgeLimit::operator=(BulgeLimit&&) noexcept = default;
+BulgeLimit::~BulgeLimit() = default;
+
+void BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
+                                 const Affine<float>& bones_from_model) {
+    if (rest_points.size() != vertex_count()) {
+        fail("rest_points", std::to_string(vertex_count()) + " points", std::to_string(rest_points.size()));
+    }
+    check_points(rest_points);
+    check_space(bones_from_model);
+    const std::scoped_lock lock(state_->mutex);
+    state_->measure(rest_points, bones_from_model);
+}
+
+std::size_t BulgeLimit::vertex_count() const noexcept { return state_->vertex_count; }
+std::size_t BulgeLimit::bone_count() const noexcept { return state_->bone_count; }
+
+bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+                       const BulgeLimitOptions& options) const noexcept {
+    const State& state = *state_;
+    if (points.size() != state.vertex_count) return false;
+    const std::scoped_lock lock(state.mutex);
+    bool is_stretched = false;
+    for (std::size_t i = 0; i < state.bones.size(); ++i) {
+        const BoneSegment<double> rest{Vec3<double>(state.segments[i].head),
+                                       Vec3<double>(state.segments[i].tail)};
+        const auto number = static_cast<std::size_t>(state.mesh.used_bones[i]);
+        Affine<double> motion{};
+        if (number < posed_from_rest.size()) motion = cast<double>(posed_from_rest[number]);
+        const double stretch =
+            is_orthonormal(motion.linear) ? 1.0 : BulgeLimitStage::stretch(motion.linear, rest);
+        is_stretched = is_stretched || stretch != 1.0;
+        state.bones[i] =
+            bulge_bone({transform_point(motion, rest.head), transform_point(motion, rest.tail)}, stretch);
+    }
+    struct Work {
+        BulgeFrame frame;
+        BulgeKernel kernel;
+    } work{state.frame(points), bulge_kernel()};
+    work.frame.form = options.form;
+    work.frame.is_stretched = is_stretched;
+    work.frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);
+    parallel_for(
+        state.mesh.blocks.size(), useful_threads(options.threads, points.size(), kVerticesWorthAThread),
+        [&work](std::size_t begin, std::size_t end) { work.kernel.limit(work.frame, begin, end); },
+        kBlocksOfAChunk);
+    return true;
+}
+
+BulgeLimit::Parts BulgeLimit::parts() const {
+    const State& state = *state_;
+    const std::scoped_lock lock(state.mutex);
+    Parts parts{bound_mesh(state.mesh, state.mesh.rest_points, state.vertex_count, state.bone_count),
+                {},
+                state.bones_from_model,
+                {}};
+    parts.segments.resize(state.bone_count);
+    for (std::size_t i = 0; i < state.segments.size(); ++i) {
+        parts.segments[static_cast<std::size_t>(state.mesh.used_bones[i])] = state.segments[i];
+    }
+    if (!state.weights.empty()) parts.weights = unpack_values(state.mesh, state.weights, state.vertex_count);
+    return parts;
+}
+
+}  // namespace sinew
