@@ -14,7 +14,7 @@ import bpy
 
 from ..core import icons
 from ..core.errors import SinewError
-from ..core.icons import VIEWS, Deformer, Icons, Situation
+from ..core.icons import RENDER, VIEWS, Deformer, Icons, Situation
 from ..core.phrases import phrase
 from ..io.animation_paths import animated_paths, is_animated, is_visibility_animated
 from . import (
@@ -26,6 +26,7 @@ from . import (
     setting_animation,
     stack,
     stored_vertex_data,
+    undeformed,
     upstream_proxy,
 )
 from .stack import armature_modifier, sinew_modifier
@@ -234,6 +235,7 @@ def _take_off(obj: bpy.types.Object) -> None:
             _show(modifier, *own_visibility(replaced))
     baked.switch_on(obj)
     notify(subscribers.before_removal, obj)
+    undeformed.remove(obj)
     if nodes is not None:
         active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
         obj.modifiers.remove(nodes)
@@ -370,7 +372,7 @@ def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
-    smooth = {}
+    neutral, smooth = stack.neutral_modifier(obj), {}
     for name in VIEWS:
         view = _view(obj, name)
         wanted = icons.icons(view, situation, name)
@@ -380,7 +382,11 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
                 _show_in(modifier, name, is_on)
         if nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
             _show_in(nodes, name, wanted.sinew)
+        if name == RENDER:
+            # Where an animation switches Sinew's, it stays on, as it changes nothing.
+            _show_in(neutral, name, wanted.sinew)
         smooth[name] = not situation.is_by_sinew or view.deformer is Deformer.ARMATURE
+    undeformed.mark(obj, situation.is_by_sinew)
     corrective_smooth.switch(obj, **smooth)
     properties.store(settings, "situation", situation.value)
 
@@ -575,6 +581,7 @@ def position_modifier(obj: bpy.types.Object) -> None:
     own, last = modifiers.index(nodes), modifiers.index(run[-1])
     if own != last + 1:
         obj.modifiers.move(own, last if own < last else last + 1)
+    undeformed.position(obj)
 
 
 def keeps_modifiers_on(obj: bpy.types.Object) -> bool:

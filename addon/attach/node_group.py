@@ -38,6 +38,15 @@ _WARNING, _WARNING_USER = "Sinew Is Missing", "User of Sinew Is Missing"
 # Inputs that name a helper object, or an attribute where there is no helper.
 _HELPER_INPUTS = ("Points", "Upstream")
 
+# The inputs that say how undeformed.py marks the deformed mesh.
+IS_MARKED, MARK_TO_REMOVE = "Is Marked", "Mark to Remove"
+_MARK_SOCKETS = {
+    IS_MARKED: (
+        "NodeSocketBool",
+        "In renders, a mesh without rest positions is the undeformed one: it stays",
+    ),
+    MARK_TO_REMOVE: ("NodeSocketString", "Attribute of rest positions that is not needed behind"),
+}
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
 IN_RENDERS_SOCKET = (
     "NodeSocketBool",
@@ -246,6 +255,7 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
             "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
             **({NORMALS: ("NodeSocketString", "Attribute that holds the normals")} if normals else {}),
             **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
+            **_MARK_SOCKETS,
             POSE: POSE_SOCKET,
         },
     )
@@ -264,16 +274,56 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
     group.links.new(source.outputs["Geometry"], place.inputs["Geometry"])
     group.links.new(named.outputs["Attribute"], enabled_socket(place.inputs, "Value"))
     # A mesh without the attribute keeps its shape instead of collapsing to the origin.
-    group.links.new(named.outputs["Exists"], place.inputs["Selection"])
+    group.links.new(
+        _both(group, named.outputs["Exists"], _is_deformed(group, source)), place.inputs["Selection"]
+    )
     # Removed, as a subdivision behind would interpolate it for each of its vertices, and exports would
     # contain it.
     group.links.new(source.outputs["Points"], remove.inputs["Name"])
     group.links.new(place.outputs["Geometry"], remove.inputs["Geometry"])
-    moved = remove.outputs["Geometry"]
+    moved = _without_mark(group, source, remove.outputs["Geometry"])
     if normals:
         moved = _take_normals_of_attribute(group, source, moved, normals)
     group.links.new(moved, result.inputs["Geometry"])
     return group
+
+
+def _is_deformed(group: bpy.types.NodeTree, source: bpy.types.Node) -> bpy.types.NodeSocket:
+    """Returns a field that says whether the mesh is the deformed one, or may be (undeformed.py)."""
+    named, view, implied, either = add_nodes(
+        group,
+        "GeometryNodeInputNamedAttribute",
+        "GeometryNodeIsViewport",
+        "FunctionNodeBooleanMath",
+        "FunctionNodeBooleanMath",
+    )
+    named.data_type, named.inputs["Name"].default_value = "FLOAT_VECTOR", "rest_position"
+    implied.operation, either.operation = "IMPLY", "OR"
+    link = group.links.new
+    link(source.outputs[IS_MARKED], implied.inputs[0])
+    link(named.outputs["Exists"], implied.inputs[1])
+    link(view.outputs[0], either.inputs[0])
+    link(implied.outputs[0], either.inputs[1])
+    return either.outputs[0]
+
+
+def _both(
+    group: bpy.types.NodeTree, first: bpy.types.NodeSocket, second: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    (both,) = add_nodes(group, "FunctionNodeBooleanMath")
+    both.operation = "AND"
+    group.links.new(first, both.inputs[0])
+    group.links.new(second, both.inputs[1])
+    return both.outputs[0]
+
+
+def _without_mark(
+    group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    (remove,) = add_nodes(group, "GeometryNodeRemoveAttribute")
+    group.links.new(source.outputs[MARK_TO_REMOVE], remove.inputs["Name"])
+    group.links.new(geometry, remove.inputs["Geometry"])
+    return remove.outputs["Geometry"]
 
 
 def _take_normals_of_attribute(
@@ -362,6 +412,7 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
                 "Object that has the upstream modifiers, to be evaluated with this one",
             ),
             **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
+            **_MARK_SOCKETS,
             POSE: POSE_SOCKET,
         },
     )
@@ -381,8 +432,8 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
     link(source.outputs["Geometry"], place.inputs["Geometry"])
     # Where the number of vertices differs, as before the first points are written, the shape is unchanged.
     fits = same_count(group, source.outputs["Geometry"], buffer, normals)
-    link(fits, place.inputs["Selection"])
-    moved = place.outputs["Geometry"]
+    link(_both(group, fits, _is_deformed(group, source)), place.inputs["Selection"])
+    moved = _without_mark(group, source, place.outputs["Geometry"])
     if normals:
         moved = _take_normals_of_buffer(
             group, source, moved, buffer, stored, index.outputs["Index"], fits, normals

@@ -12,7 +12,16 @@ import bpy
 import numpy as np
 
 from ..io import mesh_io
-from . import node_group, point_buffer, pose_driver, properties, references, stack, upstream_proxy
+from . import (
+    node_group,
+    point_buffer,
+    pose_driver,
+    properties,
+    references,
+    stack,
+    undeformed,
+    upstream_proxy,
+)
 from .subscribers import subscribers
 
 ATTRIBUTE, NORMALS_ATTRIBUTE = "sinew_points", "sinew_normals"
@@ -45,6 +54,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
             inputs[node_group.NORMALS] = settings.normals_attribute
     if normals:
         inputs[node_group.IN_RENDERS] = in_renders
+    inputs |= undeformed.ensure(obj)
     made_by_features = (make(obj) for make in subscribers.node_group)
     group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind, normals)
     if nodes.node_group != group:

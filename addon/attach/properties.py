@@ -264,6 +264,17 @@ class SinewSettings(bpy.types.PropertyGroup):
     baked: bpy.props.CollectionProperty(
         type=SinewSwitchedOff, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
+    neutral_uid: bpy.props.IntProperty(
+        description="The modifier of undeformed.py", options={"HIDDEN"}, override=OVERRIDABLE
+    )
+    marks_rest: bpy.props.BoolProperty(
+        description="Sinew has Blender add rest positions", options={"HIDDEN"}, override=OVERRIDABLE
+    )
+    adds_rest_position: bpy.props.BoolProperty(
+        description="The artist's own choice of Add Rest Position while Sinew sets it",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
     parent_type: bpy.props.StringProperty(
         description="The object's parent type before Sinew made an Armature modifier of it",
         options={"HIDDEN"},

@@ -45,6 +45,18 @@ def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     return next((m for m in nodes if node_group.is_sinew(m)), None) or next(bare, None)
 
 
+def neutral_modifier(obj: bpy.types.Object) -> bpy.types.LaplacianDeformModifier | None:
+    """Returns Sinew's modifier that changes nothing (undeformed.py), be it renamed; else one of its name."""
+    found = [m for m in obj.modifiers if m.type == "LAPLACIANDEFORM" and not m.is_bind]
+    same = (m for m in found if m.persistent_uid == properties.of(obj).neutral_uid)
+    return next(same, None) or next((m for m in found if m.name.startswith("Sinew")), None)
+
+
+def own_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Returns the modifiers that Sinew put on the object."""
+    return [m for m in (sinew_modifier(obj), neutral_modifier(obj)) if m is not None]
+
+
 def _is_ours(obj: bpy.types.Object, modifier: bpy.types.NodesModifier) -> bool:
     return modifier.name.startswith("Sinew") or (
         properties.has_sinew(obj) and properties.of(obj).modifier_uid == modifier.persistent_uid
@@ -59,11 +71,11 @@ def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | Non
 def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
     """Returns the Armature modifiers that Sinew replaces, or would replace: the first and those directly
     behind it, which Blender may chain as Multi Modifiers."""
-    own, run = sinew_modifier(obj), []
+    own, run = own_modifiers(obj), []
     for modifier in list(obj.modifiers)[_start(obj) :]:
         if modifier.type == "ARMATURE":
             run.append(modifier)
-        elif modifier != own:
+        elif modifier not in own:
             break
     return run
 
@@ -75,7 +87,8 @@ def _start(obj: bpy.types.Object) -> int:
     if not properties.has_sinew(obj):
         candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
         return _index(obj, min(candidates, key=lambda m: not can_be_on(obj, m), default=None))
-    behind_own = _index(obj, sinew_modifier(obj)) + 1
+    own = own_modifiers(obj)
+    behind_own = max((_index(obj, modifier) for modifier in own), default=len(modifiers)) + 1
     found = [modifier_of(obj, replaced) for replaced in properties.of(obj).replaced_modifiers]
     known = sorted(_index(obj, modifier) for modifier in found if modifier is not None)
     start = next(iter(known), behind_own)
@@ -85,7 +98,7 @@ def _start(obj: bpy.types.Object) -> int:
         start = behind_own
     # So do new ones directly before Sinew's or before the first.
     ahead = min(start, len(modifiers)) - 1
-    if ahead >= 0 and modifiers[ahead] == sinew_modifier(obj):
+    while ahead >= 0 and modifiers[ahead] in own:
         ahead -= 1
     # So do others in place of those that are gone, if Sinew's is behind them, as it has switched them off.
     while ahead >= 0 and (_deforms(modifiers[ahead]) or (not known and modifiers[ahead].type == "ARMATURE")):
@@ -120,19 +133,19 @@ def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Returns the modifiers before those that Sinew replaces, without Sinew's own, and without those that
     Blender leaves out in the object's mode."""
     # Compared by identity, too, as it has no node group at first.
-    own = sinew_modifier(obj)
+    own = own_modifiers(obj)
     ahead = list(obj.modifiers)[: _index(obj, armature_modifier(obj))]
     left_out = LEFT_OUT_IN_PAINT if obj.mode in ("WEIGHT_PAINT", "VERTEX_PAINT") else ()
-    return [m for m in ahead if m != own and not node_group.is_sinew(m) and m.type not in left_out]
+    return [m for m in ahead if m not in own and not node_group.is_sinew(m) and m.type not in left_out]
 
 
 def downstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Returns the modifiers behind those that Sinew replaces, or would replace, without Sinew's own."""
-    run, own = armature_modifiers(obj), sinew_modifier(obj)
+    run, own = armature_modifiers(obj), own_modifiers(obj)
     if not run and not parent_deforms(obj):
         return []
     behind = list(obj.modifiers)[_index(obj, run[-1]) + 1 :] if run else obj.modifiers
-    return [modifier for modifier in behind if modifier != own]
+    return [modifier for modifier in behind if modifier not in own]
 
 
 def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:

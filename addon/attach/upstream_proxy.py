@@ -142,6 +142,7 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
         copy.make_local(clear_liboverride=True)
     copy.name = f"{obj.name} Sinew upstream"
     properties.clear(copy)
+    copy.add_rest_position_attribute = False
     properties.of(copy).helper, properties.of(copy).token = True, uuid.uuid4().hex
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:

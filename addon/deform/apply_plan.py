@@ -165,7 +165,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         return False
     armatures = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
     origin = _origin_of(nodes, armatures)
-    obj.modifiers.remove(nodes)
+    for modifier in stack.own_modifiers(obj):
+        obj.modifiers.remove(modifier)
     kept = properties.of(origin).replaced_modifiers if origin is not None else {}
     for modifier in armatures:
         replaced = kept.get(modifier.name)

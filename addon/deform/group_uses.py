@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 
 import bpy
 
-from ..attach import properties, stage_settings
+from ..attach import properties, stack, stage_settings
 
 
 def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
@@ -28,7 +28,11 @@ def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
 
 
 def _in_modifiers(obj: bpy.types.Object) -> Iterator[str]:
+    neutral = stack.neutral_modifier(obj)
     for modifier in obj.modifiers:
+        # Any group does for it.
+        if modifier == neutral:
+            continue
         yield from _texts(modifier)
         if modifier.type == "NODES" and not hasattr(modifier, "properties"):  # before Blender 5.2
             yield from (value for _key, value in modifier.items() if isinstance(value, str))

@@ -165,13 +165,17 @@ class KeepingEngine(bpy.types.RenderEngine):
     bl_idname = "SINEW_KEEPING"
     bl_label = "Keeping"
     shapes: ClassVar[dict[str, np.ndarray]] = {}
+    undeformed: ClassVar[dict[str, np.ndarray]] = {}
+    attributes: ClassVar[dict[str, list[str]]] = {}
 
     def render(self, depsgraph):
         for obj in depsgraph.objects:
-            if obj.type == "MESH":
-                points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
-                obj.data.vertices.foreach_get("co", points.ravel())
-                self.shapes[obj.name] = points
+            if obj.type != "MESH":
+                continue
+            for name, kept in (("co", self.shapes), ("undeformed_co", self.undeformed)):
+                kept[obj.name] = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+                obj.data.vertices.foreach_get(name, kept[obj.name].ravel())
+            self.attributes[obj.name] = obj.data.attributes.keys()
         self.end_result(self.begin_result(0, 0, 4, 4))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
-from sinew_addon.attach import attach
+from sinew_addon.attach import attach, stack
 from sinew_addon.deform import session
 
 # Documented tolerance against the Armature modifier, relative to the bounding box's diagonal.
@@ -89,6 +89,11 @@ def key_shape(obj: bpy.types.Object) -> None:
     for frame, value in ((1, 0.0), (11, 1.0)):
         key.value = value
         key.keyframe_insert("value", frame=frame)
+
+
+def modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Its modifiers without the one that changes nothing (attach/undeformed.py)."""
+    return [modifier for modifier in obj.modifiers if modifier != stack.neutral_modifier(obj)]
 
 
 def final_points(obj: bpy.types.Object) -> np.ndarray:

@@ -596,7 +596,7 @@ def test_simulations_stay_with_the_original():
     obj.modifiers.new("Behind", "SUBSURF")
     compare(obj, {"dq", "blender"})
     for copy in copies(obj).values():
-        assert {m.type for m in copy.modifiers} == {"ARMATURE", "SUBSURF", "NODES"}
+        assert {m.type for m in scenes.modifiers(copy)} == {"ARMATURE", "SUBSURF", "NODES"}
 
 
 def test_what_can_not_be_compared():

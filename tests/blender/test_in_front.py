@@ -460,7 +460,7 @@ def test_an_armature_modifier_in_front_of_what_is_in_front():
     first.object = armature
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
     got = scenes.shapes(obj, [1, 6, 11])
-    assert [m.type for m in obj.modifiers] == ["ARMATURE", "SMOOTH", "ARMATURE", "NODES"]
+    assert [m.type for m in scenes.modifiers(obj)] == ["ARMATURE", "SMOOTH", "ARMATURE", "NODES"]
     properties.of(obj).enabled = False
     expected = scenes.modifier_shapes(obj, [1, 6, 11], preserve_volume=False)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)

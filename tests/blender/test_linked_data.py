@@ -114,7 +114,10 @@ def test_an_override_is_saved_as_a_blender_without_sinew_needs_it(tmp_path):
         target.objects = [obj.name]
     saved = target.objects[0]
     assert saved.library.name == "shot.blend"
-    assert [(m.type, m.show_viewport) for m in saved.modifiers] == [("ARMATURE", True), ("NODES", False)]
+    assert [(m.type, m.show_viewport) for m in scenes.modifiers(saved)] == [
+        ("ARMATURE", True),
+        ("NODES", False),
+    ]
 
 
 def test_settings_are_copied_whole():

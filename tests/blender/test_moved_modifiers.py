@@ -25,6 +25,10 @@ def make_chained(first_keeps_volume, second_keeps_volume):
     return obj
 
 
+def shown_names(obj):
+    return [modifier.name for modifier in scenes.modifiers(obj)]
+
+
 def names(obj):
     return [modifier.name for modifier in obj.modifiers]
 
@@ -62,13 +66,13 @@ def test_chained_modifiers_in_another_order(volume, over_sinew):
     check(obj, before)
     swap(obj, over_sinew)
     check(obj, swapped)
-    assert names(obj) == ["Second", "Armature", "Sinew"]
+    assert shown_names(obj) == ["Second", "Armature", "Sinew"]
     assert [replaced.name for replaced in properties.of(obj).replaced_modifiers] == ["Second", "Armature"]
     swap(obj, over_sinew)
     check(obj, before)
     attach.remove(obj)
     session.refresh(bpy.context)
-    assert names(obj) == ["Armature", "Second"]
+    assert shown_names(obj) == ["Armature", "Second"]
     check(obj, before)
 
 
@@ -121,10 +125,10 @@ def test_something_moved_between(moved, place):
     put(obj, moved, place)
     got = scenes.shapes(obj, FRAMES)
     assert properties.of(obj).error == ""
-    order = names(obj)
+    order = shown_names(obj)
     attach.remove(obj)
     session.refresh(bpy.context)
-    assert names(obj) == [name for name in order if name != "Sinew"]
+    assert shown_names(obj) == [name for name in order if name != "Sinew"]
     expected = scenes.shapes(obj, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     assert expected.shape == before.shape
@@ -209,7 +213,7 @@ def test_one_moved_in_front_and_back_while_visibility_is_keyed():
     for place in (0, 2):
         obj.modifiers.move(list(obj.modifiers).index(obj.modifiers["Solidify"]), place)
         bpy.context.view_layer.update()
-    assert [m.name for m in obj.modifiers] == ["Armature", "Sinew", "Solidify"]
+    assert shown_names(obj) == ["Armature", "Sinew", "Solidify"]
     assert scenes.worst(scenes.shapes(obj, [11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
@@ -252,5 +256,5 @@ def test_a_multi_modifier_is_chained_while_sinew_is_off():
     obj.modifiers.move(names(obj).index("Second"), 0)
     bpy.context.view_layer.update()
     got = scenes.shapes(obj, FRAMES)
-    assert names(obj) == ["Second", "Armature", "Sinew"]
+    assert shown_names(obj) == ["Second", "Armature", "Sinew"]
     assert scenes.worst(got, chained) <= scenes.TOLERANCE * scenes.diagonal(obj)

@@ -164,7 +164,7 @@ def skinning_alone(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
     """Context in which modifiers behind the skinning are switched off."""
     hidden = []
     for obj in meshes:
-        kept = [*stack.upstream(obj), *stack.armature_modifiers(obj), stack.sinew_modifier(obj)]
+        kept = [*stack.upstream(obj), *stack.armature_modifiers(obj), *stack.own_modifiers(obj)]
         hidden += [m for m in obj.modifiers if m not in kept and m.show_viewport]
     for modifier in hidden:
         modifier.show_viewport = False

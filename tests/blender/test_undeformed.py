@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Generated texture coordinates, which procedural textures use by default, are those of the rest shape, as
+with the Armature modifier; and what Sinew needs for it comes and goes with it."""
+
+import shutil
+
+import bpy
+import numpy as np
+import pytest
+import routes
+import scenes
+from conftest import KeepingEngine
+from sinew_addon.attach import attach, properties, stack
+
+
+@pytest.fixture(autouse=True)
+def released():
+    yield
+    routes.release()
+
+
+@pytest.fixture
+def rendered(rendered_points):
+    """rendered(object): its shape, its undeformed shape and its attributes, as renderers get them."""
+
+    def render(obj):
+        bpy.context.scene.frame_set(9)
+        shape = rendered_points(obj)
+        return shape, KeepingEngine.undeformed[obj.name], KeepingEngine.attributes[obj.name]
+
+    return render
+
+
+def _assert_same(got, expected):
+    shape, rest, _names = got
+    assert scenes.worst(shape, expected[0]) <= 1e-5
+    np.testing.assert_array_equal(rest, expected[1])
+
+
+def _with_keys(obj):
+    for _each in range(2):
+        obj.shape_key_add()
+    obj.data.shape_keys.key_blocks[1].data[3].co.z += 0.5
+    obj.data.shape_keys.key_blocks[1].value = 1.0
+
+
+def _in_front(kind):
+    def add(obj):
+        obj.modifiers.new("In Front", kind)
+        obj.modifiers.move(1, 0)
+
+    return add
+
+
+def _shared(obj):
+    other = bpy.data.objects.new("Other", obj.data)
+    bpy.context.scene.collection.objects.link(other)
+
+
+CHARACTERS = {
+    "plain": lambda obj: None,
+    "shape keys": _with_keys,
+    "Subdivision behind": lambda obj: obj.modifiers.new("Behind", "SUBSURF"),
+    "Solidify behind": lambda obj: obj.modifiers.new("Behind", "SOLIDIFY"),
+    "Cast behind": lambda obj: obj.modifiers.new("Behind", "CAST"),
+    "Subdivision in front": _in_front("SUBSURF"),
+    "Cast in front": _in_front("CAST"),
+    "shared mesh": _shared,
+    "Add Rest Position": lambda obj: setattr(obj, "add_rest_position_attribute", True),
+}
+
+
+@pytest.mark.parametrize("name", CHARACTERS)
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_coordinates_are_those_with_the_armature_modifier(rendered, route, name):
+    routes.force(route)
+    obj, _armature = scenes.make_arm()
+    CHARACTERS[name](obj)
+    expected = rendered(obj)
+    before = [modifier.name for modifier in obj.modifiers], obj.add_rest_position_attribute
+    scenes.add_sinew(obj, "lbs")
+    _assert_same(rendered(obj), expected)
+    assert set(rendered(obj)[2]) == set(expected[2])
+    properties.of(obj).enabled = False
+    _assert_same(rendered(obj), expected)
+    assert obj.add_rest_position_attribute == before[1]
+    properties.of(obj).enabled = True
+    _assert_same(rendered(obj), expected)
+    attach.remove(obj)
+    assert ([modifier.name for modifier in obj.modifiers], obj.add_rest_position_attribute) == before
+    _assert_same(rendered(obj), expected)
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Sinew gives no normals")
+def test_also_where_sinew_gives_the_normals(rendered):
+    obj, _armature = scenes.make_arm()
+    expected = rendered(obj)
+    scenes.add_sinew(obj, "lbs")
+    properties.of(obj).normals = properties.SKINNED_NORMALS
+    _assert_same(rendered(obj), expected)
+
+
+def test_also_with_a_heat_map(rendered):
+    obj, _armature = scenes.make_arm()
+    expected = rendered(obj)
+    scenes.add_sinew(obj, "lbs")
+    properties.of(obj).heat = True
+    _assert_same(rendered(obj), expected)
+
+
+def test_the_artists_own_attribute_of_that_name_stays(rendered):
+    obj, _armature = scenes.make_arm()
+    obj.data.attributes.new("rest_position", "FLOAT_VECTOR", "POINT").data[5].vector = (1, 2, 3)
+    expected = rendered(obj)
+    scenes.add_sinew(obj, "lbs")
+    shape, _rest, names = rendered(obj)
+    assert scenes.worst(shape, expected[0]) <= 1e-5
+    assert "rest_position" in names
+    assert not obj.add_rest_position_attribute
+
+
+def test_the_modifier_is_made_again_and_follows(rendered):
+    obj, _armature = scenes.make_arm()
+    expected = rendered(obj)
+    scenes.add_sinew(obj, "lbs")
+    obj.modifiers.remove(stack.neutral_modifier(obj))
+    _assert_same(rendered(obj), expected)
+    neutral = stack.neutral_modifier(obj)
+    neutral.name = "Renamed"
+    behind = obj.modifiers.new("Behind", "CAST")
+    behind.show_viewport = behind.show_render = False
+    obj.modifiers.move(list(obj.modifiers).index(neutral), len(obj.modifiers) - 1)
+    _assert_same(rendered(obj), expected)
+    assert [m.type for m in obj.modifiers] == ["ARMATURE", "NODES", "LAPLACIANDEFORM", "CAST"]
+    attach.remove(obj)
+    assert [m.type for m in obj.modifiers] == ["ARMATURE", "CAST"]
+
+
+def test_add_rest_position_that_the_artist_switches_meanwhile(rendered):
+    obj, _armature = scenes.make_arm()
+    obj.add_rest_position_attribute = True
+    expected = rendered(obj)
+    scenes.add_sinew(obj, "lbs")
+    obj.add_rest_position_attribute = False
+    bpy.context.view_layer.update()
+    _assert_same(rendered(obj), expected)
+    attach.remove(obj)
+    assert not obj.add_rest_position_attribute
+
+
+def test_a_saved_file_is_as_without_sinew(rendered, tmp_path):
+    obj, _armature = scenes.make_arm()
+    expected = rendered(obj)
+    scenes.add_sinew(obj, "lbs")
+    rendered(obj)
+    path, copy = str(tmp_path / "saved.blend"), str(tmp_path / "copy.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    shutil.copy(path, copy)
+    assert obj.add_rest_position_attribute
+    with bpy.data.libraries.load(copy) as (_names, loaded):
+        loaded.objects = [obj.name]
+    (saved,) = loaded.objects
+    assert not saved.add_rest_position_attribute
+    assert [m.show_viewport or m.show_render for m in saved.modifiers] == [True, False, False]
+    bpy.ops.wm.open_mainfile(filepath=path)
+    _assert_same(rendered(bpy.data.objects["Arm"]), expected)
