@@ -77,49 +77,5 @@ TEST(Centres, progress_cancels_and_throws) {
     EXPECT_EQ(tube.centres().size(), tube.scene.rest_points.size());
 }
 
-std::string refusal(const Tube& tube) {
-    try {
-        (void)tube.centres();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "nothing thrown";
-}
-
-TEST(Centres, refuse_what_is_no_mesh) {
-    Tube tube(2, 5, 4);
-    tube.triangles[7] = 20;
-    EXPECT_EQ(refusal(tube), "triangles: expected numbers of vertices, below 20, got 20 at triangle 2");
-    tube.triangles[7] = -1;
-    EXPECT_EQ(refusal(tube), "triangles: expected numbers of vertices, below 20, got -1 at triangle 2");
-    tube.triangles.resize(4);
-    EXPECT_EQ(refusal(tube), "triangles: expected three corners each, got 4");
-    tube.scene.weights[0] = -1.0f;
-    EXPECT_EQ(refusal(tube).substr(0, 17), "influence_weights");
-}
-
-TEST(VertexData, is_checked) {
-    const Tube tube(2, 5, 4);
-    const auto refused = [&](const VertexData& data) -> std::string {
-        BindData bound = tube.scene.data();
-        bound.vertex_data = std::span(&data, 1);
-        try {
-            const Binding binding(bound);
-        } catch (const std::invalid_argument& error) {
-            return error.what();
-        }
-        return "nothing thrown";
-    };
-    std::vector<float> values(60);
-    EXPECT_EQ(refused({Cor::info, values}), "nothing thrown");
-    EXPECT_EQ(refused({Dq::info, values}),
-              "vertex_data: expected that of methods that need it, got that of dq");
-    values[31] = std::numeric_limits<float>::infinity();
-    EXPECT_EQ(refused({Cor::info, values}),
-              "vertex_data: expected finite values, got NaN or infinity of cor at vertex 10");
-    values.pop_back();
-    EXPECT_EQ(refused({Cor::info, values}), "vertex_data: expected 60 numbers of cor, got 59");
-}
-
 }  // namespace
 }  // namespace sinew

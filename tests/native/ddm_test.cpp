@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -158,21 +157,6 @@ TEST_P(DdmKernels, take_bones_that_the_moments_alone_name) {
         std::ranges::fill(bound.scene.bones, 5);
         EXPECT_LT(largest_error(bound, variant()), 2.0 * kTolerance) << is_mixed;
     }
-}
-
-TEST(DirectDeltaMush, bones_that_the_moments_alone_name_are_bones_of_the_binding) {
-    Bound bound = bound_scene(24, 12, 4, false, false);
-    std::ranges::fill(bound.scene.bones, 5);
-    BindData data = bound.scene.data();
-    const VertexData rows = bound.data();
-    data.vertex_data = std::span(&rows, 1);
-    EXPECT_EQ(Binding(data).bone_count(), 12);
-    const BoundMesh mesh = Binding(data).unpack();
-    EXPECT_EQ(mesh.rest_bones.size(), 12);
-    ASSERT_EQ(mesh.vertex_data.size(), 1);
-    EXPECT_EQ(mesh.vertex_data.front().values, bound.rows);
-    data.rest_bones = data.rest_bones.first(11);
-    EXPECT_THROW(Binding{data}, std::invalid_argument);
 }
 
 TEST(DirectDeltaMush, a_vertex_without_faces_has_no_extent) {

@@ -146,19 +146,6 @@ std::string refusal(const std::function<void(Scene&)>& spoil) {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Checks only sizes: no array of such a size exists.
-TEST(Deformer, refuses_more_than_it_can_number) {
-    const Vec3<float> point(0.0f);
-    const std::size_t many = std::size_t{1} << 31;
-    BindData data{{&point, many}, {}, {}, {}, {}};
-    EXPECT_EQ(message_of([&] { const Deformer deformer(data, Lbs::info); }),
-              "rest_points: expected at most 2147483647 vertices, got 2147483648");
-    const std::int32_t bone = 0;
-    data = {{&point, 1}, {}, {&bone, many}, {}, {}};
-    EXPECT_EQ(message_of([&] { const Deformer deformer(data, Lbs::info); }),
-              "influence_bones: expected at most 2147483647 influences, got 2147483648");
-}
-
 TEST(Deformer, refuses_more_influences_of_a_vertex_than_the_limit) {
     if (test::kRunsSlowly) GTEST_SKIP();
     const auto with_influences = [](std::size_t count) {

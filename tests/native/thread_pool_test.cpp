@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstdint>
 #include <stdexcept>
 #include <thread>
 #include <vector>

@@ -207,13 +207,3 @@ def test_states_of_other_things_are_refused(of, state, message):
 
 
 # --- Representations as text
-
-
-def test_what_things_look_like():
-    binding = sinew.Binding(*RIG.mesh)
-    counts = f"60 vertices, {binding.influence_count} influences, 15 bones>"
-    assert repr(binding) == f"<sinew.Binding: {counts}"
-    assert repr(sinew.Deformer(binding, "dq")) == f"<sinew.Deformer dq: {counts}"
-    mixed = sinew.Deformer(binding, "lbs", mix=("qv", np.zeros(60)))
-    assert repr(mixed) == f"<sinew.Deformer lbs mixed with qv: {counts}"
-    assert repr(sinew.Skeleton([-1, 0])) == "<sinew.Skeleton: 2 bones>"

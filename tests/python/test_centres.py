@@ -86,35 +86,48 @@ def test_bones_of_a_vertex_may_come_twice_and_in_any_order():
     np.testing.assert_allclose(twice, expected, atol=1e-5)
 
 
-def test_threads_change_no_bit():
-    tube = Tube()
-    expected = tube.centres(threads=1)
-    for threads in (None, 0, np.int64(4), 10**30):
-        np.testing.assert_array_equal(tube.centres(threads=threads), expected)
+# --- What both precomputations share
 
 
-def test_progress_is_told_on_this_thread():
+COMPUTE = {"cor": lambda tube, **options: tube.centres(**options)}
+if "ddm" in {method.name for method in sinew.methods()}:
+    COMPUTE["ddm"] = lambda tube, **options: sinew.direct_delta_mush(
+        *tube.mesh, tube.triangles, 0.3, **options
+    )
+every_precomputation = pytest.mark.parametrize("compute", COMPUTE.values(), ids=COMPUTE)
+
+
+@every_precomputation
+def test_threads_change_no_bit(compute):
+    for tube in (Tube(), three_bones()):
+        expected = compute(tube, threads=1)
+        for threads in (None, 0, np.int64(4), 10**30):
+            np.testing.assert_array_equal(compute(tube, threads=threads), expected)
+
+
+@every_precomputation
+def test_progress_is_told_on_this_thread(compute):
     told = []
-    Tube().centres(progress=lambda done: told.append((done, threading.current_thread())), threads=2)
+    compute(Tube(), progress=lambda done: told.append((done, threading.current_thread())), threads=2)
     shares = [done for done, _thread in told]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
     assert {thread for _done, thread in told} == {threading.current_thread()}
 
 
-@pytest.mark.parametrize("at", [0.0, 0.4, 0.7, 1.0])
-def test_false_cancels_and_what_is_raised_comes_through(at):
-    tube = Tube()
-    assert tube.centres(progress=lambda done: done < at) is None
+@every_precomputation
+@pytest.mark.parametrize("at", [0.0, 0.1, 0.4, 0.7, 1.0])
+def test_false_cancels_and_what_is_raised_comes_through(compute, at):
+    assert compute(Tube(), progress=lambda done: done < at) is None
 
     def stop(done):
         if done >= at:
             raise KeyError("enough")
 
     with pytest.raises(KeyError, match="enough"):
-        tube.centres(progress=stop)
+        compute(Tube(), progress=stop)
     # Returning nothing, 0 or None does not cancel.
-    assert tube.centres(progress=lambda _done: 0) is not None
+    assert compute(Tube(), progress=lambda _done: 0) is not None
 
 
 def test_other_threads_run_meanwhile():

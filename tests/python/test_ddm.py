@@ -2,8 +2,6 @@
 """Direct delta mush: its moments compared with scipy's sparse solver, its points with singular values,
 and its effect on a tube."""
 
-import threading
-
 import numpy as np
 import pytest
 import reference
@@ -262,35 +260,6 @@ def test_the_moments_say_which_bones_move_a_vertex():
     assert np.abs(others.deform(motions) - expected).max() < 1e-6
     with pytest.raises(ValueError, match="bone_transforms"):
         others.deform(motions[:1])
-
-
-def test_threads_change_no_bit():
-    tube = three_bones()
-    expected = moments(tube, 0.3, threads=1)
-    for threads in (None, 2, 5):
-        np.testing.assert_array_equal(moments(tube, 0.3, threads=threads), expected)
-
-
-def test_progress_is_told_on_this_thread():
-    told = []
-    moments(Tube(), 0.3, progress=lambda done: told.append((done, threading.current_thread())), threads=2)
-    shares = [done for done, _thread in told]
-    assert shares == sorted(shares)
-    assert (shares[0], shares[-1]) == (0.0, 1.0)
-    assert {thread for _done, thread in told} == {threading.current_thread()}
-
-
-@pytest.mark.parametrize("at", [0.0, 0.1, 0.5, 1.0])
-def test_false_cancels_and_what_is_raised_comes_through(at):
-    tube = Tube()
-    assert moments(tube, 0.3, progress=lambda done: done < at) is None
-
-    def stop(done):
-        if done >= at:
-            raise KeyError("enough")
-
-    with pytest.raises(KeyError, match="enough"):
-        moments(tube, 0.3, progress=stop)
 
 
 @pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])

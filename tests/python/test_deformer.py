@@ -367,13 +367,6 @@ def test_out_may_be_the_array_of_rest_points(method):
 
 
 @every_method
-def test_bone_transforms_may_have_three_rows(method):
-    rig = random_rig(44, scaled=True)
-    deformer = sinew.Deformer(*rig.mesh, method, rig.rest_bones[:, :3], rig.vertex_data)
-    np.testing.assert_array_equal(deformer.deform(rig.transforms[:, :3]), rig.deform(method))
-
-
-@every_method
 def test_fourth_row_is_not_read(method):
     rig = random_rig(45)
     spoilt = rig.transforms.copy()
@@ -397,26 +390,6 @@ def test_empty_mesh_works(method):
         points = deformer.deform(motions)
         assert points.shape == (0, 3)
         assert points.dtype == np.float32
-
-
-@every_method
-def test_many_threads_may_use_one_deformer(method):
-    rig = random_rig(49, vertices=10000, most_influences=4, scaled=True)
-    deformer = rig.deformer(method)
-    expected = deformer.deform(rig.transforms)
-    results = []
-
-    def work():
-        results.extend(deformer.deform(rig.transforms, threads=2) for _ in range(5))
-
-    threads = [threading.Thread(target=work) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(results) == 20
-    for points in results:
-        np.testing.assert_array_equal(points, expected)
 
 
 @every_method
@@ -454,22 +427,6 @@ def test_gil_is_released(method):
 
 
 @every_method
-@pytest.mark.parametrize("other", METHODS)
-def test_mix_is_each_vertex_share_of_two_methods(method, other):
-    rig = random_rig(70, vertices=600, most_influences=3, scaled=True)
-    binding = rig.binding()
-    shares = np.clip(np.linspace(-0.5, 1.5, 600, dtype=np.float32), 0.0, 1.0)
-    deformer = sinew.Deformer(binding, method, mix=(other, shares))
-    assert (deformer.method, deformer.mixed_method) == (method, other)
-    a, b = (sinew.Deformer(binding, name).deform(rig.transforms) for name in (method, other))
-    points = deformer.deform(rig.transforms)
-    np.testing.assert_allclose(points, a + shares[:, None] * (b.astype(np.float64) - a), atol=1e-6)
-    np.testing.assert_array_equal(points[shares == 0.0], a[shares == 0.0])
-    np.testing.assert_array_equal(points[shares == 1.0], b[shares == 1.0])
-    np.testing.assert_array_equal(deformer.deform(rig.transforms, threads=3), points)
-
-
-@every_method
 def test_deformers_share_a_binding(method):
     rig = random_rig(71, scaled=True)
     binding = rig.binding()
@@ -499,30 +456,6 @@ def test_mix_in_another_space_goes_there_and_back():
     np.testing.assert_allclose(points, a + shares[:, None] * (b - a), atol=2e-6)
 
 
-NOT_A_NAME = [(3, "int"), (None, "NoneType"), (b"dq", "bytes"), (["dq"], "list"), ("\ud800", "'\\ud800'")]
-
-
-@pytest.mark.parametrize(("method", "got"), NOT_A_NAME)
-def test_a_method_that_is_no_name_is_refused_in_one_sentence(method, got):
-    rig = random_rig(50, vertices=3)
-    layout = np.zeros((2, 8), np.float32)
-    layout[:, 0] = 1
-    skeleton = sinew.Skeleton(np.int32([-1, 0]))
-    calls = [
-        lambda: sinew.Deformer(*rig.mesh, method=method),
-        lambda: sinew.interpolate.between(layout, layout, 0.5, method),
-        lambda: sinew.interpolate.blend(layout, np.ones(2, np.float32), method),
-        lambda: sinew.spline.catmull_rom(layout, np.float32([0, 1]), 0.5, method),
-        lambda: skeleton.interpolate(layout, layout, 0.5, method),
-        lambda: skeleton.spline(layout[None], np.float32([0]), 0.5, method),
-    ]
-    for call in calls:
-        wrong = ValueError if isinstance(method, str) else TypeError
-        with pytest.raises(wrong, match=r"^method: expected one of [\w, ]+, got ") as error:
-            call()
-        assert str(error.value).endswith(f"got {got}")
-
-
 def unaligned(array):
     """The same numbers, misaligned by one byte."""
     memory = np.zeros(array.nbytes + 1, np.uint8)
@@ -536,14 +469,6 @@ def test_unaligned_out_is_refused():
     rig = random_rig(52, vertices=3)
     with pytest.raises(ValueError, match=r"^out: expected writable .*, got one that is not aligned$"):
         rig.deform("dq", out=unaligned(rig.rest_points))
-
-
-def test_rest_bones_that_are_not_finite_are_refused():
-    rig = random_rig(53)
-    rest_bones = rig.rest_bones.copy()
-    rest_bones[2, 1, 1] = np.nan
-    with pytest.raises(ValueError, match=r"^rest_bones: expected finite values, got .* at index 2$"):
-        sinew.Deformer(*rig.mesh, "dq", rest_bones)
 
 
 @pytest.mark.parametrize("bone", [1 << 20, 100_000_000, 2**31 - 1])

@@ -145,16 +145,6 @@ def test_armature_space_is_the_blend_of_what_algorithm_1_gives():
     assert blend([a, b], (0.5, 0.5), plain("dlb")).apart.max() == 0.0
 
 
-def test_relative_blends_keep_bones_of_a_chain_together_and_armature_space_does_not():
-    """Smith 2013, figure 3.3, for blends of motions: two legs with different phases."""
-    walk, run = walks.walk(), walks.walk("late", 20, 1.1, 0.3, start=0.4)
-    for method in ("dlb", "qv_nlerp", "matrix_linear"):
-        relative = blend([walk, run], (0.5, 0.5), plain(method))
-        torn = blend([walk, run], (0.5, 0.5), plain(method, space=ARMATURE))
-        assert np.abs(relative.poses.rigid[:, 1:, 4:]).max() < 1e-12
-        assert torn.apart.max() > 0.01
-
-
 # --- Timing
 
 

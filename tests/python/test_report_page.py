@@ -13,7 +13,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from smith_2013 import measure, meshes, orders, tables
+from smith_2013 import measure, orders, tables
 from smith_2013.page import format_numbers
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
@@ -136,13 +136,6 @@ def test_the_page_says_what_the_json_says(made):
         assert answer["question"] in html.replace("&#x27;", "'").replace("&quot;", '"')
 
 
-def test_what_does_not_agree_says_why(made):
-    _html, content, _said = made
-    for number, table in content["tables"].items():
-        for row in table["rows"]:
-            assert bool(row["why"]) == (row["agrees"] is False), (number, row["name"])
-
-
 def test_what_is_missing_says_how_to_get_it(made):
     html, content, said = made
     missing = {f"Table {number}" for number, table in content["tables"].items() if table["missing"]}
@@ -153,52 +146,6 @@ def test_what_is_missing_says_how_to_get_it(made):
         assert f"{name}: Not " in said
         assert "./dev report" in said
     assert f"{len(missing)} of {len(TABLES) + len(FIGURES)} tables and figures are missing" in html
-
-
-def test_quick_mode_warns(made):
-    html, content, _said = made
-    assert content["quick"] is True
-    assert "Made in quick mode" in html
-
-
-def test_a_folder_that_is_not_there_is_said_to_be(tmp_path):
-    done = run_report(tmp_path / "out", "--programs", tmp_path / "none", status=1)
-    assert done.stderr == f"report: {tmp_path / 'none'}: no such folder\n"
-    done = run_report(tmp_path / "out", "--programs", tmp_path, status=1)
-    assert "has no program operation_counts; ./dev report builds it" in done.stderr
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_file_in_the_place_of_the_folder_is_left(tmp_path):
-    path = tmp_path / "out"
-    path.write_text("mine")
-    assert f"{path} is a file" in run_report(path, status=1).stderr
-    assert path.read_text() == "mine"
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="programs are shell scripts here")
-def test_a_program_that_fails_is_said_to(tmp_path):
-    for name in measure.PROGRAMS:
-        (tmp_path / name).write_text("#!/bin/sh\necho no such processor >&2\nexit 3\n")
-        (tmp_path / name).chmod(0o755)
-    done = run_report(tmp_path / "out", "--programs", tmp_path, status=1)
-    assert done.stderr.endswith("operation_counts: failed with status 3: no such processor\n")
-
-
-def test_without_matplotlib_the_numbers_are_there(monkeypatch):
-    from smith_2013 import paths
-
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    figure = paths.figure_3_4()
-    assert figure.pictures == ()
-    assert "matplotlib" in figure.missing
-    assert all(fact.agrees for fact in figure.facts)
-
-
-def test_missing_figures_have_the_titles_of_drawn_ones():
-    assert [figure.number for figure in meshes.missing("why")] == sorted(
-        DRAWN, key=lambda number: int(number[2:])
-    )
 
 
 @pytest.fixture(scope="module")
@@ -259,20 +206,3 @@ def test_orders_are_those_of_the_times(measurements, number):
     other = {name for name in measured - known if not name.startswith(("kernel_", "sinew_"))}
     assert not other
     assert len(rest) == (2 if number == "3.9" else 0)
-
-
-def test_an_order_that_is_another_is_said_to_be():
-    def timed(*medians):
-        names = ("glm_dual_quat", "glm_quat_vec", "glm_4x4")
-        own = {f"3.4/{name}": measure.Timing(m, m, 0.1) for name, m in zip(names, medians, strict=True)}
-        others = {name for of in orders.CANDIDATES.values() for name in of} - set(names)
-        return own | {f"3.4/{name}": measure.Timing(9.0, 9.0, 0.1) for name in others}
-
-    made = measure.Measurements({}, timed(3.0, 2.0, 1.0), timed(1.0, 2.0, 2.05), {})
-    first, second = orders.facts(made, "3.4")
-    assert first.agrees
-    assert "Of 3 pairs of rows 3 are in the printed order." in first.ours
-    assert "Not told apart by the spread: pair and matrix." in first.ours
-    assert not second.agrees
-    assert "Of 3 pairs of rows 0 are in the printed order." in second.ours
-    assert "spread" not in second.ours
