@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What README says of an installation, in an environment that has the two wheels and nothing of a checkout.
+"""Protects what README says of an installation, in an environment that has the two wheels and nothing of a
+checkout.
 
 `./dev test` makes that environment, copies this file and a rig to a folder elsewhere, and runs it in that.
 """

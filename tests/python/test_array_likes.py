@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Anything that numpy converts to an array works like that array; pickles give the same bits;
-representations."""
+"""Protects that all that numpy converts to an array works like that array, and that pickles give the same
+bits."""
 
 import copy
 import pickle

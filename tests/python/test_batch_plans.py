@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a batch reads, writes and records, without Blender: inputs, job files, journals."""
+"""Protects what a batch reads, writes and records, without Blender: inputs, job files, journals."""
 
 import glob
 import json
@@ -71,7 +71,7 @@ def test_inputs(studio, inputs, expected):
         assert found == expected
 
 
-def test_a_list_keeps_the_tree_below_what_its_files_have_in_common(studio):
+def test_a_list_keeps_folders_below_the_common_one(studio):
     lines = ["chars/hero.blend\n", "\n", f"{studio}/chars/old/hero.blend\r\n"]
     assert planned(["-"], listed=lines) == {
         "chars/hero.blend": "out/hero.blend",
@@ -83,7 +83,7 @@ def test_a_list_keeps_the_tree_below_what_its_files_have_in_common(studio):
     }
 
 
-def test_a_name_with_brackets_is_a_name_where_it_exists(studio):
+def test_a_name_with_brackets_may_be_a_file(studio):
     (studio / "b[1].blend").touch()
     assert planned(["b[1].blend"]) == {"b[1].blend": "out/b[1].blend"}
 
@@ -147,7 +147,7 @@ def test_copies_of_an_earlier_run_are_not_inputs(studio):
         (["-"], "out", "no paths"),
     ],
 )
-def test_plans_that_make_no_sense(studio, inputs, out, sentence):
+def test_plans_that_are_refused(studio, inputs, out, sentence):
     with pytest.raises(WrongUse, match=sentence):
         planned(inputs, out)
 
@@ -347,7 +347,7 @@ def saved(folder, name="a.blend"):
     return {"unfinished": unfinished.name, "written": stamp(unfinished), "source": name}
 
 
-def test_a_run_killed_before_the_name_is_finished_by_the_next(tmp_path):
+def test_a_killed_run_is_finished_by_the_next(tmp_path):
     target = tmp_path / "a.blend"
     with Journal(tmp_path) as journal:
         record = saved(tmp_path)
@@ -391,7 +391,7 @@ def test_a_journal_moves_only_unfinished_files_of_its_folder(tmp_path, harm):
     assert sorted(p for p in tmp_path.rglob("*") if p.name != NAME) + sorted(elsewhere.iterdir()) == before
 
 
-def test_what_has_no_record_is_cleared_away(tmp_path):
+def test_files_without_a_record_are_removed(tmp_path):
     saved(tmp_path)
     (tmp_path / ".2.unfinished.blend@").write_bytes(b"Blender's own")
     with Journal(tmp_path) as journal:
@@ -400,7 +400,7 @@ def test_what_has_no_record_is_cleared_away(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == [NAME]
 
 
-def test_half_a_line_is_as_if_it_had_never_been(tmp_path):
+def test_half_a_line_is_ignored(tmp_path):
     with Journal(tmp_path) as journal:
         journal.record(tmp_path / "a.blend", {"error": "one"})
         journal.record(tmp_path / "b.blend", {"error": "two"})
@@ -448,7 +448,7 @@ def test_a_journal_that_can_not_be_written(tmp_path):
         "a.blend",
     ],
 )
-def test_a_journal_leads_nowhere_else(tmp_path, line):
+def test_a_journal_moves_no_file_outside_its_folder(tmp_path, line):
     """A folder may come from anyone, and contain a journal that moves files."""
     out = tmp_path / "deep" / "out"
     out.mkdir(parents=True)
@@ -479,7 +479,7 @@ def test_a_journal_leads_nowhere_else(tmp_path, line):
         ("tree/s*/**/[bc].blend", ["sub/b.blend", "sub/deep/c.blend"]),
     ],
 )
-def test_patterns_end_where_links_lead_up_again(tmp_path, monkeypatch, pattern, expected):
+def test_patterns_with_circular_links_end(tmp_path, monkeypatch, pattern, expected):
     """With two such links, glob would need 2 ** 40 steps."""
     for name in ("a.blend", "sub/b.blend", "sub/deep/c.blend", ".hidden/d.blend"):
         (tmp_path / "tree" / name).parent.mkdir(parents=True, exist_ok=True)

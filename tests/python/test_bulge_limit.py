@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limit Bulge compared with its formula in float64, and its effect on a bent tube."""
+"""Protects Limit Bulge: compared with its formula in float64, and its effect on a bent tube."""
 
 import pickle
 

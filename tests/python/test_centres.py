@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Optimised centres of rotation: compared with the definition in float64, and their effect on a tube."""
+"""Protects optimised centres of rotation: compared with the definition in float64, and their effect on a
+tube."""
 
 import sys
 import threading
@@ -73,7 +74,7 @@ def test_centres_are_those_of_the_definition(tube):
     assert np.linalg.norm(tube.centres() - expected, axis=1).max() < 0.005
 
 
-def test_bones_of_a_vertex_may_come_twice_and_in_any_order():
+def test_bones_of_a_vertex_may_repeat_in_any_order():
     tube = three_bones()
     points, offsets, bones, weights = tube.mesh
     expected = tube.centres()
@@ -117,7 +118,7 @@ def test_progress_is_told_on_this_thread(compute):
 
 @every_precomputation
 @pytest.mark.parametrize("at", [0.0, 0.1, 0.4, 0.7, 1.0])
-def test_false_cancels_and_what_is_raised_comes_through(compute, at):
+def test_progress_can_cancel_and_raise(compute, at):
     assert compute(Tube(), progress=lambda done: done < at) is None
 
     def stop(done):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Output of commands works on any console."""
+"""Protects the output of commands on consoles without UTF-8."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct delta mush: its moments compared with scipy's sparse solver, its points with singular values,
-and its effect on a tube."""
+"""Protects direct delta mush: its moments compared with scipy's sparse solver, its points with the float64
+reference, and its effect on a tube."""
 
 import numpy as np
 import pytest

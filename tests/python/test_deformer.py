@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deformer: its methods compared with float64 reference code, its threads, its errors."""
+"""Protects the deformer: its methods compared with float64 reference code, its threads, its errors."""
 
 import os
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.DeltaMush compared with float64 numpy."""
+"""Protects sinew.DeltaMush: compared with float64 numpy."""
 
 import pickle
 
@@ -84,7 +84,7 @@ def test_writes_in_place_and_on_any_number_of_threads():
     np.testing.assert_array_equal(mush.apply(points.astype(np.float64).tolist()), expected)
 
 
-def test_bound_again_it_is_as_made_so():
+def test_binding_again_equals_a_new_one():
     mesh = mesh_of(3)
     points = bent(mesh[0])
     mush = sinew.DeltaMush(*arrays_of(mesh), iterations=9, weights=np.full(148, 0.5))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Diagnostics find planted faults and no others; what they report about dual quaternions is true."""
+"""Protects diagnostics: they find planted faults and no others; what they report about dual quaternions is
+true."""
 
 from itertools import permutations
 
@@ -84,7 +85,7 @@ def pose_check(motions_of_frames, influences):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_dependence_on_the_order_of_groups_is_what_dual_quaternions_do(seed):
+def test_dependence_on_the_order_of_groups_is_found(seed):
     """All orders of each vertex's influences, with the float64 reference."""
     rig = random_rig(seed, vertices=60, bones=8, most_influences=5)
     influences = Influences(rig.offsets, rig.bones, rig.weights)
@@ -144,7 +145,7 @@ def test_jumps_are_found_between_frames():
     assert pose_check([rotated(d) for d in (0, 60, 120, 170, 120)], influences) == {}
 
 
-def test_a_jump_is_one_in_the_deformed_mesh():
+def test_reported_jumps_are_jumps_of_the_mesh():
     """Half a degree beyond 180 degrees, the vertex jumps to the other side of the bone."""
     influences = two_bones([0.5])
     frames = [179.0, 179.6, 180.4, 181.0]

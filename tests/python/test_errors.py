@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every error names the argument, what was expected and what was given."""
+"""Protects errors: each names the argument, what was expected and what was given."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every public function of the mathematics, with 2,000 seeded cases each including edge cases, compared with
-50 digits (mpmath): float64 to 1e-14 and float32 to 1e-5 of what is summed, unless a check says why it allows
-more.
+"""Protects every public function of the mathematics, with 2,000 seeded cases each including edge cases,
+compared with 50 digits (mpmath): float64 to 1e-14 and float32 to 1e-5 of what is summed, unless a check says
+why it allows more.
 
 Rounding of the input counts as the function's error: results are compared with those for the input before it
 was rounded. Edge cases are rotations by 0, nearly 0, 180 degrees and nearly 180 degrees, both signs of

@@ -86,7 +86,7 @@ def test_degenerate_points_are_flagged(case, dtype, method):
 
 @SOLVERS
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_lines_in_any_direction_are_no_mirror_images(dtype, method):
+def test_points_on_a_line_are_never_mirrored(dtype, method):
     """The determinant of their covariance is a rounding error of either sign."""
     for seed in range(100):
         rng = np.random.default_rng(seed)
@@ -124,7 +124,7 @@ def test_no_weight_gives_the_identity_and_weights_of_0_leave_points_out(method):
 
 @SOLVERS
 @pytest.mark.parametrize(("size", "dtype"), [(1e-150, float), (1e150, float), (1e-30, "f4"), (1e30, "f4")])
-def test_sizes_near_the_ends_of_a_type(method, size, dtype):
+def test_the_smallest_and_largest_coordinates(method, size, dtype):
     source, target, _ = random_pairs(np.random.default_rng(6), 1, noise=0)
     result = fit.rigid((size * source[0]).astype(dtype), (size * target[0]).astype(dtype), method=method)
     got = matrix(result.transforms, LAYOUT_OF[method])
@@ -158,7 +158,7 @@ def test_hand_eye_of_every_layout_and_with_weights():
         assert fit.hand_eye(convert(a).astype("f4"), convert(b).astype("f4")).transforms.dtype == np.float32
 
 
-def test_hand_eye_says_what_does_not_decide():
+def test_hand_eye_of_parallel_axes_is_not_defined():
     rng = np.random.default_rng(11)
     x = rigid(rng)
 
@@ -185,7 +185,7 @@ def cluster(rng, middle, count, spread):
 
 
 @pytest.mark.parametrize("robust", [False, True])
-def test_averages_that_several_poses_are(robust):
+def test_averages_that_are_not_unique_are_not_defined(robust):
     turns = RigidTransform.from_rotation(Rotation.from_euler("z", [[0], [120], [240]], degrees=True))
     for name in ("affine", "quat_vec", "dual_quat"):
         result = fit.average(layout(turns, name), robust=robust)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arbitrary arguments for everything that the library exports: the outcome is a result, or an error that
-names an argument.
+"""Protects everything that the library exports from arbitrary arguments: the outcome is a result, or an error
+that names an argument.
 
 Accepted arguments must give the same result as plain contiguous arrays of the same numbers.
 SINEW_FUZZ_EXAMPLES (default 8000, which takes under a minute) is the number for all cases together.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The golden set's reader reproduces it, and so does the library."""
+"""Protects the golden set: its reader reproduces it, and so does the library."""
 
 import importlib
 import itertools

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones: properties of the solution, and motions that were made by known helper bones."""
+"""Protects helper bones: properties of the solution, and motions that were made by known helper bones."""
 
 from __future__ import annotations
 

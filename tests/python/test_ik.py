@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.ik compared with scipy's least squares, the law of cosines, and plain matrices for the poses."""
+"""Protects sinew.ik: compared with scipy's least squares, the law of cosines, and plain matrices for the
+poses."""
 
 import numpy as np
 import pytest

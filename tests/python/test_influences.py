@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Influences from vertex groups."""
+"""Protects influences from vertex groups."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_influences_equal_a_loop_over_the_entries():
             assert found == in_a_loop(groups, bone_of_group)
 
 
-def test_what_all_counts_is_not_copied():
+def test_arrays_are_shared_where_nothing_is_dropped():
     groups = random_groups(1, zeros=False)
     entries = entries_of_bones(groups, np.arange(5, dtype=np.int32))
     influences = entries.influences()

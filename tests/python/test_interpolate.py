@@ -132,7 +132,7 @@ def wide_motions(rng, count):
 
 
 @pytest.mark.parametrize("method", SIGNED)
-def test_what_the_order_decides_is_not_defined(method):
+def test_blends_that_depend_on_the_order_are_not_defined(method):
     rng = np.random.default_rng(20)
     even = np.ones((2000, 3))
     plain, changes = blends_in_two_orders(method, wide_motions(rng, 2000), even)
@@ -149,7 +149,7 @@ def test_what_the_order_decides_is_not_defined(method):
     assert plain.is_defined.mean() > 0.99
 
 
-def test_turns_by_thirds_are_a_tie():
+def test_three_rotations_by_120_degrees_are_a_tie():
     turns = sinew.dual_quat.from_axis_angle([0, 0, 1], np.radians([0.0, 120, 240]))
     for method in ("dlb", "dib", "sclerp"):
         assert not blend(turns, np.ones(3), method).is_defined
@@ -162,7 +162,7 @@ def test_turns_by_thirds_are_a_tie():
 
 
 @ALL
-def test_what_is_no_rotation_is_not_defined(method):
+def test_transforms_that_are_not_rigid_are_not_defined(method):
     name = LAYOUT_OF[method]
     ends = layout(rigid(np.random.default_rng(21), 2), name)
     long = ends.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which files may include and import which, read from the sources as text."""
+"""Protects the layers: which files may include and import which."""
 
 import ast
 import re
@@ -180,7 +180,7 @@ def test_jobs_hand_tasks_out_without_importing_them():
     assert rooms <= {"core", "jobs"} | FOR_ALL
 
 
-def test_what_the_extension_uses_of_the_library_is_looked_for_when_it_starts():
+def test_the_extension_checks_all_names_that_it_uses_of_the_library():
     """addon/native.py reports in a sentence if an older library lacks it."""
     addon = ROOT / "addon"
     tree = ast.parse((addon / "native.py").read_text(encoding="utf-8"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mended weights compared with plain matrices in float64."""
+"""Protects mended weights: compared with plain matrices in float64."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Metrics on shapes whose measures are known in closed form, and compared with trimesh."""
+"""Protects metrics: on shapes whose measures are known in closed form, and compared with trimesh."""
 
 import numpy as np
 import pytest

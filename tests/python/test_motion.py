@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blended clips: compared with formulas in numpy and scipy, and with walks whose contacts are known."""
+"""Protects blended clips: compared with the library's blends, and with walks whose contacts are known."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_a_clip_of_weight_one_is_that_clip(method, space, root_motion):
 
 @pytest.mark.parametrize("root_motion", [TRAVEL, KEYED])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_clip_that_is_none_of_the_cycles_is_itself_too(method, root_motion):
+def test_a_clip_without_cycles_of_weight_one_is_that_clip(method, root_motion):
     clips = pair()
     for is_aligned in (True, False):
         settings = Settings(method=method, root_motion=root_motion, align=is_aligned)

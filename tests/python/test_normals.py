@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.Normals compared with float64 numpy."""
+"""Protects sinew.Normals: compared with float64 numpy."""
 
 import pickle
 
@@ -69,7 +69,7 @@ def test_custom_normals_agree_with_the_reference(share, is_bent):
         np.testing.assert_array_equal(normals.compute(points, domain), plain.compute(points, domain))
 
 
-def test_its_own_domain_is_the_least_that_will_do():
+def test_its_domain_is_the_smallest_that_suffices():
     mesh = mesh_of(2)
     points = bent(mesh[0])
     flat = {"sharp_faces": np.ones(len(mesh[1]), bool)}
@@ -84,7 +84,7 @@ def test_its_own_domain_is_the_least_that_will_do():
     np.testing.assert_array_equal(corners, np.repeat(normals.compute(points), sizes, axis=0))
 
 
-def test_edges_are_needed_only_where_something_is_sharp():
+def test_edges_are_needed_only_for_sharp_meshes():
     mesh = mesh_of(2)
     points, offsets, corners, edges = arrays_of(mesh)
     normals = sinew.Normals(len(points), offsets, corners)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours, plots and picture comparison."""
+"""Protects colours, plots and picture comparison."""
 
 import json
 import re
@@ -122,7 +122,7 @@ def test_ratios_are_shown_around_one(least, most, high):
     np.testing.assert_array_equal(np.argsort(scale.severity(np.array([1.5, 0.25, 1.0]))), [2, 0, 1])
 
 
-def test_rounding_is_not_blown_up():
+def test_rounding_errors_are_not_scaled_up():
     scale = HeatScale.over(METRICS["distance"], [[summary(distance_max=1e-9)]], 2.0)
     assert scale.high == pytest.approx(2e-4)
 
@@ -130,7 +130,7 @@ def test_rounding_is_not_blown_up():
 @pytest.mark.parametrize(
     ("largest", "high"), [((0.0, 0.5, 0.04), 0.08), ((0.3, 0.5), 0.5), ((0.0, 0.5), 0.5), ((0.5,), 0.5)]
 )
-def test_a_torn_mesh_does_not_make_the_others_pale(largest, high):
+def test_one_torn_mesh_does_not_stretch_the_scale(largest, high):
     scale = HeatScale.over(METRICS["distance"], [[summary(distance_max=most)] for most in largest], 1.0)
     assert scale.high == pytest.approx(high)
     assert scale.clipped == (high < max(largest))

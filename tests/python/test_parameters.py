@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""NAME=VALUE, as in --set and in job files."""
+"""Protects NAME=VALUE, as in --set and in job files."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sentences that keep the values they were made from."""
+"""Protects sentences that keep the values they were made from."""
 
 import copy
 import json

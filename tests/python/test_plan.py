@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who deforms an object, as a table, without Blender."""
+"""Protects who deforms an object, as a table, without Blender."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The platforms that tools/cross_build.py builds for have consistent names. Nothing is built here."""
+"""Protects the names of the platforms that tools/cross_build.py builds for, and its wheels."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_modules_are_named_as_python_looks_for_them():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Python has no such values there")
-def test_what_is_said_of_the_system_is_what_python_was_built_with():
+def test_pyconfig_agrees_with_this_python():
     own = sysconfig.get_config_vars()
     unix = re.sub(r"#ifdef _WIN32\n.*?(#else|#endif)\n", "", PYCONFIG, flags=re.DOTALL)
     said = {name: int(value) for name, value in re.findall(r"^#define (\w+) (\d+)$", unix, re.MULTILINE)}
@@ -109,7 +109,7 @@ def test_a_wheel_is_whole_and_always_the_same(tmp_path):
     assert {n for n in installed if not compiled.fullmatch(n)} == ours - {f"sinew/{module.name}"}
 
 
-def test_what_is_left_out_elsewhere_is_there():
+def test_tests_left_out_on_other_platforms_exist():
     """A renamed test would otherwise run there unnoticed, or not at all."""
     for name in platform_tests.CHECKOUT_TESTS:
         assert (ROOT / f"tests/python/{name}.py").is_file()

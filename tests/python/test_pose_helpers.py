@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones that follow the pose, in poses other than those they were made from; and the random poses."""
+"""Protects helper bones that follow the pose, in poses other than those they were made from; and the
+random poses."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Precomputations on threads, and the folder that caches their results."""
+"""Protects precomputations on threads, and the folder that caches their results."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def until_cancelled(begun: threading.Event):
     return make
 
 
-def test_it_runs_once_for_each_key_on_a_thread_of_its_own():
+def test_each_key_runs_once_on_its_own_thread():
     calls, all_of_it = [], precompute.Precomputations()
     run = all_of_it.start("a", counted(calls))
     run.wait()
@@ -56,13 +56,13 @@ def test_it_runs_once_for_each_key_on_a_thread_of_its_own():
     assert not all_of_it.running
 
 
-def test_who_waits_computes_on_its_own_thread():
+def test_waiting_computes_on_the_waiting_thread():
     calls, all_of_it = [], precompute.Precomputations()
     np.testing.assert_array_equal(all_of_it.make_now("a", counted(calls)), RESULT)
     assert calls == [threading.current_thread()]
 
 
-def test_who_waits_for_one_that_runs_starts_no_other():
+def test_waiting_for_a_running_one_starts_no_other():
     all_of_it, go = precompute.Precomputations(), threading.Event()
     calls = []
 
@@ -78,7 +78,7 @@ def test_who_waits_for_one_that_runs_starts_no_other():
     assert len(calls) == 1
 
 
-def test_stopping_ends_the_thread_and_a_render_computes_it_all_the_same():
+def test_a_stopped_one_can_be_computed_again():
     all_of_it, begun = precompute.Precomputations(), threading.Event()
     run = all_of_it.start("a", until_cancelled(begun))
     assert begun.wait(10)
@@ -90,7 +90,7 @@ def test_stopping_ends_the_thread_and_a_render_computes_it_all_the_same():
     np.testing.assert_array_equal(all_of_it.make_now("a", counted([])), RESULT)
 
 
-def test_what_it_raises_is_told():
+def test_errors_are_reported():
     def make(_progress):
         raise ValueError("no such mesh")
 
@@ -110,7 +110,7 @@ def test_memory_is_limited(monkeypatch):
     assert [all_of_it.find(key) is not None for key in "abcd"] == [False, True, True, True]
 
 
-def test_another_process_finds_what_took_long(tmp_path, monkeypatch):
+def test_another_process_finds_slow_results(tmp_path, monkeypatch):
     monkeypatch.setattr(precompute, "SECONDS_WORTH_A_FILE", 0.0)
     first, other = (precompute.Precomputations(file_cache.FileCache(tmp_path, 10**6)) for _ in range(2))
     first.make_now("a", counted([]))
@@ -141,7 +141,7 @@ def test_a_damaged_file_is_none(tmp_path, damage):
     np.testing.assert_array_equal(cache.load("a"), RESULT)
 
 
-def test_what_was_used_least_lately_goes_first(tmp_path):
+def test_the_least_recently_used_file_is_removed_first(tmp_path):
     one = 200 + RESULT.nbytes
     cache = file_cache.FileCache(tmp_path, 3 * one)
     for age, key in enumerate("abc"):
@@ -153,13 +153,13 @@ def test_what_was_used_least_lately_goes_first(tmp_path):
     assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= cache.limit
 
 
-def test_what_does_not_fit_is_not_kept(tmp_path):
+def test_results_beyond_the_limit_are_not_stored(tmp_path):
     cache = file_cache.FileCache(tmp_path, 100)
     cache.store("a", RESULT)
     assert not list(tmp_path.iterdir())
 
 
-def test_what_a_killed_process_left_is_removed(tmp_path):
+def test_files_of_killed_processes_are_removed(tmp_path):
     old, new = tmp_path / ".old.sinew", tmp_path / ".new.sinew"
     for path in (old, new):
         path.write_bytes(b"half")
@@ -169,7 +169,7 @@ def test_what_a_killed_process_left_is_removed(tmp_path):
     assert new.exists()
 
 
-def test_a_folder_that_can_not_be_is_no_error(tmp_path):
+def test_a_folder_that_can_not_be_made_is_no_error(tmp_path):
     (tmp_path / "file").write_bytes(b"")
     cache = file_cache.FileCache(tmp_path / "file" / "folder", 10**6)
     cache.store("a", RESULT)
@@ -190,7 +190,7 @@ for number in range(300):
 """
 
 
-def test_several_processes_share_it(tmp_path):
+def test_several_processes_share_the_folder(tmp_path):
     """No process ever reads a file that another has half written."""
     running = [
         subprocess.Popen([sys.executable, "-c", WRITER, _CORE, tmp_path], stderr=subprocess.PIPE, text=True)

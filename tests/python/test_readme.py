@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first Python program of the documents runs, and README's table of methods agrees with the library."""
+"""Protects the documents' first Python program, which runs, and README's table of methods."""
 
 import re
 from pathlib import Path

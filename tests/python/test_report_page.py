@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of `./dev report`, made in quick mode: it needs no other files, and agrees with report.json.
+"""Protects the page of `./dev report`, made in quick mode: it needs no other files, and agrees with
+report.json.
 
 SINEW_EXPERIMENTS is the folder of the built programs of experiments/; without it the page has no times.
 """

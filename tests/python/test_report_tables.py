@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smith 2013, Tables 3.1 and 3.6 to 3.8 and Figures 3.4 and 3.5: what the printed digits are, and why the
-columns differ. All numbers are those of `./dev report`.
+"""Protects what is computed for Smith 2013, Tables 3.1 and 3.6 to 3.8 and Figures 3.4 and 3.5: what the
+printed digits are, and why the columns differ. All numbers are those of `./dev report`.
 
 The axes in the report are rounded and not of unit length (|(0.707, -0.707, 0)| = 0.99985). Its matrix path
 normalises the axis (as glm::rotate does), its quaternion path normalises the quaternion (cos, sin axis).

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/results.md: what is generated from its numbers, docs/results.json, and from other numbers."""
+"""Protects docs/results.md: it is what its numbers, docs/results.json, give."""
 
 import copy
 import json
@@ -36,7 +36,7 @@ def test_its_plots_are_there():
         assert len(kept) < 100_000
 
 
-def test_what_is_not_whole_makes_no_page(content, tmp_path):
+def test_incomplete_reports_make_no_page(content, tmp_path):
     report = {
         **content,
         "quick": False,

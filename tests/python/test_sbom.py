@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bill of materials agrees with a zip's content: compared with the module itself, and with
+"""Protects the bill of materials of a zip: compared with the module itself, and with
 CycloneDX's schema."""
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def zip_of_two(tmp_path):
     return make_zip(tmp_path / "sinew-1.2.3.zip", wheels)
 
 
-def test_it_says_what_the_zip_holds(zip_of_two):
+def test_it_lists_the_contents_of_the_zip(zip_of_two):
     bill = json.loads(sbom.write_bill(zip_of_two).read_text(encoding="utf-8"))
     ours = bill["metadata"]["component"]
     assert ours["name"] == "sinew"
@@ -75,7 +75,7 @@ def test_it_says_what_the_zip_holds(zip_of_two):
     }
 
 
-def test_it_is_of_the_form_that_others_read(zip_of_two):
+def test_it_is_valid_cyclonedx(zip_of_two):
     cyclonedx = pytest.importorskip(
         "cyclonedx.validation.json", reason="the library with the schema is not here"
     )
@@ -96,7 +96,7 @@ def test_it_is_of_the_form_that_others_read(zip_of_two):
         (b"sinew-compiled-in{GLM=none}", "GLM says no version"),
     ],
 )
-def test_what_it_can_not_say_is_an_error(module, said, tmp_path):
+def test_modules_with_an_unclear_list_are_refused(module, said, tmp_path):
     package_path = make_zip(tmp_path / "sinew-1.2.3.zip", [make_wheel(tmp_path, module)])
     with pytest.raises(SystemExit, match=said):
         sbom.write_bill(package_path)

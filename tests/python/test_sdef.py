@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spherical deform compared with its formula in float64, and parameters of methods, since it has one."""
+"""Protects spherical deform: compared with its formula in float64, and parameters of methods, since it has
+one."""
 
 import numpy as np
 import pytest

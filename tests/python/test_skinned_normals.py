@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sinew.SkinnedNormals: its oracle is the derivative of the methods in float64."""
+"""Protects sinew.SkinnedNormals: the oracle is the derivative of the methods in float64."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def test_agrees_with_the_differentiated_reference(method, is_scaled):
     np.testing.assert_allclose(got_tangents[clear], of_tangents[clear], rtol=0, atol=1e-4)
 
 
-def test_of_corners_are_those_of_their_vertices():
+def test_corners_have_the_normals_of_their_vertices():
     rig = rigs.random_rig(6)
     normals, tangents = frames_of(rig)
     vertices = np.random.default_rng(1).integers(0, len(normals), 900)

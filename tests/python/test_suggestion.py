@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which method is best by which criterion."""
+"""Protects which method is best by which criterion."""
 
 import math
 
@@ -25,7 +25,7 @@ def test_the_worst_frame_counts_and_its_sign_does_not():
     assert made.best(BY_NAME["volume"]) == ["b"]
 
 
-def test_equals_share_and_where_all_are_equal_nobody_is_best():
+def test_equal_methods_are_all_best_or_none():
     assert suggestion(stretch=[[0.100], [0.101], [0.2]]).best(BY_NAME["stretch"]) == ["a", "b"]
     assert suggestion(stretch=[[0.1], [0.1], [0.1]]).best(BY_NAME["stretch"]) == []
     # A method that is far off does not make the others count as equal.
@@ -33,26 +33,26 @@ def test_equals_share_and_where_all_are_equal_nobody_is_best():
 
 
 @pytest.mark.parametrize(("difference", "best"), [(1e-4, []), (1e-3, ["a"])])
-def test_lengths_are_judged_as_parts_of_the_diagonal(difference, best):
+def test_lengths_are_relative_to_the_diagonal(difference, best):
     made = suggestion(bulge=[[0.0], [difference], [difference]])
     assert made.best(BY_NAME["bulge"]) == best
 
 
-def test_what_is_not_measured_is_nobodys():
+def test_criteria_that_are_not_measured_have_no_best():
     made = suggestion(volume=[[math.nan], [math.nan], [math.nan]])
     assert made.worst == {}
     assert made.best(BY_NAME["volume"]) == made.best(BY_NAME["crossings"]) == []
     assert made.text == "All methods are equally good here."
 
 
-def test_the_best_comes_first_and_what_is_not_measured_last():
+def test_methods_are_sorted_with_unmeasured_ones_last():
     made = suggestion(volume=[[0.2], [math.nan], [-0.1]], stretch=[[0.2], [0.1], [0.3]])
     assert made.order(BY_NAME["volume"]) == ["c", "a", "b"]
     assert made.order(BY_NAME["stretch"]) == ["b", "a", "c"]
     assert made.order(BY_NAME["crossings"]) == ["a", "b", "c"]
 
 
-def test_one_sentence_says_who_is_best_at_what():
+def test_one_sentence_names_the_best():
     made = suggestion(
         stretch=[[0.2], [0.1], [0.3]], flips=[[0.2], [0.1], [0.3]], volume=[[0.1], [0.2], [0.3]]
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Threads that Python did not start, such as Blender's."""
+"""Protects threads that Python did not start, such as Blender's."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wheel of sinew-blender contains every module; tests/installed runs its content."""
+"""Protects the wheel of sinew-blender: it contains every module; tests/installed runs its content."""
 
 import re
 import shutil

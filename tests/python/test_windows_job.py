@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""On Windows, Blender processes do not outlive their batch. tests/blender/test_batch.py tests this on
+"""Protects Windows: Blender processes do not outlive their batch. tests/blender/test_batch.py tests this on
 Linux."""
 
 from __future__ import annotations

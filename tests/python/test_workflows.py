@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the hosted workflows call exists, and only the approved job publishes. Their syntax and their safety
-are checked by ./dev lint, with check-jsonschema, zizmor and, where it is installed, actionlint."""
+"""Protects the hosted workflows: what they call exists, and only the approved job publishes. Their syntax
+and their safety are checked by ./dev lint, with check-jsonschema, zizmor and, where it is installed,
+actionlint."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shaders compute what the golden set holds, on a software renderer where there is no other."""
+"""Protects the shaders: they compute what the golden set holds, on a software renderer where there is no
+other."""
 
 import re
 import sys
