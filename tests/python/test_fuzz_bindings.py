@@ -6,6 +6,7 @@ Accepted arguments must give the same result as plain contiguous arrays of the s
 SINEW_FUZZ_EXAMPLES (default 8000, which takes under a minute) is the number for all cases together.
 """
 
+import itertools
 import os
 import pickle
 import re
@@ -259,46 +260,88 @@ def blend_calls(draw):
     return function, [draw(kinds[kind](wild[i])) for i, kind in enumerate(of_arguments.split())]
 
 
+class Draw:
+    """Draws arguments of calls. Of some `count` none or one may be anything, so that errors do not hide each
+    other."""
+
+    def __init__(self, draw, count):
+        self.draw = draw
+        self._chosen = draw(st.integers(-1, count - 1))
+        self._drawn = itertools.count()
+
+    def _is_wild(self):
+        return next(self._drawn) == self._chosen
+
+    def _pair(self, make, is_optional):
+        wild = self._is_wild()
+        strategy = or_garbage(make(wild), wild)
+        return self.draw(st.one_of(st.just((None, None)), strategy) if is_optional else strategy)
+
+    def array(self, *shape, optional=False):
+        return self._pair(lambda wild: arrays(shape, wild), optional)
+
+    def integers(self, values, optional=False):
+        return self._pair(lambda wild: integers(values, wild), optional)
+
+    def one(self, known):
+        """One of the known values, without plain numbers."""
+        return self.draw(names(known, self._is_wild()))
+
+    def threads(self):
+        return self.one(st.one_of(st.none(), st.integers(0, 70)))
+
+    def out(self, count):
+        return self.one(st.sampled_from([None, np.zeros((count, 3), np.float32)]))
+
+    def skin(self, vertices, each, bones):
+        """Rest points and influences."""
+        count = vertices * each
+        return [
+            self.array(vertices, 3),
+            self.integers([each * vertex for vertex in range(vertices + 1)]),
+            self.integers([i % bones for i in range(count)]),
+            self._pair(lambda wild: arrays((count,), wild).map(positive), False),
+        ]
+
+    def faces(self, vertices):
+        """Of one of SHEETS: rest points, the faces' offsets and corners, and edges."""
+        offsets, corners, ends = SHEETS[vertices]
+        edges = self.one(st.just(np.array(ends, np.int32).reshape(-1, 2)))
+        return [self.array(vertices, 3)[0], self.integers(offsets)[0], self.integers(corners)[0], edges]
+
+
+TRANSFORMS = st.sampled_from(["affine", "rows", "quat_vec", "dual_quat"])
+
+
 @st.composite
 def fit_calls(draw):
-    of_fit = sinew._native.fit
-    count = draw(st.integers(0, 5))
-    wild = wild_one(draw, 5)
-    layout = draw(st.sampled_from(["affine", "rows", "quat_vec", "dual_quat"]))
-
-    def rows(shape, index):
-        return draw(or_garbage(arrays((count, *shape), wild[index]), wild[index]))
-
-    weights = draw(st.one_of(st.just((None, None)), st.just(rows((), 2))))
+    of_fit, count, layout = sinew._native.fit, draw(st.integers(0, 5)), draw(TRANSFORMS)
+    d = Draw(draw, 8)
+    weights = d.array(count, optional=True)
     if draw(st.booleans()):
-        solver = draw(names(st.sampled_from(sinew.fit.METHODS), wild[4]).map(lambda name: (name, None)))
+        solver = d.one(st.sampled_from(sinew.fit.METHODS)), None
         directions = [(None, None)] * 3
         if draw(st.booleans()):
-            directions = [rows((3,), 3), rows((3,), 4), (None, None)]
-        return of_fit.rigid, [rows((3,), 0), rows((3,), 1), weights, *directions, solver]
+            directions = [d.array(count, 3), d.array(count, 3), (None, None)]
+        return of_fit.rigid, [d.array(count, 3), d.array(count, 3), weights, *directions, solver]
+    poses = d.array(count, *KINDS[layout])
     if draw(st.booleans()):
-        return of_fit.hand_eye, [rows(KINDS[layout], 0), rows(KINDS[layout], 1), weights]
-    is_robust = (draw(st.booleans()), None)
-    return of_fit.average, [rows(KINDS[layout], 0), weights, is_robust]
+        return of_fit.hand_eye, [poses, d.array(count, *KINDS[layout]), weights]
+    return of_fit.average, [poses, weights, (draw(st.booleans()), None)]
 
 
 @st.composite
 def ik_calls(draw):
-    count = draw(st.integers(1, 3))
-    wild = wild_one(draw, 6)
-    layout = draw(st.sampled_from(["affine", "rows", "quat_vec", "dual_quat"]))
-
-    def rows(shape, index):
-        return draw(or_garbage(arrays(shape, wild[index]), wild[index]))
-
+    count, shape = draw(st.integers(1, 3)), KINDS[draw(TRANSFORMS)]
+    d = Draw(draw, 6)
     solver = sinew._native.ik.Solver(
         np.arange(-1, count - 1, dtype=np.int32), np.int32([count - 1]), [[1.0, 0.5]], [[1.0, 0.2]],
         None, None, None,
     )  # fmt: skip
-    method = draw(names(st.sampled_from(sinew.ik.METHODS), wild[5]).map(lambda name: (name, None)))
+    method = d.one(st.sampled_from(sinew.ik.METHODS)), None
     return solver.solve, [
-        *(rows((count, *KINDS[layout]), 0), rows((1, 3), 1), rows((1, *KINDS[layout]), 2), rows((1, 3), 3)),
-        *(rows((count, 4), 4), (None, None), method, (1e-6, None), (5, None)),
+        *(d.array(count, *shape), d.array(1, 3), d.array(1, *shape), d.array(1, 3), d.array(count, 4)),
+        *((None, None), method, (1e-6, None), (5, None)),
     ]
 
 
@@ -345,16 +388,9 @@ def test_inverse_kinematics(call):
 @many(0.05)
 @given(st.data())
 def test_solvers_of_inverse_kinematics(data):
-    count, wild = data.draw(st.integers(1, 3)), data.draw(st.booleans())
-    drawn = [
-        data.draw(or_garbage(integers(range(-1, count - 1), wild), wild)),
-        data.draw(or_garbage(integers([count - 1], wild), wild)),
-        *(data.draw(or_garbage(arrays(shape, wild), wild)) for shape in [(1, 2), (1, 2)]),
-        *(
-            data.draw(st.one_of(st.just((None, None)), or_garbage(arrays(shape, wild), wild)))
-            for shape in [(count, 3), (count, 3, 2), (count, 3)]
-        ),
-    ]
+    count, d = data.draw(st.integers(1, 3)), Draw(data.draw, 7)
+    drawn = [d.integers(range(-1, count - 1)), d.integers([count - 1]), d.array(1, 2), d.array(1, 2)]
+    drawn += [d.array(count, *shape, optional=True) for shape in ((3,), (3, 2), (3,))]
     arguments = {"parents", "effectors", "weights", "pole_angle", "locked", "limits", "stiffness"}
     attempt(sinew._native.ik.Solver, [given for given, _ in drawn], arguments)
 
@@ -407,46 +443,27 @@ def plain_mesh(values):
 @given(st.data())
 def test_meshes(data):
     vertices = data.draw(st.sampled_from([0, 1, 2, 5, 20]))
-    each = data.draw(st.integers(0, 4))
-    bones = data.draw(st.integers(1, 4))
-    influences = vertices * each
-    offsets = [each * vertex for vertex in range(vertices + 1)]
-    wild = wild_one(data.draw, 15)
-    nothing = st.just((None, None))
-    mesh = [
-        data.draw(strategy)
-        for strategy in (
-            or_garbage(arrays((vertices, 3), wild[0]), wild[0]),
-            or_garbage(integers(offsets, wild[1]), wild[1]),
-            or_garbage(integers([i % bones for i in range(influences)], wild[2]), wild[2]),
-            or_garbage(arrays((influences,), wild[3]).map(positive), wild[3]),
-            st.one_of(nothing, or_garbage(arrays((bones, 4, 4), wild[4]), wild[4])),
-        )
-    ]
+    each, bones = data.draw(st.integers(0, 4)), data.draw(st.integers(1, 4))
+    d = Draw(data.draw, 16)
+    mesh = [*d.skin(vertices, each, bones), d.array(bones, 4, 4, optional=True)]
     binding = attempt(sinew.Binding, [given for given, _ in mesh], MESH)
     if binding is None:
         return
     repr(binding)
-    method, other = data.draw(names(METHODS, wild[5])), data.draw(names(METHODS, wild[6]))
-    shares = data.draw(or_garbage(arrays((vertices,), wild[7]), wild[7]))
-    mix = data.draw(names(st.sampled_from([None, (other, shares[0])]), wild[8]))
+    method, other = d.one(METHODS), d.one(METHODS)
+    mix = d.one(st.sampled_from([None, (other, d.array(vertices)[0])]))
     deformer = attempt(sinew.Deformer, [binding, method, mix], {"method", "mix", "binding"})
     if deformer is None:
         return
     repr(deformer)
-    points = data.draw(or_garbage(arrays((vertices, 3), wild[9]), wild[9]))
+    points = d.array(vertices, 3)
     moved = attempt(lambda *given: deformer.set_rest_points(*given) or True, [points[0]], {"rest_points"})
-    pose = data.draw(or_garbage(arrays((binding.bone_count, 4, 4), wild[10]), wild[10]))
-    out = data.draw(names(st.sampled_from([None, np.zeros((vertices, 3), np.float32)]), wild[11]))
-    threads = data.draw(names(st.one_of(st.none(), st.integers(0, 70)), wild[11]))
-    space = data.draw(st.one_of(nothing, or_garbage(arrays((4, 4), wild[12]), wild[12])))
-    inverses = data.draw(
-        st.one_of(nothing, or_garbage(arrays((binding.bone_count, 4, 4), wild[13]), wild[13]))
-    )
-    parameters = data.draw(names(st.sampled_from([None, {}, {"sdef.interpolation": "slerp"}]), wild[14]))
-    if wild[14] and data.draw(st.booleans()):
-        keys = st.sampled_from(["sdef.interpolation", "sdef", "", "dq.interpolation", b"sdef", 3, None, (1,)])
-        parameters = {data.draw(keys): data.draw(GARBAGE)}
+    pose, out, threads = d.array(binding.bone_count, 4, 4), d.out(vertices), d.threads()
+    space = d.array(4, 4, optional=True)
+    inverses = d.array(binding.bone_count, 4, 4, optional=True)
+    key = st.sampled_from(["sdef.interpolation", "sdef", "", "dq.interpolation", b"sdef", 3, None, (1,)])
+    value = d.one(st.just("slerp"))
+    parameters = d.one(st.sampled_from([None, {}, {"sdef.interpolation": value}, {data.draw(key): value}]))
     known = {"bone_transforms", "out", "threads", "bones_from_model", "rest_inverses", "parameters"}
     result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0], parameters], known)
     if result is None:
@@ -475,145 +492,81 @@ SHEETS = {
 @given(st.data())
 def test_delta_mush(data):
     vertices = data.draw(st.sampled_from(sorted(SHEETS)))
-    wild = wild_one(data.draw, 14)
-    offsets, corners, ends = SHEETS[vertices]
-    points, *faces = (
-        data.draw(strategy)[0]
-        for strategy in (
-            or_garbage(arrays((vertices, 3), wild[0]), wild[0]),
-            or_garbage(integers(offsets, wild[1]), wild[1]),
-            or_garbage(integers(corners, wild[2]), wild[2]),
-        )
-    )
-    edges = np.array(ends, np.int32).reshape(-1, 2)
-    edges = data.draw(GARBAGE) if wild[3] else edges
+    d = Draw(data.draw, 15)
     settings = {
-        "iterations": data.draw(names(st.integers(0, 30), wild[4])),
-        "radius": data.draw(names(st.floats(0, 2), wild[5])),
-        "factor": data.draw(names(st.floats(0, 1), wild[6])),
-        "smooth_type": data.draw(names(st.sampled_from(["simple", "length_weighted"]), wild[7])),
-        "pin_boundary": data.draw(names(st.booleans(), wild[8])),
-        "weights": data.draw(st.one_of(st.none(), or_garbage(arrays((vertices,), wild[9]), wild[9]))),
+        "iterations": d.one(st.integers(0, 30)),
+        "radius": d.one(st.floats(0, 2)),
+        "factor": d.one(st.floats(0, 1)),
+        "smooth_type": d.one(st.sampled_from(["simple", "length_weighted"])),
+        "pin_boundary": d.one(st.booleans()),
+        "weights": d.array(vertices, optional=True)[0],
     }
-    if settings["weights"] is not None:
-        settings["weights"] = settings["weights"][0]
     known = {"rest_points", "face_offsets", "corner_vertices", "edges", *settings}
-    mush = attempt(
-        lambda *given: sinew.DeltaMush(*given[:4], **dict(zip(settings, given[4:], strict=True))),
-        [points, *faces, edges, *settings.values()],
-        known,
-    )
+    mush = attempt(lambda *given: sinew.DeltaMush(*given, **settings), d.faces(vertices), known)
     if mush is None:
         return
     repr(mush)
-    other = data.draw(or_garbage(arrays((vertices, 3), wild[10]), wild[10]))[0]
-    attempt(lambda *given: mush.bind(given[0], **settings) or True, [other], known)
-    posed = data.draw(or_garbage(arrays((vertices, 3), wild[11]), wild[11]))[0]
-    out = data.draw(names(st.sampled_from([None, np.zeros((vertices, 3), np.float32)]), wild[12]))
-    scale = data.draw(names(st.floats(-2, 2), wild[12]))
-    threads = data.draw(names(st.one_of(st.none(), st.integers(0, 70)), wild[13]))
-    result = attempt(mush.apply, [posed, out, scale, threads], {"points", "out", "scale", "threads"})
+    attempt(lambda *given: mush.bind(*given, **settings) or True, [d.array(vertices, 3)[0]], known)
+    posed, scale = d.array(vertices, 3)[0], d.one(st.floats(-2, 2))
+    given_data = [posed, d.out(vertices), scale, d.threads()]
+    result = attempt(mush.apply, given_data, {"points", "out", "scale", "threads"})
     if result is not None:
         assert result.shape == (mush.vertex_count, 3)
-        copy = pickle.loads(pickle.dumps(mush))
-        same(result, copy.apply(posed, None, scale, 1))
+        same(result, pickle.loads(pickle.dumps(mush)).apply(posed, None, scale, 1))
 
 
 @many(0.2)
 @given(st.data())
 def test_normals(data):
     vertices = data.draw(st.sampled_from(sorted(SHEETS)))
-    wild = wild_one(data.draw, 10)
-    offsets, corners, ends = SHEETS[vertices]
-    edges = np.array(ends, np.int32).reshape(-1, 2)
-
-    def custom_normals(count):
-        numbers = [(3 * i - 7, 900 * i) for i in range(count)]
-        return st.just((np.array(numbers, np.int16).reshape(-1, 2), None))
-
-    def flags(count, is_wild):
-        return st.one_of(st.none(), or_garbage(integers([i % 2 for i in range(count)], is_wild), is_wild))
-
-    given_data = [
-        data.draw(names(st.just(vertices), wild[0])),
-        data.draw(or_garbage(integers(offsets, wild[1]), wild[1]))[0],
-        data.draw(or_garbage(integers(corners, wild[2]), wild[2]))[0],
-        data.draw(GARBAGE) if wild[3] else edges,
-        data.draw(flags(len(edges), wild[4])),
-        data.draw(flags(len(offsets) - 1, wild[5])),
-        data.draw(st.one_of(st.none(), or_garbage(custom_normals(len(corners)), wild[5]))),
-    ]
-    given_data[4:] = [None if flag is None else flag[0] for flag in given_data[4:]]
-    normals = attempt(
-        lambda *given: sinew.Normals(
-            *given[:4], sharp_edges=given[4], sharp_faces=given[5], custom_normals=given[6]
-        ),
-        given_data,
-        {
-            *("vertex_count", "face_offsets", "corner_vertices", "edges"),
-            *("sharp_edges", "sharp_faces", "custom_normals"),
-        },
-    )
+    d = Draw(data.draw, 12)
+    _points, offsets, corners, edges = d.faces(vertices)
+    plain_offsets, plain_corners, ends = SHEETS[vertices]
+    custom = np.array([(3 * i - 7, 900 * i) for i in range(len(plain_corners))], np.int16).reshape(-1, 2)
+    sharp = {
+        "sharp_edges": d.integers([i % 2 for i in range(len(ends) // 2)], optional=True)[0],
+        "sharp_faces": d.integers([i % 2 for i in range(len(plain_offsets) - 1)], optional=True)[0],
+        "custom_normals": d.one(st.sampled_from([None, custom])),
+    }
+    known = {"vertex_count", "face_offsets", "corner_vertices", "edges", *sharp}
+    given_data = [d.one(st.just(vertices)), offsets, corners, edges]
+    normals = attempt(lambda *given: sinew.Normals(*given, **sharp), given_data, known)
     if normals is None:
         return
     repr(normals)
-    posed = data.draw(or_garbage(arrays((vertices, 3), wild[6]), wild[6]))[0]
-    domain = data.draw(names(st.sampled_from([None, "vertex", "corner", "face"]), wild[7]))
-    out = data.draw(names(st.sampled_from([None, np.zeros((vertices, 3), np.float32)]), wild[8]))
-    threads = data.draw(names(st.one_of(st.none(), st.integers(0, 70)), wild[9]))
-    result = attempt(normals.compute, [posed, domain, out, threads], {"points", "domain", "out", "threads"})
+    posed, domain = d.array(vertices, 3)[0], d.one(st.sampled_from([None, "vertex", "corner", "face"]))
+    given_data = [posed, domain, d.out(vertices), d.threads()]
+    result = attempt(normals.compute, given_data, {"points", "domain", "out", "threads"})
     if result is not None:
         assert result.shape == (getattr(normals, f"{domain or normals.domain}_count"), 3)
         assert np.isfinite(result).all()
-        copy = pickle.loads(pickle.dumps(normals))
-        same(result, copy.compute(posed, domain, None, 1))
+        same(result, pickle.loads(pickle.dumps(normals)).compute(posed, domain, None, 1))
 
 
 @many(0.2)
 @given(st.data())
 def test_skinned_normals(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 5, 20])), data.draw(st.integers(1, 4))
-    wild = wild_one(data.draw, 11)
-    mesh = (
-        np.zeros((vertices, 3)),
-        range(vertices + 1),
-        [v % bones for v in range(vertices)],
-        np.ones(vertices),
-    )
+    d = Draw(data.draw, 11)
+    mesh = np.zeros((vertices, 3)), range(vertices + 1), np.arange(vertices) % bones, np.ones(vertices)
     binding = sinew.Binding(*mesh)
     frames = data.draw(st.sampled_from([vertices, 3 * vertices]))
     of_frames = None if frames == vertices else [i % vertices for i in range(frames)]
-    normals = data.draw(or_garbage(arrays((frames, 3), wild[0]), wild[0]))[0]
-    tangents = data.draw(st.one_of(st.none(), or_garbage(arrays((frames, 3), wild[1]), wild[1])))
-    skinned = attempt(
-        sinew.SkinnedNormals,
-        [
-            binding,
-            normals,
-            None if tangents is None else tangents[0],
-            data.draw(names(st.just(of_frames), wild[2])),
-            data.draw(names(METHODS, wild[3])),
-            data.draw(names(st.none(), wild[4])),
-        ],
-        {"binding", "normals", "tangents", "vertices", "method", "mix"},
-    )
+    given_data = [binding, d.array(frames, 3)[0], d.array(frames, 3, optional=True)[0]]
+    given_data += [d.one(st.just(of_frames)), d.one(METHODS), d.one(st.none())]
+    known = {"binding", "normals", "tangents", "vertices", "method", "mix"}
+    skinned = attempt(sinew.SkinnedNormals, given_data, known)
     if skinned is None:
         return
     repr(skinned)
-    pose = data.draw(or_garbage(arrays((bones, 4, 4), wild[5]), wild[5]))[0]
-    threads = data.draw(names(st.one_of(st.none(), st.integers(0, 70)), wild[6]))
-    space = data.draw(names(st.none(), wild[7]))
-    inverses = data.draw(names(st.none(), wild[8]))
-    parameters = data.draw(names(st.none(), wild[9]))
+    pose, options = d.array(bones, 4, 4)[0], [d.threads(), *(d.one(st.none()) for _ in range(3))]
     known = {"bone_transforms", "threads", "bones_from_model", "rest_inverses", "parameters"}
-    result = attempt(skinned.deform, [pose, threads, space, inverses, parameters], known)
+    result = attempt(skinned.deform, [pose, *options], known)
     if result is not None:
         assert result[0].shape == (vertices, 3)
         assert result[1].shape == (skinned.frame_count, 3)
-    points = data.draw(or_garbage(arrays((vertices, 3), wild[10]), wild[10]))[0]
-    alone = attempt(
-        skinned.deform_normals, [pose, points, None, threads, space, inverses, parameters], known | {"points"}
-    )
+    given_data = [pose, d.array(vertices, 3)[0], None, *options]
+    alone = attempt(skinned.deform_normals, given_data, known | {"points"})
     if alone is not None:
         assert alone.shape == (skinned.frame_count, 3)
 
@@ -622,48 +575,31 @@ def test_skinned_normals(data):
 @given(st.data())
 def test_bulge_limits(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 2, 20])), data.draw(st.integers(1, 4))
-    each = data.draw(st.integers(0, 4))
-    wild = wild_one(data.draw, 14)
-    offsets = [each * vertex for vertex in range(vertices + 1)]
-    nothing = st.just((None, None))
+    d = Draw(data.draw, 14)
     given_data = [
-        data.draw(strategy)[0]
-        for strategy in (
-            or_garbage(arrays((vertices, 3), wild[0]), wild[0]),
-            or_garbage(integers(offsets, wild[1]), wild[1]),
-            or_garbage(integers([i % bones for i in range(vertices * each)], wild[2]), wild[2]),
-            or_garbage(arrays((vertices * each,), wild[3]).map(positive), wild[3]),
-            or_garbage(arrays((bones, 3), wild[4]), wild[4]),
-            or_garbage(arrays((bones, 3), wild[5]), wild[5]),
-            st.one_of(nothing, or_garbage(arrays((4, 4), wild[6]), wild[6])),
-            st.one_of(nothing, or_garbage(arrays((vertices,), wild[7]), wild[7])),
-        )
+        *d.skin(vertices, data.draw(st.integers(0, 4)), bones),
+        d.array(bones, 3),
+        d.array(bones, 3),
     ]
-    known = {*MESH, "heads", "tails", "segments", "bones_from_model", "weights"}
+    more = {
+        "bones_from_model": d.array(4, 4, optional=True)[0],
+        "weights": d.array(vertices, optional=True)[0],
+    }
+    known = {*MESH, "heads", "tails", "segments", *more}
     limit = attempt(
-        lambda *given: sinew.BulgeLimit(*given[:6], bones_from_model=given[6], weights=given[7]),
-        given_data,
-        known,
+        lambda *given: sinew.BulgeLimit(*given, **more), [given for given, _ in given_data], known
     )
     if limit is None:
         return
     repr(limit)
-    other = data.draw(or_garbage(arrays((vertices, 3), wild[8]), wild[8]))[0]
-    attempt(lambda *given: limit.set_rest_points(*given) or True, [other], {"rest_points"})
-    posed = data.draw(or_garbage(arrays((vertices, 3), wild[9]), wild[9]))[0]
-    pose = data.draw(or_garbage(arrays((limit.bone_count, 4, 4), wild[10]), wild[10]))[0]
-    out = data.draw(names(st.sampled_from([None, np.zeros((vertices, 3), np.float32)]), wild[11]))
-    strength = data.draw(names(st.floats(0, 1), wild[12]))
-    form = data.draw(names(st.sampled_from(["continuous", "kim_han"]), wild[13]))
-    result = attempt(
-        lambda *given: limit.apply(*given[:3], strength=given[3], form=given[4]),
-        [posed, pose, out, strength, form],
-        {"points", "bone_transforms", "out", "strength", "form"},
-    )
+    attempt(lambda *given: limit.set_rest_points(*given) or True, [d.array(vertices, 3)[0]], {"rest_points"})
+    posed, pose = d.array(vertices, 3)[0], d.array(limit.bone_count, 4, 4)[0]
+    how = {"strength": d.one(st.floats(0, 1)), "form": d.one(st.sampled_from(["continuous", "kim_han"]))}
+    known = {"points", "bone_transforms", "out", *how}
+    result = attempt(lambda *given: limit.apply(*given, **how), [posed, pose, d.out(vertices)], known)
     if result is not None:
         assert result.shape == (limit.vertex_count, 3)
-        copy = pickle.loads(pickle.dumps(limit))
-        same(result, copy.apply(posed, pose, strength=strength, form=form, threads=1))
+        same(result, pickle.loads(pickle.dumps(limit)).apply(posed, pose, **how, threads=1))
 
 
 def positive(pair):
