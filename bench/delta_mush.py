@@ -22,62 +22,26 @@ import numpy as np
 import sinew
 import sinew_addon
 from common import RESULTS, machine
+from limb import least_frame, make_limb
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.io import mesh_io
 
-SIDE, ROUNDS, FRAMES = 317, 8, range(2, 12)
+SIDE, ROUNDS = 317, 8
 ORDERS = ("rows", "random")
 CASES = [(kind, iterations) for kind in ("simple", "length_weighted") for iterations in (5, 20)]
 
 
 def make_sheet(order: str) -> bpy.types.Object:
-    """A noisy sheet along X with two bones that bend it by 100 degrees from frame 1 to 11.
-
-    order  of its vertices, one of ORDERS
-    """
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    link = bpy.context.scene.collection.objects.link
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    for index in range(2):
-        bone = armature.data.edit_bones.new(f"bone.{index}")
-        bone.head, bone.tail = (index, 0.0, 0.0), (index + 1.0, 0.0, 0.0)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    bone = armature.pose.bones[1]
-    bone.rotation_mode = "XYZ"
-    for frame, degrees in ((1, 0.0), (11, 100.0)):
-        bone.rotation_euler = (math.radians(degrees), 0.0, math.radians(degrees))
-        bone.keyframe_insert("rotation_euler", frame=frame)
+    """A noisy sheet with two bones. order: of its vertices, one of ORDERS"""
     x, y = (axis.ravel() * 2.0 / (SIDE - 1) for axis in np.mgrid[:SIDE, :SIDE])
     points = np.stack([x, y - 1.0, 0.003 * np.random.default_rng(0).normal(size=len(x))], axis=1)
     first = np.arange(SIDE * (SIDE - 1)).reshape(-1, SIDE)[:, :-1].ravel()
     faces = np.stack([first, first + SIDE, first + SIDE + 1, first + 1], axis=1)
     if order == "random":
         vertices = np.random.default_rng(1).permutation(len(points))
-        points, x, faces = points[vertices], x[vertices], np.argsort(vertices)[faces]
-    mesh = bpy.data.meshes.new("Sheet")
-    mesh.from_pydata(points, [], faces.tolist())
-    obj = bpy.data.objects.new("Sheet", mesh)
-    link(obj)
-    for index in range(2):
-        group = obj.vertex_groups.new(name=f"bone.{index}")
-        for vertex, share in enumerate(x / 2.0):
-            group.add([vertex], float(share if index else 1.0 - share), "REPLACE")
-    obj.modifiers.new("Armature", "ARMATURE").object = armature
-    return obj
-
-
-def least_frame() -> float:
-    """The minimum time of a frame, seconds."""
-    times = []
-    for frame in FRAMES:
-        started = time.perf_counter()
-        bpy.context.scene.frame_set(frame)
-        times.append(time.perf_counter() - started)
-    return min(times)
+        points, faces = points[vertices], np.argsort(vertices)[faces]
+    return make_limb(points, faces)
 
 
 def least_of_rounds(candidates: dict[str, Callable[[], None]]) -> dict[str, float]:
