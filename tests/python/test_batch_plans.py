@@ -221,32 +221,6 @@ def test_a_byte_order_mark_is_no_key(tmp_path):
     assert read(tmp_path, "\ufeff" + JOB).settings.method == "lbs"
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line", "sentence"),
-    [
-        ('method = "lbs"\nexclude', 'method = "best"\nexclude', 4, "expected one of lbs, dq, got 'best'"),
-        ('out = "done"', "out = 3", 3, "out: expected text in quotes, got 3"),
-        ('out = "done"', 'output = "done"', 3, "output: no such key; expected one of inputs"),
-        ('"Proxy*",', "7,", 5, "exclude: expected a list such as"),
-        ('match = "Face"\n', "", 9, "match is missing"),
-        ('method = "dq"\nexclude', 'methd = "dq"\nexclude', 15, "methd: no such key"),
-        ('match = "Face*"\nmethod = "lbs"', 'match = "Face*"\nmethod = "dqs"', 20, "got 'dqs'"),
-        ('match = "Face*"\n', "match = []\n", 19, "match: expected text in quotes"),
-        ('match = ["hero*.blend", "old/*.blend"]', 'match = "."', 14, "match: expected paths such as"),
-        (
-            "[[files.objects]]",
-            "[files.objects]",
-            18,
-            r"objects: expected entries that begin with \[\[files.objects",
-        ),
-    ],
-)
-def test_errors_have_a_line(tmp_path, old, new, line, sentence):
-    assert JOB.count(old) == 1
-    with pytest.raises(WrongUse, match=rf"job\.toml:{line}: .*{sentence}"):
-        read(tmp_path, JOB.replace(old, new))
-
-
 BAKES = """\
 scale = "3.x"
 bake = ["usd", "mdd"]
@@ -287,23 +261,45 @@ def test_bakes_and_scale_of_files_and_objects(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "line", "sentence"),
+    ("job", "old", "new", "line", "sentence"),
     [
-        ('"3.x"', '"2.79"', 1, "scale: expected one of 4.0, 3.x, none, got '2.79'"),
-        ('"usd", "mdd"', '"fbx"', 2, "bake: expected some of shape-keys, .*, got 'fbx'"),
-        ('"usd", "mdd"', '"pc2", "mdd"', 2, "an object can have one of pc2, mdd"),
-        ('"1-48"', '"1-"', 3, "bake_frames: expected frames such as"),
-        ('"1-48"', '"1,5"', 3, "usd: Blender exports every frame"),
-        ('"1-48"', '"-3-5"', 3, "usd: Blender exports no frames before 0"),
-        ("bake = []\n", "", 5, "these objects have no settings"),
-        ('bake = "shape-keys"', "bake = 3", 16, "bake: expected a list"),
-        ('"4.0"', "4.0", 17, "scale: expected text in quotes, got 4.0"),
+        (
+            JOB,
+            'method = "lbs"\nexclude',
+            'method = "best"\nexclude',
+            4,
+            "expected one of lbs, dq, got 'best'",
+        ),
+        (JOB, 'out = "done"', "out = 3", 3, "out: expected text in quotes, got 3"),
+        (JOB, 'out = "done"', 'output = "done"', 3, "output: no such key; expected one of inputs"),
+        (JOB, '"Proxy*",', "7,", 5, "exclude: expected a list such as"),
+        (JOB, 'match = "Face"\n', "", 9, "match is missing"),
+        (JOB, 'method = "dq"\nexclude', 'methd = "dq"\nexclude', 15, "methd: no such key"),
+        (JOB, 'match = "Face*"\nmethod = "lbs"', 'match = "Face*"\nmethod = "dqs"', 20, "got 'dqs'"),
+        (JOB, 'match = "Face*"\n', "match = []\n", 19, "match: expected text in quotes"),
+        (JOB, 'match = ["hero*.blend", "old/*.blend"]', 'match = "."', 14, "match: expected paths such as"),
+        (
+            JOB,
+            "[[files.objects]]",
+            "[files.objects]",
+            18,
+            r"objects: expected entries that begin with \[\[files.objects",
+        ),
+        (BAKES, '"3.x"', '"2.79"', 1, "scale: expected one of 4.0, 3.x, none, got '2.79'"),
+        (BAKES, '"usd", "mdd"', '"fbx"', 2, "bake: expected some of shape-keys, .*, got 'fbx'"),
+        (BAKES, '"usd", "mdd"', '"pc2", "mdd"', 2, "an object can have one of pc2, mdd"),
+        (BAKES, '"1-48"', '"1-"', 3, "bake_frames: expected frames such as"),
+        (BAKES, '"1-48"', '"1,5"', 3, "usd: Blender exports every frame"),
+        (BAKES, '"1-48"', '"-3-5"', 3, "usd: Blender exports no frames before 0"),
+        (BAKES, "bake = []\n", "", 5, "these objects have no settings"),
+        (BAKES, 'bake = "shape-keys"', "bake = 3", 16, "bake: expected a list"),
+        (BAKES, '"4.0"', "4.0", 17, "scale: expected text in quotes, got 4.0"),
     ],
 )
-def test_errors_of_bakes_have_a_line(tmp_path, old, new, line, sentence):
-    assert BAKES.count(old) == 1
+def test_errors_have_a_line(tmp_path, job, old, new, line, sentence):
+    assert job.count(old) == 1
     with pytest.raises(WrongUse, match=rf"job\.toml:{line}: .*{sentence}"):
-        read(tmp_path, BAKES.replace(old, new))
+        read(tmp_path, job.replace(old, new))
 
 
 def test_parameters_of_files_and_objects(tmp_path):

@@ -87,17 +87,6 @@ def test_both_sides_of_neutral_look_different_to_all(sight):
     assert apart[:25].min() > 25.0
 
 
-def test_each_measure_has_its_colours():
-    ramps = {name: HeatScale.fixed(metric, 2.0, 1.0, 1.0).ramp for name, metric in METRICS.items()}
-    assert ramps == {
-        "distance": viridis,
-        "bulge": diverging,
-        "stretch": diverging,
-        "area": diverging,
-        "flips": viridis,
-    }
-
-
 def summary(**values):
     return Summary(**{field: values.get(field, 0) for field in Summary.__dataclass_fields__})
 
