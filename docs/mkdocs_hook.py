@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Where the site has documents that are not in docs/.
 OUTSIDE = {
-    "README.md": "readme.html",
+    "README.md": "index.html",
     "CONTRIBUTING.md": "contributing.html",
     "CHANGELOG.md": "changelog.html",
     "SECURITY.md": "security.html",
