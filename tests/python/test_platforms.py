@@ -9,7 +9,6 @@ import importlib.metadata
 import re
 import sys
 import sysconfig
-import tomllib
 import zipfile
 from pathlib import Path
 
@@ -25,8 +24,6 @@ from platforms import PLATFORMS  # noqa: E402
 HEADERS = Path(sysconfig.get_path("include"))
 PYCONFIG = (ROOT / "cmake/python/pyconfig.h").read_text(encoding="utf-8")
 
-every_platform = pytest.mark.parametrize("platform", PLATFORMS.values(), ids=PLATFORMS)
-
 
 def test_the_lists_of_platforms_agree():
     dev = (ROOT / "dev").read_text(encoding="utf-8")
@@ -35,28 +32,6 @@ def test_the_lists_of_platforms_agree():
     assert all(name == platform.name for name, platform in PLATFORMS.items())
     workflow = (ROOT / ".github/workflows/wheels.yml").read_text(encoding="utf-8")
     assert len(re.findall(r"- \{os: ", workflow)) == len(PLATFORMS) - 1  # all but Windows on arm64
-
-
-@every_platform
-def test_a_zip_names_its_platform_and_its_wheels(platform):
-    wheels = [
-        package.Wheel(Path(f"sinew_skinning-1.2.3-{platform.wheel_tag(version)}.whl"))
-        for version in ("3.11", "3.13")
-    ]
-    assert [wheel.python for wheel in wheels] == ["cp311", "cp313"]
-    text = (ROOT / "addon/blender_manifest.toml").read_text(encoding="utf-8")
-    manifest = tomllib.loads(package.manifest_with_wheels(text, wheels))
-    assert manifest["platforms"] == [platform.name]
-    assert manifest["wheels"] == [f"./wheels/{wheel.path.name}" for wheel in wheels]
-
-
-def test_modules_are_named_as_python_looks_for_them():
-    suffixes = {name: platform.module_suffix("3.11") for name, platform in PLATFORMS.items()}
-    assert suffixes["windows-x64"] == ".cp311-win_amd64.pyd"
-    assert suffixes["macos-arm64"] == ".cpython-311-darwin.so"
-    here = sysconfig.get_config_var("EXT_SUFFIX")
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    assert here in {platform.module_suffix(version) for platform in PLATFORMS.values()}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Python has no such values there")
