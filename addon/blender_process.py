@@ -15,12 +15,11 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Iterator
-from concurrent import futures
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from .core import pipes
 from .core.errors import SinewError
 from .core.scratch import ScratchFolder
 from .core.windows_job import end_all_with_this_process, end_with_this_process
@@ -43,10 +42,6 @@ class BlenderLost(Exception):  # noqa: N818
     sentence."""
 
 
-class Stopped(Exception):  # noqa: N818
-    """The batch is being stopped."""
-
-
 @dataclass(frozen=True)
 class Limits:
     """Limits for one file.
@@ -64,9 +59,10 @@ class Limits:
 
 
 class BlenderProcess:
-    """One Blender, for one thread at a time: bpy in this Python, or the Blender program that runs this code.
+    """One Blender: bpy in this Python, or the Blender program that runs this code. While it is at work, the
+    caller has to call poll(), which also ends it where it exceeds a limit.
 
-    wait  waits until it has started, and raises SinewError where it cannot be started; otherwise run() does
+    wait  waits until it has started, and raises SinewError where it cannot be started; otherwise poll() does
           so
     """
 
@@ -91,46 +87,89 @@ class BlenderProcess:
             self._folder.remove()
             raise SinewError(f"no Blender can be started: {error.strerror or error}") from None
         end_with_this_process(self._process)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._tasks, self._replies = self._process.stdin, self._process.stdout
+        self._received = b""
         self._has_started = False
-        # The limits of the current task, if there is one; the limit that was exceeded.
-        self._limits: Limits | None = None
-        self._since = 0.0
+        # What it gets to do once it has started.
+        self._next: tuple[dict, Limits] | None = None
         self._excess: str | None = None
         # Bytes of memory at the last check.
         self._size = 0
-        self._lock = threading.Lock()
-        self._ended = threading.Event()
-        threading.Thread(target=self._watch, daemon=True).start()
+        self._checked = 0.0
         self._begin(Limits(START_LIMIT))
         if wait:
-            self._await_start()
+            while not self._has_started:
+                self.poll()
+                wait_for_any([self])
 
     def run(self, task: dict, limits: Limits) -> dict:
         """Returns the outcome of the task. Raises BlenderLost; the process cannot be used any more then."""
-        if not self._has_started:
-            self._await_start()
-        self._begin(limits)
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(json.dumps(task).encode() + b"\n")
-            self._process.stdin.flush()
-        except OSError:
-            raise BlenderLost(self._cause_of_end()) from None
-        return self._read_reply()
+        *_reports, outcome = self.follow(task, limits)
+        return outcome
 
     def follow(self, task: dict, limits: Limits) -> Iterator[dict]:
         """Yields its reports on the task, every INTERVAL s, and finally the outcome. Raises as run() does;
         closing the iterator before the outcome ends the process."""
-        aside = futures.ThreadPoolExecutor(1)
-        outcome = aside.submit(self.run, task, limits)
-        aside.shutdown(wait=False)
+        outcome = None
         try:
-            while not futures.wait([outcome], INTERVAL).done:
+            self.send(task, limits)
+            while (outcome := self.poll()) is None:
                 yield self._progress_report()
+                wait_for_any([self])
         finally:
-            if not outcome.done():
+            if outcome is None:
                 self.end()
-        yield outcome.result()
+        yield outcome
+
+    def send(self, task: dict, limits: Limits) -> None:
+        """Gives it a task; poll() will return the outcome. Raises BlenderLost."""
+        if not self._has_started:
+            self._next = task, limits
+            return
+        self._begin(limits)
+        try:
+            self._tasks.write(json.dumps(task).encode() + b"\n")
+            self._tasks.flush()
+        except OSError:
+            raise BlenderLost(self._cause_of_end()) from None
+
+    def poll(self) -> dict | None:
+        """Returns the outcome of the task, or None while it is at work. Raises BlenderLost, and SinewError
+        where it cannot be started; the process cannot be used any more then."""
+        has_ended = False
+        while pipes.can_read(self._replies) and not has_ended:
+            received = os.read(self._replies.fileno(), 2**16)
+            self._received += received
+            has_ended = not received
+        # A file that is done in time is kept.
+        while b"\n" in self._received:
+            line, _end, self._received = self._received.partition(b"\n")
+            if self._has_started:
+                return json.loads(line)
+            # Before the worker starts, Blender and its startup scripts can print anything.
+            if line.startswith(GREETINGS):
+                self._start(json.loads(line))
+        if has_ended:
+            raise BlenderLost(self._cause_of_end())
+        if time.monotonic() >= self._checked + INTERVAL:
+            self._check_limits()
+        return None
+
+    def _start(self, greeting: dict) -> None:
+        if "refused" in greeting:
+            self.end()
+            raise SinewError(greeting["refused"])
+        self._has_started = True
+        self._begin(Limits())
+        if self._next is not None:
+            self.send(*self._next)
+
+    @property
+    def replies(self) -> int:
+        """The file descriptor that can be read when poll() has something."""
+        return self._replies.fileno()
 
     def is_spent(self, limits: Limits) -> bool:
         """Whether the next file should get a new process, as memory that Blender does not free
@@ -143,39 +182,14 @@ class BlenderProcess:
         self._clean_up()
 
     def _begin(self, limits: Limits) -> None:
-        with self._lock:
-            self._limits, self._since = limits, time.monotonic()
+        self._limits, self._since = limits, time.monotonic()
 
-    def _await_start(self) -> None:
-        reply = self._read_reply()
-        self._has_started = True
-        if "refused" in reply:
-            self.end()
-            raise SinewError(reply["refused"])
-
-    def _read_reply(self) -> dict:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        # Before the worker starts, Blender and its startup scripts can print anything.
-        while line and not self._has_started and not line.startswith(GREETINGS):
-            line = self._process.stdout.readline()
-        with self._lock:
-            self._limits = None
-        if not line.endswith(b"\n"):
+    def _check_limits(self) -> None:
+        self._checked = time.monotonic()
+        self._excess = self._found_excess(self._limits)
+        if self._excess is not None:
+            self._process.kill()
             raise BlenderLost(self._cause_of_end())
-        return json.loads(line)
-
-    def _watch(self) -> None:
-        """Ends the process when a file exceeds a limit."""
-        while not self._ended.wait(INTERVAL):
-            # The lock decides whether the limit or the end of the file came first: a file done in time is
-            # kept.
-            with self._lock:
-                if self._limits is not None:
-                    self._excess = self._found_excess(self._limits)
-                if self._excess is not None:
-                    self._process.kill()
-                    return
 
     def _found_excess(self, limits: Limits) -> str | None:
         if limits.timeout and time.monotonic() > self._since + limits.timeout:
@@ -198,7 +212,6 @@ class BlenderProcess:
 
     def _clean_up(self) -> None:
         self._process.wait()
-        self._ended.set()
         self._folder.remove()
 
     def _doing(self) -> str:
@@ -217,6 +230,11 @@ class BlenderProcess:
             return psutil.Process(self._process.pid).memory_info().rss
         except psutil.Error:
             return 0
+
+
+def wait_for_any(blenders: Iterable[BlenderProcess]) -> None:
+    """Returns when one of them may have something for poll(), and after INTERVAL s at the latest."""
+    pipes.wait_for_any([blender.replies for blender in blenders], INTERVAL)
 
 
 _started = itertools.count()

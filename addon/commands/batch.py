@@ -190,7 +190,7 @@ class _Workers:
 
             if tasks:
                 prepare_blender()
-            return run_here(tasks, lambda task, _limits: worker.run(task, lambda _doing: None), _versions)
+            return run_here(tasks, lambda task: worker.run(task, lambda _doing: None), _versions)
         if self._args.scheduler is not None:
             return run_in_dask(tasks, self._limits, self._args.scheduler, self._console.complain)
         return run_on_this_machine(tasks, self._limits, self._jobs)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The workers of a batch: Blenders on this machine, or those of a dask cluster.
 
-On this machine, threads of this process distribute the tasks: the Blenders are separate processes already,
-and dask would take as much time for a small file as Blender takes to save it (bench/README.md).
+On this machine, this process distributes the tasks: the Blenders are separate processes already, and dask
+would take as much time for a small file as Blender takes to save it (bench/README.md).
 """
 
 from __future__ import annotations
@@ -11,19 +11,16 @@ import contextlib
 import importlib.metadata
 import ipaddress
 import logging
-import threading
 import uuid
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
-from queue import SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import sinew
 
-from ..blender_process import BlenderLost, BlenderProcess, Limits, Stopped
+from ..blender_process import BlenderLost, BlenderProcess, Limits, wait_for_any
 from ..core.errors import SinewError
 from ..core.opengl import default_engine
 from .journal import UNFINISHED, content_hash, stamp
@@ -44,70 +41,56 @@ def versions() -> dict[str, str]:
         raise SinewError("this Python has no Blender; install bpy") from None
 
 
+Steps: TypeAlias = Generator[BlenderProcess, None, dict]
+"""Yields the Blender that is at work, for the caller to wait for it, and returns the outcome."""
+
+_engine = cache(default_engine)
+_Outcome = TypeVar("_Outcome")
+
+
 class _Blenders:
-    """The Blenders of this process, one for each thread, each reused for the next file."""
+    """The Blenders of this process, each reused for the next file. Threads of a cluster's worker share
+    them."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
         self._idle: list[BlenderProcess] = []
         self._busy: set[BlenderProcess] = set()
-        self._stopped = False
-        self._engine: Future[str] | None = None
 
-    def run(self, task: dict, limits: Limits) -> dict:
-        # Determined once for all of them, while the first ones start.
-        engine = self._find_engine() if task["pictures"] is not None else None
+    def run(self, task: dict, limits: Limits) -> Steps:
         blender = self._take(limits)
         try:
-            if engine is not None:
-                task = {**task, "engine": engine.result()}
-            outcome = blender.run(task, limits)
+            if task["pictures"] is not None:
+                # Found once for all of them, while the first one starts.
+                task = {**task, "engine": _engine()}
+            blender.send(task, limits)
+            while (outcome := blender.poll()) is None:
+                yield blender
         finally:
-            with self._lock:
-                self._busy.discard(blender)
+            self._busy.discard(blender)
         if blender.is_spent(limits):
             blender.end()
         else:
-            with self._lock:
-                self._idle.append(blender)
+            self._idle.append(blender)
         return outcome
 
-    def _find_engine(self) -> Future[str]:
-        with self._lock:
-            if self._engine is None:
-                aside = ThreadPoolExecutor(1)
-                self._engine = aside.submit(default_engine)
-                aside.shutdown(wait=False)
-            return self._engine
-
     def _take(self, limits: Limits) -> BlenderProcess:
-        with self._lock:
-            if self._stopped:
-                raise Stopped
-            blender = self._idle.pop() if self._idle else None
-        blender = blender or BlenderProcess(limits)
-        with self._lock:
-            self._busy.add(blender)
-            if not self._stopped:
-                return blender
-        blender.end()
-        raise Stopped
+        try:
+            blender = self._idle.pop()
+        except IndexError:
+            blender = BlenderProcess(limits, wait=False)
+        self._busy.add(blender)
+        return blender
 
     def end(self) -> None:
         """Ends the idle ones."""
-        with self._lock:
-            idle, self._idle = self._idle, []
-        for blender in idle:
-            blender.end()
+        while self._idle:
+            self._idle.pop().end()
 
     def stop(self) -> None:
-        """Ends all of them at once; no new ones are started."""
-        with self._lock:
-            self._stopped = True
-            blenders = [*self._idle, *self._busy]
-            self._idle = []
-        for blender in blenders:
+        """Ends all of them at once."""
+        for blender in list(self._busy):
             blender.end()
+        self.end()
 
 
 _blenders = _Blenders()
@@ -118,14 +101,26 @@ def end_blenders() -> None:
     _blenders.end()
 
 
-def do_task(
+def do_task(task: dict, limits: Limits) -> dict:
+    """Returns the outcome of a task from a Blender of this process."""
+    return _last(_steps(task, limits))
+
+
+def _last(steps: Steps) -> dict:
+    while True:
+        try:
+            wait_for_any([next(steps)])
+        except StopIteration as end:
+            return end.value
+
+
+def _steps(
     task: dict,
     limits: Limits,
-    run: Callable[[dict, Limits], dict] = _blenders.run,
+    run: Callable[[dict, Limits], Steps] = _blenders.run,
     versions: Callable[[], dict[str, str]] = versions,
-) -> dict:
-    """Returns the outcome of a task, which is tried once more in a new process where Blender crashed or was
-    ended.
+) -> Steps:
+    """Does a task. It is tried once more in a new process where Blender crashed or was ended.
 
     task  "command", "source", "target", what the command needs, and "known": hash and versions of a source
           that need not be processed again, or None
@@ -143,7 +138,7 @@ def do_task(
         # Short, as the target's name may have the system's maximal length.
         unfinished = target.with_name(f".{uuid.uuid4().hex[:12]}{UNFINISHED}")
         try:
-            outcome = run({**task, "unfinished": str(unfinished)}, limits)
+            outcome = yield from run({**task, "unfinished": str(unfinished)}, limits)
         except BlenderLost as lost:
             outcome = {"error": f"{source}: {lost}; tried {attempt} times"}
             for leftover in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
@@ -167,12 +162,38 @@ def do_task(
 
 def run_here(
     tasks: Sequence[dict],
-    run: Callable[[dict, Limits], dict],
+    run: Callable[[dict], dict],
     versions: Callable[[], dict[str, str]],
 ) -> Generator[tuple[dict, dict], None, None]:
     """Yields each task and its outcome, one after the other in this process."""
+
+    def at_once(task: dict, _limits: Limits) -> Steps:
+        return run(task)
+        yield
+
     for task in tasks:
-        yield task, do_task(task, Limits(), run, versions)
+        yield task, _last(_steps(task, Limits(), at_once, versions))
+
+
+class _Running:
+    """A task that a Blender does. `blender` is to be waited for; `outcome` is None until it is done."""
+
+    def __init__(self, task: dict, limits: Limits) -> None:
+        self.task = task
+        self.outcome: dict | None = None
+        self._steps = _steps(task, limits)
+        self.go_on()
+
+    def go_on(self) -> None:
+        def step() -> dict | None:
+            try:
+                self.blender = next(self._steps)
+            except StopIteration as end:
+                return end.value
+            return None
+
+        if self.outcome is None:
+            self.outcome = _outcome(self.task, step)
 
 
 def run_on_this_machine(
@@ -185,28 +206,24 @@ def run_on_this_machine(
     """
     versions()
     waiting = deque(tasks)
-    done: SimpleQueue[tuple[dict, dict]] = SimpleQueue()
-
-    def work() -> None:
-        # Outcomes are handled in the main thread: here a Blender would wait for that.
-        with contextlib.suppress(IndexError):
-            while True:
-                task = waiting.popleft()
-                done.put((task, _outcome(task, partial(do_task, task, limits))))
-
-    # The threads have to run until everything is done: a Blender ends with the thread that started it.
-    pool = ThreadPoolExecutor(jobs)
-    for _ in range(jobs):
-        pool.submit(work)
+    running: list[_Running] = []
     end = _blenders.stop
     try:
-        for _ in tasks:
-            yield done.get()
+        while waiting or running:
+            for each in running:
+                each.go_on()
+            done = [(each.task, each.outcome) for each in running if each.outcome is not None]
+            running = [each for each in running if each.outcome is None]
+            # A Blender gets its next file before the outcome of its last one is handled.
+            while waiting and len(running) < jobs:
+                running.append(_Running(waiting.popleft(), limits))
+            yield from done
+            busy = [each.blender for each in running if each.outcome is None]
+            if len(busy) == len(running):
+                wait_for_any(busy)
         end = _blenders.end
     finally:
-        waiting.clear()
         end()
-        pool.shutdown(wait=False)
 
 
 def run_in_dask(
@@ -249,7 +266,7 @@ def run_in_dask(
             client.run(end_blenders)
 
 
-def _outcome(task: dict, result: Callable[[], dict]) -> dict:
+def _outcome(task: dict, result: Callable[[], _Outcome]) -> _Outcome | dict:
     try:
         return result()
     except Exception as error:

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
 import pytest
 
 # For tests that send SIGINT.
@@ -83,6 +84,10 @@ class KeptBlender:
         printed = [path.read_text(encoding="utf-8", errors="surrogateescape") for path in self._printed]
         return subprocess.CompletedProcess(words, status, *printed)
 
+    @property
+    def pid(self) -> int | None:
+        return None if self._process is None else self._process.pid
+
     def _start(self) -> None:
         folder = Path(tempfile.mkdtemp(prefix="tests-"))
         self._printed = [folder / "out", folder / "err"]
@@ -109,6 +114,12 @@ from sinew_addon.deform import characters
 characters.set_parameters({})
 status = cli.main(sys.argv[1:])
 """
+
+
+def own_children() -> list[psutil.Process]:
+    """The processes that a test has started, without the Blender that stays for others."""
+    kept = {without_sinew.pid, with_sinew.pid}
+    return [each for each in psutil.Process().children() if each.pid not in kept]
 
 
 def run_sinew(*args: object, status: int = 0) -> subprocess.CompletedProcess:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-import psutil
+import program
 import pytest
 import scenes
 from sinew_addon.core.bake import EXPORTS
@@ -96,7 +96,7 @@ def test_stopped_nothing_is_left(arm, tmp_path, kind, when):
     started = bake.start([obj], kind, list(range(1, 2000)), path.with_suffix(EXPORTS[kind]), overwrite=False)
     shares = bake_apart.sample(started)
     next(shares)
-    (child,) = psutil.Process().children()
+    (child,) = program.own_children()
     if when == "exporting":
         assert next(share for share in shares if share > 0.0) < 1.0
         assert len(below(path.parent)) > len(before[2])
@@ -112,7 +112,7 @@ def test_one_that_crashes_is_told(arm, tmp_path):
     started = bake.start([obj], "alembic", list(range(1, 2000)), path.with_suffix(".abc"), overwrite=False)
     shares = bake_apart.sample(started)
     assert next(share for share in shares if share > 0.0) < 1.0
-    (child,) = psutil.Process().children()
+    (child,) = program.own_children()
     child.kill()
     with pytest.raises(SinewError, match=r"arm\.abc: can not be written: Blender crashed .* exporting it"):
         list(shares)

@@ -424,7 +424,7 @@ def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
         blender = BlenderProcess(Limits(threads=threads))
         try:
             assert blender.run(task, Limits())["meshes"]
-            (process,) = psutil.Process().children()
+            (process,) = program.own_children()
             own = [thread.id for thread in process.threads()]
             assert all(os.sched_getaffinity(thread) == there for thread in own)
         finally:
