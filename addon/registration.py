@@ -24,7 +24,7 @@ def register() -> None:
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
     from .attach import properties, stored_vertex_data
-    from .deform import exporters, handlers
+    from .deform import exporters, handlers, lifecycle
     from .features.action_copy import feature as action_copy
     from .features.bake import feature as bake
     from .features.blend import feature as blend
@@ -70,10 +70,11 @@ def register() -> None:
     modifier_panel.register()
     precomputing.register()
     handlers.register()
+    lifecycle.register()
     exporters.register()
     for feature in (suggest, action_copy, blend, bake, compare, heat, diagnose, gltf):
         feature.register()
-    handlers.adopt_open_file()
+    lifecycle.adopt_open_file()
     atexit.unregister(_end)
     atexit.register(_end)
 
@@ -83,8 +84,8 @@ def unregister() -> None:
         # Blender as a module unregisters its extensions only after _end().
         return
     if hasattr(bpy.types.Object, "sinew"):
-        from .attach import note, properties, stored_vertex_data
-        from .deform import exporters, handlers, session
+        from .attach import properties, stored_vertex_data
+        from .deform import exporters, handlers, lifecycle
         from .features.action_copy import feature as action_copy
         from .features.bake import feature as bake
         from .features.blend import feature as blend
@@ -103,13 +104,12 @@ def unregister() -> None:
             translations,
         )
 
-        # As in a saved file: the Armature modifiers deform.
-        session.prepare_for_save()
-        note.remove()
+        lifecycle.leave_open_file()
         for feature in (gltf, diagnose, heat, compare, bake, blend, action_copy, suggest):
             feature.unregister()
         shown_colours.unregister()
         exporters.unregister()
+        lifecycle.unregister()
         handlers.unregister()
         modifier_panel.unregister()
         manual.unregister()

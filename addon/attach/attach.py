@@ -391,22 +391,6 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     properties.store(settings, "situation", situation.value)
 
 
-def prepare_for_save(obj: bpy.types.Object) -> bool:
-    """Prepares an object for a Blender without Sinew: its Armature modifiers deform, with the shape nearest
-    to Sinew's. Returns whether Sinew deformed it before; switch() reverses this."""
-    settings = properties.of(obj)
-    was_on = settings.replaces_modifiers
-    if not (was_on or settings.enabled):
-        return False
-    follow_icons(obj)
-    switch(obj, on=False)
-    # What was set for a mode may not be the nearest.
-    restore_volume(obj)
-    if deforms(obj):
-        use_nearest_volume(obj)
-    return was_on
-
-
 def use_nearest_volume(obj: bpy.types.Object) -> None:
     """Sets the Armature modifiers' Preserve Volume to what is nearest to Sinew's method, while they deform:
     in a saved file, and in modes whose tools need them. Set once: what the artist switches meanwhile

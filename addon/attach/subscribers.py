@@ -13,6 +13,10 @@ import bpy
 class Subscribers:
     """Each list is called in the order of subscription.
 
+    evaluated                 Blender has evaluated a depsgraph, apart from changes of frame
+    stepped                   an undo or redo step has ended
+    loading                   another file is loaded
+    loaded                    another file is there
     node_group                makes the node group of an object's modifier; None to use the standard one
     before_removal            Sinew is about to be taken off an object
     after_removal             Sinew was taken off an object
@@ -25,6 +29,10 @@ class Subscribers:
     precomputation_shown      the progress of that may differ
     """
 
+    evaluated: list[Callable[[bpy.types.Depsgraph], None]] = field(default_factory=list)
+    stepped: list[Callable[[], None]] = field(default_factory=list)
+    loading: list[Callable[[], None]] = field(default_factory=list)
+    loaded: list[Callable[[], None]] = field(default_factory=list)
     node_group: list[Callable[[bpy.types.Object], bpy.types.NodeTree | None]] = field(default_factory=list)
     before_removal: list[Callable[[bpy.types.Object], None]] = field(default_factory=list)
     after_removal: list[Callable[[], None]] = field(default_factory=list)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import bpy
 
@@ -28,10 +29,32 @@ def updates_suspended() -> Iterator[None]:
             _depth -= 1
 
 
+@dataclass
+class Phase:
+    """What Blender does with the file as a whole (deform/lifecycle.py).
+
+    is_saving     it is written or exported
+    is_rendering  between the events of a render's start and end
+    must_refresh  something waits for the end of a render
+    """
+
+    is_saving: bool = False
+    is_rendering: bool = False
+    must_refresh: bool = False
+
+
+phase = Phase()
+
+
 def is_rendering_in_window() -> bool:
-    """Whether a separate thread renders. Modifiers, drivers and objects must not be added or removed then:
-    the thread reads them, and only the main thread may notify the window of a change."""
+    """Whether a separate thread renders."""
     return not bpy.app.background and bpy.app.is_job_running("RENDER")
+
+
+def may_change_file() -> bool:
+    """Whether modifiers, drivers and objects may be changed: not while they are written, nor while the thread
+    of a render reads them. Also, only the main thread may notify the window of a change."""
+    return not (phase.is_saving or is_rendering_in_window())
 
 
 def is_playing_in_window() -> bool:

@@ -14,6 +14,7 @@ from ..attach import (
     node_group,
     normals,
     point_store,
+    pose_driver,
     properties,
     shared_settings,
     stack,
@@ -21,7 +22,9 @@ from ..attach import (
 )
 from ..core.errors import SinewError
 from ..core.icons import RENDER, VIEWPORT, VIEWS
+from ..io import armature_io
 from . import safe_mode, small_meshes
+from .bound import Bound
 from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State
 
 log = logging.getLogger("sinew")
@@ -110,6 +113,41 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
     point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
     attach.switch(obj, on=True)
     attach.restore_pointers(obj)
+
+
+def apply_driver(obj: bpy.types.Object, bound: Bound, wanted: Plan) -> None:
+    """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where
+    the plan says so."""
+    poses = [
+        (replaced.armature, path)
+        for (_modifier, replaced), stage in zip(
+            attach.replaced_modifiers(obj), bound.skin_stack.skin_stages, strict=False
+        )
+        if replaced.armature is not None
+        for path in armature_io.paths_to_wait_for(replaced.armature, stage.deformer.moving_bones)
+    ]
+    pose_driver.ensure(obj, list(dict.fromkeys(poses)), wanted.is_in_depsgraph)
+
+
+def apply_saved(obj: bpy.types.Object) -> None:
+    """Prepares an object for a Blender without Sinew: its Armature modifiers deform, with the shape nearest
+    to Sinew's. apply_resumed() reverses this."""
+    settings = properties.of(obj)
+    if not (settings.replaces_modifiers or settings.enabled):
+        return
+    attach.follow_icons(obj)
+    attach.switch(obj, on=False)
+    # What was set for a mode may not be the nearest.
+    attach.restore_volume(obj)
+    if attach.deforms(obj):
+        attach.use_nearest_volume(obj)
+
+
+def apply_resumed(obj: bpy.types.Object, was_on: bool) -> None:
+    """was_on: Sinew deformed it before it was saved."""
+    attach.restore_volume(obj)
+    if stack.sinew_modifier(obj) is not None:
+        attach.switch(obj, on=was_on)
 
 
 def mode_of(obj: bpy.types.Object) -> str:

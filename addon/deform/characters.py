@@ -19,7 +19,7 @@ from ..core.parameters import Value
 from ..core.spaces import transformed_axes
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from ..io import mesh_io
-from . import session
+from . import lifecycle, session
 
 
 def method_names() -> list[str]:
@@ -107,9 +107,9 @@ def use_methods_for_file(
     scales: Mapping[bpy.types.Object, str | None],
     values: Mapping[bpy.types.Object, Mapping[str, Value]],
 ) -> list[SinewError | None]:
-    """The same for a file that was opened to be saved so (see session.changing_for_file). Also sets
+    """The same for a file that was opened to be saved so (see lifecycle.changing_for_file). Also sets
     parameters, and the scale rules by name, where None leaves an object its own."""
-    return _use_methods(wanted, session.changing_for_file, scales, values)
+    return _use_methods(wanted, lifecycle.changing_for_file, scales, values)
 
 
 def set_parameters(values: Mapping[str, Value]) -> None:

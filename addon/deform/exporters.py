@@ -12,31 +12,25 @@ import functools
 from collections.abc import Callable
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..attach.subscribers import notify, subscribers
-from . import events, handlers
+from . import lifecycle
 
 _FBX, _GLTF = "EXPORT_SCENE_OT_fbx", "EXPORT_SCENE_OT_gltf"
 
 
 def before_export(*_settings: object) -> None:
-    handlers.begin_export()
+    lifecycle.begin_export()
 
 
 def after_export(*_settings: object) -> None:
     notify(subscribers.exported)
-    handlers.end_export()
+    lifecycle.end_export()
 
 
 def register() -> None:
     _wrap()
-    events.subscribe("load_post", _on_loaded)
-
-
-@persistent
-def _on_loaded(*_args: object) -> None:
-    _wrap()
+    subscribers.loaded.append(_wrap)
 
 
 def _wrap() -> None:
@@ -63,7 +57,7 @@ def _without_sinew(execute: Callable, announced: bool) -> Callable:
 
 
 def unregister() -> None:
-    events.unsubscribe("load_post", _on_loaded)
+    subscribers.loaded.remove(_wrap)
     for name in (_FBX, _GLTF):
         operator = getattr(bpy.types, name, None)
         if operator is not None and hasattr(operator.execute, "__wrapped__"):

@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's handlers of Blender's events: evaluations, changes of frame, undo, loading, saving, rendering."""
+"""Sinew's handlers of evaluations and changes of frame."""
 
 from __future__ import annotations
 
 import contextlib
-import logging
 from collections.abc import Callable
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import note, overrides, point_store, pose_driver, properties, references, stack
+from ..attach import pose_driver, properties, references, stack
 from ..attach.subscribers import notify, subscribers
-from ..attach.updates import is_main_thread, is_playing_in_window, is_rendering_in_window, reaction
-from ..core.precompute import precomputations
-from ..io.animation_paths import animated_paths
-from . import events, originals, precompute_watch, precomputing, session
+from ..attach.updates import (
+    is_main_thread,
+    is_playing_in_window,
+    is_rendering_in_window,
+    may_change_file,
+    phase,
+    reaction,
+)
+from . import events, originals, session
 from .changes import Changes, names_of_changed_meshes
 from .session import current
-
-log = logging.getLogger("sinew")
 
 # --- Evaluations and changes of frame
 
@@ -35,11 +37,11 @@ def _take_off_drivers_without_modifier() -> None:
     """Removes drivers where Sinew's modifier was applied or deleted: Blender would print a warning for a
     driver on a missing modifier. The next evaluation is the first without the modifier."""
     with reaction() as may_react:
-        if not may_react or current.is_saving or is_rendering_in_window():
+        if not (may_react and may_change_file()):
             return
         for obj, state in current.pairs:
             with contextlib.suppress(ReferenceError):
-                is_missing = state.plan.is_in_depsgraph and obj.modifiers.get(state.modifier) is None
+                is_missing = state.plan.is_in_depsgraph and obj.modifiers.get(state.noted.modifier) is None
                 # The modifier may have been renamed.
                 if is_missing and obj.is_editable and stack.sinew_modifier(obj) is None:
                     pose_driver.remove(obj)
@@ -47,6 +49,11 @@ def _take_off_drivers_without_modifier() -> None:
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _react_to_update(depsgraph)
+    notify(subscribers.evaluated, depsgraph)
+
+
+def _react_to_update(depsgraph: bpy.types.Depsgraph) -> None:
     with reaction() as may_react:
         if current.is_idle:
             if may_react:
@@ -76,11 +83,9 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
 @persistent
 def suspend_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     """Called last, and restore_modifiers() first, so that other add-ons never see a suspended modifier."""
-    if is_rendering_in_window():
-        return
-    is_playing = is_playing_in_window() and not current.is_rendering
+    is_playing = is_playing_in_window() and not phase.is_rendering
     with reaction() as may_react, contextlib.suppress(ReferenceError):
-        for obj in current.objects or () if may_react and not current.is_saving else ():
+        for obj in current.objects or () if may_react and may_change_file() else ():
             state = session.state_of(obj)
             # Objects that their Armature modifiers deform are not evaluated twice.
             if state is not None and state.dirtied_by_frames and properties.of(obj).replaces_modifiers:
@@ -114,11 +119,11 @@ def _begin_evaluation() -> None:
         evaluation = state.evaluation
         evaluation.mesh, evaluation.is_event_known, evaluation.was_tagged = 0, True, False
         try:
-            state.is_only_user = state.mesh_users == obj.data.users
-            is_renamed |= state.name != obj.name
+            evaluation.is_only_user = state.noted.mesh_users == obj.data.users
+            is_renamed |= state.noted.name != obj.name
         except ReferenceError:
             # The object was deleted since the list was made.
-            state.is_only_user = False
+            evaluation.is_only_user = False
     if is_renamed:
         session.name_requests()
 
@@ -143,8 +148,8 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
     saving (others' changes may be in the same list), and for the window during a render: points written after
     the update would then belong to the render's frame."""
     waits_for_render = is_rendering_in_window() and is_main_thread()
-    current.must_refresh |= waits_for_render
-    if not may_react or current.is_saving or waits_for_render:
+    phase.must_refresh |= waits_for_render
+    if not may_react or phase.is_saving or waits_for_render:
         if current.missed is None:
             current.missed = changes
         else:
@@ -251,173 +256,15 @@ def check_unannounced() -> float:
     return 0.25
 
 
-# --- Undo, loading, saving
-
-
-@persistent
-def before_loading(*_args: object) -> None:
-    precomputing.end()
-    on_data_replaced()
-
-
-@persistent
-def before_undo(*_args: object) -> None:
-    with reaction():
-        current.is_saving = False
-        between = list(filter(properties.has_sinew, references.noted()))
-        session.forget_for_step({obj.session_uid for obj in between})
-        for obj in between:
-            point_store.clear_references(obj)
-        references.forget()
-
-
-@persistent
-def on_undone(*_args: object) -> None:
-    with reaction():
-        session.adopt_after_step()
-
-
-@persistent
-def on_data_replaced(*_args: object) -> None:
-    """On loading: every reference is invalid, and the point buffers are others."""
-    with reaction():
-        current.is_saving = False
-        session.forget()
-
-
-@persistent
-def on_loaded(*_args: object) -> None:
-    with reaction():
-        session.forget()
-        # The file's first undo step comes after this.
-        references.forget()
-        overrides.restore()
-        note.remove()
-        if not session.objects_with_sinew(Changes()):
-            current.all_use_builtin = True
-            session.unsubscribe_from_frames()
-            return
-        # This is the file's first evaluation. Like the one that Blender would make, it has to be one of time,
-        # too, or poses that differ from their keys would stay.
-        for obj in bpy.data.objects:
-            if obj.animation_data is not None:
-                obj.update_tag(refresh={"TIME"})
-        session.refresh(bpy.context)
-
-
-@persistent
-def on_imported(*_args: object) -> None:
-    """Importing scripts can change the frame without any other event."""
-    session.subscribe_to_frames()
-
-
-@persistent
-def on_save(*_args: object) -> None:
-    """From here to on_saved() Sinew changes nothing in the file, even if Blender evaluates it, as for its
-    thumbnail."""
-    with reaction() as may_react:
-        if may_react and not current.is_idle and not _is_saved_as_it_is():
-            # So that the artist's last changes are seen separately from those made for saving.
-            bpy.context.evaluated_depsgraph_get()
-            # First, so that whatever happens, on_saved() reverses it.
-            current.is_saving = True
-            session.prepare_for_save()
-
-
-def _is_saved_as_it_is() -> bool:
-    """Whether a render's thread reads the file meanwhile, so that nothing may be prepared. With Sinew, the
-    saved file is complete, as an autosave is."""
-    if not is_rendering_in_window():
-        return False
-    log.warning("Saved during a render: save again after it, for Blenders without Sinew")
-    return True
-
-
-@persistent
-def on_saved(*_args: object) -> None:
-    with reaction() as may_react:
-        if may_react and current.is_saving:
-            current.is_saving = False
-            with references.between_steps():
-                session.resume_after_save(bpy.context)
-
-
-def begin_export() -> None:
-    """From here to end_export() the file is as in a saved state, and frames do without Sinew."""
-    with reaction() as may_react:
-        if may_react and not (current.is_idle or current.is_saving):
-            bpy.context.evaluated_depsgraph_get()
-            current.is_saving = True
-            session.prepare_for_save()
-            note.remove()
-            if not bpy.app.background:
-                # An exporter that fails does not announce its end.
-                bpy.app.timers.register(end_export, first_interval=0.0)
-
-
-def end_export() -> None:
-    on_saved()
-
-
-# --- Rendering
-
-
-@persistent
-def on_render_start(*_args: object) -> None:
-    current.is_rendering = True
-    precomputations.waits = True
-
-
-@persistent
-def on_render_end(*_args: object) -> None:
-    """Runs in the render's thread, if it has one: what waited for its end is left to the main thread."""
-    with reaction():
-        current.is_rendering = False
-        precomputations.waits = bpy.app.background
-        current.gate.restore()
-    if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
-        bpy.app.timers.register(_after_render, first_interval=0.05)
-
-
-def _after_render() -> float | None:
-    if is_rendering_in_window():
-        return 0.05
-    must_refresh = current.must_refresh or any(state.needs_apply for state in current.skinned.values())
-    current.must_refresh = False
-    if must_refresh:
-        session.refresh_between_steps(bpy.context)
-    return None
-
-
 # --- Registration
 
 _LAST = (after_others, after_others_again)
 events.FRAME_HANDLERS.update(frame_change_pre=before_frame_change, frame_change_post=on_frame_change)
 events.GATE_HANDLERS.update(frame_change_pre=suspend_modifiers, frame_change_post=restore_modifiers)
-_HANDLERS = {
-    "depsgraph_update_pre": before_update,
-    "depsgraph_update_post": on_depsgraph_update,
-    "undo_pre": before_undo,
-    "undo_post": on_undone,
-    "redo_pre": before_undo,
-    "redo_post": on_undone,
-    "load_pre": before_loading,
-    "load_post": on_loaded,
-    "save_pre": on_save,
-    "save_post": on_saved,
-    "save_post_fail": on_saved,
-    "render_init": on_render_start,
-    "render_complete": on_render_end,
-    "render_cancel": on_render_end,
-}
-if events.IMPORTS_ARE_ANNOUNCED:
-    _HANDLERS["blend_import_post"] = on_imported
+_HANDLERS = {"depsgraph_update_pre": before_update, "depsgraph_update_post": on_depsgraph_update}
 
 
 def register() -> None:
-    precomputing.begin()
-    subscribers.precomputation_requested.append(precompute_watch.begin)
-    subscribers.before_removal.append(session.forget_object)
     session.forget()
     properties.listeners.method_changed = session.setting_changed
     properties.listeners.error_requested = session.error_of
@@ -428,24 +275,7 @@ def register() -> None:
         bpy.app.timers.register(check_unannounced, first_interval=1.0, persistent=True)
 
 
-def adopt_open_file() -> None:
-    """Takes over the objects of a file that was open before Sinew was registered."""
-    # While Blender starts, its data is not accessible, and loading the first file does this.
-    if hasattr(bpy.data, "objects") and getattr(bpy.context, "view_layer", None) is not None:
-        note.remove()
-        for obj in filter(properties.has_sinew, bpy.data.objects):
-            # Without Sinew, Blender did not evaluate the keys of its settings.
-            if any(path.startswith("sinew.") for path in animated_paths(obj)):
-                obj.update_tag(refresh={"TIME"})
-        session.refresh(bpy.context)
-
-
 def unregister() -> None:
-    precomputing.end()
-    subscribers.precomputation_requested.remove(precompute_watch.begin)
-    subscribers.before_removal.remove(session.forget_object)
-    if bpy.app.timers.is_registered(precompute_watch.check):
-        bpy.app.timers.unregister(precompute_watch.check)
     session.forget()
     if bpy.app.timers.is_registered(check_unannounced):
         bpy.app.timers.unregister(check_unannounced)

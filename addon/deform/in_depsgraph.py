@@ -86,7 +86,8 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     started, settings, bound = time.perf_counter(), evaluated.sinew, skinned.bound
     # Evaluated ones, as the driver reads them.
     modifiers = [(replaced, replaced.armature) for replaced in settings.replaced_modifiers]
-    if skinned.mode != evaluated.mode or not (skinned.is_only_user or skinned.plan.in_buffer):
+    is_own_mesh = skinned.evaluation.is_only_user or skinned.plan.in_buffer
+    if skinned.noted.mode != evaluated.mode or not is_own_mesh:
         return "its mode, or the users of its mesh, changed"
     if [armature is None for _replaced, armature in modifiers] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
@@ -131,11 +132,11 @@ def _memory_to_write(
     or in the evaluated point buffer. None where it does not exist or has another size."""
     points, count = len(skinned.bound.source.points), skinned.normal_count
     if not skinned.plan.in_buffer:
-        to_points = mesh_io.vectors_in(mesh, skinned.attribute)
+        to_points = mesh_io.vectors_in(mesh, skinned.noted.attribute)
         to_normals = _NO_NORMALS
         if count:
             domain = skinned.plan.normals.domain
-            to_normals = mesh_io.vectors_in(mesh, skinned.normals_attribute, domain)
+            to_normals = mesh_io.vectors_in(mesh, skinned.noted.normals_attribute, domain)
         if to_points is None or to_normals is None:
             return None
         return (to_points, to_normals) if (len(to_points), len(to_normals)) == (points, count) else None

@@ -53,7 +53,7 @@ def read(
     for stage, (replaced, armature), takes_part in zip(
         skinned.bound.skin_stack.skin_stages,
         modifiers,
-        _taking_part(evaluated, modifiers, skinned.visibility_keyed, mode),
+        _taking_part(evaluated, modifiers, skinned.noted.visibility_keyed, mode),
         strict=False,
     ):
         if armature is None or armature.data.is_editmode or not takes_part:

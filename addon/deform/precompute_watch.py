@@ -8,6 +8,7 @@ import time
 import bpy
 
 from ..attach.subscribers import notify, subscribers
+from ..attach.updates import phase
 from ..core.precompute import precomputations
 from . import precomputing, session
 from .plan import State
@@ -28,7 +29,7 @@ def begin() -> None:
 
 def check() -> float | None:
     """Returns the seconds to the next call; None where nothing is left to watch."""
-    if current.is_saving or current.is_rendering:
+    if phase.is_saving or phase.is_rendering:
         return SECONDS
     has_ended = is_outdated = False
     for obj, skinned in list(current.pairs):

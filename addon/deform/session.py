@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All skinned objects of the open file: brings them up to date with an evaluation, and prepares them for
-saving."""
+"""All skinned objects of the open file: brings them up to date with an evaluation."""
 
 from __future__ import annotations
 
@@ -13,19 +12,15 @@ import bpy
 import numpy as np
 
 from ..attach import (
-    attach,
     node_group,
     normals,
-    note,
     orphans,
-    overrides,
     point_store,
     properties,
     references,
-    stack,
 )
 from ..attach.subscribers import notify, subscribers
-from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
+from ..attach.updates import is_rendering_in_window, may_change_file, phase, reaction, updates_suspended
 from ..core.errors import SinewError
 from . import after_update, apply_plan, events, precomputing, undo
 from .bound import uid
@@ -53,16 +48,11 @@ class Session:
     pairs             these objects, each with what was read of it
     plans             the plans of the others, by session_uid
     told              the error that was reported last for an object, by its session_uid
-    unsaved           what failed for an object when the file was saved, by its session_uid
     depsgraph         the address of the depsgraph last seen
     view_layers       those whose evaluation was seen, as from identity_of_layer()
     waiting           the objects that wait for another evaluation, as from waiting()
     missed            changes of evaluations that were not reacted to
     expected          meshes that Blender lists as changed because Sinew changed one of its settings
-    on_before_saving  the objects that Sinew deformed before the file was prepared for saving
-    is_saving         Blender is writing the file: nothing may change
-    is_rendering      between the events of a render's start and end
-    must_refresh      something waits for the end of a render
     seen              the meshes that had changed before functions behind Sinew's were called
     is_after_step     no evaluation was seen since the last undo or redo
     all_use_builtin   Armature modifiers deform all of them, and that can change only with an event that is
@@ -75,17 +65,12 @@ class Session:
     pairs: Pairs = field(default_factory=list)
     plans: dict[int, Plan] = field(default_factory=dict)
     told: dict[int, str] = field(default_factory=dict)
-    unsaved: dict[int, str] = field(default_factory=dict)
     depsgraph: int = 0
     view_layers: set[tuple[int, str]] = field(default_factory=set)
     waiting: set[tuple[int, int]] = field(default_factory=set)
     gate: Gate = field(default_factory=Gate)
     missed: Changes | None = None
     expected: set[int] = field(default_factory=set)
-    on_before_saving: set[int] = field(default_factory=set)
-    is_saving: bool = False
-    is_rendering: bool = False
-    must_refresh: bool = False
     seen: set[str] | None = None
     is_after_step: bool = False
     all_use_builtin: bool = False
@@ -185,11 +170,6 @@ def error_of(obj: bpy.types.Object) -> str:
     return plan.reason if plan.state is State.REFUSED else ""
 
 
-def failure_of_saving(obj: bpy.types.Object) -> str:
-    """Returns what failed for it when the file was saved last, as a sentence; empty for nothing."""
-    return current.unsaved.get(obj.session_uid, "")
-
-
 def state_of(obj: bpy.types.Object) -> SkinnedObject | None:
     """Returns what was read of an object; None for nothing, as plan_of() says."""
     return current.skinned.get(obj.session_uid)
@@ -245,10 +225,10 @@ def refresh(context: bpy.types.Context) -> None:
     """Deforms all skinned objects at the current frame, as after a change of settings."""
     if is_rendering_in_window():
         # Not waiting for the render's thread, which would go on to its next frame during what follows.
-        current.must_refresh = True
+        phase.must_refresh = True
         return
     with reaction() as may_react:
-        if not may_react or current.is_saving:
+        if not (may_react and may_change_file()):
             # Updates are suspended, or a handler switched an object off: whoever did that goes on from here.
             return
         current.objects = None
@@ -279,31 +259,8 @@ def changing(context: bpy.types.Context) -> Iterator[None]:
     with updates_suspended():
         yield
     for obj in filter(properties.has_sinew, bpy.data.objects):
-        _expect_mesh_update(obj)
+        expect_mesh_update(obj)
     refresh(context)
-
-
-@contextlib.contextmanager
-def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
-    """Like changing(), for a file that was opened to be saved with the new settings: at its end the file is
-    also prepared for saving. To work on with the file, call resume_after_save().
-
-    Blender has the poses from opening the file, so only objects that had Sinew before or have upstream
-    modifiers have to be evaluated.
-    """
-    with updates_suspended():
-        yield
-        current.objects = None
-        depsgraph, changes = context.view_layer.depsgraph, Changes()
-        had_sinew = depsgraph is not None and any(
-            properties.has_sinew(obj.evaluated_get(depsgraph)) for obj in objects_with_sinew(changes)
-        )
-        if depsgraph is None or had_sinew:
-            depsgraph = context.evaluated_depsgraph_get()
-        update_all(depsgraph, changes)
-        if waiting():
-            update_all(context.evaluated_depsgraph_get(), changes)
-        prepare_for_save()
 
 
 def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -315,7 +272,7 @@ def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     # Blender then touches the object's mesh. In a window that is a separate evaluation; a script may change
     # weights before it.
     if not bpy.app.background:
-        _expect_mesh_update(obj)
+        expect_mesh_update(obj)
 
 
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -327,58 +284,6 @@ def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
         settings.enabled = True  # refreshes
     else:
         refresh(context)
-
-
-# --- Saving
-
-
-def prepare_for_save() -> None:
-    """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has.
-    Raises nothing: what fails is reported, and the rest of the file is prepared."""
-    current.gate.restore()
-    objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
-    # Known before anything can fail, so that resume_after_save() reverses all of it.
-    current.on_before_saving = {obj.session_uid for obj in objects if properties.of(obj).replaces_modifiers}
-    current.unsaved.clear()
-    with updates_suspended():
-        for obj in objects:
-            with _logging_failure("A Blender without Sinew will not show it posed", obj):
-                attach.prepare_for_save(obj)
-                overrides.store(obj)
-        with _logging_failure("What the methods need is not in the file, and is computed again"):
-            precomputing.store_in_meshes([(obj, state_of(obj)) for obj in objects])
-        with _logging_failure("The file does not say that it uses Sinew"):
-            note.write([obj for obj in objects if properties.of(obj).has_nearest_volume])
-
-
-@contextlib.contextmanager
-def _logging_failure(consequence: str, obj: bpy.types.Object | None = None) -> Iterator[None]:
-    """Logs an error instead of passing it on: what is next to be saved is in the same file. The panel shows
-    that of an object."""
-    try:
-        yield
-    except Exception as error:
-        text = f"{consequence}: {type(error).__name__}: {error}"
-        if obj is not None:
-            current.unsaved[obj.session_uid] = text
-            text = f"{obj.name}: {text}"
-        log.error("%s", text, exc_info=error)
-
-
-def resume_after_save(context: bpy.types.Context) -> None:
-    """Reverses prepare_for_save(). Raises nothing of its own."""
-    with _logging_failure("The file still says that Sinew is missing"):
-        note.remove()
-    with updates_suspended():
-        for obj in filter(properties.has_sinew, bpy.data.objects):
-            _expect_mesh_update(obj)
-            if not obj.is_editable:
-                continue
-            with _logging_failure("Not as before it was saved; press Rebind", obj):
-                attach.restore_volume(obj)
-                if stack.sinew_modifier(obj) is not None:
-                    attach.switch(obj, on=obj.session_uid in current.on_before_saving)
-    refresh(context)
 
 
 # --- Reactions to an evaluation
@@ -447,7 +352,7 @@ def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
     """Returns the objects that have Sinew. Searches again where objects may have been added or removed."""
     if current.objects is None or changes.structure or current.objects_seen != _objects_now():
         current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
-        if not is_rendering_in_window():
+        if may_change_file():
             orphans.remove()
         current.objects_seen = _objects_now()
         notify(subscribers.objects_changed, current.objects)
@@ -544,7 +449,7 @@ def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
     """Gives a failing object back to its Armature modifier. Returns its plan."""
     if is_rendering_in_window():
         log.error("%s: %s; the last shape stays until the end of the render", obj.name, error)
-        current.must_refresh = True
+        phase.must_refresh = True
         return UNSEEN
     if isinstance(error, SinewError):
         refused = Plan(State.REFUSED, str(error))
@@ -553,8 +458,10 @@ def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
         refused = Plan(State.REFUSED, text)
         log.error("%s", text, exc_info=error)
         current.told[obj.session_uid] = text
-    with _logging_failure(f"{obj.name}: its Armature modifier may not deform it"):
+    try:
         apply_plan.apply(obj, old, refused)
+    except Exception as failure:
+        log.error("%s: its Armature modifier may not deform it: %s", obj.name, failure, exc_info=failure)
     return refused
 
 
@@ -570,7 +477,7 @@ def _follow_removal(obj: bpy.types.Object, plan: Plan, changes: Changes) -> bool
     state = state_of(obj)
     if not _is_named(obj, changes) and (state is None or state.is_attached(obj)):
         return False
-    if not obj.is_editable or is_rendering_in_window():
+    if not (obj.is_editable and may_change_file()):
         return False
     if not apply_plan.has_lost_modifier(obj, plan):
         return False
@@ -592,13 +499,13 @@ def _is_named(obj: bpy.types.Object, changes: Changes) -> bool:
 def _remove_groups_taken_apart(changes: Changes) -> None:
     """Removes node groups that were changed: their objects then get new ones, or an error where that happens
     again and again."""
-    for group in node_group.taken_apart() if changes.node_groups and not is_rendering_in_window() else ():
+    for group in node_group.taken_apart() if changes.node_groups and may_change_file() else ():
         log.warning("The node group %s is Sinew's own: it was changed, and is made again", group.name)
         bpy.data.node_groups.remove(group)
 
 
 def _adopt_copied_modifiers(changes: Changes) -> None:
-    for obj in changes.edited if not is_rendering_in_window() else ():
+    for obj in changes.edited if may_change_file() else ():
         # The object may have been deleted since.
         with contextlib.suppress(ReferenceError):
             is_plain = obj.type == "MESH" and obj.library is None and not properties.is_helper(obj)
@@ -614,7 +521,7 @@ def _note_readers(changes: Changes) -> None:
                 state.needs_apply |= bool(state.plan.normals.domain or state.plan.normals_reason)
 
 
-def _expect_mesh_update(obj: bpy.types.Object) -> None:
+def expect_mesh_update(obj: bpy.types.Object) -> None:
     """Notes that the next evaluation lists the object's mesh because of Sinew's own changes."""
     current.expected.add(obj.data.session_uid)
 

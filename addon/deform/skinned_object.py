@@ -19,7 +19,7 @@ from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
 from .changes import Changes
-from .plan import UNSEEN, Plan
+from .plan import Plan
 
 
 @dataclass
@@ -46,6 +46,7 @@ class Shown:
 class Evaluation:
     """How Blender's last evaluation of an object went.
 
+    is_only_user         the mesh has as many users as when the plan was applied
     mesh                 the address of the evaluated mesh that was given points, or 0; compared only within
                          the same event, while Blender keeps the mesh
     is_event_known       Blender called handlers before the evaluation, or Sinew caused it
@@ -57,6 +58,7 @@ class Evaluation:
     failures_in_a_row    how often in a row the mesh was not given points
     """
 
+    is_only_user: bool = True
     mesh: int = 0
     is_event_known: bool = True
     was_tagged: bool = False
@@ -86,60 +88,87 @@ class Evaluation:
         self.mesh, self.skip_reason, self.failures_in_a_row = mesh.as_pointer(), "", 0
 
 
-@dataclass
-class SkinnedObject:
-    """An object that has Sinew, switched on.
+@dataclass(frozen=True)
+class Noted:
+    """An object as it was when its plan was applied. Immutable: it is replaced as a whole.
 
-    bound, shown         what it is deformed by, and its shape; both change only under the lock, as Blender
-                         may evaluate the object on another thread, or on two for a render
-    plan                 who deforms it; already applied to it unless needs_apply
-    name, mode           the object's, when the plan was applied
     modifier             the name of Sinew's modifier, by which it is found again
     attribute            the mesh's point attribute; empty where the point buffer has the points
     normals_attribute    the mesh's attribute with the normals; empty where there is none
     normals_domain       the normals that drew the mesh, as from normals.domain_of()
     mesh_users           the number of users of the mesh; with several, another could read while Sinew writes
-    is_only_user         the mesh has as many users now
     visibility_keyed     for each Armature modifier, whether an animation switches it on and off
-    object_state         what the artist can change about the object itself, from object_state_of()
+    state                what the artist can change about the object itself, from state_of()
     groups               the names of its vertex groups
     dependencies         the session_uid of everything that the shape depends on
     builtin_fingerprint  why its Armature modifiers deform it (small_meshes.fingerprint()); else empty
-    group_losses         how often its modifier had lost its node group
-    needs_recheck        the mesh may have changed since it was read: it is read again at the next event, or
-                         when it is measured
-    dirtied_by_frames    the last change of frame moved the object or its rest points
     data_versions        versions of the methods' vertex data, for each Armature modifier
     """
 
-    bound: Bound
     name: str
     mode: str
+    modifier: str
+    attribute: str
+    normals_attribute: str
+    normals_domain: str
+    mesh_users: int
+    visibility_keyed: list[bool]
+    state: list
+    groups: list[str]
+    dependencies: set[int]
+    builtin_fingerprint: list[str]
+    data_versions: list[int]
+
+    @classmethod
+    def of(cls, obj: bpy.types.Object, plan: Plan, bound: Bound) -> Noted:
+        settings, mesh = properties.of(obj), obj.data
+        own = {obj.session_uid, mesh.session_uid, uid(mesh.shape_keys), uid(settings.upstream_proxy)}
+        return cls(
+            name=obj.name,
+            mode=obj.mode,
+            modifier=stack.sinew_modifier(obj).name,
+            attribute=settings.attribute,
+            normals_attribute=settings.normals_attribute,
+            normals_domain=normals.domain_of(mesh),
+            mesh_users=mesh.users,
+            visibility_keyed=[is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)],
+            state=state_of(obj),
+            groups=obj.vertex_groups.keys(),
+            dependencies=own | set(bound.armatures),
+            builtin_fingerprint=small_meshes.fingerprint(obj) if plan.uses_builtin else [],
+            data_versions=bound.data_versions,
+        )
+
+
+@dataclass
+class SkinnedObject:
+    """An object that was read.
+
+    bound, shown       what it is deformed by, and its shape; both change only under the lock, as Blender may
+                       evaluate the object on another thread, or on two for a render
+    plan               who deforms it; already applied to it unless needs_apply
+    noted              the object when the plan was applied
+    group_losses       how often its modifier had lost its node group
+    needs_recheck      the mesh may have changed since it was read: it is read again at the next event, or
+                       when it is measured
+    dirtied_by_frames  the last change of frame moved the object or its rest points
+    """
+
+    bound: Bound
+    noted: Noted
+    plan: Plan
     shown: Shown = field(default_factory=Shown)
     evaluation: Evaluation = field(default_factory=Evaluation)
     lock: threading.Lock = field(default_factory=threading.Lock)
-    plan: Plan = UNSEEN
-    needs_apply: bool = True
-    modifier: str = ""
-    attribute: str = ""
-    normals_attribute: str = ""
-    normals_domain: str = ""
-    mesh_users: int = 0
-    is_only_user: bool = True
-    visibility_keyed: list[bool] = field(default_factory=list)
-    object_state: list = field(default_factory=list)
-    groups: list[str] = field(default_factory=list)
-    dependencies: set[int] = field(default_factory=set)
-    builtin_fingerprint: list[str] = field(default_factory=list)
+    needs_apply: bool = False
     group_losses: int = 0
     needs_recheck: bool = False
     dirtied_by_frames: bool = False
-    data_versions: list[int] = field(default_factory=list)
 
     @property
     def has_new_data(self) -> bool:
         """Whether the methods' vertex data changed since the object was last updated."""
-        return self.data_versions != self.bound.data_versions
+        return self.noted.data_versions != self.bound.data_versions
 
     def bind(self, bound: Bound) -> None:
         """Sets what the object is deformed by. Drops the shape where modifiers, bones or weights changed."""
@@ -149,19 +178,6 @@ class SkinnedObject:
                 self.evaluation = self.evaluation.begin_anew()
                 self.dirtied_by_frames = False
             self.bound = bound
-
-    def note_object(self, obj: bpy.types.Object, plan: Plan) -> None:
-        """Notes that the plan was applied, and the state of the object it was applied to."""
-        self.plan, self.needs_apply, self.name = plan, False, obj.name
-        self.evaluation.was_tagged = True
-        self.builtin_fingerprint = small_meshes.fingerprint(obj) if plan.uses_builtin else []
-        self.visibility_keyed = [is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)]
-        self.normals_domain = normals.domain_of(obj.data)
-        self.modifier, self.object_state = stack.sinew_modifier(obj).name, object_state_of(obj)
-        self.groups = obj.vertex_groups.keys()
-        proxy = properties.of(obj).upstream_proxy
-        own = {obj.session_uid, obj.data.session_uid, uid(obj.data.shape_keys), uid(proxy)}
-        self.dependencies = own | set(self.bound.armatures)
 
     @property
     def points(self) -> np.ndarray:
@@ -187,7 +203,7 @@ class SkinnedObject:
         return (
             changes.complete
             and not (changes.structure or changes.armatures)
-            and self.dependencies.isdisjoint(changes.touched)
+            and self.noted.dependencies.isdisjoint(changes.touched)
         )
 
     def is_untouched_by_frame(self, obj: bpy.types.Object, meshes: set[int] | None) -> bool:
@@ -204,29 +220,29 @@ class SkinnedObject:
         if self.needs_recheck or obj.data.session_uid in meshes:
             return False
         # Where vertex groups are added, removed or renamed, Blender lists the scene as changed, too.
-        return self.mode == obj.mode and self.object_state == object_state_of(obj)
+        return self.noted.mode == obj.mode and self.noted.state == state_of(obj)
 
     def is_as_noted(self, obj: bpy.types.Object) -> bool:
         """Whether the object itself is as it was when the plan was applied."""
-        return self.object_state == object_state_of(obj) and self.groups == obj.vertex_groups.keys()
+        return self.noted.state == state_of(obj) and self.noted.groups == obj.vertex_groups.keys()
 
     def was_deformed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the last evaluation gave the object its shape."""
         if self.plan.uses_builtin:
-            return self.builtin_fingerprint == small_meshes.fingerprint(obj)
+            return self.noted.builtin_fingerprint == small_meshes.fingerprint(obj)
         given = self.evaluation.mesh
         return given != 0 and given == obj.data.evaluated_get(depsgraph).as_pointer()
 
     def is_attached(self, obj: bpy.types.Object) -> bool:
         """Whether Sinew's modifier is there, with its node group where that is needed. Another add-on's
         handler can remove them without any event."""
-        modifier = obj.modifiers.get(self.modifier)
+        modifier = obj.modifiers.get(self.noted.modifier)
         if self.plan.uses_builtin:
             return modifier is not None
         return getattr(modifier, "node_group", None) is not None
 
 
-def object_state_of(obj: bpy.types.Object) -> list:
+def state_of(obj: bpy.types.Object) -> list:
     """Everything about the object itself that the artist can change and that decides how it is deformed, but
     for its vertex groups."""
     settings = properties.of(obj)

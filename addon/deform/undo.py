@@ -50,7 +50,7 @@ def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.
         and not (plan.in_buffer or state.bound.source.from_upstream)
         and not (state.needs_recheck or state.needs_apply)
         and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
-        and obj.mode == state.mode == "OBJECT"
+        and obj.mode == state.noted.mode == "OBJECT"
         and _is_shown(obj, depsgraph)
     )
 
@@ -60,7 +60,7 @@ def is_known_after(
 ) -> bool:
     """Whether this is still the known object with its shape. Called with the first evaluation after the
     step."""
-    has_shape = state.was_deformed(obj, depsgraph) or state.dependencies.isdisjoint(changes.touched)
+    has_shape = state.was_deformed(obj, depsgraph) or state.noted.dependencies.isdisjoint(changes.touched)
     return _is_shown(obj, depsgraph) and has_shape and state.is_as_noted(obj)
 
 

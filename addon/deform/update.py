@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an event means for one skinned object: what is read again, what changes in the file, who deforms
-it."""
+"""Observes what an event shows of an object, and performs what react.py decides."""
 
 from __future__ import annotations
 
@@ -8,15 +7,15 @@ from dataclasses import replace
 
 import bpy
 
-from ..attach import attach, normals, point_store, pose_driver, properties, stack
-from ..attach.updates import is_rendering_in_window
+from ..attach import attach, normals, point_store, properties, stack
+from ..attach.updates import may_change_file
 from ..core.errors import SinewError
-from ..io import armature_io
 from ..io.animation_paths import animated_paths
 from . import after_update, apply_plan, bound, precomputing, source
 from .changes import Changes
 from .plan import Plan, State, plan
-from .skinned_object import SkinnedObject
+from .react import Action, Facts, Known, is_at_end, react
+from .skinned_object import Noted, SkinnedObject
 
 # How often the node group is restored after another add-on removed it.
 MAX_GROUP_LOSSES = 2
@@ -41,82 +40,258 @@ def update(
     Returns what is known of it from now on; its plan where nothing is read. Raises SinewError with a sentence
     for the user where Sinew cannot deform it.
     """
-    error = old.reason if old.state is State.REFUSED else _unknown_method(obj)
-    inspect = skinned is None or bool(error) or not properties.of(obj).enabled
-    if not inspect and _is_unchanged(obj, skinned, changes):
-        return skinned
-    inspect = inspect or _needs_inspection(obj, skinned, depsgraph, changes)
-    if not inspect and _has_shape(obj, skinned, depsgraph, changes):
-        skinned.dirtied_by_frames = False
-        return skinned
-    if inspect and is_rendering_in_window():
-        # This is done when the render has ended.
+    event = _Event(obj, old, skinned, depsgraph, changes)
+    facts = event.observe()
+    while (action := react(facts, event.known)) is not Action.NOTHING:
+        facts = event.perform(action, facts)
+    return event.result(facts)
+
+
+class _Event:
+    """What one event means for one object."""
+
+    def __init__(
+        self,
+        obj: bpy.types.Object,
+        old: Plan,
+        skinned: SkinnedObject | None,
+        depsgraph: bpy.types.Depsgraph,
+        changes: Changes,
+    ) -> None:
+        self.obj, self.old, self.skinned = obj, old, skinned
+        self.depsgraph, self.changes = depsgraph, changes
+        self.known = Known(old, is_bound=skinned is not None)
+        self.bound_before = None if skinned is None else skinned.bound
+        self.was_on = properties.of(obj).replaces_modifiers
+        self.error = _error_of(obj, old, skinned)
+
+    # --- Observing
+
+    def observe(self) -> Facts:
+        """Returns the facts by which to decide; others do not matter then."""
+        obj, skinned = self.obj, self.skinned
+        may_change = may_change_file()
+        is_prevented = bool(self.error) or not properties.of(obj).enabled
+        if skinned is None or is_prevented:
+            facts = Facts(may_change=may_change, is_prevented=is_prevented)
+        else:
+            facts = self._of_bound(skinned, may_change)
+        if is_at_end(facts, self.known) or (may_change and (skinned is None or facts.calls_for_plan)):
+            return facts
+        return self._with_rest(facts)
+
+    def _of_bound(self, skinned: SkinnedObject, may_change: bool) -> Facts:
+        obj, changes = self.obj, self.changes
+        if skinned.needs_recheck:
+            changes.meshes.add(obj.data.session_uid)
+            changes.touched.add(obj.data.session_uid)
+        has_same_mode = skinned.noted.mode == apply_plan.mode_of(obj)
+        facts = Facts(
+            may_change=may_change,
+            is_due=skinned.needs_apply,
+            is_detached=not skinned.is_attached(obj),
+            was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
+            is_other=not has_same_mode,
+            is_untouched=skinned.is_untouched_by(changes),
+        )
+        if facts.calls_for_plan or facts.is_untouched:
+            return facts
+        if _lacks_points(obj, skinned, self.depsgraph, changes):
+            return replace(facts, lacks_points=True)
+        if changes.structure or _may_be_other(obj, skinned, self.depsgraph, changes):
+            return replace(facts, is_other=True)
+        # Blender lists an armature's bones with each change of its pose.
+        has_shape = skinned.was_deformed(obj, self.depsgraph) and obj.data.session_uid not in changes.touched
+        return replace(facts, has_shape=has_shape and not self._have_bones_changed())
+
+    def _with_rest(self, facts: Facts) -> Facts:
+        """Adds what decides what is read."""
+        obj, skinned, depsgraph, changes = self.obj, self.skinned, self.depsgraph, self.changes
+        # Before anything else, as groups are renamed along with bones.
+        have_bones_changed = skinned is not None and self._have_bones_changed()
+        # While Sinew's modifier was off, nothing made Blender evaluate the upstream proxy.
+        if not source.is_ready(obj, depsgraph, self.was_on):
+            return replace(facts, is_upstream_there=False)
         if skinned is None:
-            return old
-        skinned.needs_apply, inspect = True, False
-        if error or not properties.of(obj).enabled:
+            return facts
+        read = skinned.bound.source
+        return replace(
+            facts,
+            has_other_modifiers=bound.is_of_other_modifiers(obj, skinned.bound),
+            have_bones_changed=have_bones_changed,
+            has_other_mesh=source.has_changed(obj, read, depsgraph, changes, self.known.is_planned),
+            is_slider_moved=not bpy.app.background and source.is_slider_moved(obj, read, depsgraph, changes),
+            lacks_surface=bound.lacks_surface(obj, skinned.bound),
+        )
+
+    def _have_bones_changed(self) -> bool:
+        return _have_bones_changed(self.obj, self.skinned, self.depsgraph, self.changes)
+
+    # --- Performing
+
+    def perform(self, action: Action, facts: Facts) -> Facts:
+        """Returns the facts by which to decide on."""
+        if action is Action.REPLAN:
+            self._replan(facts)
+            return self._with_rest(facts) if self.known.plan.is_read else facts
+        if action in (Action.REBIND, Action.READ):
+            self._read(facts, is_whole=action is Action.REBIND)
+        elif action is Action.SETTLE:
+            self._settle(facts)
+        else:
+            self._show(is_tagged=action is Action.TAG)
+        return facts
+
+    def _replan(self, facts: Facts) -> None:
+        if self.skinned is not None:
+            _count_failures(self.obj, self.skinned, facts)
+        new = plan(apply_plan.first_facts(self.obj, self.error))
+        if new.is_read:
+            _check_modifiers(self.obj, self.changes)
+            new = self._full_plan()
+        apply_plan.apply(self.obj, self.old, new)
+        self.known = replace(self.known, plan=new, is_planned=True)
+
+    def _full_plan(self) -> Plan:
+        waits_for = precomputing.waits_for(self.obj, self.skinned)
+        return plan(apply_plan.all_facts(self.obj, _failure_of(self.skinned), waits_for))
+
+    def _read(self, facts: Facts, is_whole: bool) -> None:
+        obj, skinned, depsgraph = self.obj, self.skinned, self.depsgraph
+        if skinned is None:
+            read = bound.read(obj, depsgraph)
+            noted = Noted.of(obj, self.known.plan, read)
+            self.skinned = SkinnedObject(read, noted, self.known.plan, needs_apply=True)
+        elif is_whole:
+            skinned.bind(bound.read(obj, depsgraph))
+        elif facts.have_bones_changed or facts.has_other_mesh:
+            skinned.bind(bound.read(obj, depsgraph, skinned.bound))
+        else:
+            skinned.bind(bound.with_surface(obj, depsgraph, skinned.bound))
+        self.known = replace(self.known, is_bound=True, is_read=True)
+
+    def _settle(self, facts: Facts) -> None:
+        obj, skinned, known = self.obj, self.skinned, self.known
+        is_of_another_stack = skinned.bound.is_of_another_stack(self.bound_before)
+        skinned.needs_recheck, skinned.evaluation.changed_unannounced = facts.is_slider_moved, False
+        new = self._with_data(known.plan)
+        # A render lists everything as new with each frame. Tagging the object makes Blender (4.2 to 5.2) copy
+        # it again, without what animation had set.
+        is_same = not is_of_another_stack and skinned.bound.source.equals(self.bound_before.source)
+        is_same &= not skinned.has_new_data
+        if known.is_planned or is_of_another_stack:
+            self._note(new)
+        else:
+            skinned.needs_apply |= facts.calls_for_plan
+            versions = skinned.bound.data_versions
+            skinned.noted = replace(skinned.noted, mode=obj.mode, data_versions=versions)
+        skinned.plan = new
+        if new.is_in_depsgraph:
+            skinned.dirtied_by_frames = False
+            if new.in_buffer:
+                rest, count = skinned.bound.source.points, skinned.normal_count
+                point_store.set_rest_points(obj, self.depsgraph, rest, count, anew=self._is_new(new))
+        elif not new.after_update:
+            skinned.shown.frames = None
+        differs = not is_same or self._is_new(new)
+        self.known = replace(known, plan=new, is_settled=True, differs=differs)
+
+    def _is_new(self, new: Plan) -> bool:
+        return self.bound_before is None or new != self.old
+
+    def _with_data(self, wanted: Plan) -> Plan:
+        """Requests the data that the methods need and returns the resulting plan. A plan that waits needs the
+        same modifiers and storage as one that does not, so it need not be applied again."""
+        if wanted.uses_builtin:
+            return wanted
+        if wanted.normals.domain:
+            # Not within Blender's evaluation: it takes as long as several frames.
+            self.skinned.bound.source.make_normals()
+        precomputing.request(self.obj, self.skinned, self.depsgraph)
+        waits_for = precomputing.waits_for(self.obj, self.skinned)
+        is_same = waits_for == (wanted.reason if wanted.state is State.WAITING else "")
+        return wanted if is_same else self._full_plan()
+
+    def _note(self, new: Plan) -> None:
+        """Notes that the plan was applied, and the state of the object it was applied to."""
+        obj, skinned = self.obj, self.skinned
+        if not new.uses_builtin:
+            apply_plan.apply_driver(obj, skinned.bound, new)
+            skinned.evaluation.is_only_user = True
+        # After Sinew's driver is added, as the driver counts as animation, too.
+        skinned.noted = Noted.of(obj, new, skinned.bound)
+        skinned.needs_apply, skinned.evaluation.was_tagged = False, True
+        if self.changes.frame and self.depsgraph.mode == "RENDER":
+            # Applying the plan can have Blender copy the object again: what the frame has set is set again.
+            obj.update_tag(refresh={"OBJECT", "TIME"})
+
+    def _show(self, is_tagged: bool) -> None:
+        obj, skinned = self.obj, self.skinned
+        if is_tagged:
+            # Blender evaluates the object once more, and thereby requests its points.
+            skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
+            # The object is then copied again, and what the change of frame has set has to be set again:
+            # originals of hidden objects do not have it.
+            obj.update_tag(refresh={"OBJECT", "TIME"} if self.changes.frame else {"OBJECT"})
+        else:
+            is_first = self.known.differs or not self.old.after_update
+            with skinned.lock:
+                is_planned = self.known.is_planned
+                after_update.deform(obj, skinned, self.depsgraph, self.changes, is_planned, is_first)
+        self.known = replace(self.known, is_given=True)
+
+    # --- The result
+
+    def result(self, facts: Facts) -> SkinnedObject | Plan:
+        skinned, known = self.skinned, self.known
+        if known.is_settled:
+            skinned.bound.source.known_key_values = skinned.bound.source.key_values
             return skinned
-    return _react(obj, old, skinned, depsgraph, changes, inspect, error)
-
-
-def _react(
-    obj: bpy.types.Object,
-    old: Plan,
-    skinned: SkinnedObject | None,
-    depsgraph: bpy.types.Depsgraph,
-    changes: Changes,
-    inspect: bool,
-    error: str,
-) -> SkinnedObject | Plan:
-    """inspect: the object itself may have changed; error: why it can not be deformed."""
-    before, known = (None, None) if skinned is None else (skinned.plan, skinned.bound)
-    was_on = properties.of(obj).replaces_modifiers
-    new = _apply_plan(obj, old, skinned, changes, error) if inspect else old
-    if not new.is_read:
-        if skinned is None or new.state is not State.OFF:
-            return new
-        # So that it need not be read again when it is switched on.
-        skinned.plan, skinned.needs_apply = new, True
-        return skinned
-    # Before anything else, as groups are renamed along with bones.
-    bones_changed = skinned is not None and _have_bones_changed(obj, skinned, depsgraph, changes)
-    # While Sinew's modifier was off, nothing made Blender evaluate the upstream proxy.
-    if not source.is_ready(obj, depsgraph, was_on):
+        if not known.is_planned:
+            if skinned is None:
+                return self.old
+            if facts.calls_for_plan:
+                skinned.needs_apply = True
+            elif facts.has_shape:
+                skinned.dirtied_by_frames = False
+            return skinned
+        if not known.plan.is_read:
+            if skinned is None or known.plan.state is not State.OFF:
+                return known.plan
+            # So that it need not be read again when it is switched on.
+            skinned.plan, skinned.needs_apply = known.plan, True
+            return skinned
         # What is hidden, or in another scene, stays as it is.
-        is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
-        if skinned is not None and not (is_shown and obj.evaluated_get(depsgraph).is_evaluated):
+        is_shown = self.obj.visible_get(view_layer=self.depsgraph.view_layer)
+        if skinned is not None and not (is_shown and self.obj.evaluated_get(self.depsgraph).is_evaluated):
             return skinned
-        return replace(new, state=State.WAITING_UPSTREAM)
-    skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
-    new = _with_data(obj, skinned, new, depsgraph)
-    if inspect or skinned.bound.is_of_another_stack(known):
-        _note_applied(obj, skinned, new, in_render_frame=changes.frame and depsgraph.mode == "RENDER")
-    skinned.plan = new
-    # A render lists everything as new with each frame. Tagging the object makes Blender (4.2 to 5.2) copy it
-    # again, without what animation had set.
-    is_same = not skinned.bound.is_of_another_stack(known) and skinned.bound.source.equals(known.source)
-    is_same &= not skinned.has_new_data
-    skinned.data_versions = skinned.bound.data_versions
-    if new.is_in_depsgraph:
-        _request_points(obj, skinned, depsgraph, changes, is_new_plan=new != before, is_same=is_same)
-    elif new.after_update:
-        is_first = before is None or not before.after_update
-        with skinned.lock:
-            after_update.deform(obj, skinned, depsgraph, changes, inspect, is_first or not is_same)
-    else:
-        skinned.shown.frames = None
-    skinned.bound.source.known_key_values = skinned.bound.source.key_values
-    return skinned
+        return replace(known.plan, state=State.WAITING_UPSTREAM)
 
 
-def _note_applied(obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan, in_render_frame: bool) -> None:
-    if not plan.uses_builtin:
-        keep_poses_evaluated(obj, skinned, plan)
-    # After Sinew's driver is added, as the driver counts as animation, too.
-    skinned.note_object(obj, plan)
-    if in_render_frame:
-        # Applying the plan can have Blender copy the object again: what the frame has set is set again.
-        obj.update_tag(refresh={"OBJECT", "TIME"})
+def _error_of(obj: bpy.types.Object, old: Plan, skinned: SkinnedObject | None) -> str:
+    """Returns why it can not be deformed, as a sentence; empty where it can."""
+    if old.state is State.REFUSED:
+        return old.reason
+    # A driver that gives a number without a method has a sentence of its own.
+    if not properties.has_known_methods(properties.of(obj)) and "sinew.method" not in animated_paths(obj):
+        return f"{obj.name}: its method is of a newer Sinew; update Sinew, or choose another method"
+    if skinned is not None and skinned.evaluation.user_error is not None:
+        return str(skinned.evaluation.user_error)
+    return ""
+
+
+def _count_failures(obj: bpy.types.Object, skinned: SkinnedObject, facts: Facts) -> None:
+    """Raises SinewError where something prevents Sinew again and again."""
+    if facts.lacks_points:
+        skinned.evaluation.note_failure(NOT_REQUESTED)
+    skinned.evaluation.failures_in_a_row += facts.was_skipped or facts.lacks_points
+    nodes = stack.sinew_modifier(obj) if facts.is_detached else None
+    skinned.group_losses += nodes is not None and nodes.node_group is None
+    if skinned.group_losses > MAX_GROUP_LOSSES:
+        raise SinewError(
+            f"{obj.name}: something removes Sinew's node group again and again, another add-on perhaps; "
+            "stop that, then press Rebind"
+        )
 
 
 def _lacks_points(
@@ -126,9 +301,7 @@ def _lacks_points(
     evaluation = skinned.evaluation
     if not skinned.plan.is_in_depsgraph or skinned.needs_apply or evaluation.mesh or evaluation.skip_reason:
         return False
-    is_known = (
-        skinned.mode == apply_plan.mode_of(obj) and not skinned.needs_recheck and skinned.is_as_noted(obj)
-    )
+    is_known = not skinned.needs_recheck and skinned.is_as_noted(obj)
     is_hidden = depsgraph.mode == "VIEWPORT" and not obj.visible_get(view_layer=depsgraph.view_layer)
     if not is_known or is_hidden or not obj.evaluated_get(depsgraph).is_evaluated:
         return False
@@ -148,58 +321,16 @@ def _have_bones_changed(
     return bound.have_bones_changed(obj, skinned.bound, depsgraph, changes, are_unknown)
 
 
-def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
-    """Notes changes of Sinew's modifier and of the object's name since the last event.
-
-    Raises SinewError where the user has to fix something first.
-    """
-    if skinned.evaluation.user_error is not None:
-        raise skinned.evaluation.user_error
-    if not skinned.is_attached(obj):
-        skinned.needs_apply = True
-        nodes = stack.sinew_modifier(obj)
-        skinned.group_losses += nodes is not None and nodes.node_group is None
-        if skinned.group_losses > MAX_GROUP_LOSSES:
-            raise SinewError(
-                f"{obj.name}: something removes Sinew's node group again and again, another add-on perhaps; "
-                "stop that, then press Rebind"
-            )
-    if skinned.name != obj.name:
-        skinned.name, skinned.evaluation.skip_reason = obj.name, "it has another name"
-
-
-def _is_unchanged(obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes) -> bool:
-    """Whether nothing has to be read again. A mesh that needs a recheck counts as changed.
-
-    Raises SinewError where the user has to fix something first.
-    """
-    _check_attached(obj, skinned)
-    if skinned.needs_recheck:
-        changes.meshes.add(obj.data.session_uid)
-        changes.touched.add(obj.data.session_uid)
-    return (
-        skinned.mode == apply_plan.mode_of(obj)
-        and not (skinned.needs_apply or skinned.evaluation.skip_reason)
-        and skinned.is_untouched_by(changes)
-    )
-
-
-def _needs_inspection(
+def _may_be_other(
     obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> bool:
-    """Whether the object itself may have changed, or could not be deformed as planned."""
-    if _lacks_points(obj, skinned, depsgraph, changes):
-        skinned.evaluation.note_failure(NOT_REQUESTED)
-    is_skipped = bool(skinned.evaluation.skip_reason)
-    if is_skipped:
-        skinned.evaluation.failures_in_a_row += 1
-    if skinned.mode != apply_plan.mode_of(obj) or skinned.needs_apply or is_skipped or changes.structure:
-        return True
+    """Whether the object itself may not be as it was when its plan was applied."""
     keys = obj.data.shape_keys
     is_touched = obj.session_uid in changes.objects or uid_in(keys, changes.touched)
     if not (is_touched or changes.armatures):
         return False
-    if obj.data.session_uid in changes.touched and normals.domain_of(obj.data) != skinned.normals_domain:
+    is_mesh_touched = obj.data.session_uid in changes.touched
+    if is_mesh_touched and normals.domain_of(obj.data) != skinned.noted.normals_domain:
         return True
     # Requesting points touches the object, too.
     explains_touch = skinned.plan.is_in_depsgraph or skinned.was_deformed(obj, depsgraph)
@@ -210,61 +341,11 @@ def uid_in(data: bpy.types.ID | None, uids: set[int]) -> bool:
     return data is not None and data.session_uid in uids
 
 
-def _has_shape(
-    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
-) -> bool:
-    """Whether the last evaluation gave it its shape, and nothing else changed that has to be read."""
-    return (
-        skinned.was_deformed(obj, depsgraph)
-        and obj.data.session_uid not in changes.touched
-        # Blender lists an armature's bones with each change of its pose.
-        and not _have_bones_changed(obj, skinned, depsgraph, changes)
-    )
-
-
-def _apply_plan(
-    obj: bpy.types.Object, old: Plan, skinned: SkinnedObject | None, changes: Changes, error: str
-) -> Plan:
-    """Raises SinewError where the modifiers that Sinew works with are gone."""
-    wanted = plan(apply_plan.first_facts(obj, error))
-    if wanted.is_read:
-        _check_modifiers(obj, changes)
-        waits_for = precomputing.waits_for(obj, skinned)
-        wanted = plan(apply_plan.all_facts(obj, _failure_of(skinned), waits_for))
-    apply_plan.apply(obj, old, wanted)
-    return wanted
-
-
 def _failure_of(skinned: SkinnedObject | None) -> str:
     """Why Sinew cannot deform it within Blender's evaluation; empty where nothing prevents it."""
     if skinned is None or skinned.evaluation.failures_in_a_row <= MAX_FAILURES_IN_A_ROW:
         return ""
     return skinned.evaluation.failure
-
-
-def _with_data(
-    obj: bpy.types.Object, skinned: SkinnedObject, wanted: Plan, depsgraph: bpy.types.Depsgraph
-) -> Plan:
-    """Requests the data that the methods need and returns the resulting plan. A plan that waits needs the
-    same modifiers and storage as one that does not, so it need not be applied again."""
-    if wanted.uses_builtin:
-        return wanted
-    if wanted.normals.domain:
-        # Not within Blender's evaluation: it takes as long as several frames.
-        skinned.bound.source.make_normals()
-    precomputing.request(obj, skinned, depsgraph)
-    waits_for = precomputing.waits_for(obj, skinned)
-    if waits_for == (wanted.reason if wanted.state is State.WAITING else ""):
-        return wanted
-    return plan(apply_plan.all_facts(obj, _failure_of(skinned), waits_for))
-
-
-def _unknown_method(obj: bpy.types.Object) -> str:
-    """Returns a sentence where a method is one that this Sinew does not know."""
-    # A driver that gives a number without a method has a sentence of its own.
-    if properties.has_known_methods(properties.of(obj)) or "sinew.method" in animated_paths(obj):
-        return ""
-    return f"{obj.name}: its method is of a newer Sinew; update Sinew, or choose another method"
 
 
 def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
@@ -294,69 +375,3 @@ def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
                 f"{obj.name}: its armature {armature.name} was deleted, or is in no collection; choose "
                 "another in the Armature modifier and press Rebind, or Remove"
             )
-
-
-def _bind(
-    obj: bpy.types.Object,
-    skinned: SkinnedObject | None,
-    depsgraph: bpy.types.Depsgraph,
-    changes: Changes,
-    inspect: bool,
-    bones_changed: bool,
-) -> SkinnedObject:
-    """Binds the object again where its mesh, weights, bones or modifiers changed.
-
-    inspect  the object itself may have changed
-    """
-    if skinned is None:
-        return SkinnedObject(bound.read(obj, depsgraph), obj.name, obj.mode)
-    skinned.mode = obj.mode
-    # In a window, while a shape key's slider moves, weights are read only at the next event.
-    reads_later = not bpy.app.background and source.is_slider_moved(
-        obj, skinned.bound.source, depsgraph, changes
-    )
-    if inspect and bound.is_of_other_modifiers(obj, skinned.bound):
-        skinned.bind(bound.read(obj, depsgraph))
-    elif bones_changed or (
-        not reads_later and source.has_changed(obj, skinned.bound.source, depsgraph, changes, inspect)
-    ):
-        skinned.bind(bound.read(obj, depsgraph, skinned.bound))
-    elif bound.lacks_surface(obj, skinned.bound):
-        skinned.bind(bound.with_surface(obj, depsgraph, skinned.bound))
-    skinned.needs_recheck, skinned.evaluation.changed_unannounced = reads_later, False
-    return skinned
-
-
-def _request_points(
-    obj: bpy.types.Object,
-    skinned: SkinnedObject,
-    depsgraph: bpy.types.Depsgraph,
-    changes: Changes,
-    is_new_plan: bool,
-    is_same: bool,
-) -> None:
-    """Has Blender evaluate the object once more, and thereby request its points, where they may differ."""
-    skinned.dirtied_by_frames = False
-    if skinned.plan.in_buffer:
-        rest_points = skinned.bound.source.points
-        point_store.set_rest_points(obj, depsgraph, rest_points, skinned.normal_count, anew=is_new_plan)
-    if skinned.evaluation.skip_reason or not is_same or is_new_plan:
-        skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
-        # The object is then copied again, and what the change of frame has set has to be set again: originals
-        # of hidden objects do not have it.
-        obj.update_tag(refresh={"OBJECT", "TIME"} if changes.frame else {"OBJECT"})
-
-
-def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan) -> None:
-    """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where
-    the plan says so."""
-    settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
-    skinned.attribute, skinned.normals_attribute = settings.attribute, settings.normals_attribute
-    skinned.mesh_users, skinned.is_only_user = mesh.users, True
-    poses = [
-        (replaced.armature, path)
-        for (_modifier, replaced), stage in zip(pairs, skinned.bound.skin_stack.skin_stages, strict=False)
-        if replaced.armature is not None
-        for path in armature_io.paths_to_wait_for(replaced.armature, stage.deformer.moving_bones)
-    ]
-    pose_driver.ensure(obj, list(dict.fromkeys(poses)), plan.is_in_depsgraph)

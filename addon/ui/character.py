@@ -12,12 +12,11 @@ import inspect
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..attach import attach, properties
 from ..attach.shared_settings import GROUPS, SHARED, assign
 from ..attach.subscribers import subscribers
-from ..deform import events, session
+from ..deform import session
 from . import operators
 
 # Arguments that a computed property cannot have.
@@ -70,13 +69,12 @@ def known_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
     return find_meshes(context)
 
 
-@persistent
 def _forget(*_args: object) -> None:
     """Forgets the meshes, as others may belong to the character now."""
     _Known.names = ()
 
 
-_HANDLERS = dict.fromkeys(("depsgraph_update_post", "undo_post", "redo_post", "load_post"), _forget)
+_FORGET_AT = (subscribers.evaluated, subscribers.stepped, subscribers.loaded)
 
 
 def _selection(context: bpy.types.Context) -> tuple[object, ...]:
@@ -208,10 +206,12 @@ def _clear() -> None:
 def register() -> None:
     bpy.types.Scene.sinew_character = bpy.props.PointerProperty(type=SinewCharacter)
     subscribers.after_removal.append(_clear)
-    events.subscribe_all(_HANDLERS)
+    for functions in _FORGET_AT:
+        functions.append(_forget)
 
 
 def unregister() -> None:
-    events.unsubscribe_all(_HANDLERS)
+    for functions in _FORGET_AT:
+        functions.remove(_forget)
     subscribers.after_removal.remove(_clear)
     del bpy.types.Scene.sinew_character

@@ -9,7 +9,7 @@ import bpy
 
 from ..attach import attach, behind_nodes, properties
 from ..core.icons import Deformer
-from ..deform import session, small_meshes
+from ..deform import lifecycle, session, small_meshes
 from ..deform.plan import ARMATURE_MODIFIER_MODES, State
 from .sidebar import draw_text, names_text
 from .translations import tr
@@ -82,7 +82,7 @@ def icon_of(obj: bpy.types.Object) -> str:
 
 def problems_of(obj: bpy.types.Object) -> list[str]:
     """Returns what the artist should fix, apart from what prevents Sinew."""
-    settings, state, failed = properties.of(obj), session.state_of(obj), session.failure_of_saving(obj)
+    settings, state, failed = properties.of(obj), session.state_of(obj), lifecycle.failure_of_saving(obj)
     found = [failed] if failed else []
     if state is None:
         return found

@@ -11,6 +11,7 @@ import pytest
 import scenes
 from mathutils import Quaternion
 from sinew_addon.attach import attach
+from sinew_addon.attach.subscribers import notify, subscribers
 from sinew_addon.features.diagnose import diagnose
 
 # Vertices of the planted faults; the tube's rings have twelve.
@@ -275,7 +276,7 @@ def test_meshes_that_were_deleted_since_are_not_read():
         # Their memory is in use for something else.
         for number in range(200):
             bpy.data.meshes.new(f"Next {number}")
-        diagnose.on_depsgraph_update(scene, depsgraph)
+        notify(subscribers.evaluated, depsgraph)
 
     for mesh in others:
         mesh.update()

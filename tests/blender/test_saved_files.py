@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 import scenes
 from program import checked, without_sinew
-from sinew_addon.attach import attach, node_group, note, properties, stack
-from sinew_addon.deform import exporters, safe_mode, session, small_meshes
+from sinew_addon.attach import attach, node_group, note, properties, stack, updates
+from sinew_addon.deform import apply_plan, exporters, safe_mode, session, small_meshes
 from sinew_addon.io import armature_io
 from sinew_addon.ui import state_text
 
@@ -228,7 +228,7 @@ def test_a_save_that_fails_ends_as_one_that_does_not(tmp_path):
     with pytest.raises(RuntimeError):
         save(tmp_path / "no such folder" / "saved.blend")
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-    assert not session.current.is_saving
+    assert not updates.phase.is_saving
 
 
 def test_what_fails_for_an_object_while_saving_is_in_its_panel(tmp_path, monkeypatch, caplog):
@@ -237,14 +237,14 @@ def test_what_fails_for_an_object_while_saving_is_in_its_panel(tmp_path, monkeyp
     for each in (obj, other):
         scenes.add_sinew(each, "dq")
     expected = scenes.shapes(obj, FRAMES)
-    prepare = attach.prepare_for_save
+    prepare = apply_plan.apply_saved
 
     def fail_for_one(each):
         if each == obj:
             raise RuntimeError("disk on fire")
         return prepare(each)
 
-    monkeypatch.setattr(attach, "prepare_for_save", fail_for_one)
+    monkeypatch.setattr(apply_plan, "apply_saved", fail_for_one)
     save(tmp_path / "saved.blend")
     monkeypatch.undo()
     assert "Arm: A Blender without Sinew will not show it posed: RuntimeError: disk on fire" in caplog.text
@@ -300,14 +300,14 @@ def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
     monkeypatch.setattr(small_meshes, "is_used", False)
     properties.of(small).enabled = what != "off"
     scenes.add_sinew(obj, "dq")
-    prepare = attach.prepare_for_save
+    prepare = apply_plan.apply_saved
 
     def throw(each: bpy.types.Object) -> bool:
         if each == small and what == "throws":
             raise RuntimeError("disk on fire")
         return prepare(each)
 
-    monkeypatch.setattr(attach, "prepare_for_save", throw)
+    monkeypatch.setattr(apply_plan, "apply_saved", throw)
     save(tmp_path / "saved.blend")
     shapes, _facts = played_without_sinew(tmp_path / "saved.blend")
     assert np.array_equal(shapes, expected)

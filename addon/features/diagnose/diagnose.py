@@ -10,15 +10,15 @@ from dataclasses import dataclass
 import bmesh
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...attach import attach
+from ...attach.subscribers import subscribers
 from ...core.diagnostics import Finding, PoseCheck, check_weights
 from ...core.errors import SinewError
 from ...core.influences import GroupWeights
 from ...core.rig import Bones, Weighting
 from ...core.rotations import rotations_of
-from ...deform import characters, events, group_uses, session
+from ...deform import characters, group_uses, session
 from ...io import armature_io, mesh_io
 from ...ui import stepped
 from ...ui.translations import tr
@@ -231,8 +231,7 @@ def _edited_weights(mesh: bpy.types.Mesh) -> GroupWeights:
     )
 
 
-@persistent
-def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def _on_evaluated(depsgraph: bpy.types.Depsgraph) -> None:
     if not _checks:
         return
     # By names from evaluated data: earlier handlers may have deleted the originals.
@@ -256,29 +255,24 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
         found.stale |= not bones.equals(found.bones)
 
 
-@persistent
-def on_undone(*_args: object) -> None:
+def _on_stepped() -> None:
     for found in _checks.values():
         found.suspect = True
 
 
-@persistent
-def on_loaded(*_args: object) -> None:
-    _checks.clear()
-
-
-_HANDLERS = {
-    "depsgraph_update_post": on_depsgraph_update,
-    "undo_post": on_undone,
-    "redo_post": on_undone,
-    "load_pre": on_loaded,
-}
+_SUBSCRIPTIONS = (
+    (subscribers.evaluated, _on_evaluated),
+    (subscribers.stepped, _on_stepped),
+    (subscribers.loading, _checks.clear),
+)
 
 
 def register() -> None:
-    events.subscribe_all(_HANDLERS)
+    for functions, function in _SUBSCRIPTIONS:
+        functions.append(function)
 
 
 def unregister() -> None:
-    events.unsubscribe_all(_HANDLERS)
+    for functions, function in _SUBSCRIPTIONS:
+        functions.remove(function)
     _checks.clear()

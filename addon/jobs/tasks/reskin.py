@@ -21,7 +21,7 @@ from ...core.frames import parse_frames
 from ...core.names import fits
 from ...core.output import remove
 from ...core.views import seen_extent, whole_view
-from ...deform import characters, session
+from ...deform import characters, lifecycle, session
 from ...features.bake import bake_copy
 from ...features.compare import comparison
 from ...features.pages import render
@@ -249,7 +249,7 @@ def _compare(task: dict, skinned: list[tuple[bpy.types.Object, dict]], outcome: 
         return
     objects = [obj for obj, _mesh in shown]
     with clock.doing("comparing"):
-        session.resume_after_save(bpy.context)
+        lifecycle.resume_after_save(bpy.context)
         characters.show(objects)
         frames = _frames(task["frames"], scene)
         ours = [_points(scene, objects, frame) for frame in frames]
