@@ -55,7 +55,12 @@ IN_RENDERS_SOCKET = (
 
 
 def find(kind: int) -> bpy.types.NodeTree | None:
-    return next((g for g in bpy.data.node_groups if g.get(MARK) == kind and g.library is None), None)
+    """Returns a whole one."""
+    return next((g for g in _own() if g[MARK] == kind and not _is_taken_apart(g)), None)
+
+
+def _own() -> list[bpy.types.NodeTree]:
+    return [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None]
 
 
 def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
@@ -86,8 +91,11 @@ def note_structure(group: bpy.types.NodeTree) -> None:
 
 def taken_apart() -> list[bpy.types.NodeTree]:
     """Returns the groups in which somebody changed nodes, links or sockets: they no longer set points."""
-    own = [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and _WARNING not in g.nodes]
-    return [group for group in own if group.get(_MADE_OF) not in (None, _structure(group))]
+    return list(filter(_is_taken_apart, _own()))
+
+
+def _is_taken_apart(group: bpy.types.NodeTree) -> bool:
+    return _WARNING not in group.nodes and group.get(_MADE_OF) not in (None, _structure(group))
 
 
 def _structure(group: bpy.types.NodeTree) -> str:
@@ -112,11 +120,8 @@ def _structure(group: bpy.types.NodeTree) -> str:
 
 
 def remove_unused() -> None:
-    def unused() -> list[bpy.types.NodeTree]:
-        return [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and g.users == 0]
-
     # Removing one group can leave another unused.
-    while groups := unused():
+    while groups := [group for group in _own() if group.users == 0]:
         for group in groups:
             bpy.data.node_groups.remove(group)
 
@@ -221,7 +226,7 @@ def _last_link(group: bpy.types.NodeTree) -> bpy.types.NodeLink | None:
 
 def _groups_of_points() -> list[bpy.types.NodeTree]:
     kinds = {kind + normals for kind in (ATTRIBUTE, POINT_BUFFER) for normals in _WITH_NORMALS.values()}
-    return [g for g in bpy.data.node_groups if g.get(MARK) in kinds and g.library is None]
+    return [group for group in _own() if group[MARK] in kinds]
 
 
 def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:

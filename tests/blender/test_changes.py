@@ -255,6 +255,25 @@ def test_what_is_taken_of_sinews_is_made_again(take):
     assert not properties.of(obj).error
 
 
+@pytest.mark.usefixtures("by_each_route")
+@pytest.mark.parametrize("heat", [False, True])
+def test_what_is_taken_of_a_hidden_objects_group_is_made_again(heat):
+    """Blender does not list a group as changed that no evaluated object has."""
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).heat = heat
+    expected = scenes.shapes(obj, [6, 11])
+    obj.hide_viewport = True
+    bpy.context.view_layer.update()
+    obj.modifiers["Sinew"].node_group.interface.clear()
+    obj.update_tag()
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Empty", None))
+    bpy.context.view_layer.update()
+    obj.hide_viewport = False
+    assert np.array_equal(scenes.shapes(obj, [6, 11]), expected)
+    assert not properties.of(obj).error
+
+
 def test_points_that_blender_never_requests_are_counted_and_come_after_the_update(monkeypatch):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
