@@ -18,6 +18,9 @@ is within MARGIN of the modifier's threshold. It also leaves out vertices that a
 rounding moves by the tolerance, directly or by a later modifier; for stages, a change of their input. All of
 these are computed from the input. Behind several modifiers it also leaves out vertices where Sinew is
 within the tolerance of the float64 reference: the rest of the difference is Blender's own rounding.
+
+Sinew must refuse a rig that it cannot deform as Blender does: with a sentence, and nothing of it stays.
+Vertices that a seam split, as files of engines have them, must stay together.
 """
 
 from __future__ import annotations
@@ -35,9 +38,11 @@ import bpy
 import numpy as np
 import routes
 import scenes
+import snapshot
 from mathutils import Euler, Matrix, Vector
 from sinew_addon.attach import attach, properties, stage_settings
 from sinew_addon.core import skin_stack
+from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
@@ -77,16 +82,25 @@ FEATURES = (
     "surface",
     "sdef keys",
     "stages",
+    "first multi",
+    "refused behind",
+    "seams",
 )
 # Blender's own methods, and whether each has Preserve Volume.
 ORACLES = (("lbs", False), ("dq", True))
 OTHERS = tuple(m.name for m in sinew.methods() if m.name not in dict(ORACLES))
+# Blender needs the mesh itself in front of these.
+REFUSED_BEHIND = ("MULTIRES", "SOFT_BODY")
+# A Multi Modifier directly behind one of these mixes with what it got, not with what it made.
+MIXED_BY_MULTI_MODIFIERS = ("LATTICE", "MESH_DEFORM")
 # How many vertices of a rig the reference computes: it takes a hundredth of a second for each.
 REFERENCE_VERTICES = 12
 # float32 compared with exact numbers; Blender's own results have the same rounding.
 REFERENCE_TOLERANCE = 2 * scenes.TOLERANCE
 # Results of stages: the mix of two methods, and all stages after the blend.
 MIX, AFTER = "mix", "stages after"
+# The distance between vertices that a seam split.
+TORN = "seams"
 # Vertex groups that stages use.
 PAINTED = ("painted", "painted too")
 NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after the update"}
@@ -96,8 +110,9 @@ NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after
 class Outcome:
     """The results for one rig.
 
-    errors    the largest by (requested route, method or MIX or AFTER), relative to the diagonal
+    errors    the largest by (requested route, method or MIX, AFTER or TORN), relative to the diagonal
     taken     the actual route for each requested one
+    refused   Sinew has to refuse it; the errors are then those of Blender's shape afterwards
     reason    why a shape was not made by Sinew, if so
     left_out  the number of vertices left out
     compared  the number of vertices compared with the reference, over all methods, and of those undecided by
@@ -108,6 +123,7 @@ class Outcome:
     seed: int
     errors: dict[tuple[str, str], float] = field(default_factory=dict)
     taken: dict[str, str] = field(default_factory=dict)
+    refused: bool = False
     reason: str = ""
     left_out: int = 0
     compared: int = 0
@@ -198,7 +214,10 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
         faces = make_surface(numbers(seed, "surface"), points)
     else:
         faces = faces_of(seed, features, count)
-    mesh.from_pydata(points.tolist(), [], faces)
+    origins: list[int] = []
+    if has(seed, "seams", features, share=0.2):
+        faces, origins = split_at_seams(numbers(seed, "seams"), faces, count)
+    mesh.from_pydata([*points.tolist(), *points[origins].tolist()], [], faces)
     obj = bpy.data.objects.new("Mesh", mesh)
     bpy.context.scene.collection.objects.link(obj)
     groups = [obj.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
@@ -211,6 +230,9 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
             groups[group].add([vertex], float(weights.uniform(0.05, 1.0)), "REPLACE")
     if messy:
         make_weights_messy(numbers(seed, "messy weights"), count, groups)
+    for copy, origin in enumerate(origins, count):
+        for entry in [(entry.group, entry.weight) for entry in mesh.vertices[origin].groups]:
+            groups[entry[0]].add([copy], entry[1], "REPLACE")
     if has(seed, "shape keys", features):
         add_shape_keys(seed, features, obj)
     if has(seed, "sdef keys", features):
@@ -249,6 +271,23 @@ def make_surface(rng: np.random.Generator, points: np.ndarray) -> list[tuple[int
                 faces.append((a, b, c, d))
             column += 1
     return [*faces, (0, 1, len(points) - 1)]
+
+
+def split_at_seams(
+    rng: np.random.Generator, faces: list[tuple[int, ...]], count: int
+) -> tuple[list[tuple[int, ...]], list[int]]:
+    """Gives about half of the faces vertices of their own, where they meet the others. Returns the faces, and
+    the origin of each vertex behind the first `count`."""
+    is_beyond = rng.random(len(faces)) < 0.5
+    before = {vertex for face, beyond in zip(faces, is_beyond, strict=True) if not beyond for vertex in face}
+    copies: dict[int, int] = {}
+    split = [
+        tuple(copies.setdefault(v, count + len(copies)) if v in before else v for v in face)
+        if beyond
+        else face
+        for face, beyond in zip(faces, is_beyond, strict=True)
+    ]
+    return split, list(copies)
 
 
 def make_weights_messy(rng: np.random.Generator, count: int, groups: list[bpy.types.VertexGroup]) -> None:
@@ -300,8 +339,19 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     armature = make_armature(seed, features)
     obj = make_mesh(seed, features, armature)
+    add_modifiers(seed, features, obj, armature)
+    place(seed, features, obj, armature)
+    pose(seed, features, armature)
+    if has(seed, "stages", features):
+        paint(numbers(seed, "painted"), obj)
+    bpy.context.view_layer.update()
+    return obj, armature
+
+
+def add_modifiers(seed: int, features: set[str], obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     modifier = obj.modifiers.new("Armature", "ARMATURE")
     modifier.object = armature
+    modifier.use_multi_modifier = has(seed, "first multi", features, share=0.2)
     if has(seed, "envelopes", features):
         modifier.use_bone_envelopes = True
         modifier.use_vertex_groups = bool(numbers(seed, "use groups").random() < 0.7)
@@ -315,6 +365,12 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
         add_modifier_in_front(numbers(seed, "modifier in front"), obj)
     if has(seed, "further armatures", features, share=0.3):
         add_further_armatures(seed, features, obj, armature)
+    if has(seed, "refused behind", features, share=0.03):
+        kind = str(numbers(seed, "refused behind").choice(REFUSED_BEHIND))
+        obj.modifiers.new("Refused", kind)
+
+
+def place(seed: int, features: set[str], obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     if has(seed, "object transforms", features):
         rng = numbers(seed, "object transforms")
         for each in (obj, armature):
@@ -332,11 +388,6 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
         obj.parent_bone = bones[int(numbers(seed, "bone parent").integers(len(bones)))].name
     elif has(seed, "parent deforms", features, share=0.1):
         obj.parent, obj.parent_type = armature, "ARMATURE"
-    pose(seed, features, armature)
-    if has(seed, "stages", features):
-        paint(numbers(seed, "painted"), obj)
-    bpy.context.view_layer.update()
-    return obj, armature
 
 
 def paint(rng: np.random.Generator, obj: bpy.types.Object) -> None:
@@ -350,7 +401,8 @@ def paint(rng: np.random.Generator, obj: bpy.types.Object) -> None:
 
 
 def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> None:
-    kind = str(rng.choice(("SUBSURF", "MIRROR", "CAST", "SOLIDIFY", "LATTICE", "VERTEX_WEIGHT_EDIT")))
+    kinds = ("SUBSURF", "MIRROR", "CAST", "SOLIDIFY", "LATTICE", "VERTEX_WEIGHT_EDIT", "MESH_DEFORM")
+    kind = str(rng.choice(kinds))
     modifier = obj.modifiers.new("In Front", kind)
     if kind == "CAST":
         modifier.factor = rng.uniform(-0.5, 0.8)
@@ -365,6 +417,25 @@ def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> No
         modifier.vertex_group = obj.vertex_groups[0].name
         modifier.use_add, modifier.default_weight = True, rng.uniform(0.1, 1.0)
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    if kind == "MESH_DEFORM":
+        bind_to_cage(rng, obj, modifier)
+
+
+def bind_to_cage(
+    rng: np.random.Generator, obj: bpy.types.Object, modifier: bpy.types.MeshDeformModifier
+) -> None:
+    corners = [(x, y, z) for x in (-3.0, 3.0) for y in (-3.0, 3.0) for z in (-3.0, 3.0)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh = bpy.data.meshes.new("Cage")
+    mesh.from_pydata(corners, [], sides)
+    modifier.object, modifier.precision = bpy.data.objects.new("Cage", mesh), 3
+    bpy.context.scene.collection.objects.link(modifier.object)
+    # The command works on what is visible, in object mode.
+    bpy.context.view_layer.objects.active = obj
+    bpy.context.view_layer.update()
+    bpy.ops.object.meshdeform_bind(modifier=modifier.name)
+    for vertex in mesh.vertices:
+        vertex.co += Vector(rng.normal(0, 0.4, 3))
 
 
 def add_further_armatures(
@@ -487,9 +558,12 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
                 modifier.use_deform_preserve_volume = preserve_volume
         bpy.context.view_layer.update()
         expected[method] = scenes.final_points(obj)
-    outcome = Outcome(seed, vertices=len(expected["lbs"]))
+    outcome = Outcome(seed, vertices=len(expected["lbs"]), refused=must_be_refused(obj))
     for route in wanted:
         routes.force(route)
+        if outcome.refused:
+            check_refusal(obj, expected, outcome, route)
+            continue
         scenes.add_sinew(obj)
         for method, _preserve_volume in ORACLES:
             try:
@@ -504,12 +578,58 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
+            # Smoothed weights follow edges, so they end at a seam.
+            if has(seed, "seams", features, share=0.2) and method != "ddm":
+                torn = outcome.errors.get((route, TORN), 0.0)
+                outcome.errors[route, TORN] = max(torn, distance_at_seams(obj))
         if has(seed, "stages", features):
             check_stages(obj, armature, seed, outcome, route)
         attach.remove(obj)
         session.forget()
     routes.release()
     return outcome
+
+
+def must_be_refused(obj: bpy.types.Object) -> bool:
+    kinds = [modifier.type for modifier in obj.modifiers]
+    place = kinds.index("ARMATURE")
+    is_mixed = obj.parent_type == "ARMATURE" or (place and kinds[place - 1] in MIXED_BY_MULTI_MODIFIERS)
+    return not {*kinds}.isdisjoint(REFUSED_BEHIND) or bool(
+        obj.modifiers[place].use_multi_modifier and is_mixed
+    )
+
+
+def check_refusal(
+    obj: bpy.types.Object, expected: dict[str, np.ndarray], outcome: Outcome, route: str
+) -> None:
+    before, sentence = snapshot.of_file(), ""
+    try:
+        scenes.add_sinew(obj)
+    except SinewError as error:
+        sentence = str(error)
+    (method, _preserve_volume) = ORACLES[-1]
+    error = scenes.worst(scenes.final_points(obj), expected[method])
+    if not sentence.startswith(f"{obj.name}: "):
+        error, outcome.reason = float("inf"), f"not refused with a sentence: {sentence!r}"
+    elif snapshot.of_file() != before:
+        error, outcome.reason = float("inf"), "something stays of what was refused"
+    outcome.errors[route, method] = error / scenes.diagonal(obj)
+
+
+def distance_at_seams(obj: bpy.types.Object) -> float:
+    """The largest distance between vertices that are one at rest, relative to the diagonal. They have the
+    same point, weights and other data."""
+    state = session.state_of(obj)
+    source, shown = state.bound.source, state.points
+    ends = np.cumsum(source.weights.counts)[:-1]
+    rows = [np.split(each, ends) for each in (source.weights.groups, source.weights.weights)]
+    rows.append(state.shown.rest_points)
+    rows += [] if source.sdef_keys is None else list(source.sdef_keys)
+    alike: dict[tuple[bytes, ...], list[int]] = {}
+    for vertex, row in enumerate(zip(*rows, strict=True)):
+        alike.setdefault(tuple(each.tobytes() for each in row), []).append(vertex)
+    distances = [np.ptp(shown[vertices], axis=0).max() for vertices in alike.values()]
+    return float(max(distances)) / scenes.diagonal(obj)
 
 
 def check_stages(
