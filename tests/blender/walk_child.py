@@ -64,6 +64,7 @@ class Child:
         self.walker = walk_operations.Walker(self.side, folder)
         self.walker.before_evaluation = self.before_evaluation
         self.walker.expect_rendered = self.expect_rendered
+        self.walker.points_of = self.points_of
         bpy.utils.register_class(make_engine(self.walker, self.points_of))
         self.claims: dict = {}
         self.wrong: list[str] = []

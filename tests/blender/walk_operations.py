@@ -77,6 +77,8 @@ class Walker:
         self.unpushed = False
         # What must be set before an operation that itself evaluates.
         self.before_evaluation: Callable[[], None] = lambda: None
+        # The points of an evaluated object.
+        self.points_of: Callable[[bpy.types.Object], np.ndarray]
 
     # --- Content of the file
 
@@ -199,6 +201,10 @@ class Walker:
         # This makes the evaluation that of the window, which is the only one that writes to originals.
         bpy.context.evaluated_depsgraph_get()
         self.this_frame()
+
+    def shown_points(self, obj: bpy.types.Object) -> np.ndarray:
+        """As they are now, to be compared like a render's."""
+        return self.points_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
 
     def edit_mode(self) -> None:
         """Includes the undo step that Blender's own keying operator pushes: undo without one crashes it
@@ -449,6 +455,60 @@ def enabled(w: Walker, r: random.Random) -> str | None:
     return f"{obj.name} {'on' if on else 'off'}"
 
 
+VIEWS = ("viewport", "render")
+
+
+@operation(1.5)
+def icons(w: Walker, r: random.Random) -> str | None:
+    """Clicks on the icons of Sinew's and of the Armature modifier, then on those that bring Sinew back."""
+    obj = w.mesh(
+        r,
+        lambda o: (
+            w.side.is_on(o)
+            and o.visible_get()
+            and o.override_library is None
+            and len(armature_modifiers(o)) == 1
+            and armature_modifiers(o)[0].object is not None
+            and w.side.is_in_both_views(o)
+            and not w.side.has_other_shape(o)
+            and not w.side.is_method_keyed(o)
+            and not any(".show_" in path for path in animated_paths(o))
+        ),
+    )
+    clicks = [(r.choice(("Sinew", "Armature")), r.choice(VIEWS)) for _click in range(r.randint(1, 6))]
+    if obj is None:
+        return None
+    w.object_mode()
+    # One that is left to Blender has a meaning of its own for them.
+    w.side.set_option(obj, "leave_small", False)
+    hidden, aside = dict.fromkeys(VIEWS, False), dict.fromkeys(VIEWS, False)
+
+    def deformers() -> dict[str, str]:
+        return {v: "Armature" if aside[v] else "" if hidden[v] else "Sinew" for v in VIEWS}
+
+    def click(modifier: str, view: str) -> None:
+        if modifier == "Armature":
+            aside[view] = not aside[view]
+        elif deformers()[view] == "Sinew":
+            hidden[view] = True
+        else:
+            hidden[view] = aside[view] = False
+        w.side.click(obj, modifier, view, deformers())
+        bpy.context.view_layer.update()
+
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    for number, (modifier, view) in enumerate(clicks):
+        click(modifier, view)
+        w.rendered[f"{obj.name_full} in the render, click {number + 1}"] = w.shown_points(obj)
+    w.side.before_render(obj, deformers())
+    bpy.ops.render.render()
+    for view in VIEWS:
+        if deformers()[view] != "Sinew":
+            click("Sinew", view)
+    return f"icons of {obj.name}: {', '.join(' '.join(each) for each in clicks)}"
+
+
 @operation(1)
 def rebind(w: Walker, r: random.Random) -> str | None:
     obj = w.with_sinew(r)
@@ -621,19 +681,18 @@ def mend(w: Walker, r: random.Random) -> str | None:
     return f"mend {obj.name}: {found} by {how}" if found is not None else None
 
 
-def _and_undo(w: Walker, r: random.Random, act: Callable[[], str]) -> str:
+def _and_undo(w: Walker, r: random.Random, act: Callable[[], object]) -> None:
     """Does what only Sinew's side can do, and undoes it. No redo leads there again."""
     w.object_mode()
     w.this_frame()
     w.unpushed = True
     w.push_undo()
-    said = act()
+    act()
     for message in ("done", "after"):
         w.unpushed = True
         w.push_undo()
         if message == "done":
             bpy.ops.ed.undo()
-    return said
 
 
 @operation(0.5)
@@ -686,7 +745,7 @@ def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
 def delete_points(w: Walker, r: random.Random) -> str | None:
     """What Sinew made for a mesh, and makes again."""
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.mode == "OBJECT" and o.data.library is None)
-    part = r.choice(("attribute", "attribute", "driver", "nodes", "links"))
+    part = r.choice(("attribute", "attribute", "driver", "nodes", "links", "sockets", "socket", "group"))
     if obj is None or (part != "attribute" and obj.override_library is not None):
         return None
     if w.side.is_sinew:
@@ -932,6 +991,53 @@ def key_object(w: Walker, r: random.Random) -> str | None:
         obj.keyframe_insert("location", frame=number)
     w.this_frame()
     return f"key the location of {obj.name}"
+
+
+# These keep the shape of a mesh without size; others depend on directions that it has not.
+_KEEP_COLLAPSED = {"ARMATURE", "SUBSURF", "MIRROR", "TRIANGULATE", "MASK"}
+
+
+def _is_collapsed_once(obj: bpy.types.Object) -> bool:
+    """Whether one transform of the mesh and its armatures has no inverse. Where two have none, or one nearly
+    has none, rounding decides the shape."""
+    all_of = [obj, *(modifier.object for modifier in armature_modifiers(obj))]
+    sizes = [abs(each.matrix_world.determinant()) for each in all_of if each is not None]
+    return sorted(size for size in sizes if size < 1e-6) == [0.0]
+
+
+@operation(1)
+def no_size(w: Walker, r: random.Random) -> str | None:
+    """A scale of 0 or one that is not finite, at a frame that comes after two others. What is shown then
+    depends on neither of them."""
+    obj = w.one(r, [o for o in (*w.meshes(), *w.armatures()) if o.override_library is None])
+    scale = r.choice(((0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (float("nan"), 1.0, 1.0), (1.0, float("inf"), 1.0)))
+    number, others = r.randint(*FRAMES), r.sample(range(FRAMES[0], FRAMES[1] + 1), 2)
+    if obj is None:
+        return None
+    w.object_mode()
+    before, found = obj.scale[:], []
+    for other in others:
+        obj.scale = before
+        w.before_evaluation()
+        bpy.context.scene.frame_set(other)
+        obj.scale = scale
+        w.before_evaluation()
+        bpy.context.scene.frame_set(number)
+        bpy.context.view_layer.update()
+        w.side.wait()
+        shown = [o for o in w.meshes() if w.side.has_sinew(o) and o.visible_get()]
+        found.append([w.shown_points(each) for each in shown])
+    for each, *points in zip(shown, *found, strict=True):
+        if not np.array_equal(*points, equal_nan=True):
+            raise ValueError(f"{each.name}: without size its shape depends on the frame before")
+        is_kept = _KEEP_COLLAPSED.issuperset(modifier.type for modifier in w.modifiers(each))
+        if np.isfinite(scale).all() and is_kept and _is_collapsed_once(each):
+            # Its points can be far from its origin, and are as exact as that.
+            points = np.vstack((points[0], np.zeros(3)))
+            w.rendered[f"{each.name_full} in the render, without size"] = points
+    obj.scale = before
+    w.this_frame()
+    return f"scale of {obj.name} {scale} at {number}, after {others}"
 
 
 @operation(2)
@@ -1412,6 +1518,24 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
     return f"{name} {'in front' if front else 'behind'} on {obj.name}"
 
 
+@operation(0.4)
+def hair(w: Walker, r: random.Random) -> str | None:
+    """Hair on a mesh. Its roots can be elsewhere behind Sinew, which has to say so; the mesh is the same."""
+    obj = w.mesh(r, lambda o: w.is_editable(o) and o.mode == "OBJECT" and not o.data.is_editmode)
+    source = r.choice(("VERT", "FACE"))
+    if obj is None:
+        return None
+    there = next((m for m in w.modifiers(obj) if m.type == "PARTICLE_SYSTEM"), None)
+    if there is not None:
+        obj.modifiers.remove(there)
+        return f"no hair on {obj.name}"
+    modifier = obj.modifiers.new(w.new_name("Hair"), "PARTICLE_SYSTEM")
+    settings = modifier.particle_system.settings
+    settings.type, settings.count, settings.emit_from = "HAIR", 5, source
+    w.side.check_warned(obj, modifier)
+    return f"hair on {obj.name}, from {source}"
+
+
 @operation(2)
 def move_modifier(w: Walker, r: random.Random) -> str | None:
     """Moves it to just before or after another one of the artist's; Sinew's is not counted."""
@@ -1778,6 +1902,27 @@ def delete_armature(w: Walker, r: random.Random) -> str | None:
     return _delete(w, rig, by_script)
 
 
+@operation(0.3)
+def unlink_armature(w: Walker, r: random.Random) -> str | None:
+    """It is then in no collection, as a deleted one is while Sinew knows it. Sinew has to say so. Undone, as
+    Blender does not save such an armature where no other data has it."""
+    rig = w.armature(r)
+    if rig is None or rig.override_library is not None or w.compared:
+        return None
+    name = rig.name
+
+    def act() -> None:
+        bpy.context.view_layer.update()
+        meshes = [o for o in w.objects("MESH") if o.library is None and w.side.is_on(o)]
+        for collection in rig.users_collection:
+            collection.objects.unlink(rig)
+        bpy.context.view_layer.update()
+        w.side.check_said_gone(meshes, rig)
+
+    _and_undo(w, r, act)
+    return f"{name} in no collection, and undo"
+
+
 @operation(1.5)
 def duplicate(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
@@ -2008,13 +2153,22 @@ def _read_keys_of_hidden() -> None:
 
 @operation(1)
 def save_and_load(w: Walker, r: random.Random) -> str | None:
-    w.object_mode()
+    """Sometimes in the mode that an object is in. Others are then compared before it is left."""
+    if r.random() < 0.6:
+        w.object_mode()
     w.this_frame()
     path = str(w.folder / "walk.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     _read_keys_of_hidden()
-    return "save and open"
+    modes = {o.mode for o in w.objects()}
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    for obj in w.meshes() if modes != {"OBJECT"} else ():
+        if obj.visible_get() and obj.mode == "OBJECT" and not obj.data.is_editmode:
+            w.rendered[f"{obj.name_full} in the render, opened"] = w.shown_points(obj)
+    w.object_mode()
+    return f"save and open, in {', '.join(sorted(modes))}"
 
 
 @operation(0.5)

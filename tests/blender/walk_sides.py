@@ -251,6 +251,38 @@ class BlenderSide:
             self._use_keyed_flags(obj)
         self._set(obj, ON, on)
 
+    def is_in_both_views(self, obj: bpy.types.Object) -> bool:
+        """Whether its one Armature modifier is on in both, apart from Sinew."""
+        (modifier,) = armature_modifiers(obj)
+        return modifier.show_viewport and modifier.show_render
+
+    def click(self, obj: bpy.types.Object, which: str, view: str, deformers: dict[str, str]) -> None:
+        """A click on one of the icons.
+
+        which      Sinew or Armature, a modifier
+        deformers  for each view, which of them then deforms; empty for none
+        """
+        self._show(obj, deformers, "viewport")
+
+    def before_render(self, obj: bpy.types.Object, deformers: dict[str, str]) -> None:
+        self._show(obj, deformers, "render")
+
+    def _show(self, obj: bpy.types.Object, deformers: dict[str, str], shown: str) -> None:
+        (modifier,) = armature_modifiers(obj)
+        for view, deformer in deformers.items():
+            setattr(modifier, f"show_{view}", deformer != "")
+        is_dq = self.method(obj) == "dq" if deformers[shown] == "Sinew" else modifier.show_expanded
+        modifier.use_deform_preserve_volume = is_dq
+
+    def check_warned(self, obj: bpy.types.Object, modifier: bpy.types.ParticleSystemModifier) -> None:
+        pass
+
+    def check_said_gone(self, meshes: list[bpy.types.Object], rig: bpy.types.Object) -> None:
+        """meshes  those that were on before the armature was gone"""
+
+    def wait(self) -> None:
+        pass
+
     def rebind(self, obj: bpy.types.Object) -> None:
         self.set_enabled(obj, True)
 
@@ -616,6 +648,32 @@ class SinewSide:
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
         obj.sinew.enabled = on
 
+    def is_in_both_views(self, obj: bpy.types.Object) -> bool:
+        (kept,) = obj.sinew.replaced_modifiers
+        return kept.show_viewport and kept.show_render
+
+    def click(self, obj: bpy.types.Object, which: str, view: str, deformers: dict[str, str]) -> None:
+        modifier = self.own_modifier(obj) if which == "Sinew" else armature_modifiers(obj)[0]
+        setattr(modifier, f"show_{view}", not getattr(modifier, f"show_{view}"))
+
+    def before_render(self, obj: bpy.types.Object, deformers: dict[str, str]) -> None:
+        pass
+
+    def check_said_gone(self, meshes: list[bpy.types.Object], rig: bpy.types.Object) -> None:
+        for obj in meshes:
+            is_known = any(each.armature == rig for each in obj.sinew.replaced_modifiers)
+            if is_known and not ("in no collection" in obj.sinew.error and not obj.sinew.enabled):
+                raise ValueError(f"{obj.name}: nothing says that {rig.name} is gone")
+
+    def check_warned(self, obj: bpy.types.Object, modifier: bpy.types.ParticleSystemModifier) -> None:
+        from sinew_addon.attach import behind_nodes
+
+        others = {each.type for each in obj.modifiers if each not in (modifier, self.own_modifier(obj))}
+        if self.has_sinew(obj) and others == {"ARMATURE"}:
+            is_warned = any(text.startswith(f"{modifier.name}: ") for text in behind_nodes.warnings(obj))
+            if is_warned != (modifier.particle_system.settings.emit_from != "VERT"):
+                raise ValueError(f"{obj.name}: {'a' if is_warned else 'no'} warning about {modifier.name}")
+
     def rebind(self, obj: bpy.types.Object) -> None:
         from sinew_addon.deform import session
 
@@ -796,7 +854,15 @@ class SinewSide:
             for curve in obj.animation_data.drivers if obj.animation_data is not None else ():
                 names = curve.driver.variables.keys()
                 curve.mute |= bool(names) and all(name.startswith("sinew_") for name in names)
-        elif what in ("nodes", "links") and modifier.node_group is not None:
+        elif what == "group":
+            modifier.node_group = None
+        elif modifier.node_group is None:
+            return
+        elif what == "sockets":
+            modifier.node_group.interface.clear()
+        elif what == "socket":
+            modifier.node_group.interface.items_tree[0].name = "Renamed"
+        else:
             getattr(modifier.node_group, what).clear()
 
     def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
