@@ -255,7 +255,6 @@ def test_what_is_taken_of_sinews_is_made_again(take):
     assert not properties.of(obj).error
 
 
-@pytest.mark.usefixtures("by_each_route")
 @pytest.mark.parametrize("heat", [False, True])
 def test_what_is_taken_of_a_hidden_objects_group_is_made_again(heat):
     """Blender does not list a group as changed that no evaluated object has."""

@@ -662,7 +662,7 @@ class SinewSide:
     def check_said_gone(self, meshes: list[bpy.types.Object], rig: bpy.types.Object) -> None:
         for obj in meshes:
             is_known = any(each.armature == rig for each in obj.sinew.replaced_modifiers)
-            if is_known and not ("in no collection" in obj.sinew.error and not obj.sinew.enabled):
+            if is_known and "in no collection" not in obj.sinew.error:
                 raise ValueError(f"{obj.name}: nothing says that {rig.name} is gone")
 
     def check_warned(self, obj: bpy.types.Object, modifier: bpy.types.ParticleSystemModifier) -> None:
