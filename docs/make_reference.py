@@ -127,8 +127,8 @@ def _options(parser: argparse.ArgumentParser) -> str:
 
 def python_api() -> str:
     """What `sinew` and its modules name in `__all__`, from their docstrings and types."""
-    package, native = parsed("__init__.py"), parsed("_native.pyi")
-    known = _definitions(native)
+    package = parsed("__init__.py")
+    known = _definitions(parsed("_native/__init__.pyi"))
     pages = ["# Python", said(_docstring(package))]
     modules = []
     for name in exported(package):
@@ -155,11 +155,11 @@ def _docstring(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> str:
 
 
 def exported(module: ast.Module) -> list[str]:
-    """`__all__`."""
+    """`__all__`, or nothing."""
     for node in module.body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
             return ast.literal_eval(node.value)
-    raise ValueError("a module without __all__")
+    return []
 
 
 def _definitions(module: ast.Module | ast.ClassDef) -> dict[str, list[ast.ClassDef | ast.FunctionDef]]:
@@ -183,18 +183,15 @@ def _assigned(module: ast.Module) -> dict[str, ast.expr]:
 
 def _module(name: str) -> list[str]:
     module = parsed(f"{name}.py")
-    own, assigned = _definitions(module), _assigned(module)
-    # The functions that all representations have are methods of one class.
-    shared = _definitions(_definitions(parsed("_representation.py"))["Representation"][0])
+    known, assigned = _definitions(parsed(f"_native/{name}.pyi")) | _definitions(module), _assigned(module)
     pages = [f"## sinew.{name}", said(_docstring(module))]
-    for function in exported(module):
-        title = f"{name}.{function}"
-        if function in own:
-            pages += _described(title, own[function], "###")
-        elif function in assigned and ast.unparse(assigned[function]) == f"_layout.{function}":
-            pages += _described(title, shared[function], "###")
-        elif function in assigned:
-            pages += [f"### {title}", block("python", f"{function}: {ast.unparse(assigned[function])}")]
+    # A module without a list has all that the native one has.
+    for member in exported(module) or known:
+        title = f"{name}.{member}"
+        if member in known:
+            pages += _described(title, known[member], "###")
+        elif member in assigned:
+            pages += [f"### {title}", block("python", f"{member}: {_type(assigned[member])}")]
     return pages
 
 
@@ -215,7 +212,7 @@ def _class(title: str, node: ast.ClassDef, level: str) -> list[str]:
         assert isinstance(made, ast.FunctionDef)
         pages += [block("python", _signature(made, title, result=False)), said(_docstring(made))]
     values = [
-        row(f"`{field.target.id}`", f"`{ast.unparse(field.annotation)}`", "")
+        row(f"`{field.target.id}`", f"`{_type(field.annotation)}`", "")
         for field in node.body
         if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
     ]
@@ -223,7 +220,7 @@ def _class(title: str, node: ast.ClassDef, level: str) -> list[str]:
     for name, nodes in members.items():
         first = nodes[0]
         if isinstance(first, ast.FunctionDef) and "property" in map(ast.unparse, first.decorator_list):
-            kind = ast.unparse(first.returns) if first.returns else ""
+            kind = _type(first.returns) if first.returns else ""
             values.append(row(f"`{name}`", f"`{kind}`", escaped(_docstring(first))))
         elif not name.startswith("_"):
             functions += _described(f"{title}.{name}", nodes, level)
@@ -234,7 +231,7 @@ def _class(title: str, node: ast.ClassDef, level: str) -> list[str]:
 
 def _signature(node: ast.FunctionDef, name: str, result: bool = True) -> str:
     arguments = list(_arguments(node.args))
-    returns = f" -> {ast.unparse(node.returns)}" if result and node.returns else ""
+    returns = f" -> {_type(node.returns)}" if result and node.returns else ""
     line = f"{name}({', '.join(arguments)}){returns}"
     if len(line) <= 88:
         return line
@@ -258,7 +255,14 @@ def _arguments(arguments: ast.arguments) -> Iterator[str]:
 
 
 def _argument(argument: ast.arg, default: ast.expr | None) -> str:
-    return ast.unparse(argument) + ("" if default is None else f" = {ast.unparse(default)}")
+    return _type(argument) + ("" if default is None else f" = {ast.unparse(default)}")
+
+
+def _type(node: ast.AST) -> str:
+    """A type as one writes it, without the modules of those that everyone knows."""
+    return re.sub(
+        r"\b(numpy\.typing|typing|collections\.abc|sinew\._types)\.", "", ast.unparse(node)
+    ).replace("numpy.", "np.")
 
 
 # --- The C++ headers

@@ -38,7 +38,7 @@ NATIVE: dict[str, list[str | Path]] = {
 # them.
 CHECKOUT_TESTS = (
     *("test_documented", "test_layering", "test_locks", "test_platforms", "test_release", "test_report_map"),
-    *("test_sbom", "test_site", "test_snippets", "test_wheel", "test_workflows"),
+    *("test_sbom", "test_site", "test_snippets", "test_stub", "test_wheel", "test_workflows"),
 )
 # Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands, batches
 # with kills.

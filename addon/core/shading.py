@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import sinew
@@ -12,7 +13,7 @@ from .arrays import are_equal
 from .stage_mesh import Topology
 
 # The library's names of domains by Blender's.
-_DOMAINS = {"POINT": "vertex", "CORNER": "corner"}
+_DOMAINS: dict[str, Literal["vertex", "corner"]] = {"POINT": "vertex", "CORNER": "corner"}
 
 
 @dataclass(frozen=True)

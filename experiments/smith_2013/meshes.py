@@ -76,7 +76,7 @@ class Chain:
     first: np.ndarray
     second: np.ndarray
 
-    def between(self, t: float, method: str) -> np.ndarray:
+    def between(self, t: float, method: sinew.interpolate.Method) -> np.ndarray:
         """[vertices, 3]: each bone interpolated relative to its parent, then chained (Smith 2013, algorithms
         2 and 1)."""
         module = {"matrix": sinew.affine, "qv": sinew.quat_vec}.get(method.split("_")[0], sinew.dual_quat)

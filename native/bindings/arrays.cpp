@@ -7,19 +7,11 @@
 #include <type_traits>
 #include <utility>
 
+#include "items.h"
 #include "sinew/deformer.h"
 
 namespace sinew::bindings {
 namespace {
-
-Affine<float> read_affine(const float* rows) {
-    Affine<float> a;
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column) a.linear[column][row] = rows[4 * row + column];
-        a.translation[row] = rows[4 * row + 3];
-    }
-    return a;
-}
 
 bool is_finite(const float* values, py::ssize_t count) {
     for (py::ssize_t i = 0; i < count; ++i) {
@@ -140,9 +132,33 @@ std::string checked_name(const py::handle& value, const char* argument, const st
     return {text, static_cast<std::size_t>(length)};
 }
 
+std::size_t checked_choice(const py::handle& value, const char* argument,
+                           std::span<const std::string_view> names) {
+    std::string wanted = "one of ";
+    for (const std::string_view name : names) wanted += (name == names[0] ? "" : ", ") + std::string(name);
+    const std::string given = checked_name(value, argument, wanted);
+    const auto found = std::ranges::find(names, given);
+    if (found == names.end()) fail(argument, wanted, "'" + given + "'");
+    return static_cast<std::size_t>(found - names.begin());
+}
+
+py::tuple names_in_python(std::span<const std::string_view> names) {
+    py::tuple texts(names.size());
+    for (std::size_t i = 0; i < names.size(); ++i) texts[i] = py::str(std::string(names[i]));
+    return texts;
+}
+
 py::array_t<float> checked_points(const py::handle& value, const char* argument) {
     auto points = checked<float>(value, argument, 2, "float32 [n, 3]", kMaxVertices);
     if (points.shape(1) != 3) fail(argument, "float32 [n, 3]", describe(value));
+    return points;
+}
+
+py::array_t<float> checked_points(const py::handle& value, const char* argument, std::size_t count) {
+    auto points = checked_points(value, argument);
+    if (static_cast<std::size_t>(points.shape(0)) != count) {
+        fail(argument, "float32 [" + std::to_string(count) + ", 3]", describe(value));
+    }
     return points;
 }
 
@@ -159,19 +175,20 @@ std::vector<Affine<float>> checked_affines(const py::handle& value, const char* 
         if (!is_finite(rows, 12)) {
             fail(argument, "finite values", "NaN or infinity at index " + std::to_string(i));
         }
-        affines.push_back(read_affine(rows));
+        affines.push_back(Item<Affine<float>>::read(rows));
     }
     return affines;
 }
 
 Affine<float> checked_affine(const py::handle& value, const char* argument) {
+    if (value.is_none()) return {};
     const std::string wanted = "float32 [4, 4] or [3, 4]";
     const auto array = checked<float>(value, argument, 2, wanted);
     if (array.shape(1) != 4 || (array.shape(0) != 4 && array.shape(0) != 3)) {
         fail(argument, wanted, describe(value));
     }
     if (!is_finite(array.data(), 12)) fail(argument, "finite values", "NaN or infinity");
-    return read_affine(array.data());
+    return Item<Affine<float>>::read(array.data());
 }
 
 py::array_t<float> array_of(std::span<const Vec3<float>> points) {
@@ -196,6 +213,13 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
     }
     if (!array.writeable()) fail("out", wanted, "a read-only array");
     return array;
+}
+
+void check_apart(const py::array_t<float>& out, const py::array_t<float>& points) {
+    if (out.size() > 0 && out.data() < points.data() + points.size() &&
+        points.data() < out.data() + out.size()) {
+        fail("out", "another array than the points", "one that shares memory with them");
+    }
 }
 
 std::size_t checked_integer(const py::handle& value, const char* argument, const std::string& wanted,

@@ -8,8 +8,11 @@
 #include <new>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "signatures.h"
 #include "sinew/transform/affine.h"
 
 namespace sinew::bindings {
@@ -31,6 +34,13 @@ py::array as_array(const py::handle& value, const char* argument);
 
 /// The text of a `str`. TypeError, naming `wanted`, for anything else.
 std::string checked_name(const py::handle& value, const char* argument, const std::string& wanted);
+
+/// The index of a name among these. ValueError for another name, TypeError if it is no str.
+std::size_t checked_choice(const py::handle& value, const char* argument,
+                           std::span<const std::string_view> names);
+
+/// The names as a tuple of Python's.
+py::tuple names_in_python(std::span<const std::string_view> names);
 
 /// `value` as a C-contiguous, aligned array of element type T. Copies only if it is not one already.
 template <class T>
@@ -75,10 +85,13 @@ py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_
 /// An array [n, 3], n at most kMaxVertices.
 py::array_t<float> checked_points(const py::handle& value, const char* argument);
 
+/// The same, n = `count`.
+py::array_t<float> checked_points(const py::handle& value, const char* argument, std::size_t count);
+
 /// An array [n, 4, 4] or [n, 3, 4], row-major, finite. A fourth row is not read.
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument);
 
-/// An array [4, 4] or [3, 4].
+/// An array [4, 4] or [3, 4], or None, which is the identity.
 Affine<float> checked_affine(const py::handle& value, const char* argument);
 
 static_assert(sizeof(Vec3<float>) == 3 * sizeof(float), "points are read and written in place");
@@ -86,6 +99,10 @@ static_assert(sizeof(Vec3<float>) == 3 * sizeof(float), "points are read and wri
 /// The points in an array [n, 3].
 inline std::span<const Vec3<float>> as_points(const py::array_t<float>& points) {
     return {reinterpret_cast<const Vec3<float>*>(points.data()), static_cast<std::size_t>(points.shape(0))};
+}
+
+inline std::span<Vec3<float>> as_points_to_write(py::array_t<float>& points) {
+    return {reinterpret_cast<Vec3<float>*>(points.mutable_data()), static_cast<std::size_t>(points.shape(0))};
 }
 
 template <class T>
@@ -104,6 +121,9 @@ py::array_t<float> array_of(std::span<const Vec3<float>> points);
 /// An array of points to write to; a new one if `out` is None.
 py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count);
 
+/// ValueError if `out` shares memory with `points`.
+void check_apart(const py::array_t<float>& out, const py::array_t<float>& points);
+
 /// An integer from 0 to `most`, also one of numpy's.
 std::size_t checked_integer(const py::handle& value, const char* argument, const std::string& wanted,
                             std::size_t most);
@@ -113,5 +133,12 @@ std::size_t checked_threads(const py::object& threads);
 
 /// The item `index` of a pickled state, which must have `size` items.
 py::object part_of(const py::object& state, std::size_t size, std::size_t index);
+
+/// make(the items of a pickled state), which must have `size` items.
+template <std::size_t size, class Make>
+auto from_state(const py::object& state, Make make) {
+    return [&]<std::size_t... I>(std::index_sequence<I...>) { return make(part_of(state, size, I)...); }
+    (std::make_index_sequence<size>{});
+}
 
 }  // namespace sinew::bindings

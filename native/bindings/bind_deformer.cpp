@@ -28,6 +28,16 @@ std::string names_of_methods() {
 
 }  // namespace
 
+MeshArguments::MeshArguments(const py::object& rest_points, const py::object& influence_offsets,
+                             const py::object& influence_bones, const py::object& influence_weights)
+    : points(checked_points(rest_points, "rest_points")),
+      offsets(checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]",
+                                    kMaxVertices + 1)),
+      bones(
+          checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]", kMaxInfluences)),
+      weights(checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]",
+                             kMaxInfluences)) {}
+
 MethodInfo checked_method(const py::object& method, const char* argument) {
     const std::string wanted = "one of " + names_of_methods();
     const std::string name = checked_name(method, argument, wanted);
@@ -37,24 +47,23 @@ MethodInfo checked_method(const py::object& method, const char* argument) {
 
 namespace {
 
-/// The arrays that BindData refers to.
-struct BindArrays {
-    py::array_t<float> points;
-    py::array_t<std::int32_t> offsets;
-    py::array_t<std::int32_t> bones;
-    py::array_t<float> weights;
+/// All arguments of Binding, and the arrays that BindData refers to.
+struct BindArguments : MeshArguments {
     std::vector<Affine<float>> rest_bones;
     std::vector<py::array_t<float>> vertex_arrays;
     std::vector<VertexData> vertex_data;
 
-    [[nodiscard]] BindData data() const {
-        return {as_points(points), as_span(offsets), as_span(bones),
-                as_span(weights),  rest_bones,       vertex_data};
+    [[nodiscard]] BindData data(bool is_normalised = false) const {
+        BindData data = MeshArguments::data();
+        data.rest_bones = rest_bones;
+        data.vertex_data = vertex_data;
+        data.is_normalised = is_normalised;
+        return data;
     }
 };
 
 /// Adds the arrays of a dict with names of methods as keys.
-void add_vertex_data(const py::object& vertex_data, BindArrays& arrays) {
+void add_vertex_data(const py::object& vertex_data, BindArguments& arrays) {
     if (!py::isinstance<py::dict>(vertex_data)) {
         fail("vertex_data", "None or a dict of arrays by names of methods", describe(vertex_data));
     }
@@ -71,35 +80,27 @@ void add_vertex_data(const py::object& vertex_data, BindArrays& arrays) {
     }
 }
 
-BindArrays checked_arrays(const py::object& rest_points, const py::object& influence_offsets,
-                          const py::object& influence_bones, const py::object& influence_weights,
-                          const py::object& rest_bones, const py::object& vertex_data) {
-    BindArrays arrays{
-        checked_points(rest_points, "rest_points"),
-        checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]",
-                              kMaxVertices + 1),
-        checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]", kMaxInfluences),
-        checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]", kMaxInfluences),
-        {},
-        {},
-        {}};
+BindArguments checked_arrays(const py::object& rest_points, const py::object& influence_offsets,
+                             const py::object& influence_bones, const py::object& influence_weights,
+                             const py::object& rest_bones, const py::object& vertex_data) {
+    BindArguments arrays{{rest_points, influence_offsets, influence_bones, influence_weights}, {}, {}, {}};
     if (!rest_bones.is_none()) arrays.rest_bones = checked_affines(rest_bones, "rest_bones");
     if (!vertex_data.is_none()) add_vertex_data(vertex_data, arrays);
     return arrays;
 }
 
-Binding make_binding(const py::object& rest_points, const py::object& influence_offsets,
-                     const py::object& influence_bones, const py::object& influence_weights,
-                     const py::object& rest_bones, const py::object& vertex_data) {
+Binding make_binding(const ArrayLike& rest_points, const ArrayLike& influence_offsets,
+                     const ArrayLike& influence_bones, const ArrayLike& influence_weights,
+                     const OptionalArrayLike& rest_bones, const VertexArrays& vertex_data) {
     return Binding(checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights,
                                   rest_bones, vertex_data)
                        .data());
 }
 
-Timed<Deformer> make_deformer(const py::object& rest_points, const py::object& influence_offsets,
-                              const py::object& influence_bones, const py::object& influence_weights,
-                              const py::object& method, const py::object& rest_bones,
-                              const py::object& vertex_data) {
+Timed<Deformer> make_deformer(const ArrayLike& rest_points, const ArrayLike& influence_offsets,
+                              const ArrayLike& influence_bones, const ArrayLike& influence_weights,
+                              const Name& method, const OptionalArrayLike& rest_bones,
+                              const VertexArrays& vertex_data) {
     const MethodInfo row = checked_method(method, "method");
     return Deformer(checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights,
                                    rest_bones, vertex_data)
@@ -124,7 +125,7 @@ MixArguments checked_mix(const py::object& mix) {
 
 namespace {
 
-Timed<Deformer> make_deformer_of(const Binding& binding, const py::object& method, const py::object& mix) {
+Timed<Deformer> make_deformer_of(const Binding& binding, const Name& method, const Mix& mix) {
     const MethodInfo first = checked_method(method, "method");
     const MixArguments second = checked_mix(mix);
     return Deformer(binding, first, second.data());
@@ -165,25 +166,15 @@ py::tuple state_of(const Deformer& deformer) {
     return py::make_tuple(state_of(deformer.unpack()), std::string(deformer.method().name), mix);
 }
 
-BindArrays arrays_of_state(const py::object& state) {
-    return checked_arrays(part_of(state, 6, 0), part_of(state, 6, 1), part_of(state, 6, 2),
-                          part_of(state, 6, 3), part_of(state, 6, 4), part_of(state, 6, 5));
-}
+BindArguments arrays_of_state(const py::object& state) { return from_state<6>(state, &checked_arrays); }
 
-Binding binding_of_state(const py::object& state) {
-    const BindArrays arrays = arrays_of_state(state);
-    BindData data = arrays.data();
-    data.is_normalised = true;
-    return Binding(data);
-}
+Binding binding_of_state(const py::object& state) { return Binding(arrays_of_state(state).data(true)); }
 
 Timed<Deformer> deformer_of_state(const py::object& state) {
-    const BindArrays arrays = arrays_of_state(part_of(state, 3, 0));
-    BindData data = arrays.data();
-    data.is_normalised = true;
+    const BindArguments arrays = arrays_of_state(part_of(state, 3, 0));
     const MethodInfo method = checked_method(part_of(state, 3, 1), "method");
     const MixArguments mix = checked_mix(part_of(state, 3, 2));
-    return Deformer(data, method, mix.data());
+    return Deformer(arrays.data(true), method, mix.data());
 }
 
 std::string counts_of(const auto& bound) {
@@ -305,31 +296,27 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
     arguments.values = checked_parameters(deformer, parameters);
     options.parameters = arguments.values.of_method;
     options.mix_parameters = arguments.values.of_mix;
-    if (!bones_from_model.is_none()) {
-        options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
-        if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
-            fail("bones_from_model", "an invertible transform", "one of determinant 0");
-        }
+    options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
+    if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
+        fail("bones_from_model", "an invertible transform", "one of determinant 0");
     }
     return arguments;
 }
 
 namespace {
 
-py::array_t<float> deform(const Timed<Deformer>& deformer, const py::object& bone_transforms,
-                          const py::object& out, const py::object& threads,
-                          const py::object& bones_from_model, const py::object& rest_inverses,
-                          const py::object& parameters) {
+py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone_transforms, const Out& out,
+                          const Threads& threads, const OptionalArrayLike& bones_from_model,
+                          const OptionalArrayLike& rest_inverses, const ParameterValues& parameters) {
     const DeformArguments arguments =
         checked_deform(deformer, bone_transforms, threads, bones_from_model, rest_inverses, parameters);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
-    const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
-                                        deformer.vertex_count());
-    deformer.call([&] { static_cast<void>(deformer.deform(arguments.bones, arguments.options, target)); });
+    const auto to = as_points_to_write(points);
+    deformer.call([&] { static_cast<void>(deformer.deform(arguments.bones, arguments.options, to)); });
     return points;
 }
 
-void set_rest_points(Timed<Deformer>& deformer, const py::object& rest_points) {
+void set_rest_points(Timed<Deformer>& deformer, const ArrayLike& rest_points) {
     const auto points = checked_points(rest_points, "rest_points");
     // May have to wait for another thread's deformation.
     without_gil([&] { deformer.set_rest_points(as_points(points)); });
@@ -339,49 +326,40 @@ void set_rest_points(Timed<Deformer>& deformer, const py::object& rest_points) {
 
 void bind_deformer(py::module_& m) {
     py::class_<Binding>(m, "Binding",
-                        "A mesh bound to bones. Immutable; the deformers made from it share its memory.")
-        .def(
-            py::init(&make_binding), py::arg("rest_points"), py::arg("influence_offsets"),
-            py::arg("influence_bones"), py::arg("influence_weights"), py::arg("rest_bones") = py::none(),
-            py::arg("vertex_data") = py::none(),
-            "rest_points: float32 [vertices, 3], model space.\n"
-            "influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.\n"
-            "influence_bones: int32 [influences].\n"
-            "influence_weights: float32 [influences], >= 0, any sum (they are normalised).\n"
-            "    At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,576 bones.\n"
-            "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space "
-            "of\n"
-            "    the bone transforms. Read by sbs, and by other rigid methods where a bone is scaled. None:\n"
-            "    identity.\n"
-            "vertex_data: a dict of the vertex data of methods, float32 [vertices, Method.vertex_floats] by "
-            "the\n"
-            "    method's name: {\"cor\": sinew.centres_of_rotation(...)}. A method without its data falls "
-            "back:\n"
-            "    under cor each vertex is its own centre, which is linear blending.\n\n"
-            "Arrays may be anything that numpy converts to them without losing more than digits of "
-            "fractions:\n"
-            "lists, float64, int64 whose numbers fit. All input is copied. Raises ValueError that names the\n"
-            "argument, what was expected and what was given. Can be pickled: the bound mesh, with "
-            "normalised\n"
-            "weights.")
-        .def_property_readonly("vertex_count", &Binding::vertex_count, "Number of vertices.")
-        .def_property_readonly("influence_count", &Binding::influence_count, "Influences of positive weight.")
-        .def_property_readonly("bone_count", &Binding::bone_count,
-                               "One more than the highest bone index in the influences.")
+                        R"(A mesh bound to bones. Immutable; the deformers made from it share its memory.
+
+Can be pickled: the bound mesh, with normalised weights.)")
+        .def(py::init(&make_binding), py::arg("rest_points"), py::arg("influence_offsets"),
+             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("rest_bones") = py::none(),
+             py::arg("vertex_data") = py::none(),
+             R"(rest_points: float32 [vertices, 3], model space.
+influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.
+influence_bones: int32 [influences].
+influence_weights: float32 [influences], >= 0, any sum (they are normalised).
+rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space of the bone
+    transforms. Read by sbs, and by other rigid methods where a bone is scaled. None: identity.
+vertex_data: a dict of the vertex data of methods, float32 [vertices, Method.vertex_floats] by the method's
+    name: {"cor": sinew.centres_of_rotation(...)}. A method without its data falls back: under cor each vertex
+    is its own centre, which is linear blending.
+
+At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,576 bones.)")
+        .def_property_readonly("vertex_count", &Binding::vertex_count, kVertexCount)
+        .def_property_readonly("influence_count", &Binding::influence_count, kInfluenceCount)
+        .def_property_readonly("bone_count", &Binding::bone_count, kBoneCount)
         .def("__repr__", [](const Binding& binding) { return "<sinew.Binding: " + counts_of(binding); })
         .def(
             py::pickle([](const Binding& binding) { return state_of(binding.unpack()); }, &binding_of_state));
 
     py::class_<Timed<Deformer>>(m, "Deformer",
-                                "A binding and a method, ready to deform any pose.\n\n"
-                                "Can be pickled, with its current rest points and its own binding.")
+                                R"(A binding and a method, ready to deform any pose.
+
+Can be pickled, with its current rest points and its own binding.)")
         .def(py::init(&make_deformer_of), py::arg("binding"), py::arg("method") = "lbs",
              py::arg("mix") = py::none(),
-             "binding: a Binding; not copied.\n"
-             "method: the name of one of sinew.methods().\n"
-             "mix: None, or (name of another method, weights): weights float32 [vertices] are the share of "
-             "the\n"
-             "    other method at each vertex, from 0 (none) to 1 (all); clamped. This is the stage `mix`.")
+             R"(binding: a Binding; not copied.
+method: the name of one of sinew.methods().
+mix: None, or (name of another method, weights): weights float32 [vertices] are the share of the other method
+    at each vertex, from 0 (none) to 1 (all); clamped. This is the stage `mix`.)")
         .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
              py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
              py::arg("rest_bones") = py::none(), py::arg("vertex_data") = py::none(),
@@ -397,41 +375,33 @@ void bind_deformer(py::module_& m) {
                 return std::string(method->name);
             },
             "The name of the method that `mix` adds, or None.")
-        .def_property_readonly("vertex_count", &Deformer::vertex_count, "Number of vertices.")
-        .def_property_readonly("influence_count", &Deformer::influence_count,
-                               "Influences of positive weight.")
-        .def_property_readonly("bone_count", &Deformer::bone_count,
-                               "One more than the highest bone index in the influences.")
+        .def_property_readonly("vertex_count", &Deformer::vertex_count, kVertexCount)
+        .def_property_readonly("influence_count", &Deformer::influence_count, kInfluenceCount)
+        .def_property_readonly("bone_count", &Deformer::bone_count, kBoneCount)
         .def("__repr__", &text_of_deformer)
         .def(py::pickle([](const Timed<Deformer>& deformer) { return state_of(deformer); },
                         &deformer_of_state))
-        .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
-             "Sets the rest points of this deformer alone, float32 [vertices, 3], such as when shape keys\n"
-             "change. Other threads may deform meanwhile: each of their results has either the old points or "
-             "the\n"
-             "new ones.")
         .def(
-            "deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
-            py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
-            py::arg("rest_inverses") = py::none(), py::arg("parameters") = py::none(),
-            "The deformed points, float32 [vertices, 3], model space.\n\n"
-            "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
-            "read.\n"
-            "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
-            "converted.\n"
-            "threads: maximum number; None or 0: as many as useful. The\n"
-            "    result is the same bit for bit.\n"
-            "bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone "
-            "transforms,\n"
-            "    in which the bones are blended; the result is mapped back. None: the same space.\n"
-            "rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. If given, bone_transforms are the posed\n"
-            "    bones, and each is multiplied by the inverse of its rest transform, in double.\n"
-            "parameters: a dict of values of methods' parameters by their full names, METHOD.PARAMETER, as\n"
-            "    described by Parameter; missing ones have their defaults. Parameters of methods that the\n"
-            "    deformer does not use have no effect.\n\n"
-            "A vertex without influences is not moved. Releases the GIL for large meshes. Raises ValueError "
-            "that\n"
-            "names the argument, what was expected and what was given.");
+            "set_rest_points", &set_rest_points, py::arg("rest_points"),
+            R"(Sets the rest points of this deformer alone, float32 [vertices, 3], such as when shape keys change.
+Other threads may deform meanwhile: each of their results has either the old points or the new ones.)")
+        .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
+             py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
+             py::arg("rest_inverses") = py::none(), py::arg("parameters") = py::none(),
+             R"(The deformed points, float32 [vertices, 3], model space.
+
+bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
+out: None, or float32 [vertices, 3], written and returned.
+threads: at most so many; None or 0: as many as useful.
+bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone transforms, in which the
+    bones are blended; the result is mapped back. None: the same space.
+rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. If given, bone_transforms are the posed bones, and each
+    is multiplied by the inverse of its rest transform, in double.
+parameters: a dict of values of methods' parameters by their full names, METHOD.PARAMETER, as described by
+    Parameter; missing ones have their defaults. Parameters of methods that the deformer does not use have no
+    effect.
+
+A vertex without influences is not moved.)");
 }
 
 }  // namespace sinew::bindings

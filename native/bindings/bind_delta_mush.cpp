@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/numpy.h>
 
-#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -33,14 +32,7 @@ float checked_float(const py::object& value, const char* argument) {
     return static_cast<float>(number);
 }
 
-SmoothType checked_type(const py::object& value) {
-    std::string wanted = "one of";
-    for (const std::string_view name : DeltaMushStage::kSmoothTypes) wanted += " " + std::string(name);
-    const std::string name = checked_name(value, "smooth_type", wanted);
-    const auto* const found = std::ranges::find(DeltaMushStage::kSmoothTypes, name);
-    if (found == std::end(DeltaMushStage::kSmoothTypes)) fail("smooth_type", wanted, "'" + name + "'");
-    return static_cast<SmoothType>(found - std::begin(DeltaMushStage::kSmoothTypes));
-}
+using SmoothTypeName = Typed<"typing.Literal['simple', 'length_weighted']">;
 
 bool checked_bool(const py::object& value, const char* argument) {
     if (!py::isinstance<py::bool_>(value)) fail(argument, "True or False", describe(value));
@@ -55,7 +47,8 @@ SettingArguments checked_settings(const py::object& iterations, const py::object
         iterations, "iterations", "an integer from 0 to " + std::to_string(kMaxIterations), kMaxIterations);
     arguments.settings.radius = checked_float(radius, "radius");
     arguments.settings.factor = checked_float(factor, "factor");
-    arguments.settings.type = checked_type(smooth_type);
+    arguments.settings.type =
+        static_cast<SmoothType>(checked_choice(smooth_type, "smooth_type", DeltaMushStage::kSmoothTypes));
     arguments.settings.pin_boundary = checked_bool(pin_boundary, "pin_boundary");
     if (!weights.is_none()) {
         arguments.weights =
@@ -65,11 +58,10 @@ SettingArguments checked_settings(const py::object& iterations, const py::object
     return arguments;
 }
 
-Timed<DeltaMush> make(const py::object& rest_points, const py::object& face_offsets,
-                      const py::object& corner_vertices, const py::object& edges,
-                      const py::object& iterations, const py::object& radius, const py::object& factor,
-                      const py::object& smooth_type, const py::object& pin_boundary,
-                      const py::object& weights) {
+Timed<DeltaMush> make(const ArrayLike& rest_points, const ArrayLike& face_offsets,
+                      const ArrayLike& corner_vertices, const ArrayLike& edges, const Index& iterations,
+                      const Number& radius, const Number& factor, const SmoothTypeName& smooth_type,
+                      const Flag& pin_boundary, const OptionalArrayLike& weights) {
     const auto points = checked_points(rest_points, "rest_points");
     const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
     const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
@@ -80,9 +72,9 @@ Timed<DeltaMush> make(const py::object& rest_points, const py::object& face_offs
     return DeltaMush({as_span(offsets), as_span(corners), as_span(ends)}, as_points(points), with.settings);
 }
 
-void bind(Timed<DeltaMush>& mush, const py::object& rest_points, const py::object& iterations,
-          const py::object& radius, const py::object& factor, const py::object& smooth_type,
-          const py::object& pin_boundary, const py::object& weights) {
+void bind(Timed<DeltaMush>& mush, const ArrayLike& rest_points, const Index& iterations, const Number& radius,
+          const Number& factor, const SmoothTypeName& smooth_type, const Flag& pin_boundary,
+          const OptionalArrayLike& weights) {
     const auto points = checked_points(rest_points, "rest_points");
     const SettingArguments with =
         checked_settings(iterations, radius, factor, smooth_type, pin_boundary, weights);
@@ -90,20 +82,16 @@ void bind(Timed<DeltaMush>& mush, const py::object& rest_points, const py::objec
     without_gil([&] { mush.bind(as_points(points), with.settings); });
 }
 
-py::array_t<float> apply(const Timed<DeltaMush>& mush, const py::object& points, const py::object& out,
-                         const py::object& scale, const py::object& threads) {
-    const std::size_t count = mush.vertex_count();
-    const auto given = checked_points(points, "points");
-    if (static_cast<std::size_t>(given.shape(0)) != count) {
-        fail("points", "float32 [" + std::to_string(count) + ", 3]", describe(points));
-    }
+py::array_t<float> apply(const Timed<DeltaMush>& mush, const ArrayLike& points, const Out& out,
+                         const Number& scale, const Threads& threads) {
+    const auto given = checked_points(points, "points", mush.vertex_count());
     const float details = checked_float(scale, "scale");
     const std::size_t most = checked_threads(threads);
-    py::array_t<float> result = checked_out(out, count);
-    float* const to = result.mutable_data();
+    py::array_t<float> result = checked_out(out, mush.vertex_count());
+    const auto to = as_points_to_write(result);
     mush.call([&] {
-        std::memmove(to, given.data(), static_cast<std::size_t>(given.nbytes()));
-        static_cast<void>(mush.apply({reinterpret_cast<Vec3<float>*>(to), count}, details, most));
+        std::memmove(to.data(), given.data(), static_cast<std::size_t>(given.nbytes()));
+        static_cast<void>(mush.apply(to, details, most));
     });
     return result;
 }
@@ -122,10 +110,7 @@ py::tuple state_of(const Timed<DeltaMush>& mush) {
         settings.pin_boundary, weights);
 }
 
-Timed<DeltaMush> of_state(const py::object& state) {
-    const auto part = [&](std::size_t index) { return part_of(state, 10, index); };
-    return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6), part(7), part(8), part(9));
-}
+Timed<DeltaMush> of_state(const py::object& state) { return from_state<10>(state, &make); }
 
 std::string text_of(const Timed<DeltaMush>& mush) {
     return "<sinew.DeltaMush: " + std::to_string(mush.vertex_count()) + " vertices, " +
@@ -139,33 +124,26 @@ void bind_delta_mush(py::module_& m) {
     const char* const type = DeltaMushStage::kSmoothTypes[0].data();
     py::class_<Timed<DeltaMush>>(
         m, "DeltaMush",
-        "The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest "
-        "points\n"
-        "back (Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.")
-        .def(
-            py::init(&make), py::arg("rest_points"), py::arg("face_offsets"), py::arg("corner_vertices"),
-            py::arg("edges"), py::kw_only(), py::arg("iterations") = initial.iterations,
-            py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
-            py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
-            py::arg("weights") = py::none(),
-            "rest_points: float32 [vertices, 3], without shape keys.\n"
-            "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
-            "corner_vertices: int32 [corners], the vertex of each corner.\n"
-            "edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces.\n"
-            "    At most 2^29 - 1 vertices.\n"
-            "iterations: number of smoothing iterations, 0 to 1,000; not used with a radius.\n"
-            "radius: how far the smoothing reaches, in units of the points, as the width of a Gaussian,\n"
-            "    independently of the density of the mesh; 0: use `iterations`. The shortest tenth of edges "
-            "is\n"
-            "    smoothed less far, and so are all where this would take more than 1,000 iterations.\n"
-            "factor: how far one iteration moves a vertex, 0 to 1.\n"
-            "smooth_type: \"simple\", or \"length_weighted\": neighbours are weighted by the length of their "
-            "edges.\n"
-            "pin_boundary: whether vertices on edges with a single face are left as they are.\n"
-            "weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.\n\n"
-            "All input is copied. Raises ValueError that names the argument, what was expected and what was\n"
-            "given.")
-        .def_property_readonly("vertex_count", &DeltaMush::vertex_count, "Number of vertices.")
+        R"(The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
+(Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.)")
+        .def(py::init(&make), py::arg("rest_points"), py::arg("face_offsets"), py::arg("corner_vertices"),
+             py::arg("edges"), py::kw_only(), py::arg("iterations") = initial.iterations,
+             py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
+             py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
+             py::arg("weights") = py::none(),
+             R"(rest_points: float32 [vertices, 3], without shape keys; at most 2^29 - 1 vertices.
+face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
+corner_vertices: int32 [corners], the vertex of each corner.
+edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces.
+iterations: number of smoothing iterations, 0 to 1,000; not used with a radius.
+radius: how far the smoothing reaches, in units of the points, as the width of a Gaussian, independently of
+    the density of the mesh; 0: use `iterations`. The shortest tenth of edges is smoothed less far, and so are
+    all where this would take more than 1,000 iterations.
+factor: how far one iteration moves a vertex, 0 to 1.
+smooth_type: "simple", or "length_weighted": neighbours are weighted by the length of their edges.
+pin_boundary: whether vertices on edges with a single face are not moved.
+weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.)")
+        .def_property_readonly("vertex_count", &DeltaMush::vertex_count, kVertexCount)
         .def_property_readonly("iterations", &DeltaMush::iterations,
                                "Number of smoothing iterations, also if a radius determines it.")
         .def("__repr__", &text_of)
@@ -175,23 +153,19 @@ void bind_delta_mush(py::module_& m) {
             py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
             py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
             py::arg("weights") = py::none(),
-            "Sets other rest points and settings for the same faces and edges, which takes about as long as\n"
-            "apply().\n\n"
-            "Takes the arguments of the constructor and raises ValueError as it does; the object is then\n"
-            "unchanged.")
+            R"(Sets other rest points and settings for the same faces and edges, which takes about as long as apply().
+
+The arguments and errors are those of the constructor; after an error the object is unchanged.)")
         .def("apply", &apply, py::arg("points"), py::arg("out") = py::none(), py::arg("scale") = 1.0f,
              py::arg("threads") = py::none(),
-             "The smoothed points, float32 [vertices, 3].\n\n"
-             "points: float32 [vertices, 3], deformed, in the space of the rest points.\n"
-             "out: if given, written and returned: float32 [vertices, 3], C-contiguous, aligned; never "
-             "converted.\n"
-             "    May be `points`.\n"
-             "scale: how much of the details is added back; 1: all.\n"
-             "threads: maximum number; None or 0: as many as useful. The\n"
-             "    result is the same bit for bit.\n\n"
-             "A vertex without faces is smoothed and has no details. Releases the GIL for large meshes. "
-             "Raises\n"
-             "ValueError that names the argument, what was expected and what was given.");
+             R"(The smoothed points, float32 [vertices, 3].
+
+points: float32 [vertices, 3], deformed, in the space of the rest points.
+out: None, or float32 [vertices, 3], written and returned. May be `points`.
+scale: how much of the details is added back; 1: all.
+threads: at most so many; None or 0: as many as useful.
+
+A vertex without faces is smoothed and has no details.)");
 }
 
 }  // namespace sinew::bindings

@@ -62,22 +62,6 @@ Rows<T, T> checked_weights(const py::object& value, const char* argument, py::ss
     return rows;
 }
 
-template <class F>
-py::object with_fit(const py::object& method, F f) {
-    std::string names;
-    std::apply([&](auto... row) { ((names += (names.empty() ? "" : ", ") + std::string(row.name)), ...); },
-               RigidFits{});
-    const std::string wanted = "one of " + names;
-    const std::string name = checked_name(method, "method", wanted);
-    py::object result;
-    const auto try_row = [&](auto row) {
-        if (row.name == name) result = f(row);
-    };
-    std::apply([&](auto... row) { (try_row(row), ...); }, RigidFits{});
-    if (!result) fail("method", wanted, "'" + name + "'");
-    return result;
-}
-
 template <class Method, class T>
 py::object fit_items(const std::array<py::object, 6>& values) {
     using Transform = typename Method::template Transform<T>;
@@ -97,7 +81,7 @@ py::object fit_items(const std::array<py::object, 6>& values) {
         source.input,           target.input, weights.input, source_directions.input, target_directions.input,
         direction_weights.input};
     const Shape common = broadcast(std::span<Input<T>>(inputs));
-    Output<std::tuple<Transform, T, bool, bool>> output(common);
+    Output<Named<"RigidFit", Transform, T, bool, bool>> output(common);
     const py::ssize_t count = count_of(common);
     without_gil([&] {
         const auto rows = [&]<class Value>(const Rows<T, Value>& of, std::size_t index, py::ssize_t item) {
@@ -117,13 +101,15 @@ py::object fit_items(const std::array<py::object, 6>& values) {
     return output.take();
 }
 
-py::object rigid(const py::object& source, const py::object& target, const py::object& weights,
-                 const py::object& source_directions, const py::object& target_directions,
-                 const py::object& direction_weights, const py::object& method) {
+NamedTuple<"RigidFit"> rigid(const ArrayLike& source, const ArrayLike& target,
+                             const OptionalArrayLike& weights, const OptionalArrayLike& source_directions,
+                             const OptionalArrayLike& target_directions,
+                             const OptionalArrayLike& direction_weights,
+                             const Typed<"sinew.fit.Method">& method) {
     const auto values = promoted<6>(
         {"source", "target", "weights", "source_directions", "target_directions", "direction_weights"},
         {source, target, weights, source_directions, target_directions, direction_weights});
-    return with_fit(method, [&]<class Method>(Method) {
+    return with_row<RigidFits>(method, "method", [&]<class Method>(Method) {
         return with_element(values[0], "source", Item<Vec3<double>>::kShape,
                             [&]<class T>(T) { return fit_items<Method, T>(values); });
     });
@@ -155,7 +141,7 @@ py::object hand_eye_items(const std::array<py::object, 3>& values) {
     const auto weights = checked_weights<T>(values[2], "weights", a.count);
     std::array inputs{a.input, b.input, weights.input};
     const Shape common = broadcast(std::span<Input<T>>(inputs));
-    Output<std::tuple<Transform, T, T, bool>> output(common);
+    Output<Named<"HandEye", Transform, T, T, bool>> output(common);
     const py::ssize_t count = count_of(common);
     without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
@@ -170,7 +156,8 @@ py::object hand_eye_items(const std::array<py::object, 3>& values) {
     return output.take();
 }
 
-py::object solve_hand_eye(const py::object& a, const py::object& b, const py::object& weights) {
+NamedTuple<"HandEye"> solve_hand_eye(const ArrayLike& a, const ArrayLike& b,
+                                     const OptionalArrayLike& weights) {
     const auto values = promoted<3>({"a", "b", "weights"}, {a, b, weights});
     return with_representation(values[0], "a", "..", [&]<class Row>(Row) {
         return with_element(values[0], "a", "", [&]<class T>(T) {
@@ -203,10 +190,11 @@ py::object average_items(const std::array<py::object, 2>& values, bool is_robust
         }
     });
     const py::tuple transforms = output.take();
-    return py::make_tuple(transforms[0], transforms[1], parts.take());
+    return named_tuple("Averaged", py::make_tuple(transforms[0], transforms[1], parts.take()));
 }
 
-py::object average_poses(const py::object& any_poses, const py::object& any_weights, bool is_robust) {
+NamedTuple<"Averaged"> average_poses(const ArrayLike& any_poses, const OptionalArrayLike& any_weights,
+                                     bool is_robust) {
     const auto values = promoted<2>({"poses", "weights"}, {any_poses, any_weights});
     return with_representation(values[0], "poses", "..", [&]<class Row>(Row) {
         return with_element(values[0], "poses", "", [&]<class T>(T) {
@@ -219,14 +207,62 @@ py::object average_poses(const py::object& any_poses, const py::object& any_weig
 
 void bind_fit(py::module_& m) {
     auto fit = m.def_submodule("fit");
-    py::list methods;
-    std::apply([&](auto... row) { (methods.append(py::str(std::string(row.name))), ...); }, RigidFits{});
-    fit.attr("METHODS") = py::tuple(methods);
-    fit.def("rigid", &rigid, py::arg("source"), py::arg("target"), py::arg("weights"),
-            py::arg("source_directions"), py::arg("target_directions"), py::arg("direction_weights"),
-            py::arg("method"));
-    fit.def("hand_eye", &solve_hand_eye, py::arg("a"), py::arg("b"), py::arg("weights"));
-    fit.def("average", &average_poses, py::arg("poses"), py::arg("weights"), py::arg("is_robust"));
+    fit.attr("METHODS") = names_in_python(names_of(RigidFits{}));
+    fit.def("rigid", &rigid, py::arg("source"), py::arg("target"), py::arg("weights") = py::none(),
+            py::kw_only(), py::arg("source_directions") = py::none(),
+            py::arg("target_directions") = py::none(), py::arg("direction_weights") = py::none(),
+            py::arg("method") = "horn",
+            R"(The rigid transform that maps `source` to `target` with the smallest weighted sum of squared
+distances.
+
+source, target: [.., n, 3], points. n may be 0 if there are directions; the translation is then 0.
+weights: [.., n], not negative; None: 1 each.
+source_directions, target_directions: [.., m, 3], or None. Any length, which is ignored; a pair in which
+    either has length 0 does not count.
+direction_weights: [.., m], not negative; None: 1 each. A direction counts as a point at distance 1 from the
+    middle, so its weight is in squares of lengths.
+method: one of METHODS. All minimise the same squares and differ only by rounding.
+
+kabsch  layout affine     singular value decomposition of the covariance (Kabsch 1976; Umeyama 1991)
+horn    layout quat_vec   eigenvector of a 4x4 matrix (Horn 1987)
+walker  layout dual_quat  rotation and translation at once (Walker, Shao, Volz 1991)
+
+Not defined: points on one line or all in one position, a mirror image with a symmetry, no positive weight
+(the identity). For points in a plane the fit is defined. is_mirrored: a mirror image would fit better; the
+result is still the best rotation.)");
+    fit.def(
+        "hand_eye", &solve_hand_eye, py::arg("a"), py::arg("b"), py::arg("weights") = py::none(),
+        R"(Solves a x = x b for x: the pose of one of two bodies that are fixed to each other, seen from the
+other.
+
+a, b: [.., n, 4, 4], [.., n, 3, 4], [.., n, 7] or [.., n, 8], in one layout, which the result has as well: n
+    motions of the one body and the same motions of the other, in one unit of length, such as of a robot's
+    hand and of the camera on it, or of a bone and of a marker. A matrix's linear part is replaced by the
+    nearest rotation.
+weights: [.., n], not negative; None: 1 each.
+
+Uses dual quaternions, which give rotation and translation at once (Daniilidis 1999). Then solves for the
+translation again, by least squares for that rotation (Park, Martin 1994), which is less sensitive to noise.
+Not defined: fewer than two motions, rotations only about parallel axes, only rotations by 180 degrees, no
+positive weight.)");
+    fit.def("average", &average_poses, py::arg("poses"), py::arg("weights") = py::none(), py::kw_only(),
+            py::arg("robust") = false,
+            R"(The mean of n poses, in their layout. Signs of quaternions and the order do not matter.
+
+poses: [.., n, 4, 4], [.., n, 3, 4], [.., n, 7] or [.., n, 8], n >= 1. A matrix's linear part is replaced by
+    the nearest rotation.
+weights: [.., n], not negative; None: 1 each.
+robust: weight each pose by Tukey's biweight of its angle and of its distance from the mean, which decreases
+    with both and is 0 from 3.5 times their medians on (Beaton and Tukey 1974): almost half of the weight may
+    be outliers. `kept` says how much each pose counts. Distances are those between images of the origin, so
+    the origin should be within what moves.
+
+Without `robust`, the pose relative to which the weighted screws to all poses sum to 0, as for "dib" of
+sinew.interpolate (Kavan et al. 2008, algorithm 3). The iteration starts at the mean of the rotation matrices
+(Markley et al. 2007). The result does not depend on the origin or on the unit of length. Not defined: several
+equally good means, such as for rotations by 0, 120 and 240 degrees about one axis; a pose 180 degrees from
+the result; no positive weight (the identity). With `robust`, also not defined if the poses that count do not
+have more than half of the weight, or are not all within 90 degrees of the result.)");
 }
 
 }  // namespace sinew::bindings

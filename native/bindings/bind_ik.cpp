@@ -6,6 +6,8 @@
 namespace sinew::bindings {
 namespace {
 
+using Solution = Typed<"sinew._types.Solution">;
+
 struct Solver {
     IkSolver solver;
     std::size_t bone_count;
@@ -53,23 +55,37 @@ std::vector<BoneLimits> limits_of(const py::object& locked, const py::object& li
     return result;
 }
 
-std::unique_ptr<Solver> make(const py::object& any_parents, const py::object& any_bones,
-                             const py::object& any_weights, const py::object& any_poles,
-                             const py::object& locked, const py::object& limits,
-                             const py::object& stiffness) {
-    const auto parents = checked<std::int32_t>(any_parents, "parents", 1, "int32 [bones]");
-    const auto bones = checked<std::int32_t>(any_bones, "effectors", 1, "bones, int32 [effectors]");
-    const py::ssize_t count = bones.shape(0);
-    const auto weights = checked_shape<double>(any_weights, "effectors", {count, 2}, "weights, float64");
-    const auto poles = checked_shape<double>(any_poles, "effectors", {count, 2}, "poles, float64");
-    std::vector<IkEffector> effectors;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-        effectors.push_back({.bone = bones.data()[i],
-                             .position_weight = weights.data()[2 * i],
-                             .rotation_weight = weights.data()[2 * i + 1],
-                             .has_pole = poles.data()[2 * i] != 0.0,
-                             .pole_angle = poles.data()[2 * i + 1]});
+using Effectors = Typed<"collections.abc.Sequence[sinew.ik.Effector]">;
+
+/// A tuple that is, or could be, a sinew.ik.Effector.
+IkEffector checked_effector(const py::handle& value) {
+    if (!py::isinstance<py::tuple>(value) || py::len(value) != 5) {
+        fail("effectors", "an Effector", describe(value));
     }
+    const auto parts = py::reinterpret_borrow<py::tuple>(value);
+    const int has_pole = PyObject_IsTrue(parts[3].ptr());
+    if (has_pole < 0) throw py::error_already_set();
+    const auto number = [&](std::size_t part) {
+        return checked_number(parts[part], "effectors", "weights and an angle that are numbers");
+    };
+    constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
+    const std::size_t bone = checked_integer(parts[0], "effectors", "the index of a bone", kMost);
+    return {.bone = static_cast<std::int32_t>(bone),
+            .position_weight = number(1),
+            .rotation_weight = number(2),
+            .has_pole = has_pole != 0,
+            .pole_angle = number(4)};
+}
+
+std::unique_ptr<Solver> make(const ArrayLike& any_parents, const Effectors& any_effectors,
+                             const OptionalArrayLike& locked, const OptionalArrayLike& limits,
+                             const OptionalArrayLike& stiffness) {
+    const auto parents = checked<std::int32_t>(any_parents, "parents", 1, "int32 [bones]");
+    if (!py::isinstance<py::sequence>(any_effectors)) {
+        fail("effectors", "a sequence of Effectors", describe(any_effectors));
+    }
+    std::vector<IkEffector> effectors;
+    for (const py::handle effector : any_effectors) effectors.push_back(checked_effector(effector));
     const Skeleton skeleton(as_span(parents));
     const std::size_t bone_count = skeleton.bone_count();
     const bool has_pole = effectors.size() == 1 && effectors[0].has_pole;
@@ -128,15 +144,7 @@ py::array_t<double> as_dual_quats(const py::object& value, const char* argument,
 IkOptions checked_options(const py::object& method, const py::object& tolerance,
                           const py::object& iterations) {
     IkOptions options;
-    std::string names;
-    for (const std::string_view name : kIkMethods) {
-        names += (names.empty() ? "" : ", ") + std::string(name);
-    }
-    const std::string name = checked_name(method, "method", "one of " + names);
-    std::size_t found = 0;
-    while (found < kIkMethods.size() && kIkMethods[found] != name) ++found;
-    if (found == kIkMethods.size()) fail("method", "one of " + names, "'" + name + "'");
-    options.method = static_cast<IkMethod>(found);
+    options.method = static_cast<IkMethod>(checked_choice(method, "method", kIkMethods));
     const std::string positive = "a finite number above 0";
     options.tolerance = checked_number(tolerance, "tolerance", positive);
     if (!(options.tolerance > 0.0) || !std::isfinite(options.tolerance)) {
@@ -147,9 +155,10 @@ IkOptions checked_options(const py::object& method, const py::object& tolerance,
     return options;
 }
 
-py::object solve(Solver& self, const py::object& rest, const py::object& tips, const py::object& goals,
-                 const py::object& poles, const py::object& rotations, const py::object& root,
-                 const py::object& method, const py::object& tolerance, const py::object& iterations) {
+Solution solve(Solver& self, const ArrayLike& rest, const ArrayLike& tips, const ArrayLike& goals,
+               const OptionalArrayLike& poles, const OptionalArrayLike& rotations,
+               const OptionalArrayLike& root, const Typed<"sinew.ik.Method">& method, const Number& tolerance,
+               const Index& iterations) {
     const IkOptions options = checked_options(method, tolerance, iterations);
     const std::size_t bones = self.bone_count;
     const std::size_t effectors = self.effector_count;
@@ -215,29 +224,67 @@ py::object solve(Solver& self, const py::object& rest, const py::object& tips, c
     });
     const py::tuple of = facts.take();
     const py::object steps = common.empty() ? py::object(taken[py::tuple()]) : py::object(taken);
-    return py::make_tuple(solved.take(), of[0], of[1], steps, of[2]);
-}
-
-py::object angles(const py::object& rotations) {
-    return map<Quat>({"rotations"}, {rotations}, []<class T>(const Quat<T>& q) {
-        return Vec3<T>(swing_twist_angles(glm::normalize(Quat<double>(q))));
-    });
+    return named_tuple("Solution", py::make_tuple(solved.take(), of[0], of[1], steps, of[2]));
 }
 
 }  // namespace
 
 void bind_ik(py::module_& m) {
     auto ik = m.def_submodule("ik");
-    py::list methods;
-    for (const std::string_view name : kIkMethods) methods.append(py::str(std::string(name)));
-    ik.attr("METHODS") = py::tuple(methods);
-    ik.def("swing_twist_angles", &angles, py::arg("rotations"));
-    py::class_<Solver>(ik, "Solver")
-        .def(py::init(&make), py::arg("parents"), py::arg("bones"), py::arg("weights"), py::arg("poles"),
-             py::arg("locked"), py::arg("limits"), py::arg("stiffness"))
-        .def("solve", &solve, py::arg("rest"), py::arg("tips"), py::arg("goals"), py::arg("poles"),
-             py::arg("rotations"), py::arg("root"), py::arg("method"), py::arg("tolerance"),
-             py::arg("iterations"));
+    ik.attr("METHODS") = names_in_python(kIkMethods);
+    def<Quat>(
+        ik, "swing_twist_angles", {"rotations"},
+        []<class T>(const Quat<T>& q) {
+            return Vec3<T>(swing_twist_angles(glm::normalize(Quat<double>(q))));
+        },
+        R"(The angles that limits bound, [.., 3], radians. A rotation is decomposed into a twist about y, by the
+angle y, followed by a swing without twist; x and z are twice the arcsines of the x and z of its quaternion,
+so that for a swing about x alone x is its angle.
+
+rotations: [.., 4]; signs and lengths do not matter. For a swing by 180 degrees the twist is 0.)");
+    py::class_<Solver>(
+        ik, "Solver",
+        "A solver for one tree of bones with its limits and effectors. solve() allocates only its result.")
+        .def(py::init(&make), py::arg("parents"), py::arg("effectors"), py::kw_only(),
+             py::arg("locked") = py::none(), py::arg("limits") = py::none(),
+             py::arg("stiffness") = py::none(),
+             R"(parents: int32 [bones], the index of each bone's parent, -1 for a root; parents precede their
+    children.
+effectors: at least one.
+locked: bool [bones, 3], axes x, y (along the bone) and z about which a bone does not rotate.
+limits: [bones, 3, 2], the smallest and the largest angle about x, y and z, radians, with -pi <= smallest <= 0
+    <= largest <= pi; (-inf, inf) for no limit. The angles are those of swing_twist_angles(), as for Blender's
+    IK limits. With limits of x and z a bone's swing stays within an ellipse through the four. Bones with
+    limits or locks swing by at most 177.7 degrees.
+stiffness: [bones, 3], 0 to below 1: how much less the bone rotates about an axis than about others.)")
+        .def("solve", &solve, py::arg("rest"), py::arg("tips"), py::arg("goals"),
+             py::arg("poles") = py::none(), py::kw_only(), py::arg("rotations") = py::none(),
+             py::arg("root") = py::none(), py::arg("method") = "dls", py::arg("tolerance") = 1e-6,
+             py::arg("iterations") = 100,
+             R"(Finds rotations that bring the tips to the goals.
+
+rest: [.., bones, 4, 4], [.., bones, 3, 4], [.., bones, 7] or [.., bones, 8]: each bone relative to its
+    parent, not rotated. A matrix's linear part is replaced by the nearest rotation.
+tips: [.., effectors, 3], each in the space of its bone.
+goals: [.., effectors, ..], in any of these layouts: the goals of each tip's position and of its bone's
+    rotation.
+poles: [.., effectors, 3], points; None if no effector has a pole.
+rotations: [.., bones, 4], the start; rotations beyond the limits are brought within. None: no rotation.
+root: [.., 4, 4], [.., 3, 4], [.., 7] or [.., 8], applied after the transform of every bone without a parent;
+    None: the identity. Goals and poles are in the space that it maps to.
+method: one of METHODS.
+tolerance: errors that count as reached, in lengths of the longest chain and in radians.
+iterations: maximum number of steps of all axes, or of sweeps over all bones.
+
+dls  damped least squares on screws; each step moves all axes (Wampler 1986; Sugihara 2011)
+ccd  cyclic descent, one bone after the other from the tip (Wang, Chen 1991): cheap steps, but many of them
+     where a chain is nearly straight or limited
+
+If a chain with one effector whose rotation does not count can not reach its goal, the goal is moved to the
+nearest point of its range; a chain without limits stretches straight towards it. A straight chain that points
+at a nearer goal is bent a little about its first free axis. A pole on the line from root to goal is ignored.
+Limits can cause local minima: the result is within limits, and no step improves it. A chain with one effector
+is solved a second time, starting with a rotation to the goal, and the better result is used.)");
 }
 
 }  // namespace sinew::bindings

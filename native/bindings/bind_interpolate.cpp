@@ -7,12 +7,19 @@
 namespace sinew::bindings {
 namespace {
 
-py::object between(const py::object& a, const py::object& b, const py::object& t, const py::object& method) {
+using Method = Typed<"sinew.interpolate.Method">;
+using Blended = NamedTuple<"Blended">;
+
+/// What the library returns, for an Output.
+template <class Transform>
+using Blend = Named<"Blended", Transform, bool>;
+
+Blended between(const ArrayLike& a, const ArrayLike& b, const ArrayLike& t, const Method& method) {
     return with_method(method, [&]<class Method>(Method) {
         return map<Method::template Transform, Method::template Transform, Scalar>(
             {"a", "b", "t"}, {a, b, t}, [](const auto& from, const auto& onto, auto at) {
                 const auto result = Method::between(from, onto, at);
-                return std::tuple(result.transform, result.is_defined);
+                return named<"Blended">(result.transform, result.is_defined);
             });
     });
 }
@@ -30,12 +37,12 @@ py::ssize_t take_last_axis(Input<T>& input, const std::string& wanted, const py:
 // Calls f(std::integral_constant<Signs, ..>) for the choice with the name `signs`.
 template <class F>
 py::object with_signs(const py::object& signs, F f) {
-    const std::string wanted = "one of heaviest, running_sum, as_given";
-    const std::string name = checked_name(signs, "signs", wanted);
-    if (name == "heaviest") return f(std::integral_constant<Signs, Signs::kToHeaviest>{});
-    if (name == "running_sum") return f(std::integral_constant<Signs, Signs::kRunningSum>{});
-    if (name == "as_given") return f(std::integral_constant<Signs, Signs::kAsGiven>{});
-    fail("signs", wanted, "'" + name + "'");
+    constexpr std::array<std::string_view, 3> kNames{"heaviest", "running_sum", "as_given"};
+    switch (checked_choice(signs, "signs", kNames)) {
+        case 0: return f(std::integral_constant<Signs, Signs::kToHeaviest>{});
+        case 1: return f(std::integral_constant<Signs, Signs::kRunningSum>{});
+        default: return f(std::integral_constant<Signs, Signs::kAsGiven>{});
+    }
 }
 
 template <class Method, Signs signs, class T>
@@ -50,7 +57,7 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
         element_name<T>() + "[.., " + std::to_string(terms) + "], one for each transform";
     if (take_last_axis(inputs[1], wanted, weights) != terms) fail("weights", wanted, describe(weights));
     const Shape common = broadcast(std::span<Input<T>>(inputs));
-    Output<std::tuple<Transform, bool>> output(common);
+    Output<Blend<Transform>> output(common);
     const py::ssize_t count = count_of(common);
     without_gil([&] {
         std::vector<Transform> items(static_cast<std::size_t>(terms));
@@ -68,8 +75,8 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
     return output.take();
 }
 
-py::object blend(const py::object& any_transforms, const py::object& any_weights, const py::object& method,
-                 const py::object& signs) {
+Blended blend(const ArrayLike& any_transforms, const ArrayLike& any_weights, const Method& method,
+              const Typed<"sinew.interpolate.Signs">& signs) {
     const auto [transforms, weights] = promoted<2>({"transforms", "weights"}, {any_transforms, any_weights});
     return with_method(method, [&]<class Method>(Method) {
         return with_signs(signs, [&]<Signs choice>(std::integral_constant<Signs, choice>) {
@@ -91,7 +98,7 @@ py::object spline_items(const py::object& keys, const py::object& times, const p
     const std::vector<Transform> items = items_of<Transform>(input);
     const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
     const auto moments = checked_input<T, T>(at, "at");
-    Output<std::tuple<Transform, bool>> output(moments.lead);
+    Output<Blend<Transform>> output(moments.lead);
     const py::ssize_t count = count_of(moments.lead);
     without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
@@ -103,8 +110,8 @@ py::object spline_items(const py::object& keys, const py::object& times, const p
     return output.take();
 }
 
-py::object spline(const py::object& any_keys, const py::object& any_times, const py::object& any_at,
-                  const py::object& method) {
+Blended spline(const ArrayLike& any_keys, const ArrayLike& any_times, const ArrayLike& any_at,
+               const Method& method) {
     const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
     return with_method(method, [&]<class Method>(Method) {
         return with_element(
@@ -123,8 +130,7 @@ bool is_of_points(const py::object& keys) {
     return array.ndim() > 0 && array.shape(array.ndim() - 1) == 3;
 }
 
-py::object spline_of_vectors(const py::object& any_keys, const py::object& any_times,
-                             const py::object& any_at) {
+Blended spline_of_vectors(const ArrayLike& any_keys, const ArrayLike& any_times, const ArrayLike& any_at) {
     const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
     if (is_of_points(keys)) {
         return with_element(keys, "keys", "", [&]<class T>(T) {
@@ -156,7 +162,7 @@ py::object hermite_items(const std::array<py::object, 4>& values) {
     const std::vector<Tangent> leaving = items_of<Tangent>(tangents);
     const std::vector<T> times = checked_times<T>(values[2], keys.lead[0]);
     const auto moments = checked_input<T, T>(values[3], "at");
-    Output<std::tuple<Key, bool>> output(moments.lead);
+    Output<Blend<Key>> output(moments.lead);
     const py::ssize_t count = count_of(moments.lead);
     without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
@@ -172,8 +178,8 @@ py::object hermite_items(const std::array<py::object, 4>& values) {
     return output.take();
 }
 
-py::object hermite_spline(const py::object& keys, const py::object& tangents, const py::object& times,
-                          const py::object& at) {
+Blended hermite_spline(const ArrayLike& keys, const ArrayLike& tangents, const ArrayLike& times,
+                       const ArrayLike& at) {
     const auto values = promoted<4>({"keys", "tangents", "times", "at"}, {keys, tangents, times, at});
     const bool has_points = is_of_points(values[0]);
     return with_element(values[0], "keys", "[n, 3] or [n, 8]", [&]<class T>(T) {
@@ -186,17 +192,51 @@ py::object hermite_spline(const py::object& keys, const py::object& tangents, co
 
 void bind_interpolate(py::module_& m) {
     auto interpolate = m.def_submodule("interpolate");
-    py::list methods;
-    std::apply([&](auto... row) { (methods.append(py::str(std::string(row.name))), ...); }, Interpolations{});
-    interpolate.attr("METHODS") = py::tuple(methods);
-    interpolate.def("between", &between, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method"));
-    interpolate.def("blend", &blend, py::arg("transforms"), py::arg("weights"), py::arg("method"),
-                    py::arg("signs"));
+    interpolate.attr("METHODS") = names_in_python(names_of(Interpolations{}));
+    interpolate.def("between", &between, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method") = "dlb",
+                    R"(Interpolates from `a` at t = 0 to `b` at t = 1; other t extrapolate.
+
+a, b: in the layout of the method, with rotations of unit length.
+t: [..] or a number.)");
+    interpolate.def(
+        "blend", &blend, py::arg("transforms"), py::arg("weights"), py::arg("method") = "dlb",
+        py::arg("signs") = "heaviest",
+        R"(The blend of the n transforms along the last leading axis; the axes before it broadcast.
+
+transforms: [.., n, 7] and so on, in the layout of the method, n >= 1, with rotations of unit length.
+weights: [.., n], of any sign, normalised to sum 1. Of two equal ones the first counts as the heavier.
+signs: how the free signs of quaternions are chosen.
+
+heaviest     each in the hemisphere of the heaviest: the order does not matter except for ties
+running_sum  each in the hemisphere of the sum of those before it, as Blender's Preserve Volume and
+             sinew.Deformer do, for the same shapes; the order matters. Not defined if one is
+             perpendicular to that sum
+as_given     unchanged: for transforms that are aligned already, such as along a spline)");
     auto splines = m.def_submodule("spline");
-    splines.def("catmull_rom", &spline, py::arg("keys"), py::arg("times"), py::arg("at"), py::arg("method"));
+    splines.def(
+        "catmull_rom", &spline, py::arg("keys"), py::arg("times"), py::arg("at"), py::arg("method") = "dlb",
+        R"(Blend form: the keys blended by `method` with the weights of the spline (Smith 2013, section 3.2.2).
+
+Rigid for every method except matrix_linear. The keys are in the layout of the method.
+
+If keys are more than about 100 degrees apart, the negative weights may keep the iterations of qv_slerp and dib
+from converging: the result is then not defined, finite, and may jump.)");
+    splines.def(
+        "catmull_rom_vector", &spline_of_vectors, py::arg("keys"), py::arg("times"), py::arg("at"),
+        R"(Vector form: the components as a vector of 12, 7, 8 or, for points, 3 numbers (Smith 2013, algorithm
+3).
+
+Rigid only at the keys; the layout's normalized() makes it rigid everywhere.)");
     splines.def("hermite", &hermite_spline, py::arg("keys"), py::arg("tangents"), py::arg("times"),
-                py::arg("at"));
-    splines.def("catmull_rom_vector", &spline_of_vectors, py::arg("keys"), py::arg("times"), py::arg("at"));
+                py::arg("at"),
+                R"(The cubic Hermite spline through keys with arbitrary tangents (Smith 2013, section 2.3.2).
+
+keys: [n, 3], points, or [n, 8], rigid transforms.
+tangents: for a unit of time. Of points [n, 3]. Of transforms [n, 6], twists in each key's own axes: after a
+    short time h the curve is compose(key, from_twist(h * tangent)).
+
+For transforms it is a Bezier curve whose chords are screws (Shoemake 1985, for quaternions): rigid throughout.
+Not defined where "sclerp" is not defined between two of its control poses.)");
 }
 
 }  // namespace sinew::bindings

@@ -2,18 +2,19 @@
 #include <string>
 
 #include "module.h"
+#include "signatures.h"
 #include "sinew/methods/methods.h"
 #include "sinew/stages/stages.h"
 
 namespace sinew::bindings {
 namespace {
 
-namespace py = pybind11;
-
 std::string text(std::string_view view) { return std::string(view); }
 
+using Kind = Typed<"typing.Literal['float', 'int', 'bool', 'enum', 'vertex_group', 'method']">;
+
 /// The default value; None for kinds that have none.
-py::object initial_value(const Parameter& parameter) {
+Typed<"float | int | bool | str | None"> initial_value(const Parameter& parameter) {
     switch (parameter.kind) {
         case ParameterKind::number: return py::float_(parameter.initial);
         case ParameterKind::integer: return py::int_(static_cast<long long>(parameter.initial));
@@ -26,10 +27,12 @@ py::object initial_value(const Parameter& parameter) {
     return py::none();
 }
 
-py::object bound_of(const Parameter& parameter, double bound) {
+Typed<"float | None"> bound_of(const Parameter& parameter, double bound) {
     if (!is_numeric(parameter.kind)) return py::none();
     return py::float_(bound);
 }
+
+using Texts = Typed<"tuple[str, ...]">;
 
 template <class Row, class Range>
 py::tuple tuple_of(const Range& range) {
@@ -38,7 +41,7 @@ py::tuple tuple_of(const Range& range) {
     return rows;
 }
 
-py::tuple names_of(Needs needs) {
+Texts names_of(Needs needs) {
     py::list names;
     const auto add = [&](Needs of, const char* name) {
         if (has(needs, of)) names.append(name);
@@ -65,8 +68,10 @@ void def_facts(py::class_<Row>& of, const char* type) {
     def_text<&Row::description>(of, "description", "One sentence: when to use it.");
     def_text<&Row::source>(of, "source", "The papers.");
     of.def_property_readonly(
-        "parameters", [](const Row& row) { return tuple_of<Parameter>(row.parameters); },
-        "Its settings, each a Parameter.");
+        "parameters", [](const Row& row) -> Typed<"tuple[sinew._native.Parameter, ...]"> {
+            return tuple_of<Parameter>(row.parameters);
+        },
+        "Its settings.");
     of.def("__repr__",
            [type](const Row& row) { return "<sinew." + std::string(type) + " " + text(row.name) + ">"; });
 }
@@ -82,10 +87,8 @@ void bind_methods(py::module_& m) {
                                "One of \"length\", \"angle\" (radians) and \"factor\", or empty.");
     parameter
         .def_property_readonly(
-            "kind", [](const Parameter& row) { return text(name_of(row.kind)); },
-            "One of \"float\", \"int\", \"bool\", \"enum\" (one of `choices`), \"vertex_group\" (a weight "
-            "for each "
-            "vertex)\nand \"method\" (the name of a method).")
+            "kind", [](const Parameter& row) -> Kind { return py::str(text(name_of(row.kind))); },
+            R"("enum" is one of `choices`, "vertex_group" a weight for each vertex, "method" the name of a method.)")
         .def_property_readonly("default", &initial_value,
                                "The default; None for a vertex group and a method.")
         .def_property_readonly(
@@ -95,7 +98,7 @@ void bind_methods(py::module_& m) {
             "max", [](const Parameter& row) { return bound_of(row, row.maximum); },
             "The largest value of a number, inf if there is no limit; None for other kinds.")
         .def_property_readonly(
-            "choices", [](const Parameter& row) { return tuple_of<std::string>(row.choices); },
+            "choices", [](const Parameter& row) -> Texts { return tuple_of<std::string>(row.choices); },
             "The values of an enum.")
         .def("__repr__", [](const Parameter& row) { return "<sinew.Parameter " + text(row.id) + ">"; });
 
@@ -110,11 +113,9 @@ void bind_methods(py::module_& m) {
             "The heading of its group in menus.")
         .def_property_readonly(
             "needs", [](const MethodInfo& row) { return names_of(row.needs); },
-            "What it needs besides points, influences and bone transforms: \"rest_bones\", the bones' axes,\n"
-            "where bones are scaled; \"vertex_data\", numbers for each vertex, an argument of Binding;\n"
-            "\"topology\", triangles from which these are computed; \"precomputation\", a function that "
-            "computes\n"
-            "them.")
+            R"(What it needs besides points, influences and bone transforms: "rest_bones", the bones' axes, where bones are
+scaled; "vertex_data", numbers for each vertex, an argument of Binding; "topology", triangles from which these
+are computed; "precomputation", a function that computes them.)")
         .def_property_readonly(
             "vertex_floats", [](const MethodInfo& row) { return row.vertex_floats; },
             "How many numbers its vertex data has for each vertex, or in each row; 0 if it has none.")
@@ -126,11 +127,13 @@ void bind_methods(py::module_& m) {
     def_facts(stage, "Stage");
 
     m.def(
-        "methods", [] { return tuple_of<MethodInfo>(kMethods); }, "All skinning methods, each a Method.");
+        "methods",
+        []() -> Typed<"tuple[sinew._native.Method, ...]"> { return tuple_of<MethodInfo>(kMethods); },
+        "All skinning methods.");
     m.def(
-        "stages", [] { return tuple_of<StageInfo>(kStages); },
-        "All stages, each a Stage. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit,\n"
-        "`delta_mush` is DeltaMush.");
+        "stages", []() -> Typed<"tuple[sinew._native.Stage, ...]"> { return tuple_of<StageInfo>(kStages); },
+        "All stages. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit, `delta_mush` is "
+        "DeltaMush.");
 }
 
 }  // namespace sinew::bindings

@@ -2,6 +2,7 @@
 #include <pybind11/numpy.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -17,7 +18,9 @@ namespace sinew::bindings {
 namespace {
 
 // In the order of NormalDomain.
-constexpr std::string_view kDomains[] = {"vertex", "corner", "face"};
+constexpr std::array<std::string_view, 3> kDomains{"vertex", "corner", "face"};
+using Domain = Typed<"typing.Literal['vertex', 'corner', 'face']">;
+using OptionalDomain = Typed<"typing.Literal['vertex', 'corner', 'face'] | None">;
 
 /// Flags: all numbers except 0 are set. None gives an empty array.
 std::vector<std::uint8_t> checked_flags(const py::object& value, const char* argument,
@@ -49,18 +52,15 @@ std::vector<std::int16_t> checked_custom(const py::object& value) {
 
 NormalDomain checked_domain(const Timed<Normals>& normals, const py::object& value) {
     if (value.is_none()) return normals.domain();
-    const std::string wanted = "None, \"vertex\", \"corner\" or \"face\"";
-    const std::string name = checked_name(value, "domain", wanted);
-    const auto* const found = std::ranges::find(kDomains, name);
-    if (found == std::end(kDomains)) fail("domain", wanted, "'" + name + "'");
-    return static_cast<NormalDomain>(found - std::begin(kDomains));
+    return static_cast<NormalDomain>(checked_choice(value, "domain", kDomains));
 }
 
 std::string name_of(NormalDomain domain) { return std::string(kDomains[static_cast<std::size_t>(domain)]); }
 
-Timed<Normals> make(const py::object& vertex_count, const py::object& face_offsets,
-                    const py::object& corner_vertices, const py::object& edges, const py::object& sharp_edges,
-                    const py::object& sharp_faces, const py::object& custom_normals) {
+Timed<Normals> make(const Index& vertex_count, const ArrayLike& face_offsets,
+                    const ArrayLike& corner_vertices, const OptionalArrayLike& edges,
+                    const OptionalArrayLike& sharp_edges, const OptionalArrayLike& sharp_faces,
+                    const OptionalArrayLike& custom_normals) {
     const std::size_t vertices =
         checked_integer(vertex_count, "vertex_count",
                         "an integer from 0 to " + std::to_string(kMaxNormalVertices), kMaxNormalVertices);
@@ -78,22 +78,14 @@ Timed<Normals> make(const py::object& vertex_count, const py::object& face_offse
                    {of_edges, of_faces, custom});
 }
 
-py::array_t<float> compute(const Timed<Normals>& normals, const py::object& points, const py::object& domain,
-                           const py::object& out, const py::object& threads) {
-    const std::size_t vertices = normals.count(NormalDomain::vertex);
-    const auto given = checked_points(points, "points");
-    if (static_cast<std::size_t>(given.shape(0)) != vertices) {
-        fail("points", "float32 [" + std::to_string(vertices) + ", 3]", describe(points));
-    }
+py::array_t<float> compute(const Timed<Normals>& normals, const ArrayLike& points,
+                           const OptionalDomain& domain, const Out& out, const Threads& threads) {
+    const auto given = checked_points(points, "points", normals.count(NormalDomain::vertex));
     const NormalDomain of = checked_domain(normals, domain);
     const std::size_t most = checked_threads(threads);
-    const std::size_t count = normals.count(of);
-    py::array_t<float> result = checked_out(out, count);
-    if (count > 0 && result.data() < given.data() + given.size() &&
-        given.data() < result.data() + result.size()) {
-        fail("out", "another array than the points", "one that shares memory with them");
-    }
-    const std::span<Vec3<float>> to{reinterpret_cast<Vec3<float>*>(result.mutable_data()), count};
+    py::array_t<float> result = checked_out(out, normals.count(of));
+    check_apart(result, given);
+    const auto to = as_points_to_write(result);
     normals.call([&] { static_cast<void>(normals.compute(of, as_points(given), to, most)); });
     return result;
 }
@@ -118,10 +110,7 @@ py::tuple state_of(const Timed<Normals>& normals) {
                           flags_of(sharpness.edges), flags_of(sharpness.faces), custom_of(sharpness.custom));
 }
 
-Timed<Normals> of_state(const py::object& state) {
-    const auto part = [&](std::size_t index) { return part_of(state, 7, index); };
-    return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6));
-}
+Timed<Normals> of_state(const py::object& state) { return from_state<7>(state, &make); }
 
 std::string text_of(const Timed<Normals>& normals) {
     return "<sinew.Normals: " + std::to_string(normals.count(NormalDomain::vertex)) + " vertices, " +
@@ -132,59 +121,46 @@ std::string text_of(const Timed<Normals>& normals) {
 }  // namespace
 
 void bind_normals(py::module_& m) {
+    const auto count_of = [](NormalDomain domain) {
+        return [domain](const Timed<Normals>& normals) { return normals.count(domain); };
+    };
     py::class_<Timed<Normals>>(
         m, "Normals",
-        "Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices\n"
-        "weighted by the angles of corners, of corners by fans between sharp edges. Can be pickled.")
-        .def(
-            py::init(&make), py::arg("vertex_count"), py::arg("face_offsets"), py::arg("corner_vertices"),
-            py::arg("edges") = py::none(), py::kw_only(), py::arg("sharp_edges") = py::none(),
-            py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
-            "vertex_count: number of vertices, at most 2^29 - 1.\n"
-            "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
-            "corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.\n"
-            "edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces; None "
-            "if\n"
-            "    nothing is sharp or custom.\n"
-            "sharp_edges: None, or bool [edges].\n"
-            "sharp_faces: None, or bool [faces], which are flat.\n"
-            "custom_normals: None, or int16 [corners, 2], as in Blender's attribute custom_normal.\n\n"
-            "All input is copied. Raises ValueError that names the argument, what was expected and what was\n"
-            "given.")
+        R"(Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices weighted
+by the angles of corners, of corners by fans between sharp edges. Can be pickled.)")
+        .def(py::init(&make), py::arg("vertex_count"), py::arg("face_offsets"), py::arg("corner_vertices"),
+             py::arg("edges") = py::none(), py::kw_only(), py::arg("sharp_edges") = py::none(),
+             py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
+             R"(vertex_count: number of vertices, at most 2^29 - 1.
+face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
+corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.
+edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces; None if nothing is
+    sharp or custom.
+sharp_edges: None, or bool [edges].
+sharp_faces: None, or bool [faces], which are flat.
+custom_normals: None, or int16 [corners, 2], as in Blender's attribute custom_normal.)")
         .def_property_readonly(
-            "domain", [](const Timed<Normals>& normals) { return name_of(normals.domain()); },
-            "The simplest domain that describes the mesh's shading, as Blender's Mesh.normals_domain: "
-            "\"face\"\n"
-            "if every face is flat or every edge sharp, else \"corner\" if anything is sharp, else "
-            "\"vertex\". With\n"
-            "custom normals always \"corner\".")
-        .def_property_readonly(
-            "vertex_count", [](const Timed<Normals>& normals) { return normals.count(NormalDomain::vertex); },
-            "Number of vertices.")
-        .def_property_readonly(
-            "corner_count", [](const Timed<Normals>& normals) { return normals.count(NormalDomain::corner); },
-            "Number of corners of faces.")
-        .def_property_readonly(
-            "face_count", [](const Timed<Normals>& normals) { return normals.count(NormalDomain::face); },
-            "Number of faces.")
+            "domain",
+            [](const Timed<Normals>& normals) -> Domain { return py::str(name_of(normals.domain())); },
+            R"(The simplest domain that describes the mesh's shading, as Blender's Mesh.normals_domain: "face" if every
+face is flat or every edge sharp, else "corner" if anything is sharp, else "vertex". With custom normals always
+"corner".)")
+        .def_property_readonly("vertex_count", count_of(NormalDomain::vertex), kVertexCount)
+        .def_property_readonly("corner_count", count_of(NormalDomain::corner), "Number of corners of faces.")
+        .def_property_readonly("face_count", count_of(NormalDomain::face), "Number of faces.")
         .def("__repr__", &text_of)
         .def(py::pickle(&state_of, &of_state))
-        .def(
-            "compute", &compute, py::arg("points"), py::arg("domain") = py::none(),
-            py::arg("out") = py::none(), py::arg("threads") = py::none(),
-            "Unit vectors, float32 [vertices, corners or faces, 3].\n\n"
-            "points: float32 [vertices, 3], deformed.\n"
-            "domain: \"vertex\", \"corner\" or \"face\": what each normal belongs to; None: the mesh's "
-            "domain.\n"
-            "out: if given, written and returned: float32, C-contiguous, aligned; never converted. Must not\n"
-            "    overlap the points.\n"
-            "threads: maximum number; None or 0: as many as useful. The\n"
-            "    result is the same bit for bit.\n\n"
-            "For a face without area the normal is (0, 0, 1); for a vertex without faces, the direction of "
-            "its\n"
-            "point; for a vertex whose faces' normals cancel, 0. No result is NaN. Releases the GIL for "
-            "large\n"
-            "meshes. Raises ValueError that names the argument, what was expected and what was given.");
+        .def("compute", &compute, py::arg("points"), py::arg("domain") = py::none(),
+             py::arg("out") = py::none(), py::arg("threads") = py::none(),
+             R"(Unit vectors, float32 [vertices, corners or faces, 3].
+
+points: float32 [vertices, 3], deformed.
+domain: "vertex", "corner" or "face": what each normal belongs to; None: the mesh's domain.
+out: None, or float32 of the result's shape, written and returned. Must not overlap the points.
+threads: at most so many; None or 0: as many as useful.
+
+For a face without area the normal is (0, 0, 1); for a vertex without faces, the direction of its point; for a
+vertex whose faces' normals cancel, 0. No result is NaN.)");
 }
 
 }  // namespace sinew::bindings

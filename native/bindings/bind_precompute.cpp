@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/numpy.h>
 
-#include <cstring>
 #include <optional>
 #include <stdexcept>
 
-#include "arrays.h"
+#include "deform_arguments.h"
 #include "gil.h"
 #include "module.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
@@ -50,29 +49,14 @@ auto precompute(const py::object& progress, PrecomputeOptions options, const Run
     }
 }
 
-/// The mesh argument of a precomputation.
-struct Mesh {
-    py::array_t<float> points;
-    py::array_t<std::int32_t> offsets;
-    py::array_t<std::int32_t> bones;
-    py::array_t<float> weights;
+/// The mesh of a precomputation.
+struct Mesh : MeshArguments {
     py::array_t<std::int32_t> corners;
 
-    Mesh(const py::object& rest_points, const py::object& influence_offsets,
-         const py::object& influence_bones, const py::object& influence_weights, const py::object& triangles)
-        : points(checked_points(rest_points, "rest_points")),
-          offsets(checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]",
-                                        kMaxVertices + 1)),
-          bones(checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]",
-                                      kMaxInfluences)),
-          weights(checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]",
-                                 kMaxInfluences)),
+    Mesh(const MeshArguments& mesh, const py::object& triangles)
+        : MeshArguments(mesh),
           corners(checked<std::int32_t>(triangles, "triangles", 2, "int32 [triangles, 3]")) {
         if (corners.shape(1) != 3) fail("triangles", "int32 [triangles, 3]", describe(triangles));
-    }
-
-    [[nodiscard]] BindData data() const {
-        return {as_points(points), as_span(offsets), as_span(bones), as_span(weights)};
     }
 };
 
@@ -83,35 +67,31 @@ PrecomputeOptions options_of(bool exact, const py::object& threads) {
     return options;
 }
 
-py::object centres(const py::object& rest_points, const py::object& influence_offsets,
-                   const py::object& influence_bones, const py::object& influence_weights,
-                   const py::object& triangles, bool exact, const py::object& threads,
-                   const py::object& progress) {
-    const Mesh mesh(rest_points, influence_offsets, influence_bones, influence_weights, triangles);
+using Progress = Typed<"collections.abc.Callable[[float], object] | None">;
+using Rows = Typed<"numpy.typing.NDArray[numpy.float32] | None">;
+
+Rows centres(const ArrayLike& rest_points, const ArrayLike& influence_offsets,
+             const ArrayLike& influence_bones, const ArrayLike& influence_weights, const ArrayLike& triangles,
+             bool exact, const Threads& threads, const Progress& progress) {
+    const Mesh mesh({rest_points, influence_offsets, influence_bones, influence_weights}, triangles);
     const auto found = precompute(progress, options_of(exact, threads), [&](const PrecomputeOptions& with) {
         return centres_of_rotation(mesh.data(), as_span(mesh.corners), with);
     });
     if (!found) return py::none();
-    py::array_t<float> result({mesh.points.shape(0), py::ssize_t{3}});
-    if (!found->empty())
-        std::memcpy(result.mutable_data(), found->data(), found->size() * sizeof(found->front()));
-    return result;
+    return array_of(std::span<const Vec3<float>>(*found));
 }
 
-py::object moments(const py::object& rest_points, const py::object& influence_offsets,
-                   const py::object& influence_bones, const py::object& influence_weights,
-                   const py::object& triangles, double radius, bool exact, const py::object& threads,
-                   const py::object& progress) {
-    const Mesh mesh(rest_points, influence_offsets, influence_bones, influence_weights, triangles);
+Rows moments(const ArrayLike& rest_points, const ArrayLike& influence_offsets,
+             const ArrayLike& influence_bones, const ArrayLike& influence_weights, const ArrayLike& triangles,
+             double radius, bool exact, const Threads& threads, const Progress& progress) {
+    const Mesh mesh({rest_points, influence_offsets, influence_bones, influence_weights}, triangles);
 #if SINEW_WITH_DDM
     const auto found = precompute(progress, options_of(exact, threads), [&](const PrecomputeOptions& with) {
         return direct_delta_mush(mesh.data(), as_span(mesh.corners), radius, with);
     });
     if (!found) return py::none();
     constexpr auto floats = static_cast<py::ssize_t>(kMomentFloats);
-    py::array_t<float> result({static_cast<py::ssize_t>(found->size()) / floats, floats});
-    if (!found->empty()) std::memcpy(result.mutable_data(), found->data(), found->size() * sizeof(float));
-    return result;
+    return array_of(std::span(*found)).reshape({static_cast<py::ssize_t>(found->size()) / floats, floats});
 #else
     static_cast<void>(radius);
     static_cast<void>(options_of(exact, threads));
@@ -123,47 +103,37 @@ py::object moments(const py::object& rest_points, const py::object& influence_of
 }  // namespace
 
 void bind_precompute(py::module_& m) {
-    m.def(
-        "centres_of_rotation", &centres, py::arg("rest_points"), py::arg("influence_offsets"),
-        py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::kw_only(),
-        py::arg("exact") = false, py::arg("threads") = py::none(), py::arg("progress") = py::none(),
-        "The vertex data of the method \"cor\": the optimised centre of rotation of each vertex, float32\n"
-        "[vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these "
-        "rest\n"
-        "points.\n\n"
-        "rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.\n"
-        "triangles: int32 [triangles, 3], vertices.\n"
-        "exact: compute by the definition itself, which is slow; otherwise triangles of similar weights are\n"
-        "summed.\n"
-        "threads: maximum number; None or 0: as many as useful. The result is the same bit for bit. They "
-        "give\n    way to all other threads.\n"
-        "progress: None, or a callable that is called on this thread with the completed share, 0 to 1. If "
-        "it\n"
-        "    returns False, the work is cancelled and the result is None. An exception that it raises is "
-        "passed\n"
-        "    on.\n\n"
-        "Precomputations of other methods have the same `threads` and `progress`. Releases the GIL.");
+    m.def("centres_of_rotation", &centres, py::arg("rest_points"), py::arg("influence_offsets"),
+          py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::kw_only(),
+          py::arg("exact") = false, py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+          R"(The vertex data of the method "cor": the optimised centre of rotation of each vertex, float32
+[vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest points.
+
+rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.
+triangles: int32 [triangles, 3], vertices.
+exact: compute by the definition itself, which is slow; otherwise triangles of similar weights are summed.
+threads: at most so many; None or 0: as many as useful. They give way to all other threads.
+progress: None, or a callable that is called on this thread with the completed share, 0 to 1. If it returns
+    False, the work is cancelled and the result is None. An exception that it raises is passed on.)");
     m.def(
         "direct_delta_mush", &moments, py::arg("rest_points"), py::arg("influence_offsets"),
         py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::arg("radius"),
         py::kw_only(), py::arg("exact") = false, py::arg("threads") = py::none(),
         py::arg("progress") = py::none(),
-        "The vertex data of the method \"ddm\": the moments of each bone's smoothed weights around each "
-        "vertex\n"
-        "(Le, Lewis 2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight,\n"
-        "first moment (x, y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of "
-        "the\n"
-        "vertex's first moments). Rows are in ascending order of vertices and, for each vertex, of bones. "
-        "They\n"
-        "belong to these rest points and this radius.\n\n"
-        "rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.\n"
-        "triangles: int32 [triangles, 3], vertices.\n"
-        "radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard "
-        "deviation\n"
-        "    along each axis.\n"
-        "exact: include weights below 1e-6, which are otherwise left out.\n"
-        "threads, progress: as for centres_of_rotation. Releases the GIL.\n\n"
-        "Raises RuntimeError if Sinew was built without this method.");
+        R"(The vertex data of the method "ddm": the moments of each bone's smoothed weights around each vertex (Le,
+Lewis 2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x,
+y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments).
+Rows are in ascending order of vertices and, for each vertex, of bones. They belong to these rest points and
+this radius.
+
+rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.
+triangles: int32 [triangles, 3], vertices.
+radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard deviation along
+    each axis.
+exact: include weights below 1e-6, which are otherwise left out.
+threads, progress: as for centres_of_rotation().
+
+RuntimeError if Sinew was built without this method.)");
 }
 
 }  // namespace sinew::bindings

@@ -7,7 +7,7 @@
 namespace sinew::bindings {
 namespace {
 
-Skeleton make_skeleton(const py::object& parents) {
+Skeleton make_skeleton(const ArrayLike& parents) {
     const auto array = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
     return Skeleton({array.data(), static_cast<std::size_t>(array.size())});
 }
@@ -42,8 +42,8 @@ Transform checked_root(const py::object& value) {
     return Item<Transform>::read(input.data);
 }
 
-py::object relative_to_root(const Skeleton& skeleton, const py::object& any_transforms,
-                            const py::object& any_root) {
+Array relative_to_root(const Skeleton& skeleton, const ArrayLike& any_transforms,
+                       const OptionalArrayLike& any_root) {
     const auto [transforms, root] = promoted<2>({"transforms", "root"}, {any_transforms, any_root});
     return with_representation(transforms, "transforms", "bones", [&]<class Row>(Row) {
         return with_element(transforms, "transforms", "", [&]<class T>(T) {
@@ -55,9 +55,8 @@ py::object relative_to_root(const Skeleton& skeleton, const py::object& any_tran
     });
 }
 
-py::object branch_updated(const Skeleton& skeleton, const py::object& any_relative,
-                          const py::object& any_transforms, const py::object& bone,
-                          const py::object& any_root) {
+Array branch_updated(const Skeleton& skeleton, const ArrayLike& any_relative, const ArrayLike& any_transforms,
+                     const Index& bone, const OptionalArrayLike& any_root) {
     const auto [relative, transforms, root] =
         promoted<3>({"root_relative", "transforms", "root"}, {any_relative, any_transforms, any_root});
     const std::string wanted = "the index of one of " + std::to_string(skeleton.bone_count()) + " bones";
@@ -77,6 +76,9 @@ py::object branch_updated(const Skeleton& skeleton, const py::object& any_relati
         });
     });
 }
+
+using Method = Typed<"sinew.interpolate.Method">;
+using Frames = Typed<"tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]">;
 
 // (transforms, is_defined) from run(moment, bones) for each number in `at`: for one number [bones, ..] and a
 // bool, for numbers [..] the shapes [.., bones, ..] and [..].
@@ -101,8 +103,8 @@ py::object at_all(const Skeleton& skeleton, const Input<T>& at, Run run) {
     return py::make_tuple(transforms.take(), is_defined.take());
 }
 
-py::object interpolate(const Skeleton& skeleton, const py::object& any_a, const py::object& any_b,
-                       const py::object& any_t, const py::object& method) {
+Frames interpolate(const Skeleton& skeleton, const ArrayLike& any_a, const ArrayLike& any_b,
+                   const ArrayLike& any_t, const Method& method) {
     const auto [a, b, t] = promoted<3>({"a", "b", "t"}, {any_a, any_b, any_t});
     return with_method(method, [&]<class Method>(Method) {
         const char* shape = Item<typename Method::template Transform<double>>::kShape;
@@ -133,8 +135,8 @@ py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, c
     });
 }
 
-py::object spline(const Skeleton& skeleton, const py::object& any_keyframes, const py::object& any_times,
-                  const py::object& any_time, const py::object& method) {
+Frames spline(const Skeleton& skeleton, const ArrayLike& any_keyframes, const ArrayLike& any_times,
+              const ArrayLike& any_time, const Method& method) {
     const auto [keyframes, times, time] =
         promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
     return with_method(method, [&]<class Method>(Method) {
@@ -148,8 +150,8 @@ py::object spline(const Skeleton& skeleton, const py::object& any_keyframes, con
     });
 }
 
-py::object spline_vector_form(const Skeleton& skeleton, const py::object& any_keyframes,
-                              const py::object& any_times, const py::object& any_time) {
+Frames spline_vector_form(const Skeleton& skeleton, const ArrayLike& any_keyframes,
+                          const ArrayLike& any_times, const ArrayLike& any_time) {
     const auto [keyframes, times, time] =
         promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
     return with_representation(keyframes, "keyframes", "keys, bones", [&]<class Row>(Row) {
@@ -166,69 +168,59 @@ py::object spline_vector_form(const Skeleton& skeleton, const py::object& any_ke
 }  // namespace
 
 void bind_skeleton(py::module_& m) {
-    py::class_<Skeleton>(
-        m, "Skeleton",
-        "A hierarchy of bones in which parents precede their children.\n\n"
-        "Its methods take each bone relative to its parent, in any representation, with layouts as in\n"
-        "sinew.affine, sinew.quat_vec and sinew.dual_quat, and promote arrays in the same way. They raise\n"
-        "ValueError that names the argument, what was expected and what was given.")
-        .def(py::init(&make_skeleton), py::arg("parents"),
-             "parents: int32 [bones], the index of each bone's parent, -1 for a root.\n\n"
-             "Raises ValueError if a parent does not precede its child.")
+    py::class_<Skeleton>(m, "Skeleton",
+                         R"(A hierarchy of bones in which parents precede their children.
+
+Its methods take each bone relative to its parent, in any layout of sinew.affine, sinew.quat_vec and
+sinew.dual_quat. Can be pickled.)")
+        .def(
+            py::init(&make_skeleton), py::arg("parents"),
+            R"(parents: int32 [bones], the index of each bone's parent, -1 for a root. ValueError if a parent does not
+    precede its child.)")
         .def_property_readonly("bone_count", &Skeleton::bone_count, "Number of bones.")
         .def("__repr__",
              [](const Skeleton& skeleton) {
                  return "<sinew.Skeleton: " + std::to_string(skeleton.bone_count()) + " bones>";
              })
-        .def(py::pickle(
-            [](const Skeleton& skeleton) {
-                const auto parents = skeleton.parents();
-                return py::make_tuple(
-                    py::array_t<std::int32_t>(static_cast<py::ssize_t>(parents.size()), parents.data()));
-            },
-            [](const py::tuple& state) {
-                if (state.size() != 1)
-                    fail("state", "a tuple of 1, as pickling makes it",
-                         "a tuple of " + std::to_string(state.size()));
-                return make_skeleton(state[0]);
-            }))
+        .def(py::pickle([](const Skeleton& skeleton) { return py::make_tuple(array_of(skeleton.parents())); },
+                        [](const py::object& state) { return make_skeleton(part_of(state, 1, 0)); }))
+        .def("root_relative", &relative_to_root, py::arg("transforms"), py::arg("root") = py::none(),
+             R"(Each bone relative to the root, in the layout of `transforms` (Smith 2013, algorithm 1).
+
+transforms: [bones, 4, 4] or [bones, 3, 4], for which the result is [bones, 4, 4]; [bones, 7]; [bones, 8].
+root: None, or a transform that is applied after that of every bone without a parent.)")
         .def(
-            "root_relative", &relative_to_root, py::arg("transforms"), py::arg("root") = py::none(),
-            "Each bone relative to the root, in the given representation (Smith 2013, algorithm 1).\n\n"
-            "transforms: [bones, 4, 4] or [bones, 3, 4], for which the result is [bones, 4, 4]; [bones, 7];\n"
-            "    [bones, 8].\n"
-            "root: None, or a transform that is applied after that of every bone without a parent.")
-        .def("update_branch", &branch_updated, py::arg("root_relative"), py::arg("transforms"),
-             py::arg("bone"), py::arg("root") = py::none(),
-             "Updates root_relative() after a change of one bone: computes only that bone and its "
-             "descendants.\n\n"
-             "root_relative: the result of root_relative() before the change, in the representation of\n"
-             "`transforms`.\n"
-             "transforms, root: as for root_relative().\n"
-             "bone: the index of the changed bone.")
+            "update_branch", &branch_updated, py::arg("root_relative"), py::arg("transforms"),
+            py::arg("bone"), py::arg("root") = py::none(),
+            R"(The result of root_relative() after a change of one bone: computes only that bone and its descendants.
+
+root_relative: the result before the change, in the layout of `transforms`.
+transforms, root: as for root_relative().
+bone: the index of the changed bone.)")
         .def("interpolate", &interpolate, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method") = "dlb",
-             "(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).\n\n"
-             "a, b: [bones, ..] in the representation of the method, at t = 0 and t = 1.\n"
-             "t: a number, or [..], for which the results are [.., bones, ..] and [..]; extrapolates outside "
-             "0 to\n"
-             "    1.\n"
-             "method: one of sinew.interpolate.METHODS.\n"
-             "is_defined: False if the result is not defined for some bone, which then has the result that\n"
-             "    sinew.interpolate.between specifies.")
-        .def("spline", &spline, py::arg("keyframes"), py::arg("times"), py::arg("time"),
-             py::arg("method") = "dlb",
-             "(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend "
-             "form\n"
-             "(Smith 2013, algorithm 3 and section 3.2.2).\n\n"
-             "keyframes: [keys, bones, ..] in the representation of the method, at least one key.\n"
-             "times: [keys], non-decreasing; keys of equal time are a cut.\n"
-             "time: a number, or [..], for which the results are [.., bones, ..] and [..]; constant before "
-             "the\n"
-             "    first key and after the last.\n"
-             "method: one of sinew.interpolate.METHODS.")
+             R"((transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
+
+a, b: [bones, ..] in the layout of the method, at t = 0 and t = 1.
+t: a number, or [..], for which the results are [.., bones, ..] and [..]; extrapolates outside 0 to 1.
+method: one of sinew.interpolate.METHODS.
+
+is_defined is False if the result is not defined for some bone, which then has the result that
+sinew.interpolate specifies.)")
+        .def(
+            "spline", &spline, py::arg("keyframes"), py::arg("times"), py::arg("time"),
+            py::arg("method") = "dlb",
+            R"((transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend form (Smith
+2013, algorithm 3 and section 3.2.2).
+
+keyframes: [keys, bones, ..] in the layout of the method, at least one key.
+times: [keys], non-decreasing; keys of equal time are a cut.
+time: a number, or [..], for which the results are [.., bones, ..] and [..]; constant before the first key and
+    after the last.
+method: one of sinew.interpolate.METHODS.)")
         .def("spline_vector", &spline_vector_form, py::arg("keyframes"), py::arg("times"), py::arg("time"),
-             "The same in vector form (Smith 2013, algorithm 3): not rigid between keys.\n\n"
-             "keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].");
+             R"(As spline(), in vector form (Smith 2013, algorithm 3): not rigid between keys.
+
+keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].)");
 }
 
 }  // namespace sinew::bindings

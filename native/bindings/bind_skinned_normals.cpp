@@ -16,8 +16,9 @@ py::array_t<float> checked_vectors(const py::object& value, const char* argument
     return checked_points(value, argument);
 }
 
-Timed<SkinnedNormals> make(const Binding& binding, const py::object& normals, const py::object& tangents,
-                           const py::object& vertices, const py::object& method, const py::object& mix) {
+Timed<SkinnedNormals> make(const Binding& binding, const ArrayLike& normals,
+                           const OptionalArrayLike& tangents, const OptionalArrayLike& vertices,
+                           const Name& method, const Mix& mix) {
     const auto rest_normals = checked_points(normals, "normals");
     const auto rest_tangents = checked_vectors(tangents, "tangents");
     py::array_t<std::int32_t> of_frames;
@@ -29,20 +30,21 @@ Timed<SkinnedNormals> make(const Binding& binding, const py::object& normals, co
                           second.data());
 }
 
-std::span<Vec3<float>> writable(py::array_t<float>& points) {
-    return {reinterpret_cast<Vec3<float>*>(points.mutable_data()), static_cast<std::size_t>(points.shape(0))};
-}
+using Deformed = Typed<
+    "tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32], "
+    "numpy.typing.NDArray[numpy.float32] | None]">;
 
-py::tuple deform(const Timed<SkinnedNormals>& skinned, const py::object& bone_transforms,
-                 const py::object& threads, const py::object& bones_from_model,
-                 const py::object& rest_inverses, const py::object& parameters) {
+Deformed deform(const Timed<SkinnedNormals>& skinned, const ArrayLike& bone_transforms,
+                const Threads& threads, const OptionalArrayLike& bones_from_model,
+                const OptionalArrayLike& rest_inverses, const ParameterValues& parameters) {
     const DeformArguments arguments = checked_deform(skinned.deformer(), bone_transforms, threads,
                                                      bones_from_model, rest_inverses, parameters);
     const std::size_t frames = skinned.frame_count();
     auto points = checked_out(py::none(), skinned.deformer().vertex_count());
     auto normals = checked_out(py::none(), frames);
     auto tangents = checked_out(py::none(), skinned.has_tangents() ? frames : 0);
-    const auto to_points = writable(points), to_normals = writable(normals), to_tangents = writable(tangents);
+    const auto to_points = as_points_to_write(points), to_normals = as_points_to_write(normals),
+               to_tangents = as_points_to_write(tangents);
     skinned.call([&] {
         static_cast<void>(
             skinned.deform(arguments.bones, arguments.options, to_points, to_normals, to_tangents));
@@ -51,26 +53,19 @@ py::tuple deform(const Timed<SkinnedNormals>& skinned, const py::object& bone_tr
     return py::make_tuple(points, normals, tangents);
 }
 
-py::array_t<float> deform_normals(const Timed<SkinnedNormals>& skinned, const py::object& bone_transforms,
-                                  const py::object& posed_points, const py::object& out,
-                                  const py::object& threads, const py::object& bones_from_model,
-                                  const py::object& rest_inverses, const py::object& parameters) {
+py::array_t<float> deform_normals(const Timed<SkinnedNormals>& skinned, const ArrayLike& bone_transforms,
+                                  const ArrayLike& posed_points, const Out& out, const Threads& threads,
+                                  const OptionalArrayLike& bones_from_model,
+                                  const OptionalArrayLike& rest_inverses, const ParameterValues& parameters) {
     const DeformArguments arguments = checked_deform(skinned.deformer(), bone_transforms, threads,
                                                      bones_from_model, rest_inverses, parameters);
-    const auto points = checked_points(posed_points, "points");
-    const std::size_t vertices = skinned.deformer().vertex_count();
-    if (static_cast<std::size_t>(points.shape(0)) != vertices) {
-        fail("points", "float32 [" + std::to_string(vertices) + ", 3]", describe(posed_points));
-    }
+    const auto points = checked_points(posed_points, "points", skinned.deformer().vertex_count());
     auto normals = checked_out(out, skinned.frame_count());
-    if (normals.size() > 0 && normals.data() < points.data() + points.size() &&
-        points.data() < normals.data() + normals.size()) {
-        fail("out", "another array than the points", "one that shares memory with them");
-    }
-    const auto from = as_points(points);
-    const auto to = writable(normals);
-    skinned.call(
-        [&] { static_cast<void>(skinned.deform_normals(arguments.bones, arguments.options, from, to)); });
+    check_apart(normals, points);
+    const auto to = as_points_to_write(normals);
+    skinned.call([&] {
+        static_cast<void>(skinned.deform_normals(arguments.bones, arguments.options, as_points(points), to));
+    });
     return normals;
 }
 
@@ -85,44 +80,40 @@ std::string text_of(const Timed<SkinnedNormals>& skinned) {
 void bind_skinned_normals(py::module_& m) {
     py::class_<Timed<SkinnedNormals>>(
         m, "SkinnedNormals",
-        "Normals and tangents that move with the skin, as in engines: each is "
-        "transformed by the blend of its\n"
-        "vertex, normals by the inverse transpose. The effect of weights that change "
-        "from vertex to vertex is\n"
-        "not included.")
+        R"(Normals and tangents that move with the skin, as in engines: each is transformed by the blend of its
+vertex, normals by the inverse transpose. The effect of weights that change from vertex to vertex is not
+included. A frame is a normal and, if there are tangents, its tangent.)")
         .def(py::init(&make), py::arg("binding"), py::arg("normals"), py::arg("tangents") = py::none(),
              py::arg("vertices") = py::none(), py::arg("method") = "lbs", py::arg("mix") = py::none(),
-             "binding: a Binding; not copied.\n"
-             "normals: float32 [frames, 3], at rest, of any length.\n"
-             "tangents: None, or float32 [frames, 3].\n"
-             "vertices: int32 [frames], the vertex of each, such as for the corners of faces; None: one "
-             "frame for\n"
-             "    each vertex.\n"
-             "method, mix: as for Deformer.\n\n"
-             "Raises ValueError that names the argument, what was expected and what was given.")
-        .def_property_readonly("frame_count", &SkinnedNormals::frame_count, "Number of normals.")
+             R"(binding: a Binding; not copied.
+normals: float32 [frames, 3], at rest, of any length.
+tangents: None, or float32 [frames, 3], at rest, of any length.
+vertices: int32 [frames], the vertex of each, such as for the corners of faces; None: one frame for each
+    vertex.
+method, mix: as for Deformer.)")
+        .def_property_readonly("frame_count", &SkinnedNormals::frame_count,
+                               "Number of frames: as many as normals at rest.")
         .def("__repr__", &text_of)
         .def(
             "deform", &deform, py::arg("bone_transforms"), py::arg("threads") = py::none(),
             py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
             py::arg("parameters") = py::none(),
-            "(points, normals, tangents): the deformed points, float32 [vertices, 3]; unit vectors, float32\n"
-            "[frames, 3]; the same for tangents, or None.\n\n"
-            "Arguments are those of Deformer.deform. Where the blend mirrors, a normal points to the side "
-            "given\n"
-            "by the order of a face's vertices. Where the blend collapses the plane of a normal to a line, "
-            "that\n"
-            "normal is 0. Releases the GIL for large meshes. Raises ValueError that names the argument, what "
-            "was\n"
-            "expected and what was given.")
-        .def("deform_normals", &deform_normals, py::arg("bone_transforms"), py::arg("points"),
-             py::arg("out") = py::none(), py::arg("threads") = py::none(),
-             py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
-             py::arg("parameters") = py::none(),
-             "Only the normals, if the points are known; saves a quarter of the time.\n\n"
-             "points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.\n"
-             "out: if given, written and returned: float32 [frames, 3], C-contiguous; None: a new array.\n\n"
-             "All other arguments as for deform().");
+            R"((points, normals, tangents): the deformed points, float32 [vertices, 3]; normals of unit length, float32
+[frames, 3]; the same for tangents, or None.
+
+The arguments are those of Deformer.deform(). Where the blend mirrors, a normal points to the side given by the
+order of a face's vertices. Where the blend collapses the plane of a normal to a line, that normal is 0.)")
+        .def(
+            "deform_normals", &deform_normals, py::arg("bone_transforms"), py::arg("points"),
+            py::arg("out") = py::none(), py::arg("threads") = py::none(),
+            py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
+            py::arg("parameters") = py::none(),
+            R"(The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
+
+points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.
+out: None, or float32 [frames, 3], written and returned. Must not overlap the points.
+
+The other arguments are those of deform().)");
 }
 
 }  // namespace sinew::bindings

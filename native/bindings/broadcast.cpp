@@ -45,6 +45,10 @@ void promote(std::span<py::object> values, std::span<const char* const> argument
     }
 }
 
+py::object named_tuple(const char* name, const py::tuple& parts) {
+    return py::module_::import("sinew._types").attr(name)(*parts);
+}
+
 double checked_number(const py::handle& value, const char* argument, const std::string& wanted) {
     if (!PyFloat_Check(value.ptr()) && !PyLong_Check(value.ptr())) {
         // float() would drop its imaginary part with only a warning.

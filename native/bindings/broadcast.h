@@ -178,6 +178,36 @@ struct Output<std::tuple<Values...>> {
     }
 };
 
+/// The named tuple `name` of sinew._types.
+py::object named_tuple(const char* name, const py::tuple& parts);
+
+/// Values that Python gets as the named tuple `name` of sinew._types.
+template <Text name, class... Values>
+struct Named : std::tuple<Values...> {
+    using std::tuple<Values...>::tuple;
+};
+
+template <Text name, class... Values>
+Named<name, Values...> named(const Values&... values) {
+    return {values...};
+}
+
+template <Text name, class... Values>
+struct Output<Named<name, Values...>> : Output<std::tuple<Values...>> {
+    using Output<std::tuple<Values...>>::Output;
+    py::object take() { return named_tuple(name.characters, Output<std::tuple<Values...>>::take()); }
+};
+
+/// What signatures call a result that an Output<Value> makes.
+template <class Value>
+struct SignatureOf {
+    using type = Array;
+};
+template <Text name, class... Values>
+struct SignatureOf<Named<name, Values...>> {
+    using type = NamedTuple<name>;
+};
+
 inline py::ssize_t count_of(const Shape& shape) {
     py::ssize_t count = 1;
     for (const py::ssize_t length : shape) count *= length;
@@ -217,17 +247,18 @@ py::object map(const std::array<const char*, sizeof...(In)>& arguments,
 }
 
 template <template <class> class>
-struct ObjectFor {
-    using type = const py::object&;
+struct ArgumentFor {
+    using type = const ArrayLike&;
 };
 
 /// Defines a function of the module whose arguments are arrays of the items `In`.
 template <template <class> class... In, class F>
-void def(py::module_& m, const char* name, const std::array<const char*, sizeof...(In)>& arguments, F f) {
-    const auto function = [arguments, f](typename ObjectFor<In>::type... values) {
-        return map<In...>(arguments, {values...}, f);
-    };
-    std::apply([&](auto... argument) { m.def(name, function, py::arg(argument)...); }, arguments);
+void def(py::module_& m, const char* name, const std::array<const char*, sizeof...(In)>& arguments, F f,
+         const char* doc) {
+    using Result = decltype(f(std::declval<const In<double>&>()...));
+    const auto function = [arguments, f](typename ArgumentFor<In>::type... values) ->
+        typename SignatureOf<Result>::type { return map<In...>(arguments, {values...}, f); };
+    std::apply([&](auto... argument) { m.def(name, function, py::arg(argument)..., doc); }, arguments);
 }
 
 }  // namespace sinew::bindings

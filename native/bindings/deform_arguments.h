@@ -9,6 +9,21 @@
 
 namespace sinew::bindings {
 
+/// The arguments for a mesh and its influences, and the arrays that BindData refers to.
+struct MeshArguments {
+    py::array_t<float> points;
+    py::array_t<std::int32_t> offsets;
+    py::array_t<std::int32_t> bones;
+    py::array_t<float> weights;
+
+    MeshArguments(const py::object& rest_points, const py::object& influence_offsets,
+                  const py::object& influence_bones, const py::object& influence_weights);
+
+    [[nodiscard]] BindData data() const {
+        return {as_points(points), as_span(offsets), as_span(bones), as_span(weights)};
+    }
+};
+
 /// The method with this name. ValueError that names `argument`; TypeError if it is no str.
 MethodInfo checked_method(const py::object& method, const char* argument);
 

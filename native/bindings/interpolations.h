@@ -6,22 +6,30 @@
 
 namespace sinew::bindings {
 
-/// Calls f(Method{}) for the element of Interpolations with the name `method`. ValueError for another name,
-/// TypeError if it is no str.
+/// The names of a list of types.
+template <class... Rows>
+constexpr std::array<std::string_view, sizeof...(Rows)> names_of(const std::tuple<Rows...>& /*rows*/) {
+    return {Rows::name...};
+}
+
+/// Calls f(Row{}) for the row of the list that is called `name`. ValueError for another name, TypeError if it is no
+/// str.
+template <class Rows, class F>
+py::object with_row(const py::object& name, const char* argument, F f) {
+    const std::size_t found = checked_choice(name, argument, names_of(Rows{}));
+    py::object result;
+    std::size_t index = 0;
+    const auto try_row = [&](auto row) {
+        if (index++ == found) result = f(row);
+    };
+    std::apply([&](auto... row) { (try_row(row), ...); }, Rows{});
+    return result;
+}
+
+/// The same for methods of interpolation.
 template <class F>
 py::object with_method(const py::object& method, F f) {
-    std::string names;
-    std::apply([&](auto... row) { ((names += (names.empty() ? "" : ", ") + std::string(row.name)), ...); },
-               Interpolations{});
-    const std::string wanted = "one of " + names;
-    const std::string name = checked_name(method, "method", wanted);
-    py::object result;
-    const auto try_row = [&](auto row) {
-        if (row.name == name) result = f(row);
-    };
-    std::apply([&](auto... row) { (try_row(row), ...); }, Interpolations{});
-    if (!result) fail("method", wanted, "'" + name + "'");
-    return result;
+    return with_row<Interpolations>(method, "method", f);
 }
 
 template <template <class> class X>

@@ -117,7 +117,7 @@ def test_can_be_pickled(settings):
         ({"radius": float("nan")}, "radius: expected 0 or more"),
         ({"factor": "x"}, "factor: expected a number, got str"),
         ({"factor": 1.1}, "factor: expected a number from 0 to 1"),
-        ({"smooth_type": "other"}, "smooth_type: expected one of simple length_weighted, got 'other'"),
+        ({"smooth_type": "other"}, "smooth_type: expected one of simple, length_weighted, got 'other'"),
         ({"pin_boundary": 2}, "pin_boundary: expected True or False, got int"),
         ({"weights": [1.0]}, "weights: expected none, or one for each of the 148 vertices, got 1"),
     ],

@@ -32,7 +32,8 @@ def public_functions():
     found = {
         f"{module}.{name}": getattr(getattr(sinew, module), name)
         for module in MODULES
-        for name in getattr(sinew, module).__all__
+        for name in dir(getattr(sinew, module))
+        if not name.startswith("_")
     }
     found |= {f"Skeleton.{name}": method for name, method in vars(sinew.Skeleton).items() if name[0] != "_"}
     return {name: what for name, what in found.items() if inspect.isroutine(what)}

@@ -168,6 +168,17 @@ def names_of_arguments(function):
     return set(re.findall(r"(\w+): ", function.__doc__.split("->")[0])) | {"state"}
 
 
+def by_position(function, *keywords):
+    """The function with its last arguments, which have these keywords, by position as well."""
+
+    def call(*arguments):
+        plain, named = arguments[: -len(keywords)], arguments[-len(keywords) :]
+        return function(*plain, **dict(zip(keywords, named, strict=True)))
+
+    call.__doc__ = function.__doc__
+    return call
+
+
 def attempt(call, arguments, known):
     """The result, or None if it was refused correctly."""
     try:
@@ -205,9 +216,9 @@ def plain_of(values):
 
 FUNCTIONS = {}
 for of_module in ("affine", "quat_vec", "dual_quat"):
-    native = getattr(sinew._native, of_module)
-    for of_name in (name for name in dir(native) if not name.startswith("_")):
-        FUNCTIONS[of_module, of_name] = getattr(native, of_name)
+    for of_name, function in vars(getattr(sinew, of_module)).items():
+        if not of_name.startswith("_") and of_name != "identity":
+            FUNCTIONS[of_module, of_name] = function
 ARGUMENT_KINDS = {
     "axis": "axis", "moment": "axis", "point": "axis", "points": "axis", "vectors": "axis", "normals": "axis",
     "translation": "axis", "angle": "number", "exponent": "number", "rotation": "matrix", "twist": "twist",
@@ -234,14 +245,13 @@ def transform_calls(draw):
 
 @st.composite
 def blend_calls(draw):
-    of_interpolate, of_spline = sinew._native.interpolate, sinew._native.spline
     function, of_arguments = draw(
         st.sampled_from(
             [
-                (of_interpolate.between, "transform transform number way"),
-                (of_interpolate.blend, "many weights way"),
-                (of_spline.catmull_rom, "many times number way"),
-                (of_spline.catmull_rom_vector, "many times number"),
+                (sinew.interpolate.between, "transform transform number way"),
+                (sinew.interpolate.blend, "many weights way"),
+                (sinew.spline.catmull_rom, "many times number way"),
+                (sinew.spline.catmull_rom_vector, "many times number"),
             ]
         )
     )
@@ -315,7 +325,7 @@ TRANSFORMS = st.sampled_from(["affine", "rows", "quat_vec", "dual_quat"])
 
 @st.composite
 def fit_calls(draw):
-    of_fit, count, layout = sinew._native.fit, draw(st.integers(0, 5)), draw(TRANSFORMS)
+    count, layout = draw(st.integers(0, 5)), draw(TRANSFORMS)
     d = Draw(draw, 8)
     weights = d.array(count, optional=True)
     if draw(st.booleans()):
@@ -323,23 +333,23 @@ def fit_calls(draw):
         directions = [(None, None)] * 3
         if draw(st.booleans()):
             directions = [d.array(count, 3), d.array(count, 3), (None, None)]
-        return of_fit.rigid, [d.array(count, 3), d.array(count, 3), weights, *directions, solver]
+        keywords = ("source_directions", "target_directions", "direction_weights", "method")
+        rigid = by_position(sinew.fit.rigid, *keywords)
+        return rigid, [d.array(count, 3), d.array(count, 3), weights, *directions, solver]
     poses = d.array(count, *KINDS[layout])
     if draw(st.booleans()):
-        return of_fit.hand_eye, [poses, d.array(count, *KINDS[layout]), weights]
-    return of_fit.average, [poses, weights, (draw(st.booleans()), None)]
+        return sinew.fit.hand_eye, [poses, d.array(count, *KINDS[layout]), weights]
+    return by_position(sinew.fit.average, "robust"), [poses, weights, (draw(st.booleans()), None)]
 
 
 @st.composite
 def ik_calls(draw):
     count, shape = draw(st.integers(1, 3)), KINDS[draw(TRANSFORMS)]
     d = Draw(draw, 6)
-    solver = sinew._native.ik.Solver(
-        np.arange(-1, count - 1, dtype=np.int32), np.int32([count - 1]), [[1.0, 0.5]], [[1.0, 0.2]],
-        None, None, None,
-    )  # fmt: skip
+    effector = sinew.ik.Effector(count - 1, 1.0, 0.5, has_pole=True, pole_angle=0.2)
+    solver = sinew.ik.Solver(np.arange(-1, count - 1, dtype=np.int32), [effector])
     method = d.one(st.sampled_from(sinew.ik.METHODS)), None
-    return solver.solve, [
+    return by_position(solver.solve, "rotations", "root", "method", "tolerance", "iterations"), [
         *(d.array(count, *shape), d.array(1, 3), d.array(1, *shape), d.array(1, 3), d.array(count, 4)),
         *((None, None), method, (1e-6, None), (5, None)),
     ]
@@ -388,11 +398,15 @@ def test_inverse_kinematics(call):
 @many(0.05)
 @given(st.data())
 def test_solvers_of_inverse_kinematics(data):
-    count, d = data.draw(st.integers(1, 3)), Draw(data.draw, 7)
-    drawn = [d.integers(range(-1, count - 1)), d.integers([count - 1]), d.array(1, 2), d.array(1, 2)]
+    count, d = data.draw(st.integers(1, 3)), Draw(data.draw, 10)
+    fields = [d.one(st.just(count - 1)), *(d.one(st.floats(-1, 4)) for _ in range(2))]
+    fields += [d.one(st.booleans()), d.one(st.floats(-4, 4))]
+    effectors = d.one(st.just([sinew.ik.Effector(*fields)]))
+    drawn = [d.integers(range(-1, count - 1)), (effectors, None)]
     drawn += [d.array(count, *shape, optional=True) for shape in ((3,), (3, 2), (3,))]
     arguments = {"parents", "effectors", "weights", "pole_angle", "locked", "limits", "stiffness"}
-    attempt(sinew._native.ik.Solver, [given for given, _ in drawn], arguments)
+    solver = by_position(sinew.ik.Solver, "locked", "limits", "stiffness")
+    attempt(solver, [given for given, _ in drawn], arguments)
 
 
 @many(0.15)

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 import sinew
@@ -125,9 +126,9 @@ def test_the_python_package_is_whole(site):
                 for member, found in vars(value).items()
                 if not member.startswith("_") and not isinstance(found, property)
             }
-        elif hasattr(value, "__all__"):
-            own = set(value.__all__) - set(vars(_types))
-            wanted |= {f"sinew.{name}"} | {f"{name}.{member}" for member in own}
+        elif isinstance(value, ModuleType):
+            own = {member for member in getattr(value, "__all__", dir(value)) if not member.startswith("_")}
+            wanted |= {f"sinew.{name}"} | {f"{name}.{member}" for member in own - set(vars(_types))}
         elif callable(value):
             wanted.add(name)
     assert wanted <= set(headings), wanted - set(headings)

@@ -69,3 +69,15 @@ class Averaged(NamedTuple, Generic[Float]):
     transforms: NDArray[Float]
     is_defined: NDArray[np.bool_] | Any
     kept: NDArray[Float]
+
+
+class Solution(NamedTuple):
+    """rotations [.., bones, 4]: relative to rest, w >= 0; distance and angle (radians) [..]: the largest
+    remaining errors of a tip's position and rotation; iterations [..], int32; is_reached [..]: whether
+    both are within the tolerance."""
+
+    rotations: NDArray[np.float64]
+    distance: NDArray[np.float64] | Any
+    angle: NDArray[np.float64] | Any
+    iterations: NDArray[np.int32] | Any
+    is_reached: NDArray[np.bool_] | Any

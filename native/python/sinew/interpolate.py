@@ -38,11 +38,10 @@ Each result says whether it is defined. It is not defined in these cases, and is
 No result is NaN.
 """
 
-from typing import Any, Final, Literal
-
-from numpy.typing import ArrayLike
+from typing import Final, Literal
 
 from ._native import interpolate as _native
+from ._native.interpolate import between, blend
 from ._types import Blended
 
 __all__ = ["METHODS", "Blended", "Method", "Signs", "between", "blend"]
@@ -54,36 +53,3 @@ Method = Literal[
 ]
 
 METHODS: Final[tuple[Method, ...]] = _native.METHODS
-
-
-def between(a: ArrayLike, b: ArrayLike, t: ArrayLike, method: Method = "dlb") -> Blended[Any]:
-    """Interpolates from `a` at t = 0 to `b` at t = 1; other t extrapolate. Leading axes of a, b and t
-    broadcast.
-
-    a, b: in the layout of the method, with rotations of unit length. The result is float32 if all arrays are
-        float32 or smaller, float64 otherwise.
-    t: [..] or a number.
-
-    Raises ValueError that names the argument, what was expected and what was given.
-    """
-    return Blended(*_native.between(a, b, t, method))
-
-
-def blend(
-    transforms: ArrayLike, weights: ArrayLike, method: Method = "dlb", signs: Signs = "heaviest"
-) -> Blended[Any]:
-    """The blend of the n transforms along the last leading axis; the axes before it broadcast.
-
-    transforms: [.., n, 7] and so on, in the layout of the method, n >= 1, with rotations of unit length.
-    weights: [.., n], of any sign, normalised to sum 1. Of two equal ones the first counts as the heavier.
-    signs: how the free signs of quaternions are chosen.
-
-    heaviest     each in the hemisphere of the heaviest: the order does not matter except for ties
-    running_sum  each in the hemisphere of the sum of those before it, as Blender's Preserve Volume and
-                 sinew.Deformer do, for the same shapes; the order matters. Not defined if one is
-                 perpendicular to that sum
-    as_given     unchanged: for transforms that are aligned already, such as along a spline
-
-    Raises ValueError that names the argument, what was expected and what was given.
-    """
-    return Blended(*_native.blend(transforms, weights, method, signs))
