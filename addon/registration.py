@@ -49,7 +49,6 @@ def register() -> None:
         precomputing,
         preferences,
         presets,
-        shown_colours,
         translations,
     )
 
@@ -64,7 +63,6 @@ def register() -> None:
     properties.register()
     stored_vertex_data.register()
     character.register()
-    shown_colours.register()
     menus.register()
     manual.register()
     modifier_panel.register()
@@ -72,7 +70,7 @@ def register() -> None:
     handlers.register()
     lifecycle.register()
     exporters.register()
-    for feature in (suggest, action_copy, blend, bake, compare, heat, diagnose, gltf):
+    for feature in (suggest, action_copy, compare, heat, diagnose, gltf):
         feature.register()
     lifecycle.adopt_open_file()
     atexit.unregister(_end)
@@ -87,8 +85,6 @@ def unregister() -> None:
         from .attach import properties, stored_vertex_data
         from .deform import exporters, handlers, lifecycle
         from .features.action_copy import feature as action_copy
-        from .features.bake import feature as bake
-        from .features.blend import feature as blend
         from .features.compare import feature as compare
         from .features.diagnose import feature as diagnose
         from .features.gltf import feature as gltf
@@ -100,14 +96,12 @@ def unregister() -> None:
             menus,
             modifier_panel,
             precomputing,
-            shown_colours,
             translations,
         )
 
         lifecycle.leave_open_file()
-        for feature in (gltf, diagnose, heat, compare, bake, blend, action_copy, suggest):
+        for feature in (gltf, diagnose, heat, compare, action_copy, suggest):
             feature.unregister()
-        shown_colours.unregister()
         exporters.unregister()
         lifecycle.unregister()
         handlers.unregister()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Photographs the panel Bake Error in the window of a real Blender: human.blend baked to bones, with the
-errors before on the left and those after on the right.
+"""Photographs the heat map of the error of a bake in the window of a real Blender: human.blend baked to
+bones, with the errors before on the left and those after on the right.
 
     blender --factory-startup human.blend --python docs/photograph_bake.py -- sinew.zip bake-error.webp
 """
@@ -37,7 +37,7 @@ def steps() -> Iterator[None]:
     window.install(ZIP)
     scene, obj = bpy.context.scene, bpy.data.objects["Human"]
     window.select_only(obj)
-    window.open_panels("SINEW_PT_bake_error", first=("SINEW_PT_main", "SINEW_PT_bake_error"))
+    window.open_panels("SINEW_PT_measures", first=("SINEW_PT_main", "SINEW_PT_measures"))
     shading = window.area_of("VIEW_3D").spaces[0].shading
     before = shading.color_type
     with window.in_view3d():
@@ -57,9 +57,9 @@ def steps() -> Iterator[None]:
     yield
     pictures = []
     shown = []
-    for choice in ("BEFORE", "AFTER"):
+    for choice in ("bake_error_before", "bake_error"):
         with window.in_view3d():
-            bpy.ops.sinew.bake_error("INVOKE_DEFAULT", errors=choice)
+            bpy.ops.sinew.heat_map("INVOKE_DEFAULT", quantity=choice)
         yield
         pictures.append(PICTURE.with_name(f"{choice}.png"))
         window.photograph(pictures[-1])
@@ -67,7 +67,7 @@ def steps() -> Iterator[None]:
     left, right = (view_in(picture) for picture in pictures)
     window.save_webp(np.hstack([left[:, : left.shape[1] // 2], right]), PICTURE)
     with window.in_view3d():
-        bpy.ops.sinew.bake_error("INVOKE_DEFAULT", errors="OFF")
+        bpy.ops.sinew.heat_map("INVOKE_DEFAULT")
     facts = {"color types": [before, *shown, shading.color_type]}
     print("FACTS " + json.dumps(facts), flush=True)
 

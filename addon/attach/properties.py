@@ -385,6 +385,11 @@ def is_helper(obj: bpy.types.Object) -> bool:
     return obj.is_property_set("sinew") and obj.sinew.helper
 
 
+def shows_heat(obj: bpy.types.Object) -> bool:
+    """Whether its heat map is on; objects without Sinew can show errors of a bake."""
+    return obj.is_property_set("sinew") and obj.sinew.heat
+
+
 def is_copy(obj: bpy.types.Object) -> bool:
     """Whether a comparison made this object, to show a method beside the original."""
     return obj.is_property_set("sinew") and bool(obj.sinew.copied_for)

@@ -34,7 +34,6 @@ _SECTIONS = {
     "bpy.ops.sinew.mend*": "diagnostics",
     "bpy.ops.sinew.*precomput*": "method",
     "bpy.ops.sinew.*": "character",
-    "bpy.types.object.sinew_blend*": "blend-actions",
     "bpy.types.sinewblend*": "blend-actions",
     "bpy.types.scene.sinew_most_influences*": "diagnostics",
     "bpy.types.sinewmeasures*": "heat-map",

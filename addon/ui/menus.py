@@ -99,6 +99,7 @@ class SINEW_MT_heat(_Submenu, bpy.types.Menu):
     bl_description = "A measure of the deformation as colours, and where it is worst"
     entries = (
         Entry("sinew.heat_map", icon="SHADING_RENDERED"),
+        Entry("sinew.heat_map", "Heat Map of Bake Error", values={"quantity": "bake_error"}),
         *_over("sinew.worst_frames", "Find Worst Frames"),
         *_over("sinew.fit_heat_range", "Fit Heat Map"),
     )
@@ -115,8 +116,7 @@ class SINEW_MT_animation(_Submenu, bpy.types.Menu):
     bl_description = "In-betweens, blends of actions and inverse kinematics"
     entries = (
         Entry("sinew.bake_inbetweens", "Bake In-betweens\u2026"),
-        Entry("sinew.blend_actions"),
-        Entry("sinew.blend_import_clip", "Add Clip to the Blend\u2026"),
+        Entry("sinew.blend_actions", "Blend Actions\u2026"),
         Entry("sinew.bake_ik", "Bake Sinew IK\u2026"),
         Entry("sinew.original_action"),
     )
@@ -127,8 +127,6 @@ class SINEW_MT_bake(_Submenu, bpy.types.Menu):
     bl_description = "Shapes as data that plays without Sinew"
     entries = (
         Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
-        Entry("sinew.bake_error", "Show Bake Error", values={"errors": "AFTER"}),
-        Entry("sinew.bake_error", "Hide Bake Error", values={"errors": "OFF"}),
         Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
         Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
     )

@@ -43,12 +43,6 @@ def shortened(name: str, most: int = NAME_LENGTH) -> str:
     return f"{name[:ahead]}…{name[len(name) - (most - ahead - 1) :]}"
 
 
-def draw_armature(layout: bpy.types.UILayout, context: bpy.types.Context, armature: bpy.types.Object) -> None:
-    """Draws the name of an armature object, shortened to fit."""
-    name = shortened(armature.name, characters(context) - 4)
-    layout.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
-
-
 def names_text(names: Sequence[str], most: int = 3) -> str:
     """Returns the first names as one text, with the number of the others."""
     text = ", ".join(shortened(name) for name in names[:most])

@@ -127,6 +127,10 @@ class Asking(Stepped):
             return context.window_manager.invoke_props_dialog(self)
         return super().invoke(context, event)
 
+    def values(self) -> dict[str, object]:
+        """Returns the settings of the dialog, as another call takes them."""
+        return self.as_keywords(ignore=("in_steps",))
+
     def cancel(self, context: bpy.types.Context) -> None:
         # The dialog itself has nothing to end.
         if self.in_steps:
@@ -136,8 +140,7 @@ class Asking(Stepped):
         if getattr(self, "asked", False):
             # The operator of a dialog cannot run in steps itself.
             name = type(self).__name__.removeprefix("SINEW_OT_")
-            values = self.as_keywords(ignore=("in_steps",))
-            getattr(bpy.ops.sinew, name)("INVOKE_DEFAULT", in_steps=True, **values)
+            getattr(bpy.ops.sinew, name)("INVOKE_DEFAULT", in_steps=True, **self.values())
             return {"CANCELLED"}
         return super().execute(context)
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: a character of five meshes by clicks and keys. Prints "FACTS" and a line
-of JSON; pictures of each step lie in the folder.
+"""In Blender's window, with Sinew's zip: a character of five meshes by clicks and keys. Prints "FACTS" and a
+line of JSON; pictures of each step lie in the folder.
 
     blender --factory-startup --enable-event-simulate --python panel_in_window.py -- sinew.zip FOLDER
 
 The window has 1280 x 800 pixels. Places are those of its picture: from the left, from the top.
-"""  # noqa: E501
+"""
 
 from __future__ import annotations
 
@@ -391,13 +391,13 @@ def bake_error() -> Iterator[None]:
         bpy.ops.sinew.bake("EXEC_DEFAULT", kind="bones", frames="1-20", helpers=4)
         bpy.ops.view3d.view_selected()
         bpy.ops.ed.undo_push(message="baked")
-    yield from search("show bake error")
+    yield from search("heat map of bake error")
     yield from undo()
     facts["bake error undone"] = shading.color_type
-    yield from search("show bake error")
+    yield from search("heat map of bake error")
     shown = shading.color_type
     window.photograph(FOLDER / "bake-error.png")
-    yield from search("hide bake error")
+    yield from search("heat map of bake error")
     window.photograph(FOLDER / "bake-error-off.png")
     view = (slice(200, -200), slice(100, 700))
     vivid = [float(np.ptp(pixels_of(name)[view], axis=2).mean()) for name in ("bake-error", "bake-error-off")]

@@ -17,7 +17,8 @@ from pygltflib import GLTF2
 from scipy.spatial import cKDTree
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
-from sinew_addon.features.bake import bake, error_map
+from sinew_addon.features.bake import bake
+from sinew_addon.features.heat import bake_error, measures
 from sinew_addon.io import actions, files
 from test_bake import FRAMES, read_elsewhere, world_shapes
 
@@ -309,18 +310,19 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     mesh.attributes.active_color_name = "Paint"
     expected = world_shapes([obj], FRAMES)[0]
     before = list(mesh.attributes.keys())
-    assert not bpy.ops.sinew.bake_error.poll()
+    with pytest.raises(RuntimeError, match="No mesh here was baked"):
+        bpy.ops.sinew.heat_map(quantity="bake_error")
     bpy.ops.sinew.bake(kind="bones", frames=",".join(map(str, FRAMES)), motion=motion, helpers=2)
     played = world_shapes([obj], FRAMES)[0]
     colours = {}
-    for choice, shape in (("BEFORE", lbs), ("AFTER", played)):
+    for choice, shape in ((bake_error.BEFORE, lbs), (bake_error.AFTER, played)):
         wanted = np.sqrt(np.square(shape - expected).sum(axis=2).mean(axis=0))
-        found = error_map.errors_of(obj.data, choice)
+        found = bake_error.errors_of(obj.data, choice, len(obj.data.vertices))
         mean = np.sqrt(np.square(wanted).mean())
-        assert np.isclose(error_map.rms([obj], choice), mean, rtol=1e-3)
+        assert np.isclose(bake_error.rms([obj], choice), mean, rtol=1e-3)
         assert np.allclose(found, wanted, atol=1e-4 * scenes.diagonal(obj))
-        bpy.ops.sinew.bake_error(errors=choice)
-        assert error_map.shown([obj]) == choice
+        assert bpy.ops.sinew.heat_map(quantity=choice) == {"FINISHED"}
+        assert bake_error.shown(bpy.context.scene) == [obj]
         name = obj.data.attributes.active_color_name
         shown = np.empty(4 * len(wanted), dtype=np.float32)
         obj.data.attributes[name].data.foreach_get("color", shown)
@@ -329,23 +331,25 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
         order = np.argsort(found)
         light = colours[choice] @ (0.2126, 0.7152, 0.0722)
         assert (np.diff(light[order]) > -1e-3).all()
-    assert colours["BEFORE"].max() > 0.8
-    assert colours["AFTER"].mean() < colours["BEFORE"].mean()
-    bpy.ops.sinew.bake_error(errors="OFF")
+    assert colours[bake_error.BEFORE].max() > 0.8
+    assert colours[bake_error.AFTER].mean() < colours[bake_error.BEFORE].mean()
+    bpy.ops.sinew.heat_map()
     # Numbers are read from the mesh once, until it changes.
-    assert error_map.summary_of(obj.data) is error_map.summary_of(obj.data)
+    assert bake_error.summary_of(obj.data) is bake_error.summary_of(obj.data)
     kept = {"Sinew bake error", "Sinew bake error before"}
     assert set(obj.data.attributes.keys()) - kept == set(before) - {"sinew_points"}
     assert obj.data.attributes.active_color_name == "Paint"
-    assert error_map.shown([obj]) == "OFF"
-    most = error_map.end_of_scale([obj])
+    assert bake_error.shown(bpy.context.scene) == []
+    settings = measures.of(bpy.context.scene)
+    most = bake_error.scale_of(settings, [obj]).high
     edited = bmesh.new()
     edited.from_mesh(obj.data)
-    worst = [v for v in edited.verts if error_map.errors_of(obj.data, "BEFORE")[v.index] > 0.5 * most]
+    errors = bake_error.errors_of(obj.data, bake_error.BEFORE, len(obj.data.vertices))
+    worst = [v for v in edited.verts if errors[v.index] > 0.5 * most]
     bmesh.ops.delete(edited, geom=worst, context="VERTS")
     edited.to_mesh(obj.data)
     edited.free()
-    assert error_map.end_of_scale([obj]) <= 0.5 * most
+    assert bake_error.scale_of(settings, [obj]).high <= 0.5 * most
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from sinew import quat_vec
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.motion import blend as core
 from sinew_addon.core.motion.blend import Settings
-from sinew_addon.features.blend import blend_actions, blend_settings
+from sinew_addon.features.blend import blend_actions
 from sinew_addon.io import actions, clips, files
 from sinew_addon.io.clips import finished
 
@@ -206,10 +206,7 @@ def test_the_actions_and_all_else_stay_as_they_were():
     armature, chosen, _pair = make_walks()
     keys = [[(c.data_path, [tuple(p.co) for p in c.keyframe_points]) for c in
              actions.all_curves(a, actions.slot_for(a, armature))] for a in chosen]  # fmt: skip
-    blend = armature.sinew_blend
-    for action in chosen:
-        blend.clips.add().action = action
-    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
+    assert bpy.ops.sinew.blend_actions(actions=rows(chosen)) == {"FINISHED"}
     made = armature.animation_data.action
     assert made.name == "Blend WALK RUN"
     assert made not in chosen
@@ -218,20 +215,27 @@ def test_the_actions_and_all_else_stay_as_they_were():
     assert len(bpy.data.actions) == 3
 
 
-# --- The panel's buttons
+# --- The operator
+
+
+def rows(chosen, weights=(1.0, 1.0), first=(1.0, 1.0)):
+    """Actions as the dialog has them."""
+    return [
+        {"name": action.name, "weight": weight, "weight_from": weight_from}
+        for action, weight, weight_from in zip(chosen, weights, first, strict=True)
+    ]
 
 
 def test_the_operator_blends_and_undo_takes_it_back():
     armature, chosen, _pair = make_walks()
     actions.play(armature, chosen[0], actions.slot_for(chosen[0], armature))
-    assert bpy.ops.sinew.blend_add_clip() == {"FINISHED"}
-    assert not bpy.ops.sinew.blend_actions.poll()
-    assert bpy.ops.sinew.blend_add_clip() == {"FINISHED"}
-    assert [clip.action.name for clip in armature.sinew_blend.clips] == ["WALK", "RUN"]
+    with pytest.raises(RuntimeError, match="choose two actions or more"):
+        bpy.ops.sinew.blend_actions(actions=rows(chosen, (1.0, 0.0)))
+    gone = {"name": "GONE", "weight": 1.0, "weight_from": 1.0}
+    with pytest.raises(RuntimeError, match="no action 'GONE'"):
+        bpy.ops.sinew.blend_actions(actions=[*rows(chosen), gone])
     bpy.ops.ed.undo_push(message="before")
-    armature.sinew_blend.clips[1].weight = 0.5
-    armature.sinew_blend.method = "sclerp"
-    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
+    assert bpy.ops.sinew.blend_actions(actions=rows(chosen, (1.0, 0.5)), method="sclerp") == {"FINISHED"}
     assert len(film(armature, range(1, 3))) == 2
     assert armature.animation_data.action.frame_range[1] == 24.0
     bpy.ops.ed.undo_push(message="Blend Actions")
@@ -239,40 +243,19 @@ def test_the_operator_blends_and_undo_takes_it_back():
     armature = bpy.data.objects["Legs"]
     assert armature.animation_data.action.name == "WALK"
     assert len(bpy.data.actions) == 2
-    assert bpy.ops.sinew.blend_remove_clip(index=0) == {"FINISHED"}
-    assert [clip.action.name for clip in armature.sinew_blend.clips] == ["RUN"]
-
-
-def test_a_blend_leaves_no_trace_once_it_is_empty():
-    armature, _chosen, _pair = make_walks()
-    # Checking whether there is one, as panel and menu do, must not store one.
-    assert not bpy.ops.sinew.blend_actions.poll()
-    assert blend_settings.of(armature) is None
-    assert not armature.is_property_set("sinew_blend")
-    bpy.ops.sinew.blend_add_clip()
-    assert len(blend_settings.of(armature).clips) == 1
-    with pytest.raises(RuntimeError, match="no such action"):
-        bpy.ops.sinew.blend_remove_clip(index=1)
-    bpy.ops.sinew.blend_remove_clip(index=0)
-    assert not armature.is_property_set("sinew_blend")
 
 
 def test_weights_change_between_two_shares_of_the_motion():
     armature, chosen, _pair = make_walks()
-    for action, start, end in zip(chosen, (1.0, 0.0), (0.0, 1.0), strict=True):
-        clip = armature.sinew_blend.clips.add()
-        clip.action, clip.weight_from, clip.weight = action, start, end
-    blend = armature.sinew_blend
-    blend.changes, blend.cycles, blend.smooth = True, 4, True
-    blend.change_start, blend.change_end = 50.0, 75.0
+    options = {"changes": True, "cycles": 4, "smooth": True, "change_start": 50.0, "change_end": 75.0}
+    options["actions"] = rows(chosen, (0.0, 1.0), (1.0, 0.0))
     first = played(armature, chosen[0], [1, 10, 20])
-    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
+    assert bpy.ops.sinew.blend_actions(**options) == {"FINISHED"}
     got = film(armature, [1, 10, 20])
     # The walk is alone at first, with its own pace except for the blend's whole frames.
     assert np.abs(got - first).max() < 1e-3
-    blend.change_start = 80.0
     with pytest.raises(RuntimeError, match="shares of the motion from 0 to 1, one after the other"):
-        bpy.ops.sinew.blend_actions()
+        bpy.ops.sinew.blend_actions(**options | {"change_start": 80.0})
 
 
 @pytest.mark.parametrize("steps", [1, 40, 90])
@@ -290,21 +273,14 @@ def test_stopped_nothing_has_changed(steps):
 
 
 def test_errors_are_reported_in_one_sentence():
-    armature, chosen, _pair = make_walks()
+    _armature, chosen, _pair = make_walks()
     other = bpy.data.actions.new("EMPTY")
-    for action in (chosen[0], other):
-        armature.sinew_blend.clips.add().action = action
     with pytest.raises(RuntimeError, match="EMPTY moves no bone of Legs: choose another action"):
-        bpy.ops.sinew.blend_actions()
-    armature.sinew_blend.clips[1].action = chosen[1]
-    armature.sinew_blend.root = "tail"
+        bpy.ops.sinew.blend_actions(actions=rows((chosen[0], other)))
     with pytest.raises(RuntimeError, match="There is no bone 'tail'"):
-        bpy.ops.sinew.blend_actions()
-    armature.sinew_blend.root = ""
-    for clip in armature.sinew_blend.clips:
-        clip.weight = 0.0
+        bpy.ops.sinew.blend_actions(actions=rows(chosen), root="tail")
     with pytest.raises(RuntimeError, match="not all of them 0"):
-        bpy.ops.sinew.blend_actions()
+        bpy.ops.sinew.blend_actions(actions=rows(chosen, (0.0, 0.0)))
     assert len(bpy.data.actions) == 3
 
 
@@ -387,11 +363,6 @@ def test_a_bvh_file_becomes_an_action(tmp_path):
     assert run.name == "run"
     assert run.use_fake_user
     walk = legs.animation_data.action
-    bpy.context.view_layer.objects.active = legs
-    assert bpy.ops.sinew.blend_import_clip(filepath=str(tmp_path / "run.bvh")) == {"FINISHED"}
-    assert [clip.action.name for clip in legs.sinew_blend.clips] == ["run.001"]
-    with pytest.raises(RuntimeError, match="no such file"):
-        bpy.ops.sinew.blend_import_clip(filepath=str(tmp_path / "none.bvh"))
     for action, source in ((walk, pair[0]), (run, pair[1])):
         shown = played(legs, action, range(1, 2 + round(source.length)))
         order = [source.rig.names.index(name) for name in clips.rig_of(legs).names]

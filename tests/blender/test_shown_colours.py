@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heat maps and errors of bakes to bones change the same 3D views and active colour attributes, and restore
+"""Heat maps, also those of the error of a bake, change 3D views and active colour attributes, and restore
 them."""
 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 import pytest
 import scenes
+import test_heat_map
 import whole_file
 from sinew_addon import registration
-from sinew_addon.attach import attach, properties
-from sinew_addon.features.bake import error_map
-from sinew_addon.features.heat import heat_nodes, measures
-
-BOTH = ("heat", "error")
-NAMES = {"heat": heat_nodes.NAME, "error": error_map.COLOURS}
+from sinew_addon.attach import attach
+from sinew_addon.features.heat import bake_error, measures
+from sinew_addon.features.heat.heat_nodes import NAME
 
 
 def shadings() -> list[bpy.types.View3DShading]:
@@ -43,86 +42,91 @@ def baked_arm(name: str = "Baked") -> bpy.types.Object:
     obj = painted_arm(name)
     scenes.add_sinew(obj, "dq")
     assert bpy.ops.sinew.bake(kind="bones", frames="1,6,11", helpers=2) == {"FINISHED"}
-    for number, shading in enumerate(shadings()):
-        shading.color_type = ("MATERIAL", "RANDOM", "SINGLE", "OBJECT")[number % 4]
     return obj
 
 
-def make(same: bool) -> dict[str, bpy.types.Object]:
-    """The object that shows each; with `same` one shows both."""
-    baked = baked_arm()
-    heated = baked if same else painted_arm("Heated")
-    scenes.add_sinew(heated, "dq")
-    bpy.context.scene.frame_set(6)
-    return {"heat": heated, "error": baked}
-
-
-def show(objects: dict[str, bpy.types.Object], what: str, on: bool) -> None:
+def shown_arm(what: str) -> bpy.types.Object:
+    """An arm that can show a measure of the deformation, or the error of a bake."""
+    obj = baked_arm() if what == "error" else painted_arm("Heated")
     if what == "heat":
-        properties.of(objects[what]).heat = on
-    else:
-        error_map.show([objects[what]], "AFTER" if on else "OFF")
+        scenes.add_sinew(obj, "dq")
+    for number, shading in enumerate(shadings()):
+        shading.color_type = ("MATERIAL", "RANDOM", "SINGLE", "OBJECT")[number % 4]
+    bpy.context.scene.frame_set(6)
+    return obj
 
 
-@pytest.mark.parametrize("same", [True, False])
-@pytest.mark.parametrize("first_on", BOTH)
-@pytest.mark.parametrize("first_off", BOTH)
-def test_in_any_order_all_is_restored(same, first_on, first_off):
-    objects = make(same)
-    last_on, last_off = (BOTH[BOTH.index(first) - 1] for first in (first_on, first_off))
-    measures.of(bpy.context.scene)  # reading makes them
+def show(what: str) -> None:
+    """Switches it on, or off."""
+    assert bpy.ops.sinew.heat_map(quantity="bake_error" if what == "error" else "stretch") == {"FINISHED"}
+
+
+@pytest.mark.parametrize("what", ["heat", "error"])
+def test_all_is_restored(what):
+    obj = shown_arm(what)
+    measures.of(bpy.context.scene).quantity = "bake_error" if what == "error" else "stretch"
     whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
     before, types = whole_file.of_open_file(), color_types()
     assert len(set(types)) > 1
-    assert {colours_of(obj.data) for obj in objects.values()} == {("Second", "First")}
-    show(objects, first_on, True)
-    show(objects, last_on, True)
+    assert colours_of(obj.data) == ("Second", "First")
+    show(what)
     assert set(color_types()) == {"VERTEX"}
-    # On one mesh, the one that was switched on last.
-    wanted = dict.fromkeys(BOTH, NAMES[last_on]) if same else NAMES
-    assert {what: colours_of(obj.data) for what, obj in objects.items()} == {
-        what: (name, "First") for what, name in wanted.items()
-    }
-    show(objects, first_off, False)
-    assert set(color_types()) == {"VERTEX"}
-    assert colours_of(objects[last_off].data) == (NAMES[last_off], "First")
-    if not same:
-        assert colours_of(objects[first_off].data) == ("Second", "First")
-    show(objects, last_off, False)
+    assert colours_of(obj.data) == (NAME, "First")
+    show(what)
     bpy.context.view_layer.update()
     assert color_types() == types
     assert whole_file.differences(before, whole_file.of_open_file()) == []
 
 
-def test_what_the_artist_chooses_meanwhile_stays():
-    objects = make(same=True)
-    mesh = objects["heat"].data
-    for what in BOTH:
-        show(objects, what, True)
-    mesh.attributes.active_color_name = "First"
+def test_another_measure_hides_the_errors_of_a_bake():
+    obj = shown_arm("error")
+    types = color_types()
+    show("error")
+    measures.of(bpy.context.scene).quantity = "stretch"
+    assert color_types() == types
+    assert NAME not in obj.data.attributes
+    assert colours_of(obj.data) == ("Second", "First")
+    measures.of(bpy.context.scene).quantity = "bake_error_before"
+    assert colours_of(obj.data) == (NAME, "First")
+
+
+def test_a_baked_mesh_that_sinew_deforms_again_shows_its_errors():
+    obj = shown_arm("error")
+    scenes.add_sinew(obj, "dq")
+    show("error")
+    colours = test_heat_map.shown_colours(obj)
+    assert np.ptp(colours, axis=0).max() > 0.1
+    errors = bake_error.errors_of(obj.data, "bake_error", len(obj.data.vertices))
+    assert np.argmax(errors) == np.argmax(colours[:, 0] + colours[:, 1])
+
+
+@pytest.mark.parametrize("what", ["heat", "error"])
+def test_what_the_artist_chooses_meanwhile_stays(what):
+    obj = shown_arm(what)
+    show(what)
+    obj.data.attributes.active_color_name = "First"
     shadings()[0].color_type = "TEXTURE"
-    for what in BOTH:
-        show(objects, what, False)
-        assert mesh.attributes.active_color_name == "First"
+    show(what)
+    assert obj.data.attributes.active_color_name == "First"
     assert color_types()[0] == "TEXTURE"
 
 
 def test_another_bake_hides_the_errors_of_the_last_one():
     obj = baked_arm()
     types = color_types()
-    bpy.ops.sinew.bake_error(errors="AFTER")
+    bpy.ops.sinew.heat_map(quantity="bake_error")
     scenes.add_sinew(obj, "cor")
     bpy.ops.sinew.bake(kind="bones", frames="1,6,11", helpers=1)
-    assert error_map.shown([obj]) == "OFF"
+    assert bake_error.shown(bpy.context.scene) == []
     assert color_types() == types
     assert colours_of(obj.data) == ("Second", "First")
-    assert [mesh.name for mesh in bpy.data.meshes if error_map.COLOURS in mesh.attributes] == []
+    assert [mesh.name for mesh in bpy.data.meshes if NAME in mesh.attributes] == []
 
 
 def test_undo_and_redo_of_the_errors():
     types = baked_arm() and color_types()
     bpy.ops.ed.undo_push(message="baked")
-    bpy.ops.sinew.bake_error(errors="BEFORE")
+    bpy.ops.sinew.heat_map(quantity="bake_error_before")
     bpy.ops.ed.undo_push(message="errors")
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
@@ -132,22 +136,22 @@ def test_undo_and_redo_of_the_errors():
     bpy.context.view_layer.update()
     obj = bpy.data.objects["Baked"]
     assert set(color_types()) == {"VERTEX"}
-    assert error_map.shown([obj]) == "BEFORE"
-    bpy.ops.sinew.bake_error(errors="OFF")
+    assert bake_error.shown(bpy.context.scene) == [obj]
+    bpy.ops.sinew.heat_map()
     assert color_types() == types
     assert colours_of(obj.data) == ("Second", "First")
 
 
 def test_a_saved_file_shows_the_errors_and_gives_all_back(tmp_path):
     types = baked_arm() and color_types()
-    bpy.ops.sinew.bake_error(errors="AFTER")
+    bpy.ops.sinew.heat_map(quantity="bake_error")
     path = str(tmp_path / "errors.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
     obj = bpy.data.objects["Baked"]
     assert set(color_types()) == {"VERTEX"}
-    assert error_map.shown([obj]) == "AFTER"
-    bpy.ops.sinew.bake_error(errors="OFF")
+    assert bake_error.shown(bpy.context.scene) == [obj]
+    bpy.ops.sinew.heat_map()
     assert color_types() == types
     assert colours_of(obj.data) == ("Second", "First")
 
@@ -155,29 +159,28 @@ def test_a_saved_file_shows_the_errors_and_gives_all_back(tmp_path):
 def test_a_deleted_mesh_gives_the_views_back():
     obj = baked_arm()
     types = color_types()
-    bpy.ops.sinew.bake_error(errors="AFTER")
+    bpy.ops.sinew.heat_map(quantity="bake_error")
     bpy.data.objects.remove(obj)
     bpy.context.view_layer.update()
     assert color_types() == types
 
 
-@pytest.mark.parametrize("same", [True, False])
-def test_without_the_add_on_all_is_as_before(same):
-    objects = make(same)
+@pytest.mark.parametrize("what", ["heat", "error"])
+def test_without_the_add_on_all_is_as_before(what):
+    obj = shown_arm(what)
     types = color_types()
-    for what in BOTH:
-        show(objects, what, True)
+    show(what)
     registration.unregister()
     try:
         assert color_types() == types
-        for obj in objects.values():
-            assert colours_of(obj.data) == ("Second", "First")
-            assert error_map.COLOURS not in obj.data.attributes
+        assert colours_of(obj.data) == ("Second", "First")
+        assert NAME not in obj.data.attributes
     finally:
         registration.register()
-    # The object still has its heat map.
-    assert set(color_types()) == {"VERTEX"}
-    assert colours_of(objects["heat"].data) == (heat_nodes.NAME, "First")
-    attach.remove(objects["heat"])
+    if what == "heat":
+        # The object still has its heat map.
+        assert set(color_types()) == {"VERTEX"}
+        assert colours_of(obj.data) == (NAME, "First")
+        attach.remove(obj)
     assert color_types() == types
-    assert colours_of(objects["heat"].data) == ("Second", "First")
+    assert colours_of(obj.data) == ("Second", "First")

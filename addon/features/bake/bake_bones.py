@@ -26,7 +26,7 @@ from ...core.stages import StageValues
 from ...deform import characters
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io, mesh_io
-from . import bake_state, error_map, shape_animation
+from . import bake_state, shape_animation
 from .take_off import take_off
 
 # Share of the time that reading the frames takes.
@@ -213,8 +213,6 @@ class _Rig:
 
     def place(self, frames: Sequence[float]) -> None:
         solution, bones = self._solution, self._bones
-        # Those of an earlier bake.
-        error_map.hide([obj.data for obj in self.meshes if obj.data.is_editable])
         own = [bones.names[bone] for bone in solution.parents]
         follows_pose = bool(solution.blends)
         # Only visible objects can be edited.

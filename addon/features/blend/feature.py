@@ -1,16 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers blends of actions: classes, and the settings of an armature object."""
+"""Registers blends of actions: their operator."""
 
-from __future__ import annotations
-
-from . import blend_panel, blend_settings
-
-CLASSES = (*blend_settings.CLASSES, *blend_panel.CLASSES)
-
-
-def register() -> None:
-    blend_settings.register()
-
-
-def unregister() -> None:
-    blend_settings.unregister()
+from .blend_operator import CLASSES as CLASSES

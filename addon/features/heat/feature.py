@@ -9,39 +9,64 @@ from ...attach import properties
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...deform import session
-from ...ui import shown_colours
-from . import heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measures, redraw
+from . import (
+    bake_error,
+    heat_legend,
+    heat_map,
+    heat_nodes,
+    heat_panel,
+    heat_view,
+    measures,
+    redraw,
+    shown_colours,
+)
 
 CLASSES = (*measures.CLASSES, *heat_panel.CLASSES)
 
 
 def register() -> None:
     measures.register()
-    measures.Listener.changed = session.refresh
+    measures.Listener.changed = _measures_changed
     properties.listeners.heat_changed = _heat_changed
-    shown_colours.sources.append(heat_view.shown)
+    # The artist's choices while colours are shown.
+    bpy.types.Mesh.sinew_shown_colours = bpy.props.StringProperty(options={"HIDDEN"})
+    bpy.types.Screen.sinew_colour_types = bpy.props.StringProperty(options={"HIDDEN"})
     for functions, function in _SUBSCRIPTIONS:
         functions.append(function)
 
 
 def unregister() -> None:
     heat_legend.show(False)
-    shown_colours.sources.remove(heat_view.shown)
+    shown_colours.sync(())
+    for obj in filter(bake_error.is_on, bpy.data.objects):
+        if obj.type == "MESH":
+            heat_nodes.remove_applied(obj.data)
+        properties.clear(obj)
     for functions, function in _SUBSCRIPTIONS:
         functions.remove(function)
     measures.Listener.changed = properties.listeners.heat_changed = None
+    del bpy.types.Mesh.sinew_shown_colours, bpy.types.Screen.sinew_colour_types
     measures.unregister()
 
 
+def _measures_changed(context: bpy.types.Context) -> None:
+    if not is_rendering_in_window():
+        heat_view.sync_errors()
+    session.refresh(context)
+
+
 def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    if not properties.has_sinew(obj):
-        return
     # Otherwise this is done at the end of the render.
     if not is_rendering_in_window() and not properties.of(obj).heat:
         heat_view.take_off(obj)
-    session.setting_changed(obj, context)
-    if not is_rendering_in_window():
+    if properties.has_sinew(obj):
+        session.setting_changed(obj, context)
+    if is_rendering_in_window():
+        return
+    if properties.has_sinew(obj):
         heat_view.tidy()
+    else:
+        heat_view.sync_errors()
 
 
 def _take_off(obj: bpy.types.Object) -> None:
@@ -50,7 +75,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 
 def _objects_changed(_objects: list[bpy.types.Object]) -> None:
-    heat_view.sync_legend()
+    heat_view.sync()
     if not is_rendering_in_window():
         heat_nodes.remove_unused_material()
 

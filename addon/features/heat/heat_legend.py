@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.heat import HeatScale
 from ...io import units
+from . import bake_error
 
 WIDTH, BAR, MARGIN, GAP, FONT_SIZE = 420, 14, 24, 8, 12
 STEPS = 64
@@ -55,6 +56,9 @@ def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str
 def _draw() -> None:
     context = bpy.context
     content = contents.get(context.scene.session_uid)
+    errors = bake_error.legend_of(context.scene) if content is None else None
+    if errors is not None:
+        content = Content(*errors)
     if content is None:
         return
     if not context.space_data.overlay.show_overlays:

@@ -11,7 +11,7 @@ from ...core.heat import HeatScale
 from ...core.metrics import Measured
 from ...deform.skinned_object import SkinnedObject
 from ...ui.translations import joined, tr
-from . import heat_legend, heat_nodes, live, measures
+from . import bake_error, heat_legend, heat_nodes, live, measures
 from .measures import SinewMeasures
 
 # The inputs of the last colours, by the session_uid of the scene.
@@ -45,7 +45,7 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
     inputs = (subject.measured, *_choices(settings))
     if _equal(inputs, _last.get(scene)) and all(heat_nodes.has_colours(obj) for obj, _state in shown):
         return
-    values = subject.measured.field(settings.quantity)
+    values = _values(subject, settings.quantity)
     scale = scale_of(settings, subject.measured, values)
     colours = scale.linear_colours(values)
     for (obj, _state), own in zip(shown, subject.split(colours), strict=True):
@@ -58,6 +58,15 @@ def _has_points(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
     """Whether its point buffer is filled: that of a copied object is not, until the copy is deformed."""
     buffer = properties.of(obj).point_buffer
     return buffer is not None and len(buffer.data.vertices) == len(skinned.bound.source.points)
+
+
+def _values(subject: live.Subject, quantity: str) -> np.ndarray:
+    """[vertices of all]"""
+    if quantity not in measures.BAKE_ERRORS:
+        return subject.measured.field(quantity)
+    return np.concatenate(
+        [bake_error.errors_of(part.obj.data, quantity, part.surface.vertex_count) for part in subject.parts]
+    )
 
 
 def scale_of(settings: SinewMeasures, measured: Measured, values: np.ndarray) -> HeatScale:

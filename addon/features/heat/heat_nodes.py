@@ -45,6 +45,17 @@ def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
     mesh.update_tag()
 
 
+def write_to_mesh(mesh: bpy.types.Mesh, colours: np.ndarray) -> None:
+    """Stores float32 [vertices, 3], linear, in a mesh without Sinew."""
+    rows = np.ones((len(colours), 4), dtype=np.float32)
+    rows[:, :3] = colours
+    attribute = mesh_io.attribute_to_write(mesh, NAME)
+    if attribute is None:
+        attribute = mesh_io.add_attribute(mesh, NAME, "FLOAT_COLOR", "POINT")
+    attribute.data.foreach_set("color", rows.ravel())
+    mesh.update_tag()
+
+
 def has_colours(obj: bpy.types.Object) -> bool:
     point_buffer = properties.of(obj).point_buffer
     return point_buffer is not None and mesh_io.find_attribute(point_buffer.data, COLOURS) is not None
@@ -56,8 +67,8 @@ def remove_colours(obj: bpy.types.Object) -> None:
 
 
 def remove_applied(mesh: bpy.types.Mesh) -> None:
-    """Removes colours and material from a mesh to which the group was applied. Faces get the material of the
-    previous slot: the mesh no longer knows which one they had."""
+    """Removes colours from a mesh that has them itself, and the material if the group was applied. Faces get
+    the material of the previous slot: the mesh no longer knows which one they had."""
     if not mesh.is_editable or mesh.is_editmode:
         return
     mesh_io.remove_attribute(mesh, NAME)

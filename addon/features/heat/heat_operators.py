@@ -9,27 +9,69 @@ import bpy
 
 from ...attach import properties
 from ...deform import characters
-from ...ui import stepped
+from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.translations import tr
-from . import measures, worst_frames
+from . import bake_error, measures, worst_frames
 
 
-class SINEW_OT_heat_map(OnSinewObjects, bpy.types.Operator):
+def meant(context: bpy.types.Context, quantity: str) -> list[bpy.types.Object]:
+    """Returns the targets that can show a measure."""
+    if quantity in measures.BAKE_ERRORS:
+        return [obj for obj in operators.targets(context) if bake_error.is_baked(obj)]
+    return operators.sinew_targets(context)
+
+
+class OfHeatMap:
+    """An operator or a panel on what can show a heat map."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return operators.has_sinew_targets(context) or bool(meant(context, bake_error.AFTER))
+
+
+class SINEW_OT_heat_map(OfHeatMap, bpy.types.Operator):
     bl_idname = "sinew.heat_map"
     bl_label = "Heat Map"
     bl_description = (
         "Show a measure of the deformation as colours, in Solid shading, in materials and in renders; once "
-        "more: everything as it was"
+        "more: everything as it was. Switch errors of a bake off before an export, which would write them"
     )
     bl_options = {"REGISTER", "UNDO"}
 
+    quantity: bpy.props.StringProperty(
+        name="Measure",
+        description="Its short name; empty: the one that is chosen",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if super().poll(context):
+            return operators.can_change(cls)
+        cls.poll_message_set(
+            tr("Select a mesh that Sinew deforms or that was baked to bones, or its armature")
+        )
+        return False
+
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = sinew_targets(context)
-        on = not any(properties.of(obj).heat for obj in objects)
+        settings = measures.of(context.scene)
+        quantity = self.quantity or settings.quantity
+        if quantity not in measures.QUANTITIES:
+            self.report({"ERROR"}, tr("There is no measure {name}", name=repr(quantity)))
+            return {"CANCELLED"}
+        objects = meant(context, quantity)
+        if not objects:
+            self.report({"ERROR"}, "No mesh here was baked to bones")
+            return {"CANCELLED"}
+        on = quantity != settings.quantity or not any(map(properties.shows_heat, objects))
+        if quantity != settings.quantity:
+            settings.quantity = quantity
         for obj in objects:
-            if properties.of(obj).heat != on:
+            if properties.shows_heat(obj) != on:
                 properties.of(obj).heat = on
+            if not on and not properties.has_sinew(obj):
+                properties.clear(obj)
         return {"FINISHED"}
 
 

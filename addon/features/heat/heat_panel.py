@@ -14,23 +14,31 @@ from ...io import units
 from ...ui import operators
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import joined, tr
-from . import heat_operators, live, measures, redraw, worst_frames
+from . import bake_error, heat_operators, live, measures, redraw, worst_frames
+from .heat_operators import OfHeatMap, meant
 
 # What a frame's badness is measured by.
 _WORST = {"stretch_rms": "{value} RMS", "area_rms": "{value} RMS", "flipped_area": "{value} of the area"}
 
 
-class SINEW_PT_measures(Sidebar, operators.OfSkinned, bpy.types.Panel):
+class SINEW_PT_measures(Sidebar, OfHeatMap, bpy.types.Panel):
     bl_label = "Heat Map"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, measures.of(context.scene)
-        layout.active = operators.are_any_on(context)
-        shown = any(properties.of(obj).heat for obj in operators.sinew_targets(context))
+        objects = meant(context, settings.quantity)
+        layout.active = operators.are_any_on(context) or settings.quantity in measures.BAKE_ERRORS
+        shown = any(map(properties.shows_heat, objects))
         layout.operator("sinew.heat_map", icon="SHADING_RENDERED", depress=shown)
         layout.prop(settings, "quantity", text="")
         draw_text(layout, context, settings.metric.text)
+        if settings.quantity in measures.BAKE_ERRORS and objects:
+            before, after = (
+                units.text(context.scene, "length", bake_error.rms(objects, quantity))
+                for quantity in (bake_error.BEFORE, bake_error.AFTER)
+            )
+            draw_text(layout, context, tr("RMS {before} before, {after} after", before=before, after=after))
         if settings.quantity == "distance":
             column = layout.column(align=True)
             column.label(text="Compared with")

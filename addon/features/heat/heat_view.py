@@ -1,34 +1,47 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which objects show a heat map, and what has to be done where one begins or ends."""
+"""Which meshes show a heat map, and what has to be done where one begins or ends."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import bpy
 
 from ...attach import node_group, properties
-from ...ui import shown_colours
-from . import heat_legend, heat_nodes, measures
+from . import bake_error, heat_legend, heat_nodes, measures, shown_colours
 
 
-def shown() -> Iterator[tuple[bpy.types.Mesh, str]]:
-    """A source of shown_colours."""
+def shown() -> set[bpy.types.Mesh]:
+    """The meshes that show colours now."""
+    found = {obj.data for scene in bpy.data.scenes for obj in bake_error.shown(scene)}
     for obj in filter(properties.has_sinew, bpy.data.objects):
         if properties.of(obj).heat and properties.of(obj).enabled:
-            yield obj.data, heat_nodes.NAME
+            found.add(obj.data)
+    return found
 
 
-def sync_legend() -> None:
-    heat_legend.show(any(shown()))
+def sync() -> None:
+    """Updates meshes, views and the legend; called where what is shown may have changed."""
+    meshes = shown()
+    shown_colours.sync(meshes)
+    heat_legend.show(bool(meshes))
+
+
+def sync_errors() -> None:
+    """Colours the meshes that show errors of a bake, and no others."""
+    for scene in bpy.data.scenes:
+        if bake_error.shown(scene):
+            bake_error.colour(scene)
+    sync()
+    meshes = shown()
+    for obj in filter(bake_error.is_on, bpy.data.objects):
+        if obj.type == "MESH" and obj.data not in meshes:
+            heat_nodes.remove_applied(obj.data)
 
 
 def take_off(obj: bpy.types.Object) -> None:
     """Removes the heat map from an object, except its node group."""
     properties.of(obj).property_unset("heat")
     # First, as Blender chooses another active colour attribute when that one is removed.
-    shown_colours.sync()
-    sync_legend()
+    sync()
     heat_nodes.remove_colours(obj)
     heat_nodes.remove_applied(obj.data)
 

@@ -13,6 +13,29 @@ from ...core.heat import HeatScale
 from ...core.metrics import METRICS, Metric
 
 PER_FRAME, FIXED = "FRAME", "FIXED"
+# Of meshes that were baked to bones.
+BAKE_ERRORS = {
+    metric.name: metric
+    for metric in (
+        Metric(
+            "bake_error",
+            "Bake error",
+            "length",
+            "linear",
+            "",
+            "How far a vertex that was baked to bones is from Sinew's shape: RMS over the bake's frames.",
+        ),
+        Metric(
+            "bake_error_before",
+            "Bake error before",
+            "length",
+            "linear",
+            "",
+            "The same of linear blending with the weights before the bake.",
+        ),
+    )
+}
+QUANTITIES = METRICS | BAKE_ERRORS
 
 
 class Listener:
@@ -32,7 +55,7 @@ class SinewMeasures(bpy.types.PropertyGroup):
     quantity: bpy.props.EnumProperty(
         name="Measure",
         description="What the heat map shows and worst frames are found by",
-        items=[(m.name, m.label, m.text, number) for number, m in enumerate(METRICS.values())],
+        items=[(m.name, m.label, m.text, number) for number, m in enumerate(QUANTITIES.values())],
         default="stretch",
         options=set(),
         update=_changed,
@@ -86,7 +109,7 @@ class SinewMeasures(bpy.types.PropertyGroup):
 
     @property
     def metric(self) -> Metric:
-        return METRICS[self.quantity]
+        return QUANTITIES[self.quantity]
 
     @property
     def end(self) -> str:

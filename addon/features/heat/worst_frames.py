@@ -79,6 +79,8 @@ def scan(
 
     Raises SinewError where an object cannot be measured.
     """
+    if quantity not in METRICS:
+        raise SinewError("The errors of a bake are those over all of its frames: choose another measure")
     check_measurable(objects)
     armatures, metric, found = armatures_of(objects), METRICS[quantity], []
     extremes: list[float] = []

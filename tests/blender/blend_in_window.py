@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Photographs the panel Blend Actions in the window of a real Blender, on human.blend. Esc stops a long
-blend, the next goes to its end, and Ctrl+Z undoes it: it takes --enable-event-simulate.
+"""Blends actions in the window of a real Blender, on human.blend, and photographs the dialog. Esc stops a
+long blend, the next goes to its end, and Ctrl+Z undoes it: it takes --enable-event-simulate.
 
-    blender --factory-startup OPTION human.blend --python docs/photograph_blend.py -- sinew.zip panel.png
+    blender --factory-startup OPTION human.blend --python tests/blender/blend_in_window.py -- sinew.zip
+    blend.png
 """
 
 from __future__ import annotations
@@ -41,9 +42,19 @@ def rig() -> bpy.types.Object:
     return next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
 
 
-def blend_by_button() -> None:
+def blend(**options: object) -> None:
     with window.in_view3d():
-        bpy.ops.sinew.blend_actions("INVOKE_DEFAULT")
+        bpy.ops.sinew.blend_actions("INVOKE_DEFAULT", **options)
+
+
+# As the dialog's OK.
+CHOSEN = {
+    "in_steps": True,
+    "actions": [
+        {"name": "STRAIN", "weight": 1.0, "weight_from": 1.0},
+        {"name": "LATE", "weight": 0.5, "weight_from": 1.0},
+    ],
+}
 
 
 def steps() -> Iterator[None]:
@@ -51,7 +62,6 @@ def steps() -> Iterator[None]:
     window.install(ZIP)
     armature = rig()
     window.select_only(armature)
-    window.open_panels("SINEW_PT_blend")
     strain = armature.animation_data.action
     strain.name = "STRAIN"
     other = strain.copy()
@@ -61,36 +71,31 @@ def steps() -> Iterator[None]:
     yield
     yield
     window.choose_tab()
-    with window.in_view3d():
-        bpy.ops.sinew.blend_add_clip()
-        bpy.ops.sinew.blend_add_clip()
-    blend = armature.sinew_blend
-    facts["listed"] = [clip.action.name for clip in blend.clips]
-    blend.clips[1].weight = 0.5
-    # With the fields that it shows.
-    blend.changes = True
     bpy.context.scene.frame_set(16)
     with window.in_view3d("WINDOW"):
         view = bpy.context.space_data.region_3d
         view.view_location, view.view_distance = (0.35, 0.0, 0.1), 2.6
     for _tick in range(10):
         yield
+    blend()
+    yield
+    yield
     window.photograph(PICTURE)
-    blend.changes = False
+    middle = bpy.context.window_manager.windows[0]
+    window.press("ESC", (middle.width // 2, middle.height // 2))
     yield
     other.frame_end = LONG
     bpy.ops.ed.undo_push(message="Before")
     before = state()
-    blend_by_button()
+    blend(**CHOSEN)
     yield from window.until(is_blending, "the blend")
     yield
-    middle = bpy.context.window_manager.windows[0]
     window.press("ESC", (middle.width // 2, middle.height // 2))
     yield from window.until(lambda: not is_blending(), "the end of the blend")
     facts["stopped"] = [before, state()]
     other.frame_end = 40
     bpy.ops.ed.undo_push(message="Shorter")
-    blend_by_button()
+    blend(**CHOSEN)
     yield from window.until(lambda: not is_blending() and len(bpy.data.actions) == 3, "the new action")
     facts["ended"] = state()
     window.press("Z", (middle.width // 2, middle.height // 2), ctrl=True)

@@ -7,15 +7,34 @@ through tr() and counted().
 
 from __future__ import annotations
 
+import ast
+import re
 from collections.abc import Iterable
+from pathlib import Path
 
 import bpy
 
-from ...core.phrases import Phrase
-from . import german
+from ..core.phrases import Phrase
+
+_ENTRY = re.compile(r'^msgid ((?:".*"\n)+)msgstr ((?:".*"\n?)+)', re.MULTILINE)
+
+
+def read(path: Path) -> dict[str, str]:
+    """Returns the texts of a .po file of gettext, each with its translation; without those that are not
+    translated, fuzzy or obsolete."""
+    texts = {}
+    for block in path.read_text(encoding="utf-8").split("\n\n"):
+        entry = _ENTRY.search(block)
+        if entry is not None and "#, fuzzy" not in block:
+            # The strings are written as in Python.
+            text, translated = ("".join(map(ast.literal_eval, part.splitlines())) for part in entry.groups())
+            if text and translated:
+                texts[text] = translated
+    return texts
+
 
 # By language alone, which Blender uses for all of its countries: de for de_DE.
-LANGUAGES = {"de": german.TEXTS}
+LANGUAGES = {path.stem: read(path) for path in (Path(__file__).parents[1] / "translations").glob("*.po")}
 # Blender translates an operator's label, and the text of its buttons, in a separate context.
 CONTEXTS = (bpy.app.translations.contexts.default, bpy.app.translations.contexts.operator_default)
 
