@@ -6,10 +6,15 @@ from __future__ import annotations
 import atexit
 import logging
 import sys
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 import bpy
 
 from . import native
+
+if TYPE_CHECKING:
+    from .attach.feature import Feature
 
 _registered: list[type] = []
 _has_ended = False
@@ -23,19 +28,47 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from .attach import properties, stored_vertex_data
     from .deform import exporters, handlers, lifecycle
-    from .features.action_copy import feature as action_copy
-    from .features.bake import feature as bake
-    from .features.blend import feature as blend
-    from .features.compare import feature as compare
-    from .features.corrective import feature as corrective
-    from .features.diagnose import feature as diagnose
-    from .features.gltf import feature as gltf
-    from .features.heat import feature as heat
-    from .features.ik import feature as ik
-    from .features.inbetween import feature as inbetween
-    from .features.suggest import feature as suggest
+
+    # The order of the panels.
+    parts, features = _parts(), _features()
+    for each in (*parts, *features):
+        _register_classes(each.classes)
+    for part in parts:
+        part.register()
+    handlers.register()
+    lifecycle.register()
+    exporters.register()
+    for feature in features:
+        feature.register()
+    lifecycle.adopt_open_file()
+    atexit.unregister(_end)
+    atexit.register(_end)
+
+
+def unregister() -> None:
+    if _has_ended:
+        # Blender as a module unregisters its extensions only after _end().
+        return
+    if hasattr(bpy.types.Object, "sinew"):
+        from .deform import exporters, handlers, lifecycle
+
+        lifecycle.leave_open_file()
+        for feature in reversed(_features()):
+            feature.unregister()
+        exporters.unregister()
+        lifecycle.unregister()
+        handlers.unregister()
+        for part in reversed(_parts()):
+            part.unregister()
+    while _registered:
+        bpy.utils.unregister_class(_registered.pop())
+
+
+def _parts() -> tuple[Feature, ...]:
+    """What an object and a character have, with its panel."""
+    from .attach import properties, stored_vertex_data
+    from .attach.feature import Feature
     from .ui import (
         character,
         character_operators,
@@ -52,69 +85,27 @@ def register() -> None:
         translations,
     )
 
-    # The order of the panels.
-    for owner in (
-        *(preferences, properties, stored_vertex_data, character, operators, precomputing),
-        *(character_operators, presets, lesson, menus, main_panel, meshes_panel),
-        *(suggest, action_copy, inbetween, blend, ik, bake, corrective, compare, heat, diagnose, gltf),
-    ):
-        _register_classes(owner.CLASSES)
-    translations.register()
-    properties.register()
-    stored_vertex_data.register()
-    character.register()
-    menus.register()
-    manual.register()
-    modifier_panel.register()
-    precomputing.register()
-    handlers.register()
-    lifecycle.register()
-    exporters.register()
-    for feature in (suggest, action_copy, compare, heat, diagnose, gltf):
-        feature.register()
-    lifecycle.adopt_open_file()
-    atexit.unregister(_end)
-    atexit.register(_end)
+    return (
+        translations.FEATURE,
+        Feature(preferences.CLASSES),
+        properties.FEATURE,
+        stored_vertex_data.FEATURE,
+        character.FEATURE,
+        Feature((*operators.CLASSES, *character_operators.CLASSES, *presets.CLASSES, *lesson.CLASSES)),
+        precomputing.FEATURE,
+        menus.FEATURE,
+        manual.FEATURE,
+        modifier_panel.FEATURE,
+        Feature((*main_panel.CLASSES, *meshes_panel.CLASSES)),
+    )
 
 
-def unregister() -> None:
-    if _has_ended:
-        # Blender as a module unregisters its extensions only after _end().
-        return
-    if hasattr(bpy.types.Object, "sinew"):
-        from .attach import properties, stored_vertex_data
-        from .deform import exporters, handlers, lifecycle
-        from .features.action_copy import feature as action_copy
-        from .features.compare import feature as compare
-        from .features.diagnose import feature as diagnose
-        from .features.gltf import feature as gltf
-        from .features.heat import feature as heat
-        from .features.suggest import feature as suggest
-        from .ui import (
-            character,
-            manual,
-            menus,
-            modifier_panel,
-            precomputing,
-            translations,
-        )
-
-        lifecycle.leave_open_file()
-        for feature in (gltf, diagnose, heat, compare, action_copy, suggest):
-            feature.unregister()
-        exporters.unregister()
-        lifecycle.unregister()
-        handlers.unregister()
-        modifier_panel.unregister()
-        manual.unregister()
-        menus.unregister()
-        precomputing.unregister()
-        character.unregister()
-        stored_vertex_data.unregister()
-        properties.unregister()
-        translations.unregister()
-    while _registered:
-        bpy.utils.unregister_class(_registered.pop())
+def _features() -> tuple[Feature, ...]:
+    names = (
+        *("suggest", "action_copy", "inbetween", "blend", "ik", "bake", "corrective", "compare", "heat"),
+        *("diagnose", "gltf"),
+    )
+    return tuple(import_module(f".features.{name}.feature", __package__).FEATURE for name in names)
 
 
 def _end() -> None:

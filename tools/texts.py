@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Collects all texts that Sinew shows, for tools/translations.py: those registered in Blender, and those in code."""
+"""Collects all texts that Sinew shows, for tools/translations.py: those registered in Blender, and those
+in code."""
 
 from __future__ import annotations
 
@@ -146,6 +147,8 @@ def _shown_by(node: ast.AST) -> Iterator[ast.expr]:
         names = {target.id for target in node.targets if isinstance(target, ast.Name)}
         if names & VARIABLES:
             yield node.value
+    if isinstance(node, ast.FunctionDef) and node.name == "refusal":
+        yield from (each.value for each in ast.walk(node) if isinstance(each, ast.Return) and each.value)
     if isinstance(node, ast.Call):
         name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         yield from (node.args[place] for place in ARGUMENTS.get(name, ()) if place < len(node.args))

@@ -12,6 +12,7 @@ import sinew
 from ..core.icons import Situation
 from ..core.scale_rule import SCALE_RULES
 from . import stage_settings
+from .feature import Feature
 from .method_items import method_items
 from .stage_settings import OFF
 
@@ -30,6 +31,13 @@ def method_description(name: str) -> str:
     return (
         "What Blender's modifier does, as its options say" if name == BLENDER else METHODS[name].description
     )
+
+
+def method_choices() -> list[tuple[str, str, str, str, int]]:
+    """Returns the Armature modifier and all methods, as items of an enum property. The stored number stays
+    that of the method, even if the list of methods changes."""
+    numbers = {BLENDER: 0, **{name: method.number + 1 for name, method in METHODS.items()}}
+    return [(n, method_label(n), method_description(n), "NONE", number) for n, number in numbers.items()]
 
 
 def has_known_methods(settings: SinewSettings) -> bool:
@@ -444,23 +452,20 @@ def clear(obj: bpy.types.Object) -> None:
     obj.property_unset("sinew")
 
 
-CLASSES = (
-    *(SinewReplacedModifier, SinewSwitchedOff),
-    *STAGE_GROUPS.values(),
-    *METHOD_GROUPS.values(),
-    SinewSettings,
+FEATURE = Feature(
+    (
+        *(SinewReplacedModifier, SinewSwitchedOff),
+        *STAGE_GROUPS.values(),
+        *METHOD_GROUPS.values(),
+        SinewSettings,
+    ),
+    {
+        "Object.sinew": bpy.props.PointerProperty(type=SinewSettings, override=OVERRIDABLE),
+        # A property of meshes, so that its getter receives the evaluated mesh and nothing is stored.
+        "Mesh.sinew_request": bpy.props.FloatProperty(
+            get=_mesh_requested,
+            options={"HIDDEN"},
+            description="Read by pose_driver's driver, to request points",
+        ),
+    },
 )
-
-# A property of meshes, so that its getter receives the evaluated mesh and nothing is stored.
-MESH_REQUEST = bpy.props.FloatProperty(
-    get=_mesh_requested, options={"HIDDEN"}, description="Read by pose_driver's driver, to request points"
-)
-
-
-def register() -> None:
-    bpy.types.Object.sinew = bpy.props.PointerProperty(type=SinewSettings, override=OVERRIDABLE)
-    bpy.types.Mesh.sinew_request = MESH_REQUEST
-
-
-def unregister() -> None:
-    del bpy.types.Object.sinew, bpy.types.Mesh.sinew_request

@@ -14,6 +14,8 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
+from .feature import Feature
+
 NAME = "sinew_vertex_data"
 
 log = logging.getLogger("sinew")
@@ -67,12 +69,7 @@ def remove(mesh: bpy.types.Mesh) -> None:
         mesh.property_unset(NAME)
 
 
-def register() -> None:
-    setattr(bpy.types.Mesh, NAME, bpy.props.PointerProperty(type=SinewVertexData, options={"HIDDEN"}))
-
-
-def unregister() -> None:
-    delattr(bpy.types.Mesh, NAME)
-
-
-CLASSES = (SinewVertexData,)
+FEATURE = Feature(
+    (SinewVertexData,),
+    {f"Mesh.{NAME}": bpy.props.PointerProperty(type=SinewVertexData, options={"HIDDEN"})},
+)

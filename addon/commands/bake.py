@@ -22,7 +22,7 @@ from .console import Console
 from .outcome import Outcome
 
 if TYPE_CHECKING:
-    from ..features.bake.bake import Started
+    from ..features.bake.bake_state import Started
 
 HELP = """\
 Writes Sinew's deformation of every armature-deformed mesh as data that plays without it. Inputs are never

@@ -11,7 +11,7 @@ Bind a Gauge to a mesh, set each frame's rest shape and bones, then measure any 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar
@@ -107,6 +107,17 @@ class FrameOfRig:
     rest_axes: np.ndarray
     posed_axes: np.ndarray
     motions: np.ndarray
+
+    @classmethod
+    def of(cls, rest: np.ndarray, rigs: Iterable[tuple[Bones, np.ndarray, np.ndarray]]) -> FrameOfRig:
+        """rigs: the bones of each mesh, with their matrices [bones + joints, 4, 4] at rest and posed."""
+        rest_axes, posed_axes, motions = [], [], []
+        for bones, at_rest, posed in rigs:
+            rest_axes.append(bone_axes(bones, at_rest))
+            posed_axes.append(bone_axes(bones, posed))
+            # An armature of zero scale moves nothing that could be measured.
+            motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
+        return cls(rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
 
     @cached_property
     def rotations(self) -> np.ndarray:

@@ -216,6 +216,16 @@ def set_frame(scene: bpy.types.Scene, frame: float) -> None:
     interrupt.check()
 
 
+@contextmanager
+def kept_frame(scene: bpy.types.Scene) -> Iterator[None]:
+    """Context in which any frame can be set; afterwards the scene is at its own."""
+    frame = scene.frame_float
+    try:
+        yield
+    finally:
+        set_frame(scene, frame)
+
+
 def whole_views(
     meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
 ) -> list[View]:

@@ -222,10 +222,6 @@ def reason_against(curves: Sequence[bpy.types.FCurve]) -> str | None:
     return None
 
 
-def key_of(curve: bpy.types.FCurve) -> tuple[str, int]:
-    return curve.data_path, curve.array_index
-
-
 def plays(channel: Channel, rotation: str | None) -> bool:
     """Whether the channel has an effect where `rotation` is its bone's rotation property: not a rotation of
     another mode, nor a channel of a missing bone."""

@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 
 from ..attach import attach, properties
+from ..attach.feature import Feature
 from ..attach.shared_settings import GROUPS, SHARED, assign
 from ..attach.subscribers import subscribers
 from ..deform import session
@@ -72,9 +73,6 @@ def known_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
 def _forget(*_args: object) -> None:
     """Forgets the meshes, as others may belong to the character now."""
     _Known.names = ()
-
-
-_FORGET_AT = (subscribers.evaluated, subscribers.stepped, subscribers.loaded)
 
 
 def _selection(context: bpy.types.Context) -> tuple[object, ...]:
@@ -187,8 +185,6 @@ SinewCharacter.__annotations__.update(
     }
 )
 
-CLASSES = (*_GROUP_CLASSES.values(), SinewCharacter)
-
 
 def of(scene: bpy.types.Scene) -> SinewCharacter:
     """Reading it makes it, in a scene that had none."""
@@ -203,15 +199,13 @@ def _clear() -> None:
                 scene.property_unset("sinew_character")
 
 
-def register() -> None:
-    bpy.types.Scene.sinew_character = bpy.props.PointerProperty(type=SinewCharacter)
-    subscribers.after_removal.append(_clear)
-    for functions in _FORGET_AT:
-        functions.append(_forget)
-
-
-def unregister() -> None:
-    for functions in _FORGET_AT:
-        functions.remove(_forget)
-    subscribers.after_removal.remove(_clear)
-    del bpy.types.Scene.sinew_character
+FEATURE = Feature(
+    (*_GROUP_CLASSES.values(), SinewCharacter),
+    {"Scene.sinew_character": bpy.props.PointerProperty(type=SinewCharacter)},
+    subscriptions=(
+        (subscribers.after_removal, _clear),
+        (subscribers.evaluated, _forget),
+        (subscribers.stepped, _forget),
+        (subscribers.loaded, _forget),
+    ),
+)

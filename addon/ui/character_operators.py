@@ -8,6 +8,7 @@ import contextlib
 import bpy
 
 from ..attach import properties, shared_settings
+from ..core.errors import SinewError
 from ..deform import session
 from . import character
 from .operators import OnSinewObjects, sinew_targets
@@ -28,12 +29,10 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
         method = properties.METHODS.get(given.method)
         return tip(cls.bl_description if method is None else method.description)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         if self.method not in properties.METHODS:
             names = ", ".join(properties.METHODS)
-            text = tr("Method {name}: choose one of {names}", name=repr(self.method), names=names)
-            self.report({"ERROR"}, text)
-            return {"CANCELLED"}
+            raise SinewError(tr("Method {name}: choose one of {names}", name=repr(self.method), names=names))
         character.set_method(context, self.method)
         return {"FINISHED"}
 
@@ -66,14 +65,13 @@ class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
         name="Mesh", description="Empty: the active one", options={"HIDDEN", "SKIP_SAVE"}
     )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         active = context.active_object
         name = self.name or (active.name if active is not None else "")
         obj = next((o for o in sinew_targets(context) if o.name == name), None)
         if obj is None:
             name = name or tr("The active object")
-            self.report({"ERROR"}, tr("{name} is no mesh that Sinew deforms", name=name))
-            return {"CANCELLED"}
+            raise SinewError(tr("{name} is no mesh that Sinew deforms", name=name))
         settings = properties.of(obj)
         settings.is_own = not settings.is_own
         others = [other for other in character.followers(context) if other != obj]

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..attach import properties
+from ..attach.feature import Feature
 
 PAGE = Path(__file__).resolve().parent.parent / "manual.html"
 # By the start of the name, in lower case as Blender looks it up; the first match counts.
@@ -64,9 +65,12 @@ def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
     return PAGE.as_uri(), tuple((pattern, f"#{section}") for pattern, section in _SECTIONS.items())
 
 
-def register() -> None:
+def _begin() -> None:
     bpy.utils.register_manual_map(manual_map)
 
 
-def unregister() -> None:
+def _end() -> None:
     bpy.utils.unregister_manual_map(manual_map)
+
+
+FEATURE = Feature(begin=_begin, end=_end)

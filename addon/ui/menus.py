@@ -12,6 +12,7 @@ import bpy
 import rna_keymap_ui
 
 from ..attach import properties
+from ..attach.feature import Feature
 from . import operators
 from .stepped import OVER
 
@@ -238,9 +239,7 @@ def draw_shortcuts(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
                 rna_keymap_ui.draw_kmi([], user, keymap, item, layout, 0)
 
 
-def register() -> None:
-    for name, draw in MENUS.items():
-        getattr(bpy.types, name).append(draw)
+def _begin() -> None:
     addons = bpy.context.window_manager.keyconfigs.addon
     if addons is None:
         # In background mode.
@@ -253,12 +252,12 @@ def register() -> None:
         _shortcuts.append((keymap, item))
 
 
-def unregister() -> None:
-    for name, draw in MENUS.items():
-        getattr(bpy.types, name).remove(draw)
+def _end() -> None:
     while _shortcuts:
         keymap, item = _shortcuts.pop()
         keymap.keymap_items.remove(item)
 
 
-CLASSES = (SINEW_MT_methods, *SUBMENUS, SINEW_MT_menu, SINEW_MT_pie)
+FEATURE = Feature(
+    (SINEW_MT_methods, *SUBMENUS, SINEW_MT_menu, SINEW_MT_pie), menus=MENUS, begin=_begin, end=_end
+)

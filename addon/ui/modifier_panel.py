@@ -7,6 +7,7 @@ from __future__ import annotations
 import bpy
 
 from ..attach import properties
+from ..attach.feature import Feature
 from ..deform import session
 from ..deform.plan import State
 from . import state_text
@@ -29,9 +30,12 @@ def _draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
     draw_text(box, context, state_text.sentence_of(obj), alert=is_refused)
 
 
-def register() -> None:
+def _begin() -> None:
     getattr(bpy.types, PANEL).prepend(_draw)
 
 
-def unregister() -> None:
+def _end() -> None:
     getattr(bpy.types, PANEL).remove(_draw)
+
+
+FEATURE = Feature(begin=_begin, end=_end)

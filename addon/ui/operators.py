@@ -95,12 +95,41 @@ def waits_for_render() -> str:
     return "Wait for the end of the render" if is_rendering_in_window() else ""
 
 
-def can_change(operator: type[bpy.types.Operator]) -> bool:
-    """For poll()."""
-    reason = waits_for_render()
-    if reason:
-        operator.poll_message_set(tr(reason))
-    return not reason
+class Acting:
+    """A base class of operators. Subclasses have refusal(context), or run(context), which may raise
+    SinewError, or both."""
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        """Returns why it can not run now; empty where it can."""
+        return ""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        reason = cls.refusal(context) or waits_for_render()
+        if reason:
+            cls.poll_message_set(tr(reason))
+        return not reason
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            return self.run(context)
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+
+class OnSinewObjects(Acting):
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        return "" if has_sinew_targets(context) else "Select a mesh that Sinew deforms, or its armature"
+
+
+class OnDeformed(Acting):
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        is_any = any(attach.armature_of(obj) is not None for obj in targets(context))
+        return "" if is_any else "Select a mesh that an armature deforms, or the armature"
 
 
 def can_take_over(obj: bpy.types.Object) -> bool:
@@ -156,7 +185,7 @@ FIRST_METHODS = [
 ]
 
 
-class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
+class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
     bl_idname = "sinew.add"
     bl_label = "Add Sinew"
     bl_description = (
@@ -174,22 +203,17 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def refusal(cls, context: bpy.types.Context) -> str:
         has_target = False
         for obj in _each_target(context):
             if not properties.has_sinew(obj):
-                return can_change(cls)
+                return ""
             has_target = True
-        others = attach.not_meshes(context.selected_objects)
         if has_target:
-            cls.poll_message_set(tr("The meshes of the armature have Sinew already"))
-        elif others:
-            text = tr("{name} is no mesh: Sinew deforms meshes only", name=others[0].name)
-            cls.poll_message_set(text)
-        else:
-            text = tr("Select a mesh with an Armature modifier, or an armature that deforms one")
-            cls.poll_message_set(text)
-        return False
+            return "The meshes of the armature have Sinew already"
+        for other in attach.not_meshes(context.selected_objects):
+            return tr("{name} is no mesh: Sinew deforms meshes only", name=other.name)
+        return "Select a mesh with an Armature modifier, or an armature that deforms one"
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         # Only for a click: a script's default must not depend on the user's preferences.
@@ -215,15 +239,6 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
                 self.report({"WARNING"}, f"{obj.name}: {tr(sentence)}")
         session.refresh(context)
         return result
-
-
-class OnSinewObjects:
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if has_sinew_targets(context):
-            return can_change(cls)
-        cls.poll_message_set(tr("Select a mesh that Sinew deforms, or its armature"))
-        return False
 
 
 class SINEW_OT_rebind(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
@@ -265,21 +280,14 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
+    def refusal(cls, context: bpy.types.Context) -> str:
         objects = sinew_targets(context)
-        if any(can_take_over(obj) for obj in objects):
-            return True
+        if not objects or any(can_take_over(obj) for obj in objects):
+            return super().refusal(context)
         on = [obj for obj in objects if properties.of(obj).enabled]
         # Of several meshes, one with a Corrective Smooth has more to say.
         on.sort(key=lambda obj: corrective_smooth.candidate(obj) is None)
-        if on:
-            reason = tr(corrective_smooth.why_none(on[0]))
-            cls.poll_message_set(f"{on[0].name}: {reason}")
-        else:
-            cls.poll_message_set(tr("Switch Sinew on first"))
-        return False
+        return f"{on[0].name}: {tr(corrective_smooth.why_none(on[0]))}" if on else "Switch Sinew on first"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
@@ -300,10 +308,9 @@ class SINEW_OT_make_group(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
 
     stage: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}, description="Name of the stage")
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         if self.stage not in stage_settings.STAGES:
-            self.report({"ERROR"}, tr("There is no stage {name}", name=repr(self.stage)))
-            return {"CANCELLED"}
+            raise SinewError(tr("There is no stage {name}", name=repr(self.stage)))
         objects = self.meant(sinew_targets(context))
         if not self.name:
             objects = [obj for obj in objects if not properties.of(obj).is_own] or objects

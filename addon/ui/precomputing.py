@@ -8,11 +8,12 @@ from collections.abc import Sequence
 
 import bpy
 
+from ..attach.feature import Feature
 from ..attach.subscribers import subscribers
 from ..core.precompute import precomputations
 from ..deform import precompute_watch, precomputing
 from ..deform.skinned_object import SkinnedObject
-from . import status_bar
+from . import sidebar, stepped
 from .translations import tr
 
 # Seconds between checks whether there is still something to stop.
@@ -47,7 +48,7 @@ class SINEW_OT_watch_precomputation(bpy.types.Operator):
 
     def _end(self, context: bpy.types.Context) -> None:
         context.window_manager.event_timer_remove(self._timer)
-        status_bar.clear(context.workspace)
+        stepped.clear_progress(context.workspace)
 
 
 class SINEW_OT_stop_precomputation(bpy.types.Operator):
@@ -104,14 +105,10 @@ def _show() -> None:
         if _watcher_of(window) is not None:
             if runs:
                 text = tr("Sinew computes what its methods need: {share} (Esc stops)", share=f"{share:.0%}")
-                status_bar.show(window.workspace, text, share)
+                stepped.show_progress(window.workspace, text, share)
             else:
-                status_bar.clear(window.workspace)
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+                stepped.clear_progress(window.workspace)
+    sidebar.redraw()
 
 
 def _watch() -> None:
@@ -127,12 +124,7 @@ def _watcher_of(window: bpy.types.Window) -> bpy.types.Operator | None:
     return next((each for each in window.modal_operators if each.bl_idname == own), None)
 
 
-def register() -> None:
-    subscribers.precomputation_shown.append(_show)
-
-
-def unregister() -> None:
-    subscribers.precomputation_shown.remove(_show)
-
-
-CLASSES = (SINEW_OT_watch_precomputation, SINEW_OT_stop_precomputation, SINEW_OT_precompute)
+FEATURE = Feature(
+    (SINEW_OT_watch_precomputation, SINEW_OT_stop_precomputation, SINEW_OT_precompute),
+    subscriptions=((subscribers.precomputation_shown, _show),),
+)

@@ -26,7 +26,7 @@ PATHS = (
 )
 
 
-class SINEW_OT_method_preset_add(OnSinewObjects, AddPresetBase, bpy.types.Operator):
+class SINEW_OT_method_preset_add(AddPresetBase, OnSinewObjects, bpy.types.Operator):
     bl_idname = "sinew.method_preset_add"
     bl_label = "Add Method Preset"
     bl_description = "Keep the method, its parameters and the stages under a name, or remove that preset"

@@ -30,6 +30,15 @@ class SINEW_PT_unavailable(Sidebar, bpy.types.Panel):
         draw_text(self.layout, context, native.load_error() or "Restart Blender to use Sinew", icon="ERROR")
 
 
+def redraw() -> None:
+    """Has Blender draw the sidebars of all 3D views again."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions if area.type == "VIEW_3D" else ():
+                if region.type == "UI":
+                    region.tag_redraw()
+
+
 def characters(context: bpy.types.Context) -> int:
     """The number of characters that fit the region's width."""
     return int(context.region.width / context.preferences.system.ui_scale * CHARACTERS_PER_PIXEL)

@@ -12,7 +12,7 @@ import bpy
 from ..core.errors import SinewError
 from ..deform import characters, precompute_watch, session
 from ..io import pose_io
-from . import status_bar
+from .operators import Acting
 from .translations import tr
 
 # The window redraws in between: rarely enough to cost little, often enough for Esc.
@@ -25,7 +25,7 @@ OVER = [
 OVER_WHICH = {"name": "Over", "description": "The frames to go through", "items": OVER}
 
 
-class Stepped:
+class Stepped(Acting):
     """A base class: subclasses have steps(context), which yields the progress, and finish(context), which
     uses the result. Both may raise SinewError, which is reported.
 
@@ -82,7 +82,7 @@ class Stepped:
             return self._finished(context)
         context.window_manager.progress_update(share)
         text = tr("{doing}: {share} (Esc stops)", doing=tr(self.saying), share=f"{share:.0%}")
-        status_bar.show(context.workspace, text, share)
+        show_progress(context.workspace, text, share)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -111,19 +111,19 @@ class Stepped:
         manager = context.window_manager
         manager.event_timer_remove(self._timer)
         manager.progress_end()
-        status_bar.clear(context.workspace)
+        clear_progress(context.workspace)
         for area in context.screen.areas:
             area.tag_redraw()
 
 
-class Asking(Stepped):
+class WithDialog(Stepped):
     """A base class: asks for the settings in a dialog first."""
 
     in_steps: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.in_steps:
-            self.asked = True
+            self.has_dialog = True
             return context.window_manager.invoke_props_dialog(self)
         return super().invoke(context, event)
 
@@ -137,7 +137,7 @@ class Asking(Stepped):
             super().cancel(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if getattr(self, "asked", False):
+        if getattr(self, "has_dialog", False):
             # The operator of a dialog cannot run in steps itself.
             name = type(self).__name__.removeprefix("SINEW_OT_")
             getattr(bpy.ops.sinew, name)("INVOKE_DEFAULT", in_steps=True, **self.values())
@@ -164,15 +164,34 @@ def frames_over(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object], o
 def kept_frame(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object]) -> Iterator[None]:
     """Context in which any frame can be set; afterwards the scene is at its own frame, and armatures are
     posed as before, keyed or not."""
-    frame = scene.frame_float
     poses = [(armature, pose_io.read_channels(armature.pose.bones)) for armature in armatures]
     try:
-        yield
+        with characters.kept_frame(scene):
+            yield
     finally:
-        characters.set_frame(scene, frame)
         moved = [armature for armature, pose in poses if pose_io.write_channels(armature.pose.bones, pose)]
         for armature in moved:
             armature.update_tag()
         if moved:
             bpy.context.view_layer.update()
             session.refresh(bpy.context)
+
+
+# In units of a button's width.
+WIDTH = 24
+
+
+def show_progress(workspace: bpy.types.WorkSpace, text: str, share: float) -> None:
+    """Shows a bar filled to `share`, 0 to 1, until clear(); `text` is translated already."""
+
+    def draw(header: bpy.types.Header, _context: bpy.types.Context) -> None:
+        row = header.layout.row()
+        row.ui_units_x = WIDTH
+        row.progress(factor=share, text=text, translate=False)
+
+    workspace.status_text_set(draw)
+
+
+def clear_progress(workspace: bpy.types.WorkSpace) -> None:
+    """Shows again what Blender shows by itself."""
+    workspace.status_text_set(None)

@@ -7,13 +7,14 @@ through tr() and counted().
 
 from __future__ import annotations
 
-import ast
+import json
 import re
 from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
 
+from ..attach.feature import Feature
 from ..core.phrases import Phrase
 
 _ENTRY = re.compile(r'^msgid ((?:".*"\n)+)msgstr ((?:".*"\n?)+)', re.MULTILINE)
@@ -26,8 +27,8 @@ def read(path: Path) -> dict[str, str]:
     for block in path.read_text(encoding="utf-8").split("\n\n"):
         entry = _ENTRY.search(block)
         if entry is not None and "#, fuzzy" not in block:
-            # The strings are written as in Python.
-            text, translated = ("".join(map(ast.literal_eval, part.splitlines())) for part in entry.groups())
+            # Its strings are written as in JSON.
+            text, translated = ("".join(map(json.loads, part.splitlines())) for part in entry.groups())
             if text and translated:
                 texts[text] = translated
     return texts
@@ -68,7 +69,7 @@ def tip(text: str) -> str:
     return bpy.app.translations.pgettext_tip(text)
 
 
-def register() -> None:
+def _begin() -> None:
     messages = {
         language: {(context, text): translated for text, translated in texts.items() for context in CONTEXTS}
         for language, texts in LANGUAGES.items()
@@ -76,5 +77,8 @@ def register() -> None:
     bpy.app.translations.register(__name__, messages)
 
 
-def unregister() -> None:
+def _end() -> None:
     bpy.app.translations.unregister(__name__)
+
+
+FEATURE = Feature(begin=_begin, end=_end)

@@ -125,6 +125,7 @@ def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
         ),
         *("replaced_smooth", "parent_type", "attribute"),
         *("normals_attribute", "point_buffer", "modifier_uid"),
+        *("marks_rest", "neutral_uid", "adds_rest_position"),
         *(
             "upstream_proxy",
             "upstream_signature",

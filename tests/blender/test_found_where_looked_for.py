@@ -73,9 +73,9 @@ def test_entries_of_the_menu_have_values_that_the_operators_take():
 def test_the_menus_have_it_until_sinew_goes(menu):
     functions = getattr(bpy.types, menu).draw._draw_funcs
     assert menus.MENUS[menu] in functions
-    menus.unregister()
+    menus.FEATURE.unregister()
     assert menus.MENUS[menu] not in functions
-    menus.register()
+    menus.FEATURE.register()
 
 
 def test_the_manual_has_a_section_for_every_operator_and_property(monkeypatch):
@@ -90,9 +90,9 @@ def test_the_manual_has_a_section_for_every_operator_and_property(monkeypatch):
         assert start == Path(manual.PAGE).as_uri()
         assert anchor in anchors, name
     assert WM_OT_doc_view_manual._lookup_rna_url("bpy.ops.sinew.compare", verbose=False).endswith("#compare")
-    manual.unregister()
+    manual.FEATURE.unregister()
     assert WM_OT_doc_view_manual._lookup_rna_url("bpy.ops.sinew.compare", verbose=False) is None
-    manual.register()
+    manual.FEATURE.register()
 
 
 def test_a_preset_has_method_and_parameters_for_another_character(tmp_path, monkeypatch):

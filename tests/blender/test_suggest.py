@@ -10,8 +10,8 @@ import scenes
 from sinew_addon.attach import properties
 from sinew_addon.core.suggestion import CRITERIA, Suggestion
 from sinew_addon.features.heat import live
-from sinew_addon.features.suggest import suggest, suggest_panel
-from sinew_addon.features.suggest.crossings import crossing_triangles
+from sinew_addon.features.suggest import feature, suggest
+from sinew_addon.features.suggest.suggest import crossing_triangles
 
 
 @pytest.fixture(autouse=True)
@@ -109,10 +109,8 @@ def test_values_are_texts_of_their_units():
     bpy.ops.sinew.suggest()
     scene, texts = bpy.context.scene, {}
     for criterion in CRITERIA:
-        texts[criterion.name] = suggest_panel.value_text(
-            scene, criterion, found().worst["lbs", criterion.name]
-        )
+        texts[criterion.name] = feature.value_text(scene, criterion, found().worst["lbs", criterion.name])
     assert texts["stretch"].endswith("%")
     assert texts["volume"].startswith("-")
     assert texts["crossings"].isdigit()
-    assert suggest_panel.value_text(scene, CRITERIA[0], None) == "none"
+    assert feature.value_text(scene, CRITERIA[0], None) == "none"

@@ -25,14 +25,6 @@ class SinewActionCopy(bpy.types.PropertyGroup):
     channels: bpy.props.StringProperty(description="The pose before")
 
 
-def register() -> None:
-    bpy.types.Action.sinew_copy = bpy.props.PointerProperty(type=SinewActionCopy)
-
-
-def unregister() -> None:
-    del bpy.types.Action.sinew_copy
-
-
 def is_on(armature: bpy.types.Object) -> bool:
     """Whether the armature plays a copy with keys of Sinew."""
     action = actions.playing(armature)[0]

@@ -1,16 +1,54 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers the record of a replaced action, and the operator that restores it."""
+"""Copies of actions that Sinew keys: their record, and the operator that plays the original again."""
 
 from __future__ import annotations
 
-from . import action_copy, original_operator
+import bpy
 
-CLASSES = (action_copy.SinewActionCopy, *original_operator.CLASSES)
+from ...attach.feature import Feature
+from ...deform import characters
+from ...ui import operators
+from . import action_copy
 
 
-def register() -> None:
-    action_copy.register()
+class OnArmature(operators.Acting):
+    """A base class of operators on the armatures of the selection."""
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        return "" if operators.armatures(context) else "Select an armature"
 
 
-def unregister() -> None:
-    action_copy.unregister()
+def selected_bones(armature: bpy.types.Object) -> list[str] | None:
+    """Returns the bones that are selected in pose mode; None, which means all, in other modes and without a
+    selection."""
+    if armature.mode != "POSE":
+        return None
+    # Of bones up to Blender 4.5, of pose bones since 5.0.
+    return [b.name for b in armature.pose.bones if (b if hasattr(b, "select") else b.bone).select] or None
+
+
+class SINEW_OT_original_action(operators.Acting, bpy.types.Operator):
+    bl_idname = "sinew.original_action"
+    bl_label = "Original Action"
+    bl_description = (
+        "Play the action that was there before Sinew keyed a copy, with its IK constraints; the copy goes"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        is_any = any(map(action_copy.is_on, operators.armatures(context)))
+        return "" if is_any else "Sinew has keyed no copy of this armature's action"
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        for armature in filter(action_copy.is_on, operators.armatures(context)):
+            action_copy.restore(armature)
+        characters.set_frame(context.scene, context.scene.frame_float)
+        return {"FINISHED"}
+
+
+FEATURE = Feature(
+    (action_copy.SinewActionCopy, SINEW_OT_original_action),
+    {"Action.sinew_copy": bpy.props.PointerProperty(type=action_copy.SinewActionCopy)},
+)

@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's deformation as data that plays without Sinew: shape keys, point caches and exported files.
-
-A bake runs in steps, so that a window stays responsive and it can be stopped at any time: sample() reads the
-frames, place() puts the result into the stack, publish() gives files their names, discard() removes what was
-written.
-"""
+"""Sinew's deformation as data that plays without Sinew: shape keys, point caches and exported files."""
 
 from __future__ import annotations
 
@@ -24,14 +19,14 @@ from ...io import files
 from ...io.animation_paths import curves_of
 from . import bake_export, bake_state, shape_animation
 from .bake_bones import BoneBake
-from .take_off import take_off
+from .bake_state import Started, take_off
 
 SHAPE_KEYS = "shape-keys"
 
 
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """Returns the points that Sinew gives its modifier at the current frame, float32 [vertices, 3]; the array
-    belongs to the binding."""
+    is written again at the next."""
     return bake_state.state_of(obj).points
 
 
@@ -67,9 +62,7 @@ class ShapeKeys:
             obj.shape_key_clear()
         shape_animation.add(obj, self.frames, shapes)
 
-    @property
-    def files(self) -> list[tuple[Path, Path]]:
-        return []
+    files = ()
 
     def discard(self) -> None:
         self.samples.clear()
@@ -128,7 +121,7 @@ class Cache:
         self.file.discard()
 
 
-class Bake:
+class Bake(Started):
     """A bake of several meshes at once, so that every frame is evaluated once."""
 
     def __init__(
@@ -142,10 +135,9 @@ class Bake:
         self.frames, self.folder, self.made_folder = frames, folder, not folder.exists()
         self.bakes: list[ShapeKeys | Cache] = []
         scene = bpy.context.scene
-        before = scene.frame_float
-        characters.set_frame(scene, frames[0])
         names: set[str] = set()
-        try:
+        with self.whole_or_nothing(), characters.kept_frame(scene):
+            characters.set_frame(scene, frames[0])
             for obj in meshes:
                 points_of(obj)
                 if kind == SHAPE_KEYS:
@@ -154,21 +146,11 @@ class Bake:
                     path = folder / f"{_file_name(obj, names)}.{kind}"
                     files.check_free(path, overwrite)
                     self.bakes.append(Cache(obj, frames, path, kind))
-        except BaseException:
-            self.discard()
-            raise
-        finally:
-            characters.set_frame(scene, before)
-
-    @property
-    def what(self) -> str:
-        return ", ".join(one.obj.name for one in self.bakes)
+        self.what = ", ".join(obj.name for obj in meshes)
 
     def sample(self) -> Generator[float, None, None]:
-        """Goes through the frames; yields the progress, 0 to 1, after each."""
         scene = bpy.context.scene
-        before = scene.frame_float
-        try:
+        with self.whole_or_nothing(), characters.kept_frame(scene):
             for number, frame in enumerate(self.frames):
                 characters.set_frame(scene, frame)
                 for one in self.bakes:
@@ -177,44 +159,23 @@ class Bake:
                     for one in self.bakes:
                         one.end()
                 yield (number + 1) / len(self.frames)
-        except BaseException:
-            self.discard()
-            raise
-        finally:
-            characters.set_frame(scene, before)
 
     def place(self) -> None:
-        try:
+        with self.whole_or_nothing():
             for one in self.bakes:
                 # Sinew's own position in the stack while it deforms, not the one while Blender does.
                 attach.switch(one.obj, on=True)
                 one.place()
-        except BaseException:
-            self.discard()
-            raise
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
-        """Each file that is written, with the name that publish() gives it."""
         return [pair for one in self.bakes for pair in one.files]
-
-    def publish(self) -> None:
-        for unfinished, path in self.files:
-            bake.publish(unfinished, path)
 
     def discard(self) -> None:
         for one in self.bakes:
             one.discard()
         if self.made_folder and self.folder.exists() and not any(self.folder.iterdir()):
             self.folder.rmdir()
-
-
-Started = Bake | BoneBake | bake_export.SceneExport | bake_export.MorphExport
-
-
-def suffix_of(kind: str) -> str:
-    """The extension of the file that a bake is for."""
-    return bake.EXPORTS.get(kind, ".blend")
 
 
 def start(

@@ -31,24 +31,19 @@ def sample(started: Export) -> Generator[float, None, None]:
     if painted:
         raise SinewError(f"{', '.join(painted)}: painted and not saved; save or pack it first")
     share, outcome = 0.0, None
-    try:
-        with _copy(started) as copy:
-            blender = BlenderProcess(Limits(), wait=False)
-            try:
-                for outcome in blender.follow(_task(started, copy), Limits()):
-                    share = (outcome or {}).get("share", share)
-                    yield share
-            finally:
-                # It has finished, or is not wanted any more.
-                blender.end()
+    with started.whole_or_nothing(), _copy(started) as copy:
+        blender = BlenderProcess(Limits(), wait=False)
+        try:
+            for outcome in blender.follow(_task(started, copy), Limits()):
+                share = (outcome or {}).get("share", share)
+                yield share
+        except BlenderLost as lost:
+            raise SinewError(f"{started.path}: can not be written: {lost}") from None
+        finally:
+            # It has finished, or is not wanted any more.
+            blender.end()
         if "error" in outcome:
             raise SinewError(outcome["error"])
-    except BlenderLost as lost:
-        started.discard()
-        raise SinewError(f"{started.path}: can not be written: {lost}") from None
-    except BaseException:
-        started.discard()
-        raise
 
 
 def export(task: dict, report: Callable[..., None]) -> dict:

@@ -1,16 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bake to bones: helper bones in addition to a rig's own, and weights, which Blender's Armature modifier
-and every engine can play. Helper bones have plain keys, or follow the pose by Blender's constraints.
-
-Like bake.Bake it runs in steps: sample(), place(), publish(), discard().
-"""
+and every engine can play. Helper bones have plain keys, or follow the pose by Blender's constraints."""
 
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -27,7 +23,7 @@ from ...deform import characters
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io, mesh_io
 from . import bake_state, shape_animation
-from .take_off import take_off
+from .bake_state import Started, take_off
 
 # Share of the time that reading the frames takes.
 _SAMPLING = 0.2
@@ -40,7 +36,7 @@ _POSES, _UNSEEN_POSES = 64, 32
 Shape = tuple[np.ndarray, SkinStageFrame, StageValues]
 
 
-class BoneBake:
+class BoneBake(Started):
     """A bake in which the meshes of each armature share helper bones.
 
     reports  of each armature, after sample()
@@ -49,41 +45,24 @@ class BoneBake:
     def __init__(
         self, meshes: list[bpy.types.Object], frames: Sequence[float], options: HelperOptions
     ) -> None:
-        scene = bpy.context.scene
-        before = scene.frame_float
-        characters.set_frame(scene, frames[0])
-        try:
-            rigs: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+        rigs: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+        with characters.kept_frame(bpy.context.scene):
+            characters.set_frame(bpy.context.scene, frames[0])
             for obj in meshes:
                 _check_bones(obj, bake_state.posed_state_of(obj))
                 rigs.setdefault(_rig_of(obj), []).append(obj)
-        finally:
-            characters.set_frame(scene, before)
-        self.frames, self.options = frames, options
+        self.frames, self.options, self.what = frames, options, ", ".join(obj.name for obj in meshes)
         self._rigs = [_Rig(rig, own) for rig, own in rigs.items()]
         self.reports: list[Report] = []
 
-    @property
-    def what(self) -> str:
-        return ", ".join(obj.name for rig in self._rigs for obj in rig.meshes)
-
-    @property
-    def files(self) -> list[tuple[Path, Path]]:
-        """No files."""
-        return []
-
     def sample(self) -> Generator[float, None, None]:
-        """Goes through the frames, and solves; yields the progress, 0 to 1."""
         scene = bpy.context.scene
-        before = scene.frame_float
-        try:
+        with characters.kept_frame(scene):
             for number, frame in enumerate(self.frames):
                 characters.set_frame(scene, frame)
                 for rig in self._rigs:
                     rig.take()
                 yield _SAMPLING * (number + 1) / len(self.frames)
-        finally:
-            characters.set_frame(scene, before)
         for number, rig in enumerate(self._rigs):
             for share in _naming(rig.meshes, rig.solve(self.options)):
                 yield _SAMPLING + (1.0 - _SAMPLING) * (number + share) / len(self._rigs)
@@ -92,9 +71,6 @@ class BoneBake:
     def place(self) -> None:
         for rig in self._rigs:
             rig.place(self.frames)
-
-    def publish(self) -> None:
-        """Does nothing, as nothing is in files."""
 
     def discard(self) -> None:
         self._rigs.clear()

@@ -16,6 +16,7 @@ from ...deform import characters
 from ...io import files
 from . import bake
 from .bake_bones import BoneBake
+from .bake_state import Started
 
 
 def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
@@ -34,8 +35,8 @@ def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
     typed = settings["bake_frames"]
     frames = sorted(set(parse_frames(typed))) if typed else range(scene.frame_start, scene.frame_end + 1)
     beside: list[tuple[Path, Path]] = []
-    started: list[bake.Started] = []
-    in_file: list[bake.Started] = []
+    started: list[Started] = []
+    in_file: list[Started] = []
     bakes = []
     try:
         wanted = _wanted(settings, meshes)

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes by Blender's own exporters: the final meshes, with UVs and materials.
-
-Like bake.Bake they run in steps: sample(), place(), publish(), discard().
-"""
+"""Bakes by Blender's own exporters: the final meshes, with UVs and materials."""
 
 from __future__ import annotations
 
@@ -23,6 +20,7 @@ from ...core.spaces import transformed
 from ...deform import characters, session
 from ...io import files
 from . import bake_state, shape_animation, usd_textures
+from .bake_state import Started
 
 
 def _alembic(path: str, first: int, last: int) -> None:
@@ -64,7 +62,7 @@ GLTF = "gltf"
 SAMPLED = 0.5
 
 
-class _Export:
+class _Export(Started):
     """An export to one file: written to `unfinished` first, then moved to `path`.
 
     meshes   that Sinew deforms
@@ -74,7 +72,6 @@ class _Export:
     kind: str
     meshes: list[bpy.types.Object]
     carried: list[bpy.types.Object]
-    frames: Sequence[float]
     path: Path
     unfinished: Path
 
@@ -93,15 +90,7 @@ class _Export:
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
-        """Each file that is written, with the name that publish() gives it."""
         return [(self.unfinished, self.path)]
-
-    def place(self) -> None:
-        """The open file is not changed."""
-
-    def publish(self) -> None:
-        for unfinished, path in self.files:
-            core.publish(unfinished, path)
 
     def discard(self) -> None:
         remove(self.unfinished)
@@ -129,22 +118,17 @@ class SceneExport(_Export):
         self.unfinished = _prepare(self, path)
 
     def sample(self) -> Generator[float, None, None]:
-        scene = bpy.context.scene
-        before = scene.frame_float, scene.frame_start, scene.frame_end
-        try:
-            with _selected([*self.meshes, *self.carried]), self.textures.on_disk():
-                scene.frame_start, scene.frame_end = self.first, self.last
-                with _reporting_frames(self, 0.0):
-                    _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
+        first, last = self.first, self.last
+        with self.whole_or_nothing(), _frames_of_scene(first, last):
+            with (
+                _selected([*self.meshes, *self.carried]),
+                self.textures.on_disk(),
+                _reporting_frames(self, 0.0),
+            ):
+                _export(lambda: SCENES[self.kind](str(self.unfinished), first, last), self)
             for obj in self.meshes:
                 bake_state.check_on(obj)
             yield 1.0
-        except BaseException:
-            self.discard()
-            raise
-        finally:
-            scene.frame_start, scene.frame_end = before[1:]
-            characters.set_frame(scene, before[0])
 
     def whole_in_a_copy(self) -> AbstractContextManager[None]:
         return self.textures.on_disk()
@@ -173,8 +157,7 @@ class MorphExport(_Export):
 
     def sample(self) -> Generator[float, None, None]:
         scene = bpy.context.scene
-        before = scene.frame_float
-        try:
+        with self.whole_or_nothing(), characters.kept_frame(scene), self._removing():
             for number, frame in enumerate(self.frames):
                 characters.set_frame(scene, frame)
                 for obj in self.meshes:
@@ -191,20 +174,10 @@ class MorphExport(_Export):
             characters.set_frame(scene, self.frames[0])
             self._make()
             with _unstretched(scene), _selected(self.made):
-                self._animate()
-                first, last = scene.frame_start, scene.frame_end
-                scene.frame_start, scene.frame_end = int(self.frames[0]), int(self.frames[-1])
-                try:
-                    with _reporting_frames(self, SAMPLED):
-                        _export(self._write, self)
-                finally:
-                    scene.frame_start, scene.frame_end = first, last
-        except BaseException:
-            self.discard()
-            raise
-        finally:
-            self._remove()
-            characters.set_frame(scene, before)
+                for made, samples in zip(self.made, self.samples.values(), strict=True):
+                    shape_animation.add(made, self.frames, samples)
+                with _frames_of_scene(self.frames[0], self.frames[-1]), _reporting_frames(self, SAMPLED):
+                    _export(self._write, self)
         yield 1.0
 
     def _in_first_space(self, obj: bpy.types.Object) -> np.ndarray:
@@ -237,10 +210,6 @@ class MorphExport(_Export):
             bpy.context.scene.collection.objects.link(made)
             self.made.append(made)
 
-    def _animate(self) -> None:
-        for made, samples in zip(self.made, self.samples.values(), strict=True):
-            shape_animation.add(made, self.frames, samples)
-
     def _write(self) -> None:
         bpy.ops.export_scene.gltf(
             filepath=str(self.unfinished),
@@ -258,14 +227,19 @@ class MorphExport(_Export):
             export_frame_range=True,
         )
 
-    def _remove(self) -> None:
-        for made in self.made:
-            keys = made.data.shape_keys
-            action = keys.animation_data.action if keys is not None and keys.animation_data else None
-            bpy.data.meshes.remove(made.data)
-            if action is not None:
-                bpy.data.actions.remove(action)
-        self.made.clear()
+    @contextmanager
+    def _removing(self) -> Iterator[None]:
+        """Context after which the copies are gone."""
+        try:
+            yield
+        finally:
+            for made in self.made:
+                keys = made.data.shape_keys
+                action = keys.animation_data.action if keys is not None and keys.animation_data else None
+                bpy.data.meshes.remove(made.data)
+                if action is not None:
+                    bpy.data.actions.remove(action)
+            self.made.clear()
 
 
 def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -330,6 +304,19 @@ def _reporting_frames(export: SceneExport | MorphExport, start: float) -> Iterat
         yield
     finally:
         bpy.app.handlers.frame_change_post.remove(on_frame)
+
+
+@contextmanager
+def _frames_of_scene(first: float, last: float) -> Iterator[None]:
+    """Context in which the scene has these frames, as exporters take them; afterwards it is at its own."""
+    scene = bpy.context.scene
+    before = scene.frame_start, scene.frame_end
+    with characters.kept_frame(scene):
+        scene.frame_start, scene.frame_end = int(first), int(last)
+        try:
+            yield
+        finally:
+            scene.frame_start, scene.frame_end = before
 
 
 @contextmanager

@@ -1,15 +1,72 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks and reads what Sinew deforms, for baking."""
+"""What all bakes have in common, and what they read of an object.
+
+A bake runs in steps, so that a window stays responsive and it can be stopped at any time.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
 import bpy
 
-from ...attach import properties
+from ...attach import attach, corrective_smooth, properties
+from ...core import bake
 from ...core.errors import SinewError
 from ...deform import session
 from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
+
+
+class Started:
+    """
+    frames  ascending
+    what    what is baked, in words
+    """
+
+    frames: Sequence[float]
+    what: str
+
+    def sample(self) -> Generator[float, None, None]:
+        """Goes through the frames; yields the progress, 0 to 1."""
+        raise NotImplementedError
+
+    def place(self) -> None:
+        """Puts the result into the open file."""
+
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        """Each file that is written, with the name that publish() gives it."""
+        return []
+
+    def publish(self) -> None:
+        for unfinished, path in self.files:
+            bake.publish(unfinished, path)
+
+    def discard(self) -> None:
+        """Removes what was written."""
+
+    @contextmanager
+    def whole_or_nothing(self) -> Iterator[None]:
+        """Context that discards the bake where it is left before its end."""
+        try:
+            yield
+        except BaseException:
+            self.discard()
+            raise
+
+
+def take_off(obj: bpy.types.Object) -> None:
+    """Takes Sinew off an object whose shape is in a bake from now on; the Armature modifiers stay as they
+    were, and anything that the bake already includes is switched off."""
+    # A deforming parent would deform the baked shape again.
+    properties.of(obj).parent_type = ""
+    smooth = corrective_smooth.replaced_modifier(obj)
+    attach.take_off(obj)
+    if smooth is not None:
+        smooth.show_viewport = smooth.show_render = False
 
 
 def check_on(obj: bpy.types.Object) -> None:

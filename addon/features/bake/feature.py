@@ -1,4 +1,144 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers bakes: their operator."""
+"""Bakes: an operator."""
 
-from .bake_operator import CLASSES as CLASSES
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+from ...attach.feature import Feature
+from ...core.bake import BONES, EXPORTS
+from ...core.errors import SinewError
+from ...core.frames import parse_frames
+from ...core.helper_bones import KEYS, POSE, SCALED_KEYS, HelperOptions
+from ...deform import characters
+from ...ui import stepped
+from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.translations import tr
+from . import bake, bake_apart, bake_bones, bake_state
+
+WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
+
+
+class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
+    bl_idname = "sinew.bake"
+    bl_label = "Bake"
+    bl_description = (
+        "Write what Sinew deforms as data that plays without it. A bake into this file takes Sinew off"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+    saying = "Sinew bakes"
+    stopped = "Bake stopped; nothing was written"
+
+    kind: bpy.props.EnumProperty(
+        name="To",
+        description="What plays the shapes: a modifier or shape keys of this file, or another program",
+        items=[
+            ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
+            ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),
+            ("pc2", "PC2 Cache", "A point cache and a Mesh Cache modifier, in this file"),
+            (BONES, "Bones", "Helper bones and weights, in this file: what engines play"),
+            ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
+            ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
+            ("gltf", "glTF", "The final meshes, the frames as morph targets; this file stays as it is"),
+        ],
+    )
+    frames: bpy.props.StringProperty(
+        name="Frames", description="Such as 1,12,40-48; empty: the scene's frames", default=""
+    )
+    step: bpy.props.IntProperty(
+        name="Step", description="Every so many of the frames", default=1, min=1, soft_max=12
+    )
+    folder: bpy.props.StringProperty(
+        name="Folder",
+        description="Where files go; // is beside this file",
+        default="//",
+        subtype="DIR_PATH",
+        # Without it, newer versions warn about "//"; older ones do not know it.
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set(),
+    )
+    overwrite: bpy.props.BoolProperty(
+        name="Overwrite", description="Replace files that are there already", default=False
+    )
+    helpers: bpy.props.IntProperty(
+        name="Helper Bones",
+        description="How many each armature gets at most; 0: two a joint",
+        default=0,
+        min=0,
+        soft_max=200,
+    )
+    error: bpy.props.FloatProperty(
+        name="Error",
+        description="No more helper bones are added once the rms error is this much of the meshes' diagonal; "
+        "0: all of them",
+        default=0.0,
+        min=0.0,
+        max=100.0,
+        precision=3,
+        subtype="PERCENTAGE",
+    )
+    influences: bpy.props.IntProperty(
+        name="Influences",
+        description="How many bones move a vertex at most; most engines take four",
+        default=4,
+        min=1,
+        soft_max=8,
+    )
+    motion: bpy.props.EnumProperty(
+        name="Motion",
+        description="What moves helper bones",
+        items=[
+            (KEYS, "Keys", "Plain keys over these frames, of bones that do not change size: for any engine"),
+            (
+                SCALED_KEYS,
+                "Keys with Scale",
+                "Helper bones also grow and shrink, and come nearer: for engines that play scale",
+            ),
+            (POSE, "Pose", "Constraints by which they follow the pose: other animation has them, too"),
+        ],
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        of_kind = ("motion", "helpers", "error", "influences") if self.kind == BONES else ()
+        if self.kind not in WITHOUT_FILES:
+            of_kind = ("folder", "overwrite")
+        for name in ("kind", "frames", "step", *of_kind):
+            layout.prop(self, name)
+        if self.kind not in EXPORTS:
+            layout.label(text="Takes Sinew off: what is baked plays without it", icon="INFO")
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        self.started = self._start(context)
+        # In a window, Blender's exporters would block.
+        is_apart = self.in_steps and self.kind in EXPORTS
+        yield from bake_apart.sample(self.started) if is_apart else self.started.sample()
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        with self.started.whole_or_nothing():
+            self.started.publish()
+            self.started.place()
+        self.report({"INFO"}, tr("Baked {names}", names=self.started.what))
+        if isinstance(self.started, bake_bones.BoneBake):
+            for report in self.started.reports:
+                for sentence in report.sentences(characters.length_unit(context.scene)):
+                    self.report({"INFO"}, tr(sentence))
+        return {"FINISHED"}
+
+    def _start(self, context: bpy.types.Context) -> bake_state.Started:
+        scene, name = context.scene, Path(bpy.data.filepath).stem
+        if self.kind not in WITHOUT_FILES and self.folder.startswith("//") and not name:
+            raise SinewError("Save the file first, or choose a folder that is not beside it")
+        frames = sorted(set(parse_frames(self.frames))) if self.frames.strip() else None
+        frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
+        suffix = EXPORTS.get(self.kind, ".blend")
+        target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
+        helpers = HelperOptions(self.helpers, self.error, self.influences, self.motion)
+        meshes, frames = sinew_targets(context), frames[:: self.step]
+        return bake.start(meshes, self.kind, frames, target, self.overwrite, helpers)
+
+
+FEATURE = Feature((SINEW_OT_bake,))

@@ -1,4 +1,235 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers blends of actions: their operator."""
+"""Blends of actions: an operator; its dialog lists those of the armature."""
 
-from .blend_operator import CLASSES as CLASSES
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+from ...attach.feature import Feature
+from ...core.errors import SinewError
+from ...core.motion import blend as core
+from ...core.motion.timing import Weights
+from ...io import clips
+from ...ui import operators, stepped
+from ...ui.sidebar import draw_text
+from ...ui.translations import counted, tr
+from . import blend_actions
+
+
+class SinewBlendAction(bpy.types.PropertyGroup):
+    """An action in the dialog, called `name`."""
+
+    weight: bpy.props.FloatProperty(
+        name="Weight",
+        description="How much of the action is in the blend; weights are brought to sum 1",
+        default=1.0,
+        min=0.0,
+        soft_max=1.0,
+    )
+    weight_from: bpy.props.FloatProperty(
+        name="At First",
+        description="How much of the action is in the blend before its weights change",
+        default=1.0,
+        min=0.0,
+        soft_max=1.0,
+    )
+
+
+class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
+    bl_idname = "sinew.blend_actions"
+    bl_label = "Blend Actions"
+    bl_description = (
+        "Blend actions of the armature into a new one of plain keys, which it plays; the actions themselves "
+        "stay as they are"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+    saying = "Sinew blends actions"
+
+    actions: bpy.props.CollectionProperty(
+        type=SinewBlendAction, description="The actions to blend", options={"SKIP_SAVE"}
+    )
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How poses of a bone are blended",
+        items=[(m.name, m.label, m.description, m.number) for m in core.METHODS.values()],
+        default="dlb",
+    )
+    space: bpy.props.EnumProperty(
+        name="Space",
+        description="Relative to what bones are blended",
+        items=[
+            (core.RELATIVE, "Parents", "Each bone relative to its parent: chains stay whole", 0),
+            (
+                core.ARMATURE,
+                "Armature",
+                "Each bone by itself: it keeps its direction, and bones that are not connected leave their "
+                "parents",
+                1,
+            ),
+        ],
+        default=core.RELATIVE,
+    )
+    align: bpy.props.BoolProperty(
+        name="Align",
+        description="Bring the actions to the same moment of their motion, and cycles to a common length; "
+        "else each plays from its first frame",
+        default=True,
+    )
+    align_bone: bpy.props.StringProperty(
+        name="Aligned by",
+        description="The bone that says which moment it is, such as a foot; empty: all bones",
+    )
+    changes: bpy.props.BoolProperty(
+        name="Change Weights",
+        description="Let the weights change in the course of the blend",
+        default=False,
+    )
+    change_start: bpy.props.FloatProperty(
+        name="Begins At",
+        description="The share of the motion after which weights change",
+        subtype="PERCENTAGE",
+        default=0.0,
+        min=0.0,
+        max=100.0,
+        precision=0,
+    )
+    change_end: bpy.props.FloatProperty(
+        name="Ends At",
+        description="The share of the motion after which they have changed",
+        subtype="PERCENTAGE",
+        default=100.0,
+        min=0.0,
+        max=100.0,
+        precision=0,
+    )
+    smooth: bpy.props.BoolProperty(
+        name="Slow In and Out",
+        description="Let the change of weights begin and end slowly; else it is even",
+        default=False,
+    )
+    cycles: bpy.props.IntProperty(
+        name="Cycles",
+        description="How often actions that repeat go round in the blend",
+        default=1,
+        min=1,
+        soft_max=20,
+    )
+    root_motion: bpy.props.EnumProperty(
+        name="Root Motion",
+        description="What becomes of the way that the root goes over the ground",
+        items=[
+            (core.TRAVEL, "Blended", "Steps of the root are blended and added up: speeds and turns blend", 0),
+            (core.IN_PLACE, "In Place", "The way over the ground is taken out", 1),
+            (core.KEYED, "As Keyed", "The root is blended as any other bone", 2),
+        ],
+        default=core.TRAVEL,
+    )
+    root: bpy.props.StringProperty(
+        name="Root",
+        description="The bone that carries the others; empty: the uppermost that moves",
+    )
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        armature = _armature(context)
+        if armature is None:
+            return "Select an armature, or a mesh that it deforms"
+        if not armature.is_editable:
+            return tr("{name} is linked: make a library override of it first", name=armature.name)
+        return ""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not self.actions:
+            armature = _armature(context)
+            playing = armature.animation_data.action if armature.animation_data is not None else None
+            found = dict.fromkeys(action for action in (playing, *bpy.data.actions) if action is not None)
+            for action in found:
+                if clips.keyed_properties(armature, action):
+                    row = self.actions.add()
+                    row.name, row.weight = action.name, float(len(self.actions) <= 2)
+        return super().invoke(context, event)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, armature = self.layout, _armature(context)
+        layout.use_property_split = True
+        for each in self.actions:
+            column = layout.column(align=True)
+            if self.changes:
+                column.prop(each, "weight_from", text=tr("{name}, at First", name=each.name), translate=False)
+            column.prop(each, "weight", text=each.name, translate=False)
+        if len(self.actions) < 2:
+            draw_text(layout, context, "Blender has no two actions of this armature", icon="INFO")
+        for name in ("method", "space", "changes"):
+            layout.prop(self, name)
+        if self.changes:
+            times = layout.column(align=True)
+            times.prop(self, "change_start")
+            times.prop(self, "change_end")
+            layout.prop(self, "smooth")
+        layout.prop(self, "align")
+        if self.align:
+            layout.prop_search(self, "align_bone", armature.data, "bones")
+        layout.prop(self, "cycles")
+        layout.prop(self, "root_motion")
+        if self.root_motion == core.TRAVEL or self.align:
+            layout.prop_search(self, "root", armature.data, "bones")
+
+    def values(self) -> dict[str, object]:
+        rows = [{name: getattr(each, name) for name in _OF_ACTION} for each in self.actions]
+        return {**super().values(), "actions": rows}
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        armature = _armature(context)
+        # By name: after undo, or loading another file, pointers would be invalid.
+        self._armature = armature.name
+        chosen = [each for each in self.actions if each.weight or (self.changes and each.weight_from)]
+        missing = [each.name for each in chosen if each.name not in bpy.data.actions]
+        if missing:
+            raise SinewError(f"There is no action {missing[0]!r}")
+        self._made = yield from blend_actions.make(
+            armature,
+            [bpy.data.actions[each.name] for each in chosen],
+            self._weights(chosen),
+            self._settings(),
+        )
+
+    def _weights(self, chosen: list[SinewBlendAction]) -> Weights:
+        last = [each.weight for each in chosen]
+        if not self.changes:
+            return Weights.of(last, len(last))
+        at = (0.01 * self.change_start, 0.01 * self.change_end)
+        return Weights.of(([each.weight_from for each in chosen], last), len(last), at, self.smooth)
+
+    def _settings(self) -> core.Settings:
+        return core.Settings(
+            method=self.method,
+            space=self.space,
+            align=self.align,
+            align_bones=(self.align_bone,) if self.align_bone else (),
+            root=self.root or None,
+            root_motion=self.root_motion,
+            cycles=self.cycles,
+        )
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        made = self._made
+        blend_actions.play(bpy.data.objects[self._armature], made.action)
+        frames = counted(made.frames, "{count} frame", "{count} frames")
+        self.report({"INFO"}, tr("Made {name}: {frames}", name=made.action.name, frames=frames))
+        for note in made.notes():
+            self.report({"WARNING"}, note)
+        context.view_layer.update()
+        return {"FINISHED"}
+
+
+_OF_ACTION = ("name", "weight", "weight_from")
+
+
+def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The armature whose actions are blended: the active one, or the one of the active mesh."""
+    return next(iter(operators.armatures(context)), None)
+
+
+FEATURE = Feature((SinewBlendAction, SINEW_OT_blend_actions))

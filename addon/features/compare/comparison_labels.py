@@ -26,20 +26,6 @@ SIZE, PADDING, STRIPE, ABOVE = 13, 6, 3, 16
 BELOW_TOP = 150
 BACKGROUND = (0.05, 0.05, 0.05, 0.75)
 
-_handle: object | None = None
-
-
-def register() -> None:
-    global _handle
-    _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
-
-
-def unregister() -> None:
-    global _handle
-    if _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None
-
 
 def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, float], Vector]]:
     """Returns text, colour and world position of each label: centred above a method's visible copies, or
@@ -82,7 +68,7 @@ def _top(
     return Vector(((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2]))
 
 
-def _draw() -> None:
+def draw() -> None:
     context = bpy.context
     if context.space_data.type != "VIEW_3D" or not context.space_data.overlay.show_overlays:
         return

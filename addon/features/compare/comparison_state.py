@@ -17,18 +17,8 @@ def _changed(state: SinewComparison, _context: bpy.types.Context) -> None:
 
 
 def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> list[tuple]:
-    # The stored number stays that of the method, even if the list of methods changes.
-    numbers = {name: method.number + 1 for name, method in properties.METHODS.items()}
-    return [
-        (
-            name,
-            properties.method_label(name),
-            properties.method_description(name),
-            "NONE",
-            numbers.get(name, 0),
-        )
-        for name in methods_of(state)
-    ]
+    choices = {item[0]: item for item in properties.method_choices()}
+    return [choices[name] for name in methods_of(state)]
 
 
 class SinewComparison(bpy.types.PropertyGroup):

@@ -1,20 +1,237 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers comparisons: classes, what a scene stores, labels in the 3D views."""
+"""Comparisons: a panel and its buttons, what a scene stores, labels in the 3D views."""
 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
-from . import comparison_labels, comparison_operators, comparison_panel, comparison_state
+from ...attach import attach, properties
+from ...attach.feature import Feature
+from ...core.comparison import USUAL_METHODS
+from ...core.errors import SinewError
+from ...deform import characters
+from ...ui import operators
+from ...ui.sidebar import Sidebar, draw_text
+from ...ui.translations import tr
+from . import comparison, comparison_labels, comparison_state, framing
 
-CLASSES = (*comparison_state.CLASSES, *comparison_operators.CLASSES, *comparison_panel.CLASSES)
+
+def character(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Returns the visible meshes that the selected armatures deform, and those parented to their bones:
+    clothes and eyes belong to the selected body. Empty where nothing is deformed."""
+    armatures, viewport = operators.armatures(context), _viewport(context)
+    visible = [
+        obj
+        for obj in context.scene.objects
+        if obj.type == "MESH" and not properties.is_copy(obj) and obj.visible_get(viewport=viewport)
+    ]
+    deformed = [obj for obj in attach.deformed_meshes(visible) if attach.armature_of(obj) in armatures]
+    attached = [obj for obj in visible if attach.armature_of(obj) is None and _hangs_on(obj, armatures)]
+    return [*deformed, *attached] if deformed else []
 
 
-def register() -> None:
-    bpy.types.Scene.sinew_comparison = bpy.props.PointerProperty(type=comparison_state.SinewComparison)
-    comparison_labels.register()
+def _hangs_on(obj: bpy.types.Object, armatures: list[bpy.types.Object]) -> bool:
+    parent = obj.parent
+    while parent is not None and parent not in armatures:
+        parent = parent.parent
+    return parent is not None
 
 
-def unregister() -> None:
-    comparison_labels.unregister()
-    del bpy.types.Scene.sinew_comparison
+def _viewport(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
+    space = context.space_data
+    return space if space is not None and space.type == "VIEW_3D" else None
+
+
+def _compared(context: bpy.types.Context) -> list[bpy.types.Object]:
+    state = comparison_state.of_scene(context.scene)
+    return comparison.originals(state) if state is not None else []
+
+
+class SinewComparisonChoice(bpy.types.PropertyGroup):
+    """A method in the dialog, called `name`."""
+
+    is_shown: bpy.props.BoolProperty(
+        name="Show", description="Show a copy of the character under this method"
+    )
+
+
+METHOD_ITEMS = [
+    *((m.name, m.label, m.description) for m in properties.METHODS.values()),
+    (
+        characters.BLENDER,
+        properties.method_label(characters.BLENDER),
+        "As it stands in the stack, without Sinew",
+    ),
+]
+
+
+class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
+    bl_idname = "sinew.compare"
+    bl_label = "Compare"
+    bl_description = (
+        "Show live copies of the character beside it, one for each method, until End Comparison takes them "
+        "away; renders leave them out"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    methods: bpy.props.EnumProperty(
+        name="Methods",
+        description="Show a copy of the character under each of these",
+        items=METHOD_ITEMS,
+        options={"ENUM_FLAG"},
+        default=set(USUAL_METHODS),
+    )
+    # Clicking an enum flag would clear all others.
+    choices: bpy.props.CollectionProperty(
+        type=SinewComparisonChoice,
+        name="Choices",
+        description="The same as check boxes, in the dialog",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        if context.mode.startswith("EDIT"):
+            return "Leave edit mode first"
+        is_any = operators.armatures(context) or _compared(context)
+        return "" if is_any else "Select a mesh that an armature deforms, or the armature"
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        state = comparison_state.of_scene(context.scene)
+        if state is not None and comparison_state.methods_of(state):
+            self.methods = set(comparison_state.methods_of(state))
+        self.choices.clear()
+        for name, _label, _description in METHOD_ITEMS:
+            choice = self.choices.add()
+            choice.name, choice.is_shown = name, name in self.methods
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        column.label(text="Show a copy under each of these")
+        for choice in self.choices:
+            column.prop(choice, "is_shown", text=properties.method_label(choice.name))
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        if self.choices:
+            self.methods = {choice.name for choice in self.choices if choice.is_shown}
+        methods = [name for name in characters.method_names() if name in self.methods]
+        meshes = character(context) or _compared(context)
+        if not methods:
+            raise SinewError("Choose at least one method to compare")
+        if not meshes:
+            raise SinewError("The armature deforms no mesh that is visible; show one first")
+        problems = comparison.start(context, meshes, methods, _right_of_view(context))
+        viewport = _viewport(context)
+        if viewport is not None and viewport.local_view is not None:
+            for copy in comparison_state.copies_of(comparison_state.of_scene(context.scene)):
+                copy.local_view_set(viewport, True)
+        if viewport is not None:
+            framing.show_all(context, viewport, meshes)
+        for problem in problems:
+            self.report({"WARNING"}, problem)
+        return {"FINISHED"}
+
+
+def _right_of_view(context: bpy.types.Context) -> np.ndarray:
+    """[3], the direction of the screen's right in the world; +X where there is no 3D view."""
+    viewport = _viewport(context)
+    if viewport is None or viewport.region_3d is None:
+        return np.array([1.0, 0.0, 0.0])
+    # Also if the button is in the sidebar, a region without its own view.
+    return np.array(viewport.region_3d.view_matrix)[0, :3]
+
+
+class _WhileComparing:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if comparison_state.of_scene(context.scene) is not None:
+            return True
+        cls.poll_message_set("Compare methods first")
+        return False
+
+
+class SINEW_OT_flip_comparison(_WhileComparing, bpy.types.Operator):
+    bl_idname = "sinew.flip_comparison"
+    bl_label = "Flip Comparison"
+    bl_description = "Show the other of the two copies that are compared, at the same place"
+    # Only a view of the comparison: an undo step for each flip would push out the artist's own steps, and
+    # take longer than the flip.
+    bl_options = {"REGISTER"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        state = comparison_state.of_scene(context.scene)
+        if state.arrangement != comparison_state.ONE_OF_TWO:
+            state.arrangement = comparison_state.ONE_OF_TWO
+        else:
+            state.shows_second = not state.shows_second
+        (shown,) = comparison_state.shown_methods(state)
+        self.report({"INFO"}, properties.method_label(shown))
+        return {"FINISHED"}
+
+
+class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
+    bl_idname = "sinew.end_comparison"
+    bl_label = "End Comparison"
+    bl_description = "Take the copies away, and all that was made for them"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        return "" if comparison.is_on() else "There is no comparison"
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        comparison.end(context)
+        return {"FINISHED"}
+
+
+class SINEW_PT_comparison(Sidebar, bpy.types.Panel):
+    bl_label = "Compare"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        state = comparison_state.of_scene(context.scene)
+        if state is None:
+            layout.operator("sinew.compare", text="Compare…", icon="MOD_ARRAY")
+            if comparison.is_on():
+                draw_text(layout, context, "Another scene shows a comparison", icon="INFO")
+                layout.operator("sinew.end_comparison", icon="X")
+            return
+        _draw_arrangement(layout, context, state)
+        if state.collection is not None:
+            layout.prop(state.collection, "hide_render", text="Render the Copies", invert_checkbox=True)
+        row = layout.row(align=True)
+        row.operator("sinew.compare", text="Methods…")
+        row.operator("sinew.end_comparison", icon="X")
+
+
+def _draw_arrangement(
+    layout: bpy.types.UILayout, context: bpy.types.Context, state: comparison_state.SinewComparison
+) -> None:
+    methods = comparison_state.methods_of(state)
+    if not methods:
+        draw_text(layout, context, "The copies were deleted", icon="INFO")
+        return
+    layout.row(align=True).prop(state, "arrangement", expand=True)
+    layout.prop(state, "spacing")
+    if state.arrangement == comparison_state.OVERLAID and context.space_data.shading.type == "SOLID":
+        layout.prop_enum(context.space_data.shading, "color_type", "OBJECT", text="Colour by Method")
+    if state.arrangement == comparison_state.ONE_OF_TWO:
+        column = layout.column(align=True)
+        column.prop(state, "first", text="")
+        column.prop(state, "second", text="")
+        (shown,) = comparison_state.shown_methods(state)
+        layout.operator("sinew.flip_comparison", text="Flip", icon="UV_SYNC_SELECT")
+        draw_text(layout, context, tr("Shown: {method}", method=tr(properties.method_label(shown))))
+
+
+FEATURE = Feature(
+    (
+        *comparison_state.CLASSES,
+        *(SinewComparisonChoice, SINEW_OT_compare, SINEW_OT_flip_comparison, SINEW_OT_end_comparison),
+        SINEW_PT_comparison,
+    ),
+    {"Scene.sinew_comparison": bpy.props.PointerProperty(type=comparison_state.SinewComparison)},
+    overlays=(comparison_labels.draw,),
+)

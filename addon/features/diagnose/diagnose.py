@@ -260,19 +260,12 @@ def _on_stepped() -> None:
         found.suspect = True
 
 
-_SUBSCRIPTIONS = (
+SUBSCRIPTIONS = (
     (subscribers.evaluated, _on_evaluated),
     (subscribers.stepped, _on_stepped),
     (subscribers.loading, _checks.clear),
 )
 
 
-def register() -> None:
-    for functions, function in _SUBSCRIPTIONS:
-        functions.append(function)
-
-
-def unregister() -> None:
-    for functions, function in _SUBSCRIPTIONS:
-        functions.remove(function)
+def forget() -> None:
     _checks.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers the glTF export: a check box in the exporter, stored in the scene."""
+"""The glTF export: a check box in the exporter, stored in the scene."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 
 import bpy
 
+from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
+from . import export
 
 
 class SinewGltf(bpy.types.PropertyGroup):
@@ -22,8 +24,6 @@ class SinewGltf(bpy.types.PropertyGroup):
         options=set(),
     )
 
-
-CLASSES = (SinewGltf,)
 
 _ADDON = __package__.rpartition(".features")[0]
 
@@ -39,29 +39,10 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
 
 def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) -> None:
     """settings: the exporter's own. begin_export: from then on Sinew deforms nothing."""
-    from . import export
-
     context = bpy.context
     found, left_out = export.collect(context) if context.scene.sinew_gltf.skinning else ([], [])
     begin_export()
     export.begin(found, left_out, settings)
-
-
-def register() -> None:
-    from . import export
-
-    subscribers.exported.append(export.end)
-    bpy.types.Scene.sinew_gltf = bpy.props.PointerProperty(type=SinewGltf)
-    _exporters_panels()[_ADDON] = draw
-
-
-def unregister() -> None:
-    from . import export
-
-    subscribers.exported.remove(export.end)
-    export.end()
-    _exporters_panels().pop(_ADDON, None)
-    del bpy.types.Scene.sinew_gltf
 
 
 def _exporters_panels() -> dict[str, Callable]:
@@ -73,3 +54,21 @@ def _exporters_panels() -> dict[str, Callable]:
         # Blender can be built without the exporter.
         return {}
     return getattr(io_scene_gltf2, "exporter_extension_layout_draw", {})
+
+
+def _begin() -> None:
+    _exporters_panels()[_ADDON] = draw
+
+
+def _end() -> None:
+    export.end()
+    _exporters_panels().pop(_ADDON, None)
+
+
+FEATURE = Feature(
+    (SinewGltf,),
+    {"Scene.sinew_gltf": bpy.props.PointerProperty(type=SinewGltf)},
+    subscriptions=((subscribers.exported, export.end),),
+    begin=_begin,
+    end=_end,
+)

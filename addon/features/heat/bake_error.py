@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The errors of a bake to bones, as quantities of the heat map. The bake has stored them in the mesh; Sinew
-is off such a mesh, so its colours are an attribute of the mesh itself while they are shown, and only then, as
-exporters would write them."""
+"""The errors of a bake to bones, as quantities of the heat map. The bake has stored them in the mesh;
+Sinew is off such a mesh, so its colours are an attribute of the mesh itself while they are shown, and only
+then, as exporters would write them."""
 
 from __future__ import annotations
 

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers heat maps, and subscribes to what Sinew does with its objects."""
+"""Heat maps: panels and their buttons, what a scene stores, a legend in the 3D views, and colours of each
+frame."""
 
 from __future__ import annotations
 
 import bpy
 
 from ...attach import properties
+from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...deform import session
@@ -18,41 +20,20 @@ from . import (
     heat_view,
     measures,
     redraw,
-    shown_colours,
 )
 
-CLASSES = (*measures.CLASSES, *heat_panel.CLASSES)
 
-
-def register() -> None:
-    measures.register()
-    measures.Listener.changed = _measures_changed
+def _begin() -> None:
     properties.listeners.heat_changed = _heat_changed
-    # The artist's choices while colours are shown.
-    bpy.types.Mesh.sinew_shown_colours = bpy.props.StringProperty(options={"HIDDEN"})
-    bpy.types.Screen.sinew_colour_types = bpy.props.StringProperty(options={"HIDDEN"})
-    for functions, function in _SUBSCRIPTIONS:
-        functions.append(function)
 
 
-def unregister() -> None:
-    heat_legend.show(False)
-    shown_colours.sync(())
+def _end() -> None:
+    heat_view.activate(())
     for obj in filter(bake_error.is_on, bpy.data.objects):
         if obj.type == "MESH":
             heat_nodes.remove_applied(obj.data)
         properties.clear(obj)
-    for functions, function in _SUBSCRIPTIONS:
-        functions.remove(function)
-    measures.Listener.changed = properties.listeners.heat_changed = None
-    del bpy.types.Mesh.sinew_shown_colours, bpy.types.Screen.sinew_colour_types
-    measures.unregister()
-
-
-def _measures_changed(context: bpy.types.Context) -> None:
-    if not is_rendering_in_window():
-        heat_view.sync_errors()
-    session.refresh(context)
+    properties.listeners.heat_changed = None
 
 
 def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -85,11 +66,23 @@ def _colour(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> 
     heat_map.update(session.states_of(heated, depsgraph), depsgraph)
 
 
-_SUBSCRIPTIONS = (
-    (subscribers.node_group, heat_nodes.group_of),
-    (subscribers.before_removal, _take_off),
-    (subscribers.after_removal, heat_view.tidy),
-    (subscribers.objects_changed, _objects_changed),
-    (subscribers.deformed, _colour),
-    (subscribers.frame_shown, redraw.request),
+FEATURE = Feature(
+    (*measures.CLASSES, *heat_panel.CLASSES),
+    {
+        **measures.PROPERTIES,
+        # The artist's choices while colours are shown.
+        "Mesh.sinew_shown_colours": bpy.props.StringProperty(options={"HIDDEN"}),
+        "Screen.sinew_colour_types": bpy.props.StringProperty(options={"HIDDEN"}),
+    },
+    subscriptions=(
+        (subscribers.node_group, heat_nodes.group_of),
+        (subscribers.before_removal, _take_off),
+        (subscribers.after_removal, heat_view.tidy),
+        (subscribers.objects_changed, _objects_changed),
+        (subscribers.deformed, _colour),
+        (subscribers.frame_shown, redraw.request),
+    ),
+    overlays=(heat_legend.draw,),
+    begin=_begin,
+    end=_end,
 )

@@ -30,17 +30,6 @@ class Content:
 
 # By the session_uid of the measured scene.
 contents: dict[int, Content] = {}
-_handle: object | None = None
-
-
-def show(on: bool) -> None:
-    """Switches the drawing of the legend on or off."""
-    global _handle
-    if on and _handle is None and not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
-    elif not on and _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None
 
 
 def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str]:
@@ -53,7 +42,7 @@ def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str
     return texts
 
 
-def _draw() -> None:
+def draw() -> None:
     context = bpy.context
     content = contents.get(context.scene.session_uid)
     errors = bake_error.legend_of(context.scene) if content is None else None

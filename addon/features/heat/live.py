@@ -15,7 +15,7 @@ import numpy as np
 
 from ...attach import attach, corrective_smooth, properties, stage_settings, upstream_proxy
 from ...core import influences
-from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
+from ...core.metrics import FrameOfRig, Gauge, Measured
 from ...core.skin_stack import SkinStack
 from ...core.spaces import is_same_space, transformed, transformed_axes
 from ...core.stages import StageValues
@@ -238,16 +238,12 @@ def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
 
 
 def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
-    rest_axes, posed_axes, motions = [], [], []
+    rigs = []
     for part, armature in zip(subject.parts, armatures, strict=True):
         bones, frame = part.bound.first_deformer.bones, part.skinned.shown.frames[0]
         at_rest = armature @ bones.rest
-        posed = at_rest if frame is None else armature @ frame.pose
-        rest_axes.append(bone_axes(bones, at_rest))
-        posed_axes.append(bone_axes(bones, posed))
-        # An armature of zero scale moves nothing that could be measured.
-        motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
-    return FrameOfRig(subject.rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
+        rigs.append((bones, at_rest, at_rest if frame is None else armature @ frame.pose))
+    return FrameOfRig.of(subject.rest, rigs)
 
 
 def _world(obj: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> np.ndarray:

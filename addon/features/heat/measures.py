@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import bpy
 
 from ...attach import properties
+from ...attach.updates import is_rendering_in_window
 from ...core.diagnostics import USUAL_INFLUENCES
 from ...core.heat import HeatScale
 from ...core.metrics import METRICS, Metric
+from ...deform import session
 
 PER_FRAME, FIXED = "FRAME", "FIXED"
 # Of meshes that were baked to bones.
@@ -38,15 +38,12 @@ BAKE_ERRORS = {
 QUANTITIES = METRICS | BAKE_ERRORS
 
 
-class Listener:
-    """The function that is called when settings change; set on registration."""
-
-    changed: Callable[[bpy.types.Context], None] | None = None
-
-
 def _changed(_settings: SinewMeasures, context: bpy.types.Context) -> None:
-    if Listener.changed is not None:
-        Listener.changed(context)
+    from . import heat_view
+
+    if not is_rendering_in_window():
+        heat_view.sync_errors()
+    session.refresh(context)
 
 
 class SinewMeasures(bpy.types.PropertyGroup):
@@ -63,15 +60,7 @@ class SinewMeasures(bpy.types.PropertyGroup):
     other: bpy.props.EnumProperty(
         name="Compared with",
         description="What distances are measured to",
-        items=[
-            (
-                properties.BLENDER,
-                properties.method_label(properties.BLENDER),
-                properties.method_description(properties.BLENDER),
-                0,
-            ),
-            *((m.name, m.label, m.description, m.number + 1) for m in properties.METHODS.values()),
-        ],
+        items=properties.method_choices(),
         options=set(),
         update=_changed,
     )
@@ -136,18 +125,15 @@ def clear(scene: bpy.types.Scene) -> None:
 CLASSES = (SinewMeasures,)
 
 
-def register() -> None:
-    bpy.types.Scene.sinew_measures = bpy.props.PointerProperty(type=SinewMeasures)
+PROPERTIES = {
+    "Scene.sinew_measures": bpy.props.PointerProperty(type=SinewMeasures),
     # Not in that group, as this setting is also read in files without anything of Sinew's.
-    bpy.types.Scene.sinew_most_influences = bpy.props.IntProperty(
+    "Scene.sinew_most_influences": bpy.props.IntProperty(
         name="Most Influences",
         description="How many bones may move a vertex before it is reported",
         default=USUAL_INFLUENCES,
         min=1,
         soft_max=8,
         options=set(),
-    )
-
-
-def unregister() -> None:
-    del bpy.types.Scene.sinew_measures, bpy.types.Scene.sinew_most_influences
+    ),
+}

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...attach.updates import is_rendering_in_window
+from ...ui import sidebar
 
 # A panel with numbers was drawn since they last changed, so it is open.
 wanted = False
@@ -17,9 +16,4 @@ def request() -> None:
     if not wanted or is_rendering_in_window():
         return
     wanted = False
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+    sidebar.redraw()

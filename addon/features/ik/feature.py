@@ -1,6 +1,61 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers inverse kinematics: its operator."""
+"""Inverse kinematics: an operator that keys it."""
 
 from __future__ import annotations
 
-from .ik_operator import CLASSES as CLASSES
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+
+from ...attach.feature import Feature
+from ...core import ik as core
+from ...deform import characters
+from ...io import ik_io
+from ...ui import operators, stepped
+from ...ui.translations import tr
+from ..action_copy.feature import OnArmature, selected_bones
+from . import ik_bake
+
+
+class SINEW_OT_bake_ik(OnArmature, stepped.WithDialog, bpy.types.Operator):
+    bl_idname = "sinew.bake_ik"
+    bl_label = "Bake Sinew IK"
+    bl_description = (
+        "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in "
+        "a copy of the action; the constraints are muted until Original Action"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    saying = "Sinew solves inverse kinematics"
+
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How the rotations are found",
+        items=[(name, label, text) for name, (label, text) in core.LABELS.items()],
+    )
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH)
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        armature = operators.armatures(context)[0]
+        frames = stepped.frames_over(context.scene, [armature], self.over)
+        self._found: list[ik_bake.Baked] = []
+        with stepped.kept_frame(context.scene, [armature]):
+            trees = ik_io.read_trees(armature, selected_bones(armature))
+            yield from ik_bake.steps(armature, trees, frames, self.method, self._found)
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        # The baked action applies at the current frame, too.
+        characters.set_frame(context.scene, context.scene.frame_float)
+        bones = sum(len(each.tree.bones) for each in self._found)
+        worst = max(float(np.max(each.errors)) for each in self._found)
+        text = tr(
+            "{count} bones keyed; the tips are at most {share} of a chain's length off",
+            count=bones,
+            share=f"{worst:.2%}",
+        )
+        self.report({"INFO"}, text)
+        return {"FINISHED"}
+
+
+FEATURE = Feature((SINEW_OT_bake_ik,))

@@ -1,6 +1,75 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers in-betweens: their operator."""
+"""In-betweens: an operator that keys them."""
 
 from __future__ import annotations
 
-from .inbetween_operator import CLASSES as CLASSES
+from collections.abc import Iterator
+
+import bpy
+
+from ...attach.feature import Feature
+from ...core import inbetween as core
+from ...ui import operators, stepped
+from ...ui.translations import tr
+from ..action_copy.feature import OnArmature, selected_bones
+from . import inbetween_bake
+
+
+class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operator):
+    bl_idname = "sinew.bake_inbetweens"
+    bl_label = "Bake In-betweens"
+    bl_description = (
+        "Move the selected bones, or all, between the keyed poses of their action by another method than "
+        "curves, by plain keys in a copy of the action"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+    saying = "Sinew keys in-betweens"
+
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How the bones move between the keyed poses of the action",
+        items=[(m.name, m.label, m.description, m.number) for m in core.METHODS.values()],
+        default="qv_slerp",
+    )
+    path: bpy.props.EnumProperty(
+        name="Path",
+        description="Which keyed poses shape the way from one to the next",
+        items=[
+            (
+                core.STRAIGHT,
+                "Key to Key",
+                "The two neighbours, at the pace of the keys' own interpolation",
+            ),
+            (
+                core.SPLINE,
+                "Spline",
+                "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace",
+            ),
+        ],
+    )
+    step: bpy.props.IntProperty(
+        name="Step", description="Frames from one baked key to the next", default=1, min=1, soft_max=12
+    )
+    over: bpy.props.EnumProperty(**{**stepped.OVER_WHICH, "default": "ACTION"})
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        self._baked: list[inbetween_bake.Baked] = []
+        armature, span = operators.armatures(context)[0], None
+        if self.over == "SCENE":
+            frames = stepped.frames_over(context.scene, [armature], self.over)
+            span = (frames[0], frames[-1])
+        only = selected_bones(armature)
+        settings = inbetween_bake.Settings(self.method, self.path, self.step, span, only)
+        yield from inbetween_bake.steps(armature, settings, self._baked)
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        baked = self._baked[0]
+        action = baked.armature.animation_data.action
+        self.report({"INFO"}, tr("{count} bones into {action}", count=baked.bones, action=action.name))
+        for note in baked.notes(self.path):
+            self.report({"WARNING"}, note)
+        context.view_layer.update()
+        return {"FINISHED"}
+
+
+FEATURE = Feature((SINEW_OT_bake_inbetweens,))

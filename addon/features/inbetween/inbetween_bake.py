@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 import bpy
@@ -59,7 +59,7 @@ def steps(armature: bpy.types.Object, settings: Settings, found: list[Baked]) ->
     with action_copy.playing(armature, core.METHODS[settings.method].label):
         poses = keyed_poses.read(armature, settings.only)
         baked = Baked(armature, left=poses.left)
-        wanted = [_times(group, poses.curves, settings) for group in poses.groups]
+        wanted = [_times(group, settings) for group in poses.groups]
         baked.bones = sum(
             len(group.rows) for group, times in zip(poses.groups, wanted, strict=True) if len(times)
         )
@@ -80,10 +80,10 @@ def steps(armature: bpy.types.Object, settings: Settings, found: list[Baked]) ->
             yield (number + 1) / len(times)
         for group, own_times in zip(poses.groups, wanted, strict=True):
             values = np.array(samples)[np.searchsorted(times, own_times)]
-            for number, bone, column in zip(group.curves, group.bones, group.columns, strict=True):
+            for curve, bone, column in zip(group.curves, group.bones, group.columns, strict=True):
                 if len(own_times):
                     row = group.rows[bone]
-                    _write_keys(poses.curves[number], group, int(bone), own_times, values[:, row, column])
+                    _write_keys(curve, group, int(bone), own_times, values[:, row, column])
     found.append(baked)
 
 
@@ -94,12 +94,12 @@ _OUTER = (
 )
 
 
-def _times(group: keyed_poses.Group, curves: Sequence[bpy.types.FCurve], settings: Settings) -> np.ndarray:
+def _times(group: keyed_poses.Group, settings: Settings) -> np.ndarray:
     """Returns the times of the keys that a group's bones get, float32: the frames, and the artist's keys."""
     keys, outside = group.times, []
     if settings.range is not None:
         keys = keys[(keys >= settings.range[0]) & (keys <= settings.range[1])]
-    elif any(_extrapolates(curves[number]) for number in group.curves):
+    elif any(map(_extrapolates, group.curves)):
         # A curve with linear extrapolation takes its slope from the last two keys.
         outside = [keys[0] - 1.0, keys[-1] + 1.0]
     if len(keys) < 2:

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,9 +13,6 @@ import numpy as np
 from ...core import inbetween as core
 from ...io import actions, pose_io
 
-# The number of keyed poses that are kept: those that playback uses now and soon.
-KEPT = 8
-
 
 @dataclass
 class Group:
@@ -25,7 +21,7 @@ class Group:
     times           [keys]
     rows, modes     [bones], their index in the pose, and their rotation mode
     keyed           [bones, 10], the channels that have curves
-    curves          [curves], their indices among all curves
+    curves          their curves
     bones, columns  [curves], the channel that each moves, as indices of `keyed`
     still           [keys, bones], whether a bone holds its pose until the next key
     gains           [2], how much the channels [bones, 10] increase in a cycle of the keys, before the first
@@ -37,29 +33,23 @@ class Group:
     rows: np.ndarray
     modes: np.ndarray
     keyed: np.ndarray
-    curves: list[int]
+    curves: list[bpy.types.FCurve]
     bones: np.ndarray
     columns: np.ndarray
     still: np.ndarray
     gains: tuple[np.ndarray | None, np.ndarray | None]
-    poses: OrderedDict[int, np.ndarray] = field(default_factory=OrderedDict)
+    poses: dict[int, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass
 class KeyedPoses:
     """What was read of a slot for an armature; valid until the action changes.
 
-    curves  all of the slot
-    left    bones that keep their curves, each with the reason
+    left  bones that keep their curves, each with the reason
     """
 
-    curves: list[bpy.types.FCurve]
     groups: list[Group]
     left: dict[str, str]
-
-    @property
-    def bones(self) -> int:
-        return sum(len(group.rows) for group in self.groups)
 
 
 @dataclass
@@ -95,8 +85,6 @@ def read(armature: bpy.types.Object, only: Collection[str] | None = None) -> Key
     """Reads the keyed poses of the action that an armature plays, of all bones or only of some."""
     action, slot = actions.playing(armature)
     rotations = pose_io.rotation_properties(armature.pose.bones)
-    everything = actions.all_curves(action, slot)
-    numbers = {actions.key_of(curve): number for number, curve in enumerate(everything)}
     rows = {name: row for row, name in enumerate(rotations)}
     found: dict[object, list[_Bone]] = {}
     left = {}
@@ -110,7 +98,7 @@ def read(armature: bpy.types.Object, only: Collection[str] | None = None) -> Key
             continue
         bone = _Bone.read(armature.pose.bones[name], rows[name], pairs)
         found.setdefault(bone.likeness, []).append(bone)
-    return KeyedPoses(everything, [_group(bones, numbers) for bones in found.values()], left)
+    return KeyedPoses([_group(bones) for bones in found.values()], left)
 
 
 class _Bone(NamedTuple):
@@ -138,7 +126,7 @@ class _Bone(NamedTuple):
         return (self.times.tobytes(), *(gain is None for gain in self.gains))
 
 
-def _group(bones: list[_Bone], numbers: dict[tuple[str, int], int]) -> Group:
+def _group(bones: list[_Bone]) -> Group:
     owners = [number for number, bone in enumerate(bones) for _pair in bone.pairs]
     columns = [channel.column for bone in bones for _curve, channel in bone.pairs]
     keyed = np.zeros((len(bones), pose_io.CHANNELS), dtype=bool)
@@ -154,7 +142,7 @@ def _group(bones: list[_Bone], numbers: dict[tuple[str, int], int]) -> Group:
         rows=np.array([bone.row for bone in bones]),
         modes=np.array([bone.mode for bone in bones]),
         keyed=keyed,
-        curves=[numbers[actions.key_of(curve)] for bone in bones for curve, _channel in bone.pairs],
+        curves=[curve for bone in bones for curve, _channel in bone.pairs],
         bones=np.array(owners),
         columns=np.array(columns),
         still=np.array([bone.still for bone in bones]).T,
@@ -168,15 +156,14 @@ def pose_at(armature: bpy.types.Object, poses: KeyedPoses, time: float, method: 
     poses   from read()
     method  of core.METHODS
     """
-    curves = poses.curves
     channels = pose_io.read_channels(armature.pose.bones)
     pose, names = Pose(channels), armature.pose.bones.keys()
     for group in poses.groups:
-        values = [curves[number].evaluate(time) for number in group.curves]
+        values = [curve.evaluate(time) for curve in group.curves]
         channels[group.rows[group.bones], group.columns] = values
         span = span_at(group, time)
         if span is not None:
-            found, is_far = _between(group, span, curves, channels[group.rows], method, path)
+            found, is_far = _between(group, span, channels[group.rows], method, path)
             channels[group.rows] = np.where(group.keyed, found, channels[group.rows])
             pose.far += [names[row] for row in group.rows[is_far]]
     return pose
@@ -212,18 +199,13 @@ def _repeats(group: Group, number: int) -> bool:
 
 
 def _between(
-    group: Group,
-    span: Span,
-    curves: Sequence[bpy.types.FCurve],
-    now: np.ndarray,
-    method: str,
-    path: str,
+    group: Group, span: Span, now: np.ndarray, method: str, path: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """float64 [bones, 10], and which bones rotate too far, [bones]; `now` [bones, 10] is Blender's pose."""
     # A channel without keys has its current value at all of them.
     keys = np.stack(
         [
-            np.where(group.keyed, _channels_at(group, curves, key, number), now)
+            np.where(group.keyed, _channels_at(group, key, number), now)
             for key, number in zip(span.keys, span.rounds, strict=True)
         ]
     )
@@ -242,18 +224,13 @@ def _between(
     return channels, ~found.is_defined | ((group.modes != "QUATERNION") & (angles > np.pi + 1e-4))
 
 
-def _channels_at(
-    group: Group, curves: Sequence[bpy.types.FCurve], key: int, number_of_round: int
-) -> np.ndarray:
+def _channels_at(group: Group, key: int, number_of_round: int) -> np.ndarray:
     """float64 [bones, 10]: the channels at a key, in a cycle of the keys."""
     channels = group.poses.get(key)
     if channels is None:
-        channels = np.zeros(group.keyed.shape)
+        channels = group.poses[key] = np.zeros(group.keyed.shape)
         time = float(group.times[key])
-        channels[group.bones, group.columns] = [curves[number].evaluate(time) for number in group.curves]
-        group.poses[key] = channels
-        if len(group.poses) > KEPT:
-            group.poses.popitem(last=False)
+        channels[group.bones, group.columns] = [curve.evaluate(time) for curve in group.curves]
     if number_of_round == 0:
         return channels
     return channels + number_of_round * group.gains[number_of_round > 0]

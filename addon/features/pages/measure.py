@@ -22,7 +22,7 @@ from ...core.diagnostics import Finding, PoseCheck, check_weights
 from ...core.errors import SinewError
 from ...core.influences import GroupWeights, Influences, entries_of_bones
 from ...core.influences import joined as influences_of_all
-from ...core.metrics import FrameOfRig, Gauge, Summary, bone_axes
+from ...core.metrics import FrameOfRig, Gauge, Summary
 from ...core.rig import Bones, Weighting
 from ...core.spaces import transformed
 from ...core.surface import joined
@@ -253,13 +253,9 @@ def _bone_matrices(part: Part) -> np.ndarray:
 def _frame_of_rig(
     subject: Subject, rest: tuple[np.ndarray, list[np.ndarray]], pose: list[np.ndarray]
 ) -> FrameOfRig:
-    rest_axes, posed_axes, motions = [], [], []
-    for part, at_rest, posed in zip(subject.parts, rest[1], pose, strict=True):
-        rest_axes.append(bone_axes(part.weighting.bones, at_rest))
-        posed_axes.append(bone_axes(part.weighting.bones, posed))
-        # An armature of zero scale moves nothing that could be measured.
-        motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
-    return FrameOfRig(rest[0], *map(np.concatenate, (rest_axes, posed_axes, motions)))
+    points, at_rest = rest
+    bones = [part.weighting.bones for part in subject.parts]
+    return FrameOfRig.of(points, zip(bones, at_rest, pose, strict=True))
 
 
 def _check_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:

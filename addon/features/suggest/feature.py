@@ -1,14 +1,152 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers suggestions: a panel and its buttons. Nothing is stored in files."""
+"""Suggestions: a panel with the best methods at each measure, or all in order, and a click to use one.
+Nothing is stored in files."""
 
-from .suggest_panel import CLASSES as CLASSES
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+from ...attach import properties
+from ...attach.feature import Feature
+from ...core.suggestion import CRITERIA, Criterion, Suggestion, Worst
+from ...io import units
+from ...ui import operators, stepped
+from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.sidebar import Sidebar, draw_text
+from ...ui.translations import counted, tr
+from . import suggest
+
+BEST = "best"
+# Several methods can be equally good.
+MOST_BEST = 3
 
 
-def register() -> None:
-    pass
+class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
+    bl_idname = "sinew.suggest"
+    bl_label = "Suggest a Method"
+    bl_description = (
+        "Measure what every method would make of the frames, and say which is best at what. The method stays "
+        "as it is"
+    )
+    bl_options = {"REGISTER"}
+    saying = "Sinew measures every method"
+
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        return suggest.scan(context.scene, sinew_targets(context), self.over)
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        self.report({"INFO"}, suggest.suggestions[context.scene.session_uid].text)
+        return {"FINISHED"}
 
 
-def unregister() -> None:
-    from .suggest import suggestions
+class SINEW_OT_suggestions_by(bpy.types.Operator):
+    bl_idname = "sinew.suggestions_by"
+    bl_label = "Suggestions by Measure"
+    bl_description = "Show the best methods at each measure, or all methods in the order of one"
+    bl_options = {"INTERNAL"}
 
-    suggestions.clear()
+    measure: bpy.props.EnumProperty(
+        name="Measure",
+        description="What the methods are compared by",
+        items=(
+            (BEST, "Best at Each Measure", "The best methods at each measure, with their worst value"),
+            *((criterion.name, criterion.label, criterion.text) for criterion in CRITERIA),
+        ),
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        _View.measure = self.measure
+        return {"FINISHED"}
+
+
+class _View:
+    """What the panel shows: BEST, or a criterion's name."""
+
+    measure = BEST
+
+
+class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
+    bl_label = "Suggest"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.active = operators.are_any_on(context)
+        layout.operator_menu_enum("sinew.suggest", "over", text="Measure All Methods", icon="VIEWZOOM")
+        suggestion = suggest.suggestions.get(context.scene.session_uid)
+        if suggestion is None:
+            return
+        count = len(suggestion.frames)
+        draw_text(
+            layout, context, counted(count, "The worst of {count} frame", "The worst of {count} frames")
+        )
+        used = {properties.of(obj).method for obj in sinew_targets(context)}
+        criterion = next((c for c in CRITERIA if c.name == _View.measure), None)
+        text = "Best at Each Measure" if criterion is None else criterion.label
+        layout.operator_menu_enum("sinew.suggestions_by", "measure", text=text, icon="SORTSIZE")
+        if criterion is None:
+            _draw_best(layout, context, suggestion, used)
+        else:
+            draw_text(layout, context, criterion.text)
+            _draw_order(layout, context, suggestion, criterion, used)
+
+
+def _draw_best(
+    layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, used: set[str]
+) -> None:
+    """used: the methods of the objects that the panel is about"""
+    for criterion in CRITERIA:
+        best = suggestion.best(criterion)
+        row = layout.split(factor=0.45)
+        measured = suggestion.order(criterion)
+        value = _value(context, suggestion, criterion, measured[0])
+        row.label(text=f"{tr(criterion.label)} {value}", translate=False)
+        column = row.column(align=True)
+        for method in best[:MOST_BEST]:
+            _draw_method(column, suggestion, method, used)
+        if len(best) > MOST_BEST:
+            column.label(text=tr("and {count} more", count=len(best) - MOST_BEST), translate=False)
+        elif not best and (measured[0], criterion.name) in suggestion.worst:
+            column.label(text="All alike")
+
+
+def _draw_order(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    suggestion: Suggestion,
+    criterion: Criterion,
+    used: set[str],
+) -> None:
+    best = suggestion.best(criterion)
+    column = layout.column(align=True)
+    for method in suggestion.order(criterion):
+        row = column.split(factor=0.64, align=True)
+        _draw_method(row, suggestion, method, used)
+        value = _value(context, suggestion, criterion, method)
+        row.label(text=value, icon="CHECKMARK" if method in best else "BLANK1", translate=False)
+
+
+def _draw_method(layout: bpy.types.UILayout, suggestion: Suggestion, method: str, used: set[str]) -> None:
+    text = suggestion.methods[method]
+    layout.operator("sinew.use_method", text=text, depress=method in used).method = method
+
+
+def _value(context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion, method: str) -> str:
+    return value_text(context.scene, criterion, suggestion.worst.get((method, criterion.name)))
+
+
+def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:
+    if worst is None:
+        return tr("none")
+    if criterion.unit == "count":
+        return f"{worst.value:,.0f}"
+    return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")
+
+
+FEATURE = Feature(
+    (SINEW_OT_suggest, SINEW_OT_suggestions_by, SINEW_PT_suggest), end=suggest.suggestions.clear
+)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import bpy
 import numpy as np
+from mathutils.bvhtree import BVHTree
 
 from ...attach import properties
 from ...core.metrics import Measured, Shape
@@ -14,7 +15,21 @@ from ...core.suggestion import CRITERIA, Suggestion
 from ...ui import stepped
 from ..heat import live
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
-from .crossings import crossing_triangles
+
+
+def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> set[tuple[int, int]]:
+    """Returns pairs of triangles that cross and share no vertex, the lower index first.
+
+    points     [vertices, 3]
+    triangles  int [triangles, 3]
+    """
+    tree = BVHTree.FromPolygons(points.tolist(), triangles.tolist(), all_triangles=True)
+    pairs = np.array(tree.overlap(tree), dtype=np.int64).reshape(-1, 2)
+    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
+    first, second = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
+    apart = ~(first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
+    return set(map(tuple, pairs[apart].tolist()))
+
 
 # Counting crossings takes longer than everything else together, so it is done only at this many frames,
 # evenly distributed.
