@@ -742,65 +742,47 @@ def _is_below(parents, bone):
     return bone == 2
 
 
+def skeleton_keys(name, dtype):
+    """A skeleton, keys [KEYS, BONES, ..] in this layout, their times, and times to evaluate."""
+    keys = motions(109).of(name, dtype)[: KEYS * BONES]
+    keys = keys.reshape(KEYS, BONES, *keys.shape[1:])
+    times = np.array([0, 1, 3, 3, 4, 7], dtype)
+    return sinew.Skeleton(skeletons()[0]), keys, times, np.array([-1, 0, 0.25, 2, 3, 3.5, 6.75, 7, 9], dtype)
+
+
+# Each bone of a skeleton gets the bits of the function that is compared with 50 digits above.
+
+
 def skeleton_interpolate(_name, _function):
-    a, b, t = between_cases()
-    for method in sinew.interpolate.METHODS:
-        name = LAYOUT_OF[method]
-        want, size, cancels, _is_defined = between_wanted(method)
+    for method, name in LAYOUT_OF.items():
         for dtype in FLOATS:
-            first, second = of_groups(a, name, dtype), of_groups(b, name, dtype)
-            one = sinew.interpolate.between(a.of(name, dtype), b.of(name, dtype), t.astype(dtype), method)
-            got = []
-            for g in range(GROUPS):
-                skeleton = sinew.Skeleton(skeletons()[g])
-                bones, defined = skeleton.interpolate(first[g], second[g], dtype(t[g * BONES]), method)
-                assert bool(defined) == one.is_defined.reshape(GROUPS, BONES)[g].all()
-                got.append(bones)
-            agree_blend(np.concatenate(got), name, want, size, cancels, one.is_defined)
+            skeleton, keys, _times, at = skeleton_keys(name, dtype)
+            bones, defined = skeleton.interpolate(keys[0], keys[1], at, method)
+            want = sinew.interpolate.between(keys[0], keys[1], at[:, None], method)
+            np.testing.assert_array_equal(bones, want.transforms)
+            np.testing.assert_array_equal(defined, want.is_defined.all(axis=1))
 
 
-def _skeleton_curves(name, dtype, run):
-    """The results [COUNT, ..] in the order of spline_wanted(), from run(skeleton, keyframes, times, at)
-    for BONES curves at once."""
-    cases, times, at = spline_cases()
-    keys = getattr(cases, name)
-    keys = keys.reshape(CURVES // BONES, BONES, KEYS, *keys.shape[1:]).swapaxes(1, 2)
-    found, defined = [], []
-    for g in range(CURVES // BONES):
-        skeleton = sinew.Skeleton(skeletons()[g])
-        bones, is_defined = run(
-            skeleton, keys[g].astype(dtype), times[g * BONES].astype(dtype), at[g * BONES].astype(dtype)
-        )
-        found.append(np.swapaxes(bones, 0, 1))
-        defined.append(np.repeat(is_defined[None], BONES, axis=0))
-    got = np.concatenate(found)
-    return got.reshape(COUNT, *got.shape[2:]), np.concatenate(defined).reshape(COUNT)
+def agree_by_bone(result, of_bone):
+    for bone in range(BONES):
+        np.testing.assert_array_equal(result[0][:, bone], of_bone[bone].transforms)
+    np.testing.assert_array_equal(result[1], np.all([each.is_defined for each in of_bone], axis=0))
 
 
 def skeleton_spline(_name, _function):
-    for method in sinew.interpolate.METHODS:
+    for method, name in LAYOUT_OF.items():
         for dtype in FLOATS:
-            got, defined = _skeleton_curves(
-                LAYOUT_OF[method],
-                dtype,
-                lambda skeleton, keys, times, at, method=method: skeleton.spline(keys, times, at, method),
-            )
-            # Compared with 50 digits above.
-            bones, is_defined = of_curves(method, dtype)
-            np.testing.assert_array_equal(got, bones)
-            of_bones = is_defined.reshape(CURVES // BONES, BONES, TIMES).all(axis=1)
-            np.testing.assert_array_equal(defined, np.repeat(of_bones[:, None], BONES, axis=1).reshape(COUNT))
+            skeleton, keys, *when = skeleton_keys(name, dtype)
+            want = [sinew.spline.catmull_rom(keys[:, bone], *when, method) for bone in range(BONES)]
+            agree_by_bone(skeleton.spline(keys, *when, method), want)
 
 
 def skeleton_spline_vector(_name, _function):
     for name in LAYOUTS:
-        want, size = vector_wanted(name)
         for dtype in FLOATS:
-            got, defined = _skeleton_curves(
-                name, dtype, lambda skeleton, keys, times, at: skeleton.spline_vector(keys, times, at)
-            )
-            assert defined.all()
-            agree_motions(got, name, want, size, signed=True)
+            skeleton, keys, *when = skeleton_keys(name, dtype)
+            want = [sinew.spline.catmull_rom_vector(keys[:, bone], *when) for bone in range(BONES)]
+            agree_by_bone(skeleton.spline_vector(keys, *when), want)
 
 
 BLENDS = {

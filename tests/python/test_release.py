@@ -58,6 +58,20 @@ def test_a_new_version_is_set_everywhere_and_changes_nothing_else(texts):
     assert release.with_version(after, "9.8.8", "2032-01-01")["CITATION.cff"].count("date-released") == 1
 
 
+def test_nothing_else_names_the_version(texts):
+    """Other files that a release would have to change."""
+    named = re.compile(
+        rf"sinew[^\n]{{0,20}}(?<![\d.]){re.escape(release.version_in(texts))}(?![\d.])", re.IGNORECASE
+    )
+    tracked = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
+    ).stdout
+    files = [name for name in tracked.split() if re.search(r"\.(py|md|h|cpp|txt|toml|html)$", name)]
+    found = {name for name in files if named.search((ROOT / name).read_text(encoding="utf-8"))}
+    # Results keep the version that was measured.
+    assert found <= {*release.FILES, "docs/results.md"}
+
+
 @pytest.mark.parametrize(
     "wrong", ["", "1", "1.2", "v1.2.3", "1.2.3rc1", "01.2.3", "1.2.3.4", "1.2.3\n", "1\u0662.0.0"]
 )
