@@ -19,6 +19,7 @@ using test::Mesh;
 using test::Random;
 using test::random_mesh;
 using test::same_bits;
+using test::sheet;
 
 std::vector<Vec3<float>> bent(const Mesh& mesh, std::uint32_t seed) {
     Random random(seed);
@@ -197,20 +198,6 @@ TEST_P(Mushes, threads_change_no_bit) {
             EXPECT_TRUE(same(mushed(mush, points, 1.0f, threads), expected)) << threads;
         }
     }
-}
-
-/// A flat square of `size` by `size` vertices with side 1.
-Mesh sheet(std::int32_t size) {
-    Mesh mesh;
-    for (std::int32_t x = 0; x < size; ++x) {
-        for (std::int32_t y = 0; y < size; ++y) {
-            mesh.rest_points.push_back(Vec3<float>(x, y, 0) / static_cast<float>(size - 1));
-            const std::int32_t v = x * size + y;
-            if (x > 0 && y > 0) mesh.add_face({v - size - 1, v - 1, v, v - size});
-        }
-    }
-    mesh.add_edges_of_faces();
-    return mesh;
 }
 
 // A step across a sheet becomes the integral of a Gaussian: at the distance of its width, erf(1 / sqrt(2)) =

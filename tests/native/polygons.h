@@ -41,6 +41,20 @@ struct Mesh {
     [[nodiscard]] MeshTopology topology() const { return {offsets, corners, edges}; }
 };
 
+/// A flat square of `size` by `size` vertices with side 1.
+inline Mesh sheet(std::int32_t size) {
+    Mesh mesh;
+    for (std::int32_t x = 0; x < size; ++x) {
+        for (std::int32_t y = 0; y < size; ++y) {
+            mesh.rest_points.push_back(Vec3<float>(x, y, 0) / static_cast<float>(size - 1));
+            const std::int32_t v = x * size + y;
+            if (x > 0 && y > 0) mesh.add_face({v - size - 1, v - 1, v, v - size});
+        }
+    }
+    mesh.add_edges_of_faces();
+    return mesh;
+}
+
 /// A sheet of triangles, quads and hexagons, with holes, edges of three faces, and edges and vertices without
 /// faces.
 inline Mesh random_mesh(std::uint32_t seed, std::int32_t size) {

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "polygons.h"
 #include "scene.h"
 #include "sinew/delta_mush.h"
 #include "sinew/ik/solver.h"
@@ -158,49 +159,24 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     EXPECT_LE(in_frames, 5 * 4 * 3 * static_cast<int>(deformers.size()));
 }
 
-/// A square of quads.
-struct Sheet {
-    std::vector<Vec3<float>> points;
-    std::vector<std::int32_t> offsets{0};
-    std::vector<std::int32_t> corners;
-    std::vector<std::int32_t> edges;
-
-    [[nodiscard]] MeshTopology topology() const { return {offsets, corners, edges}; }
-};
-
-Sheet sheet() {
-    constexpr std::int32_t kSize = 150;
-    Sheet made;
-    auto& [points, offsets, corners, edges] = made;
-    for (std::int32_t v = 0; v < kSize * kSize; ++v) {
-        points.emplace_back(v / kSize, v % kSize, v % 3);
-        if (v >= kSize) edges.insert(edges.end(), {v - kSize, v});
-        if (v % kSize > 0) edges.insert(edges.end(), {v - 1, v});
-        if (v < kSize || v % kSize == 0) continue;
-        corners.insert(corners.end(), {v - kSize - 1, v - 1, v, v - kSize});
-        offsets.push_back(static_cast<std::int32_t>(corners.size()));
-    }
-    return made;
-}
-
 TEST(DeltaMush, allocates_nothing_once_it_is_bound) {
-    Sheet mesh = sheet();
-    const DeltaMush mush(mesh.topology(), mesh.points, {});
+    test::Mesh mesh = test::sheet(150);
+    const DeltaMush mush(mesh.topology(), mesh.rest_points, {});
     const int allocations_before = allocations;
-    for (const std::size_t threads : {1, 4, 0}) EXPECT_TRUE(mush.apply(mesh.points, 1.0f, threads));
+    for (const std::size_t threads : {1, 4, 0}) EXPECT_TRUE(mush.apply(mesh.rest_points, 1.0f, threads));
     EXPECT_EQ(allocations, allocations_before);
 }
 
 TEST(Normals, allocate_nothing_once_they_are_made) {
-    const Sheet mesh = sheet();
+    const test::Mesh mesh = test::sheet(150);
     std::vector<std::uint8_t> sharp(mesh.edges.size() / 2);
     sharp[7] = 1;
-    const Normals normals(mesh.topology(), mesh.points.size(), {sharp, {}});
+    const Normals normals(mesh.topology(), mesh.rest_points.size(), {sharp, {}});
     for (const NormalDomain domain : {NormalDomain::vertex, NormalDomain::corner, NormalDomain::face}) {
         std::vector<Vec3<float>> result(normals.count(domain));
         const int allocations_before = allocations;
         for (const std::size_t threads : {1, 4, 0})
-            EXPECT_TRUE(normals.compute(domain, mesh.points, result, threads));
+            EXPECT_TRUE(normals.compute(domain, mesh.rest_points, result, threads));
         EXPECT_EQ(allocations, allocations_before);
         EXPECT_GT(result.back().z, 0.1f);
     }
