@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+import sinew
 from motions import layout, matrix, rigid
 from scipy.spatial.transform import RigidTransform, Rotation
 from sinew import fit
@@ -28,6 +29,31 @@ def by_scipy(source, target, weights):
     middles = [np.average(points, axis=0, weights=weights) for points in (source, target)]
     rotation = Rotation.align_vectors(target - middles[1], source - middles[0], weights=weights)[0]
     return RigidTransform.from_components(middles[1] - rotation.apply(middles[0]), rotation).as_matrix()
+
+
+@SOLVERS
+def test_directions_count_as_scipys_vectors(method):
+    rng = np.random.default_rng(2)
+    vectors = rng.normal(size=(200, 5, 3))
+    rotations = Rotation.random(200, rng=rng)
+    moved = np.einsum("cij,cpj->cpi", rotations.as_matrix(), vectors) + 0.1 * rng.normal(size=vectors.shape)
+    unit = [array / np.linalg.norm(array, axis=2, keepdims=True) for array in (vectors, moved)]
+    weights = rng.uniform(0.1, 2.0, (200, 5))
+    result = fit.rigid(
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+        source_directions=vectors,
+        target_directions=3 * moved,
+        direction_weights=weights,
+        method=method,
+    )
+    assert result.is_defined.all()
+    want = [
+        Rotation.align_vectors(b, a, weights=w)[0].as_matrix() for a, b, w in zip(*unit, weights, strict=True)
+    ]
+    got = matrix(result.transforms, LAYOUT_OF[method])
+    np.testing.assert_allclose(got[:, :3, :3], want, rtol=0, atol=1e-12)
+    assert (got[:, :3, 3] == 0).all()
 
 
 @SOLVERS
@@ -131,6 +157,56 @@ def test_the_smallest_and_largest_coordinates(method, size, dtype):
     got[:3, 3] /= size
     assert result.is_defined
     np.testing.assert_allclose(got, want, atol=1e-3 if dtype == "f4" else 1e-9)
+
+
+def hand_eye_reference(a, b):
+    """Daniilidis 1999, eqs. 31 to 36: x as [8] from dual quaternions [n, 8]."""
+
+    def cross(v):
+        return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+    rows = []
+    for p, q in zip(a, b, strict=True):
+        p, q = p * np.sign(p[0]), q * np.sign(q[0])
+        real = np.column_stack([p[1:4] - q[1:4], cross(p[1:4] + q[1:4])])
+        dual = np.column_stack([p[5:] - q[5:], cross(p[5:] + q[5:])])
+        rows += [np.hstack([real, np.zeros((3, 4))]), np.hstack([dual, real])]
+    v7, v8 = np.linalg.svd(np.vstack(rows))[2][6:]
+    roots = np.roots([v7[:4] @ v7[4:], v7[:4] @ v8[4:] + v8[:4] @ v7[4:], v8[:4] @ v8[4:]]).real
+    found = max((s * v7 + v8 for s in roots), key=lambda v: np.linalg.norm(v[:4]) / np.linalg.norm(v))
+    return found / np.linalg.norm(found[:4]) * np.sign(found[0])
+
+
+def motions_of_two(rng, count, motions, noise=0.0):
+    """Motions of one body, those of the other, and x: a x = x b up to noise."""
+    x = rigid(rng, count)
+    a = [rigid(rng, count) for _ in range(motions)]
+    b = [x.inv() * each * x for each in a]
+    if noise:
+        twists = rng.normal(size=(motions, count, 6)) * noise
+        b = [each * RigidTransform.from_exp_coords(t) for each, t in zip(b, twists, strict=True)]
+    stacked = [np.stack([layout(each, "dual_quat") for each in of], axis=1) for of in (a, b)]
+    return *stacked, x
+
+
+def test_hand_eye_of_noisy_motions_is_that_of_the_paper():
+    a, b, _ = motions_of_two(np.random.default_rng(9), 200, 8, noise=0.01)
+    for i in range(200):
+        # Rotations by 180 degrees have signs that noise decides, which the formulas do not determine.
+        clear = (np.abs(a[i, :, 0]) > 0.05) & (np.abs(b[i, :, 0]) > 0.05)
+        p, q = a[i, clear], b[i, clear]
+        # The paper's rows depend on the unit of length; Sinew's do not.
+        longest = max(np.linalg.norm(sinew.dual_quat.to_quat_vec(e)[:, 4:], axis=1).max() for e in (p, q))
+        scale = np.repeat([1, 1 / longest], 4)
+        want = hand_eye_reference(p * scale, q * scale) / scale
+        got = matrix(fit.hand_eye(p, q).transforms, "dual_quat")
+        rotation = matrix(want, "dual_quat")[:3, :3]
+        np.testing.assert_allclose(got[:3, :3], rotation, atol=1e-11)
+        # The paper's translation does not minimise the remaining squares; Sinew's does.
+        a_motions, b_motions = matrix(p, "dual_quat"), matrix(q, "dual_quat")
+        rows = np.vstack(a_motions[:, :3, :3] - np.eye(3))
+        right = np.concatenate(b_motions[:, :3, 3] @ rotation.T - a_motions[:, :3, 3])
+        np.testing.assert_allclose(got[:3, 3], np.linalg.lstsq(rows, right, rcond=None)[0], atol=1e-10)
 
 
 def test_hand_eye_of_parallel_axes_is_not_defined():

@@ -37,6 +37,18 @@ def test_broadcasts_one_against_many(method):
     np.testing.assert_array_equal(blends.transforms[1, 2], blend(table[1], weights[2], method).transforms)
 
 
+@ALL
+def test_repeated_transforms_count_with_all_their_weights(method):
+    name, order = LAYOUT_OF[method], np.array([0, 1, 2, 1, 0, 2, 2, 0])
+    rng = np.random.default_rng(4)
+    twists = np.column_stack([rng.uniform(-0.5, 0.5, (3, 3)), rng.uniform(-2, 2, (3, 3))])
+    three = layout(rigid(rng) * RigidTransform.from_exp_coords(twists), name)
+    weights = rng.uniform(0.05, 1.0, len(order))
+    many = blend(three[order], weights, method).transforms
+    once = blend(three, np.bincount(order, weights), method).transforms
+    close(matrix(many, name), matrix(once, name), 1e-12)
+
+
 # Input without a unique result: the result is finite and marked as not defined.
 @ALL
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -39,10 +39,22 @@ def expected_of(points, mesh, sharp, domain):
     return reference.corner_normals(points, faces, edges, **sharp)
 
 
+def with_large_faces(mesh):
+    """Adds polygons of up to 70 corners."""
+    points, faces, edges = mesh
+    for count in (5, 7, 8, 9, 32, 33, 70):
+        turn = 2 * np.pi * np.arange(count) / count
+        ring = len(points) + np.arange(count)
+        points = np.vstack([points, np.stack([np.cos(turn), np.sin(turn), 0.1 * np.cos(3 * turn)], axis=1)])
+        faces = [*faces, ring.tolist()]
+        edges = np.vstack([edges, np.stack([ring, np.roll(ring, -1)], axis=1)])
+    return points.astype(np.float32), faces, np.sort(edges, axis=1).astype(np.int32)
+
+
 @pytest.mark.parametrize("share", [(0.2, 0.1), (0.7, 0.0), (0.0, 0.4)])
 @pytest.mark.parametrize("domain", DOMAINS)
 def test_agrees_with_the_reference(domain, share):
-    mesh = mesh_of(1)
+    mesh = with_large_faces(mesh_of(1))
     sharp = sharp_of(mesh, *share)
     points = bent(mesh[0])
     normals = normals_of(mesh, **sharp)
