@@ -856,14 +856,12 @@ class SinewSide:
                 curve.mute |= bool(names) and all(name.startswith("sinew_") for name in names)
         elif what == "group":
             modifier.node_group = None
-        elif modifier.node_group is None:
-            return
-        elif what == "sockets":
-            modifier.node_group.interface.clear()
-        elif what == "socket":
-            modifier.node_group.interface.items_tree[0].name = "Renamed"
-        else:
+        elif what in ("nodes", "links") and modifier.node_group is not None:
             getattr(modifier.node_group, what).clear()
+        elif what == "sockets" and modifier.node_group is not None:
+            modifier.node_group.interface.clear()
+        elif what == "socket" and modifier.node_group is not None:
+            modifier.node_group.interface.items_tree[0].name = "Renamed"
 
     def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
         pass
