@@ -258,6 +258,7 @@ def _of_modifier(name):
     found = scenes.final_points(obj)
     if scenes.worst(given, found) > scenes.TOLERANCE * scenes.diagonal(obj):
         _print_inputs(obj)
+        _print_what_was_deformed(obj, given, found)
     modifier.use_deform_preserve_volume = own
     properties.of(obj).enabled = True
     return found
@@ -276,6 +277,20 @@ def _print_inputs(obj):
     current, state = session.current, session.state_of(obj)
     print("depsgraph seen", current.depsgraph == depsgraph.as_pointer(), "plan", state and state.plan)
     print("missed", current.missed, "expected", current.expected, "waiting", current.waiting)
+
+
+def _print_what_was_deformed(obj, given, found):
+    """Of two shapes that it had just before, the one that the modifier got instead of the rest shape."""
+    twin = bpy.data.objects.new("Twin", obj.data.copy())
+    bpy.context.scene.collection.objects.link(twin)
+    modifier = twin.modifiers.new("Armature", "ARMATURE")
+    modifier.object = attach.armature_of(obj)
+    for name, points in (("Sinew's shape", given), ("its linear shape", scenes.final_points(twin))):
+        twin.data.vertices.foreach_set("co", points.ravel())
+        modifier.use_deform_preserve_volume = True
+        twin.data.update()
+        print(name, "deformed differs by", scenes.worst(scenes.final_points(twin), found))
+    bpy.data.objects.remove(twin)
 
 
 def _points_of(mesh):
