@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -44,7 +45,7 @@ def deform(
     if differs or is_first or not is_stored:
         _store(obj, skinned)
     if differs or is_first:
-        shown.milliseconds = 1000.0 * (time.perf_counter() - started)
+        skinned.shown = replace(shown, milliseconds=1000.0 * (time.perf_counter() - started))
 
 
 def _store(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
@@ -66,12 +67,13 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
         settings = properties.of(obj)
     modifiers = list(zip(settings.replaced_modifiers, armatures, strict=False))
     frames = pose.read(evaluated, settings, modifiers, skinned, depsgraph.mode)
-    shown = skinned.shown
-    shown.frames = frames
-    shown.rest_points = source.rest_points(obj, skinned.bound.source, depsgraph)
-    shown.stage_values = pose.stage_values(settings)
-    differs = skinned.bound.skin_stack.deform(shown.rest_points, frames, values=shown.stage_values)
-    shown.number += differs
+    rest_points = source.rest_points(obj, skinned.bound.source, depsgraph)
+    values = pose.stage_values(settings)
+    differs = skinned.bound.skin_stack.deform(rest_points, frames, values=values)
+    number = skinned.shown.number + differs
+    skinned.shown = replace(
+        skinned.shown, frames=frames, rest_points=rest_points, stage_values=values, number=number
+    )
     return differs
 
 

@@ -7,16 +7,6 @@ from collections.abc import Callable, Mapping
 
 import bpy
 
-# Blender 4.2 has no event for imported objects: there each frame has to be checked.
-IMPORTS_ARE_ANNOUNCED = hasattr(bpy.app.handlers, "blend_import_post")
-
-
-# Sinew's functions at a change of frame, by event (handlers.py); subscribed only where there is something to
-# do.
-FRAME_HANDLERS: dict[str, Callable] = {}
-# Functions that suspend modifiers after all other functions, and restore them before any other.
-GATE_HANDLERS: dict[str, Callable] = {}
-
 _OURS = __package__.rpartition(".")[0]
 
 # At these events others can change meshes while Sinew works.

@@ -56,19 +56,17 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
 def _react_to_update(depsgraph: bpy.types.Depsgraph) -> None:
     with reaction() as may_react:
         if current.is_idle:
-            if may_react:
-                session.unsubscribe_from_frames()
             return
         original = originals.finder("depsgraph_update_post", on_depsgraph_update)
         _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
-        if may_react:
-            session.unsubscribe_from_frames()
     _end_event()
     _note_seen("depsgraph_update_post", depsgraph)
 
 
 @persistent
 def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    if current.all_use_builtin:
+        return
     _subscribe_behind_others("frame_change_post", on_frame_change)
     _begin_evaluation()
     if is_rendering_in_window():
@@ -77,7 +75,7 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
         events.call_last("frame_change_pre", suspend_modifiers)
         events.call_first("frame_change_post", restore_modifiers)
     else:
-        events.unsubscribe_all(events.GATE_HANDLERS)
+        events.unsubscribe_all(_GATE)
 
 
 @persistent
@@ -259,9 +257,14 @@ def check_unannounced() -> float:
 # --- Registration
 
 _LAST = (after_others, after_others_again)
-events.FRAME_HANDLERS.update(frame_change_pre=before_frame_change, frame_change_post=on_frame_change)
-events.GATE_HANDLERS.update(frame_change_pre=suspend_modifiers, frame_change_post=restore_modifiers)
-_HANDLERS = {"depsgraph_update_pre": before_update, "depsgraph_update_post": on_depsgraph_update}
+# Functions that suspend modifiers after all other functions, and restore them before any other.
+_GATE = {"frame_change_pre": suspend_modifiers, "frame_change_post": restore_modifiers}
+_HANDLERS = {
+    "depsgraph_update_pre": before_update,
+    "depsgraph_update_post": on_depsgraph_update,
+    "frame_change_pre": before_frame_change,
+    "frame_change_post": on_frame_change,
+}
 
 
 def register() -> None:
@@ -279,7 +282,7 @@ def unregister() -> None:
     session.forget()
     if bpy.app.timers.is_registered(check_unannounced):
         bpy.app.timers.unregister(check_unannounced)
-    for handlers in (_HANDLERS, events.FRAME_HANDLERS, events.GATE_HANDLERS):
+    for handlers in (_HANDLERS, _GATE):
         events.unsubscribe_all(handlers)
     for event in ("frame_change_post", "depsgraph_update_post"):
         for function in _LAST:

@@ -20,7 +20,7 @@ from ..attach import point_store, properties
 from ..io import mesh_io
 from . import pose, source
 from .plan import State
-from .skinned_object import SkinnedObject
+from .skinned_object import Shown, SkinnedObject
 
 _NO_NORMALS = np.empty((0, 3), dtype=np.float32)
 
@@ -100,17 +100,15 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     rest_points = source.evaluated_points(evaluated, mesh, bound.source)
     if rest_points is None:
         return "what modifiers in front make of its mesh changed"
-    shown, values = skinned.shown, pose.stage_values(settings)
+    values = pose.stage_values(settings)
     bound.skin_stack.deform(rest_points, frames, out, values)
-    shown.frames, shown.rest_points, shown.stage_values = frames, rest_points, values
-    shown.number += 1
     if len(normals):
         bound.write_normals(out, rest_points, skinned.plan.normals, normals)
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)
-    shown.first_point = out[0].tobytes()
     skinned.evaluation.succeed(mesh)
-    shown.milliseconds = 1000.0 * (time.perf_counter() - started)
+    number, taken = skinned.shown.number + 1, 1000.0 * (time.perf_counter() - started)
+    skinned.shown = Shown(frames, rest_points, values, out[0].tobytes(), number, taken)
     # An animation can choose a method whose data has not been requested yet.
     is_new_need = skinned.plan.state is not State.WAITING and pose.lacks_data(bound, frames)
     return "what its method needs is not computed" if is_new_need else ""

@@ -73,8 +73,6 @@ def on_loaded(_may_react: bool) -> None:
     note.remove()
     notify(subscribers.loaded)
     if not session.objects_with_sinew(Changes()):
-        session.current.all_use_builtin = True
-        session.unsubscribe_from_frames()
         return
     # This is the file's first evaluation. Like the one that Blender would make, it has to be one of time,
     # too, or poses that differ from their keys would stay.
@@ -82,12 +80,6 @@ def on_loaded(_may_react: bool) -> None:
         if obj.animation_data is not None:
             obj.update_tag(refresh={"TIME"})
     session.refresh(bpy.context)
-
-
-@_handler
-def on_imported(_may_react: bool) -> None:
-    """Importing scripts can change the frame without any other event."""
-    session.subscribe_to_frames()
 
 
 # --- Saving and exporting
@@ -270,8 +262,6 @@ _HANDLERS = {
     "render_complete": on_render_end,
     "render_cancel": on_render_end,
 }
-if events.IMPORTS_ARE_ANNOUNCED:
-    _HANDLERS["blend_import_post"] = on_imported
 
 
 def register() -> None:

@@ -96,26 +96,16 @@ requests = DepsgraphRequests()
 def forget() -> None:
     """Forgets everything: it is read again at the next event."""
     current.gate.restore()
-    current.objects = None
-    subscribe_to_frames()
-    current.depsgraph = 0
-    current.view_layers = set()
-    current.waiting = set()
-    current.missed = None
-    current.seen = None
-    current.expected = set()
-    current.is_after_step = False
-    current.skinned.clear()
-    current.plans.clear()
-    _set_pairs([])
+    # Others refer to `current` itself.
+    vars(current).update(vars(Session(told=current.told)))
+    name_requests()
 
 
 def forget_object(obj: bpy.types.Object) -> None:
     """Forgets an object that Sinew is taken off; others stay bound."""
     gone = _forget_known(obj)
-    current.objects = None
+    current.objects, current.all_use_builtin = None, False
     _set_pairs([(other, state) for other, state in current.pairs if state is not gone])
-    subscribe_to_frames()
 
 
 def forget_for_step(changed: set[int]) -> None:
@@ -192,32 +182,6 @@ def states_of(
     return [(obj, state) for obj, state in pairs if state.shown.frames is not None]
 
 
-# --- Subscribing to changes of frame
-
-
-def subscribe_to_frames() -> None:
-    """Has Blender call Sinew at each change of frame, until it is known that there is nothing to do."""
-    current.all_use_builtin = False
-    events.subscribe_all(events.FRAME_HANDLERS)
-
-
-def _subscribe_to_needed_frames() -> None:
-    if current.objects:
-        events.subscribe("frame_change_post", events.FRAME_HANDLERS["frame_change_post"])
-    if not current.all_use_builtin:
-        events.subscribe("frame_change_pre", events.FRAME_HANDLERS["frame_change_pre"])
-
-
-def unsubscribe_from_frames() -> None:
-    """Removes handlers that are not needed: each Python handler takes 3 to 10 us of a frame."""
-    if current.is_idle and events.IMPORTS_ARE_ANNOUNCED:
-        events.unsubscribe_all(events.FRAME_HANDLERS)
-        events.unsubscribe_all(events.GATE_HANDLERS)
-    elif current.all_use_builtin:
-        events.unsubscribe_all(events.GATE_HANDLERS)
-        events.unsubscribe("frame_change_pre", events.FRAME_HANDLERS["frame_change_pre"])
-
-
 # --- Settings
 
 
@@ -236,7 +200,6 @@ def refresh(context: bpy.types.Context) -> None:
             state.needs_apply = True
         depsgraph = context.evaluated_depsgraph_get()
         update_all(depsgraph, Changes())
-        unsubscribe_from_frames()
         # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
         if bpy.app.background:
             # If no object waits, this evaluation only shows what was just changed: Sinew need not react to
@@ -316,7 +279,6 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         states = [(obj, state_of(obj)) for obj in objects_with_sinew(Changes())]
         _set_pairs([(obj, state) for obj, state in states if state is not None])
         current.all_use_builtin = _do_all_use_builtin()
-        _subscribe_to_needed_frames()
         notify(subscribers.deformed, current.objects or [], depsgraph)
         notify(subscribers.frame_shown)
 

@@ -22,9 +22,9 @@ from .changes import Changes
 from .plan import Plan
 
 
-@dataclass
+@dataclass(frozen=True)
 class Shown:
-    """The shape that an object was last given.
+    """The shape that an object was last given. Immutable: it is replaced as a whole, on any thread.
 
     frames        the inputs of each Armature modifier; None before the first shape
     rest_points   float32 [vertices, 3], the points it was deformed from

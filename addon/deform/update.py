@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -12,6 +12,7 @@ from ..attach.updates import may_change_file
 from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths
 from . import after_update, apply_plan, bound, precomputing, source
+from .bound import uid
 from .changes import Changes
 from .plan import Plan, State, plan
 from .react import Action, Facts, Known, is_at_end, react
@@ -47,23 +48,21 @@ def update(
     return event.result(facts)
 
 
+@dataclass
 class _Event:
     """What one event means for one object."""
 
-    def __init__(
-        self,
-        obj: bpy.types.Object,
-        old: Plan,
-        skinned: SkinnedObject | None,
-        depsgraph: bpy.types.Depsgraph,
-        changes: Changes,
-    ) -> None:
-        self.obj, self.old, self.skinned = obj, old, skinned
-        self.depsgraph, self.changes = depsgraph, changes
-        self.known = Known(old, is_bound=skinned is not None)
-        self.bound_before = None if skinned is None else skinned.bound
-        self.was_on = properties.of(obj).replaces_modifiers
-        self.error = _error_of(obj, old, skinned)
+    obj: bpy.types.Object
+    old: Plan
+    skinned: SkinnedObject | None
+    depsgraph: bpy.types.Depsgraph
+    changes: Changes
+
+    def __post_init__(self) -> None:
+        self.known = Known(self.old, is_bound=self.skinned is not None)
+        self.bound_before = None if self.skinned is None else self.skinned.bound
+        self.was_on = properties.of(self.obj).replaces_modifiers
+        self.error = _error_of(self.obj, self.old, self.skinned)
 
     # --- Observing
 
@@ -85,20 +84,19 @@ class _Event:
         if skinned.needs_recheck:
             changes.meshes.add(obj.data.session_uid)
             changes.touched.add(obj.data.session_uid)
-        has_same_mode = skinned.noted.mode == apply_plan.mode_of(obj)
         facts = Facts(
             may_change=may_change,
             is_due=skinned.needs_apply,
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
-            is_other=not has_same_mode,
+            is_other=skinned.noted.mode != apply_plan.mode_of(obj),
             is_untouched=skinned.is_untouched_by(changes),
         )
         if facts.calls_for_plan or facts.is_untouched:
             return facts
-        if _lacks_points(obj, skinned, self.depsgraph, changes):
+        if self._lacks_points(skinned):
             return replace(facts, lacks_points=True)
-        if changes.structure or _may_be_other(obj, skinned, self.depsgraph, changes):
+        if changes.structure or self._may_be_other(skinned):
             return replace(facts, is_other=True)
         # Blender lists an armature's bones with each change of its pose.
         has_shape = skinned.was_deformed(obj, self.depsgraph) and obj.data.session_uid not in changes.touched
@@ -124,8 +122,40 @@ class _Event:
             lacks_surface=bound.lacks_surface(obj, skinned.bound),
         )
 
+    def _lacks_points(self, skinned: SkinnedObject) -> bool:
+        """Whether Blender evaluated another pose without requesting the points, as where the driver is
+        muted."""
+        obj, depsgraph = self.obj, self.depsgraph
+        if not skinned.plan.is_in_depsgraph or skinned.evaluation.mesh:
+            return False
+        is_known = not skinned.needs_recheck and skinned.is_as_noted(obj)
+        is_hidden = depsgraph.mode == "VIEWPORT" and not obj.visible_get(view_layer=depsgraph.view_layer)
+        if not is_known or is_hidden or not obj.evaluated_get(depsgraph).is_evaluated:
+            return False
+        if not source.is_ready(obj, depsgraph) or self._have_bones_changed():
+            return False
+        if source.has_changed(obj, skinned.bound.source, depsgraph, self.changes, touched=True):
+            return False
+        with skinned.lock:
+            return skinned.shown.frames is not None and after_update.shape(obj, skinned, depsgraph)
+
+    def _may_be_other(self, skinned: SkinnedObject) -> bool:
+        """Whether the object itself may not be as it was when its plan was applied."""
+        obj, changes = self.obj, self.changes
+        is_touched = obj.session_uid in changes.objects or uid(obj.data.shape_keys) in changes.touched
+        if not (is_touched or changes.armatures):
+            return False
+        is_mesh_touched = obj.data.session_uid in changes.touched
+        if is_mesh_touched and normals.domain_of(obj.data) != skinned.noted.normals_domain:
+            return True
+        is_reshaped = skinned.plan.uses_builtin and not skinned.was_deformed(obj, self.depsgraph)
+        return is_reshaped or not skinned.is_as_noted(obj)
+
     def _have_bones_changed(self) -> bool:
-        return _have_bones_changed(self.obj, self.skinned, self.depsgraph, self.changes)
+        # While it was off, changes were not recorded.
+        are_unknown = self.old.state is State.OFF or self.changes.after_step
+        read, changes = self.skinned.bound, self.changes
+        return bound.have_bones_changed(self.obj, read, self.depsgraph, changes, are_unknown)
 
     # --- Performing
 
@@ -153,8 +183,11 @@ class _Event:
         self.known = replace(self.known, plan=new, is_planned=True)
 
     def _full_plan(self) -> Plan:
+        failure = ""
+        if self.skinned is not None and self.skinned.evaluation.failures_in_a_row > MAX_FAILURES_IN_A_ROW:
+            failure = self.skinned.evaluation.failure
         waits_for = precomputing.waits_for(self.obj, self.skinned)
-        return plan(apply_plan.all_facts(self.obj, _failure_of(self.skinned), waits_for))
+        return plan(apply_plan.all_facts(self.obj, failure, waits_for))
 
     def _read(self, facts: Facts, is_whole: bool) -> None:
         obj, skinned, depsgraph = self.obj, self.skinned, self.depsgraph
@@ -179,6 +212,7 @@ class _Event:
         # it again, without what animation had set.
         is_same = not is_of_another_stack and skinned.bound.source.equals(self.bound_before.source)
         is_same &= not skinned.has_new_data
+        is_new_plan = self.bound_before is None or new != self.old
         if known.is_planned or is_of_another_stack:
             self._note(new)
         else:
@@ -190,14 +224,10 @@ class _Event:
             skinned.dirtied_by_frames = False
             if new.in_buffer:
                 rest, count = skinned.bound.source.points, skinned.normal_count
-                point_store.set_rest_points(obj, self.depsgraph, rest, count, anew=self._is_new(new))
+                point_store.set_rest_points(obj, self.depsgraph, rest, count, anew=is_new_plan)
         elif not new.after_update:
-            skinned.shown.frames = None
-        differs = not is_same or self._is_new(new)
-        self.known = replace(known, plan=new, is_settled=True, differs=differs)
-
-    def _is_new(self, new: Plan) -> bool:
-        return self.bound_before is None or new != self.old
+            skinned.shown = replace(skinned.shown, frames=None)
+        self.known = replace(known, plan=new, is_settled=True, differs=not is_same or is_new_plan)
 
     def _with_data(self, wanted: Plan) -> Plan:
         """Requests the data that the methods need and returns the resulting plan. A plan that waits needs the
@@ -294,60 +324,6 @@ def _count_failures(obj: bpy.types.Object, skinned: SkinnedObject, facts: Facts)
         )
 
 
-def _lacks_points(
-    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
-) -> bool:
-    """Whether Blender evaluated another pose without requesting the points, as where the driver is muted."""
-    evaluation = skinned.evaluation
-    if not skinned.plan.is_in_depsgraph or skinned.needs_apply or evaluation.mesh or evaluation.skip_reason:
-        return False
-    is_known = not skinned.needs_recheck and skinned.is_as_noted(obj)
-    is_hidden = depsgraph.mode == "VIEWPORT" and not obj.visible_get(view_layer=depsgraph.view_layer)
-    if not is_known or is_hidden or not obj.evaluated_get(depsgraph).is_evaluated:
-        return False
-    if not source.is_ready(obj, depsgraph) or _have_bones_changed(obj, skinned, depsgraph, changes):
-        return False
-    if source.has_changed(obj, skinned.bound.source, depsgraph, changes, touched=True):
-        return False
-    with skinned.lock:
-        return skinned.shown.frames is not None and after_update.shape(obj, skinned, depsgraph)
-
-
-def _have_bones_changed(
-    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
-) -> bool:
-    # While it was off, changes were not recorded.
-    are_unknown = skinned.plan.state is State.OFF or changes.after_step
-    return bound.have_bones_changed(obj, skinned.bound, depsgraph, changes, are_unknown)
-
-
-def _may_be_other(
-    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
-) -> bool:
-    """Whether the object itself may not be as it was when its plan was applied."""
-    keys = obj.data.shape_keys
-    is_touched = obj.session_uid in changes.objects or uid_in(keys, changes.touched)
-    if not (is_touched or changes.armatures):
-        return False
-    is_mesh_touched = obj.data.session_uid in changes.touched
-    if is_mesh_touched and normals.domain_of(obj.data) != skinned.noted.normals_domain:
-        return True
-    # Requesting points touches the object, too.
-    explains_touch = skinned.plan.is_in_depsgraph or skinned.was_deformed(obj, depsgraph)
-    return not explains_touch or not skinned.is_as_noted(obj)
-
-
-def uid_in(data: bpy.types.ID | None, uids: set[int]) -> bool:
-    return data is not None and data.session_uid in uids
-
-
-def _failure_of(skinned: SkinnedObject | None) -> str:
-    """Why Sinew cannot deform it within Blender's evaluation; empty where nothing prevents it."""
-    if skinned is None or skinned.evaluation.failures_in_a_row <= MAX_FAILURES_IN_A_ROW:
-        return ""
-    return skinned.evaluation.failure
-
-
 def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
     """Brings what Sinew stores about the modifiers in line with what the artist did to them.
 
@@ -359,10 +335,6 @@ def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
     attach.restore_volume(obj)
     attach.follow_stack(obj)
     attach.adopt_pointers(obj)
-    _check_armatures(obj, changes)
-
-
-def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
     armatures = properties.of(obj).armatures
     if not armatures:
         raise SinewError(

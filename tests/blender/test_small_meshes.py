@@ -11,7 +11,7 @@ import whole_file
 from program import run_sinew
 from sinew_addon.attach import attach, normals, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
-from sinew_addon.deform import events, handlers, session, small_meshes
+from sinew_addon.deform import session, small_meshes
 from sinew_addon.features.heat import live
 from sinew_addon.ui import state_text
 
@@ -223,36 +223,26 @@ def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, be
     assert looked_at == []
 
 
-def test_blender_calls_at_frames_only_for_what_sinew_has_to_do(arm, tmp_path):
+@pytest.mark.parametrize("beside", ["nothing", "one that is left to Blender"])
+def test_what_a_script_appends_between_two_frames_is_deformed(arm, tmp_path, beside):
+    """Where Sinew has nothing to do in frames; Blender has no other event for it."""
     obj, _armature = arm
-    ours = [
-        (bpy.app.handlers.frame_change_pre, handlers.before_frame_change),
-        (bpy.app.handlers.frame_change_post, handlers.on_frame_change),
-    ]
-
-    def heard():
-        return [function in functions for functions, function in ours]
-
-    # Blender 4.2 does not notify about what comes from other files.
-    told = events.IMPORTS_ARE_ANNOUNCED
-    assert heard() == [False, True]
     properties.of(obj).method = "qv"
-    assert heard() == [True, True]
     of_qv = scenes.shapes(obj, FRAMES)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    if beside != "nothing":
+        other, _rig = scenes.make_arm(name="Other")
+        scenes.add_sinew(other)
+        bpy.context.scene.frame_set(1)
+        assert deformer(other) == "blender"
     bpy.context.view_layer.update()
-    assert heard() == [False, not told]
     with bpy.data.libraries.load(str(tmp_path / "arm.blend")) as (_, to):
         to.objects = ["Arm", "Arm Rig"]
-    assert heard() == [told, True]
     for appended in to.objects:
         bpy.context.scene.collection.objects.link(appended)
     obj = to.objects[0]
     assert scenes.worst(scenes.shapes(obj, FRAMES), of_qv) <= 1e-5 * scenes.diagonal(obj)
-    properties.of(obj).method = "lbs"
-    bpy.context.view_layer.update()
-    assert heard() == [False, True]
 
 
 def test_weights_that_a_script_changed_between_frames_are_in_the_numbers(arm):
