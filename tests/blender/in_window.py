@@ -16,16 +16,22 @@ from conftest import REPOSITORY
 HERE = Path(__file__).parent
 
 
-def facts_of(script: str, folder: Path, *others: str) -> dict:
-    """The facts that a script here prints as JSON after FACTS, and its lines of errors as "printed".
-
-    others  names of further scripts that it imports, besides window and window_scene
-    """
+def program_and_package() -> tuple[str, str]:
+    """The whole Blender and the zip; skips the test without them."""
     program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
     if not (program and package):
         pytest.skip("SINEW_FULL_BLENDER or SINEW_PACKAGE is not set: no Blender with a window is tested")
     if bpy.app.version < (5, 2):
         pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
+    return program, package
+
+
+def facts_of(script: str, folder: Path, *others: str) -> dict:
+    """The facts that a script here prints as JSON after FACTS, and its lines of errors as "printed".
+
+    others  names of further scripts that it imports, besides window and window_scene
+    """
+    program, package = program_and_package()
     shutil.copy(package, folder / "sinew.zip")
     shutil.copy(REPOSITORY / "docs" / "window.py", folder)
     for name in ("window_scene", *others, script):

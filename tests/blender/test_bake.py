@@ -3,13 +3,10 @@
 
 from __future__ import annotations
 
-import os
-import re
 import signal
 import struct
 import subprocess
 import time
-from contextlib import suppress
 
 import bpy
 import numpy as np
@@ -221,23 +218,6 @@ def small_disk(tmp_path):
         yield folder
 
 
-@pytest.fixture
-def locked_folder(tmp_path):
-    with program.disk(tmp_path / "locked", "ro") as folder:
-        yield folder
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["mdd", "alembic", "usd", "gltf"])
-def test_room_is_looked_for_first(arm, small_disk, kind):
-    _obj, path = arm
-    refused = run_sinew(
-        "bake", path, "--method", METHOD, "--to", kind, "--frames", "1-60", "--out", small_disk, status=1
-    )
-    assert "MB and 0.1 MB are free" in refused.stderr
-    assert not list(small_disk.iterdir())
-
-
 def test_a_disk_that_fills_up_meanwhile(small_disk):
     cache = core.PointCache(small_disk / "a.mdd", "mdd", [1], 100_000, 24.0)
     with pytest.raises(SinewError, match=r"a\.mdd: can not be written: No space left on device"):
@@ -331,15 +311,6 @@ def test_files_of_one_name_do_not_meet(arm, tmp_path):
     )
     caches = {p.relative_to(tmp_path / "o").as_posix() for p in (tmp_path / "o").rglob("*.mdd")}
     assert caches == {"arm_cache/Arm.mdd", "other_cache/Arm.mdd"}
-
-
-@pytest.mark.parametrize("kind", ["shape-keys", "pc2", "usd", "alembic", "gltf"])
-def test_a_folder_that_can_not_be_written(arm, locked_folder, kind):
-    _obj, path = arm
-    refused = run_sinew(
-        "bake", path, "--method", METHOD, "--to", kind, "--frames", "1-3", "--out", locked_folder, status=1
-    )
-    assert "can not be written" in refused.stderr
 
 
 @pytest.mark.slow
@@ -657,26 +628,3 @@ def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
     assert process.returncode == 130, errors
     assert errors == "sinew: stopped\n"
     assert not [p for p in out.rglob("*") if p.is_file()]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["alembic", "usd", "gltf"])
-def test_an_export_shows_its_frames(arm, tmp_path, kind):
-    pty = pytest.importorskip("pty", reason="no terminals here")
-    pytest.importorskip("rich", reason="a bar is rich's")
-    _obj, path = arm
-    ours, theirs = pty.openpty()
-    command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", f"1-{LONG[kind]}")
-    process = program.start_sinew(*command, "--out", tmp_path, stdout=subprocess.DEVNULL, stderr=theirs)
-    os.close(theirs)
-    shown = b""
-    # Reading from a terminal fails once nobody writes to it any more.
-    with suppress(OSError):
-        while part := os.read(ours, 65536):
-            shown += part
-    os.close(ours)
-    assert process.wait(timeout=60) == 0, shown
-    shares = [int(share) for share in re.findall(rb"(\d+)%", shown)]
-    assert shares == sorted(shares)
-    assert shares[-1] == 100
-    assert len({share for share in shares if 0 < share < 100}) > 1, shares

@@ -90,23 +90,6 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
     assert [bone.name for bone in bpy.data.armatures["Arm Rig"].bones] == list(bones)
 
 
-@pytest.mark.slow
-def test_helper_bones_that_scale_play_to_the_stated_error(arm, tmp_path):
-    """Under a bone that is itself scaled."""
-    obj, path = arm
-    rig = obj.modifiers["Armature"].object
-    for size, frame in (((1.0, 1.0, 1.0), 1), ((1.2, 1.5, 1.3), 11)):
-        rig.pose.bones["bone.0"].scale = size
-        rig.pose.bones["bone.0"].keyframe_insert("scale", frame=frame)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    scenes.add_sinew(obj, METHOD)
-    expected = world_shapes([obj], FRAMES)[0]
-    file, (report,) = baked(path, tmp_path / "out", "--motion", "scaled-keys")
-    assert_states(report, read_elsewhere(file, FRAMES, tmp_path)["Arm"], expected)
-    _file, (rigid,) = baked(path, tmp_path / "rigid")
-    assert report["after"]["rms"] < 0.9 * rigid["after"]["rms"]
-
-
 def pose_anew(rig):
     """Another action than the baked one, with rotations that this one does not have."""
     rig.animation_data_clear()

@@ -4,7 +4,6 @@ played."""
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
@@ -376,24 +375,6 @@ def test_a_bvh_file_becomes_an_action(tmp_path):
     assert np.abs(heads_of(made.clip) - heads_of(wanted)[:, order]).max() < 1e-3
 
 
-def test_a_gltf_files_animations_become_actions(real_rig):
-    path = real_rig("Fox.glb")
-    files.open_file(path)
-    fox = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
-    scene, count = bpy.context.scene, len(bpy.data.objects)
-    made = clips.import_actions(fox, path)
-    # Blender 4.2 calls them Run_root and so on.
-    names = sorted(action.name.removesuffix("_root") for action in made)
-    assert names == ["Fox Run", "Fox Survey", "Fox Walk"]
-    assert (bpy.context.scene, len(bpy.data.objects), len(bpy.data.scenes)) == (scene, count, 1)
-    for action in made:
-        theirs = bpy.data.actions[action.name.removeprefix("Fox ")]
-        one, other = (finished(clips.read(fox, each)) for each in (action, theirs))
-        assert one.length == pytest.approx(other.length)
-        difference = quat_vec.to_affine(one.poses.rigid) - quat_vec.to_affine(other.poses.rigid)
-        assert np.abs(difference[..., :3, :3]).max() < CLOSE
-
-
 def test_files_that_do_not_fit_are_refused(tmp_path):
     armature, (walk, _run), _pair = make_walks()
     actions.play(armature, walk, actions.slot_for(walk, armature))
@@ -446,27 +427,6 @@ def test_the_command_writes_a_copy(walking, tmp_path):
         "Blend WALK RUN: 181 frames, no cycle, carried by hips"
         in run_sinew("blend", walking, *options).stdout
     )
-
-
-@pytest.mark.slow
-def test_the_command_measures(walking):
-    def measured(*options):
-        command = ("blend", walking, "--actions", "WALK", "RUN", "--measure", "--json", *options)
-        return json.loads(run_sinew(*command).stdout)
-
-    found, linear, apart = (
-        measured(*options) for options in ((), ("--method", "matrix_linear"), ("--no-align",))
-    )
-    assert found["feet"] == ["foot.L", "foot.R"]
-    walk, run, blend = found["measures"]
-    assert (walk["length"], run["length"], blend["length"]) == (20.0, 30.0, 25.0)
-    assert (walk["travel"], run["travel"]) == (pytest.approx(0.04), pytest.approx(1.1 / 30, rel=1e-4))
-    assert blend["travel"] == pytest.approx(0.95 / 25, rel=1e-4)
-    assert found["shrinking"]["volume"] == 1.0
-    assert linear["shrinking"]["volume"] < 0.99
-    assert any("shrinks to" in note for note in linear["notes"])
-    assert not found["notes"]
-    assert apart["measures"][2]["sliding"] > 2.0 * blend["sliding"]
 
 
 @pytest.mark.slow

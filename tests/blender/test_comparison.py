@@ -142,11 +142,6 @@ def subdivided_last(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
     obj.modifiers.new("Last", "SUBSURF")
 
 
-def subdivided_last_and_pinned(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.modifiers.new("Cast", "CAST").factor = 0.2
-    obj.modifiers.new("Last", "SUBSURF").use_pin_to_last = True
-
-
 def mirrored_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
     obj.modifiers.new("Front", "MIRROR").use_axis = (False, False, True)
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
@@ -183,7 +178,6 @@ SETUPS = [
     moving,
     subdivided_behind,
     subdivided_last,
-    subdivided_last_and_pinned,
     mirrored_in_front,
     with_shape_keys,
     parent_deforms,
@@ -550,36 +544,6 @@ def test_labels_do_not_cover_each_other():
     assert heights[0] == 50
     assert heights[3:] == [50, 70, 90]
     assert comparison_labels.apart([(0, 10, 50), (100, 10, 50)], line=20, gap=12) == [10, 10]
-
-
-def test_each_method_has_a_colour_of_its_own():
-    obj, _armature = scenes.make_arm()
-    compare(obj, set(characters.method_names()))
-    colours = {tuple(copy.color) for copy in copies(obj).values()}
-    assert len(colours) == len(characters.method_names())
-    assert (1.0, 1.0, 1.0, 1.0) not in colours
-
-
-def evaluations_of_compare(methods: set[str]) -> int:
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    obj, _armature = scenes.make_arm()
-    mirrored_in_front(obj, _armature)
-    bpy.context.view_layer.update()
-    count = []
-
-    def counting(*_args: object) -> None:
-        count.append(1)
-
-    bpy.app.handlers.depsgraph_update_pre.append(counting)
-    try:
-        compare(obj, methods)
-    finally:
-        bpy.app.handlers.depsgraph_update_pre.remove(counting)
-    return len(count)
-
-
-def test_methods_cost_no_evaluation_each():
-    assert evaluations_of_compare(set(METHODS)) == evaluations_of_compare({"dq"})
 
 
 def test_the_copies_are_not_rendered_unless_asked_for():

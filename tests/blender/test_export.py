@@ -11,7 +11,6 @@ import sys
 from pathlib import Path
 
 import bpy
-import in_window
 import numpy as np
 import pytest
 import read_glb
@@ -316,18 +315,3 @@ def test_human(tmp_path, real_rig):
     use(obj, "cor")
     write(glb, export_all_influences=True)
     assert_plays(glb, obj, [1, 16, 32])
-
-
-@pytest.mark.once
-def test_in_a_window(tmp_path_factory):
-    """With the exporter's own file browser, with the extension installed."""
-    facts = in_window.facts_of("export_in_window", tmp_path_factory.mktemp("window"), "five_meshes")
-    assert facts["printed"] == []
-    assert facts["with"].keys() == facts["without"].keys()
-    assert set(map(tuple, facts["without"].values())) == {(None, False)}
-    assert ["cor", True] in facts["with"].values()
-    # Objects parented to bones have no skin.
-    assert set(map(tuple, facts["with"].values())) <= {("cor", True), (None, False)}
-    assert facts["attributes"] == []
-    assert facts["on"]
-    assert all(facts["on"])

@@ -5,20 +5,17 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import sysconfig
 import tomllib
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 import pytest
 import scenes
 from conftest import REPOSITORY
-from sinew_addon.core.bake import EXPORTS, KINDS
 
 INSTALL = """
 import json, sys
@@ -256,117 +253,3 @@ def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tm
     assert bpy.data.objects["Arm"].sinew.method == "qv"
     bpy.context.scene.frame_set(7)
     assert not bpy.data.objects["Arm"].sinew.error
-
-
-@pytest.fixture
-def photographed(package, tmp_path, real_rig):
-    """photographed(script, *pictures, options=()): the facts that a script prints in a Blender with a
-    window that has Sinew's zip and human.blend."""
-    program = os.environ.get("SINEW_FULL_BLENDER")
-    if not program:
-        pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
-    if bpy.app.version < (5, 2):
-        pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
-
-    def run(script: str, *pictures: str, options: Sequence[str] = ()) -> dict[str, object]:
-        # The whole Blender can read the temporary folder, but not the files next to this checkout.
-        shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
-        shutil.copy(package, tmp_path / "sinew.zip")
-        for name in (script, "docs/window.py"):
-            shutil.copy(REPOSITORY / name, tmp_path)
-        start = [program, "run", "--factory-startup", "--python-exit-code", "3", *options, "human.blend"]
-        result = subprocess.run(
-            [*start, "--python", Path(script).name, "--", "sinew.zip", *pictures],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=400,
-            check=False,
-            env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
-        )
-        assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
-        assert all((tmp_path / picture).stat().st_size > 20_000 for picture in pictures)
-        lines = [line for line in result.stdout.splitlines() if line.startswith("FACTS ")]
-        assert lines, result.stdout + result.stderr
-        return json.loads(lines[0][6:])
-
-    return run
-
-
-@pytest.mark.slow
-def test_the_panel_in_a_window(photographed):
-    """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
-    facts = photographed("docs/photograph_panel.py", "panel.png")
-    assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
-    assert facts["error"] == ""
-
-
-@pytest.mark.slow
-def test_blending_actions_in_a_window(photographed):
-    """In steps, between which the window is drawn: Esc restores everything, and Ctrl+Z undoes a blend."""
-    options = ["--enable-event-simulate"]
-    facts = photographed("tests/blender/blend_in_window.py", "blend.png", options=options)
-    before, after = facts["stopped"]
-    assert before == after == facts["undone"]
-    assert facts["ended"]["plays"] == "Blend STRAIN LATE"
-    assert facts["ended"]["frame"] == before["frame"]
-
-
-@pytest.mark.slow
-def test_sculpt_mode_in_a_window(photographed):
-    facts = photographed("docs/photograph_sculpt.py", "sculpt.png")
-    assert facts["linear"] > 1e-3 * facts["diagonal"]
-    assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
-    assert facts["worst after"] == 0.0
-    assert facts["volume"] == [True, False]
-
-
-@pytest.mark.slow
-def test_a_comparison_in_a_window(photographed):
-    """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
-    facts = photographed("docs/photograph_comparison.py", "comparison.png")
-    assert facts["played"]
-    assert facts["posed"] > 0.01
-    for when in ("played", "posed", "overlaid", "after undo", "reopened"):
-        assert facts[f"worst {when}"] <= 1e-6 * facts["diagonal"], when
-    # The first and the last of the table.
-    assert facts["flipped"] == [["lbs"], ["qv"], ["lbs"]]
-    assert facts["after undo"] == ["dq", "lbs", "qv"]
-    assert facts["left"] == []
-
-
-@pytest.mark.slow
-def test_heat_map_and_diagnostics_in_a_window(photographed):
-    """Goes through frames in steps, between which the window is drawn; then the scene has its old frame."""
-    facts = photographed("docs/photograph_heat.py", "heat-map.png", "diagnostics.png")
-    assert facts == {"scan": ["RUNNING_MODAL"], "frame after the scan": 16, "played": True, "mode": "EDIT"}
-
-
-@pytest.mark.slow
-def test_the_errors_of_a_bake_in_a_window(photographed):
-    facts = photographed("docs/photograph_bake.py", "bake-error.webp")
-    assert facts == {"color types": ["MATERIAL", "VERTEX", "VERTEX", "MATERIAL"]}
-
-
-@pytest.mark.slow
-def test_bakes_in_a_window(photographed):
-    """With the dialog: Esc in the middle of each restores everything, and Ctrl+Z undoes one that is
-    finished."""
-    script = "tests/blender/bake_in_window.py"
-    facts = photographed(script, "bake.png", options=["--enable-event-simulate"])
-    stopped, ended = facts["stopped"], facts["ended"]
-    assert stopped.keys() == ended.keys() >= {"shape-keys", "mdd", "gltf"}
-    assert not any(one["changed"] for one in stopped.values()), stopped
-    assert "baked/human_cache/.Human.mdd.unfinished" in stopped["mdd"]["files meanwhile"]
-    for kind in stopped.keys() & {"alembic", "usd", "gltf"}:
-        assert "baked/.human.unfinished.blend" in stopped[kind]["files meanwhile"], kind
-        assert stopped[kind]["blenders meanwhile"] == 1, kind
-        assert f"baked/human{EXPORTS[kind]}" in ended[kind]["files"], kind
-        assert ended[kind]["modifiers"] == ["ARMATURE", "NODES"], kind
-    assert not any(one["not undone"] for one in ended.values()), ended
-    assert (ended["shape-keys"]["keys"], ended["shape-keys"]["modifiers"]) == (True, ["ARMATURE"])
-    assert ended["mdd"]["modifiers"] == ["MESH_CACHE", "ARMATURE"]
-    assert ended["bones"]["modifiers"] == ["ARMATURE"]
-    assert stopped.keys() | facts["refused"].keys() == set(KINDS) - {"pc2"}
-    assert all("built without" in error for error in facts["refused"].values())
-    assert not any(".unfinished" in name for one in ended.values() for name in one["files"])

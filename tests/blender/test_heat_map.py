@@ -327,17 +327,6 @@ def test_converted_to_a_mesh_it_leaves_nothing_of_itself():
     assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
 
 
-def test_what_is_deleted_gives_the_views_back():
-    obj, _armature = scenes.make_arm()
-    types = color_types()
-    scenes.add_sinew(obj, "dq")
-    bpy.ops.sinew.heat_map()
-    bpy.data.objects.remove(obj)
-    bpy.context.view_layer.update()
-    session.refresh(bpy.context)
-    assert color_types() == types
-
-
 def test_a_duplicate_has_colours_of_its_own():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")

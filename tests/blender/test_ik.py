@@ -259,21 +259,6 @@ def test_a_second_bake_keeps_what_was_there_first():
     np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
 
 
-def test_undo_takes_it_back():
-    arm = make_arm()
-    constrain(arm, "arm.1", make_empty("Target", near()))
-    bpy.ops.ed.undo_push(message="before")
-    before = poses(arm, ["arm.0", "arm.1"])
-    bpy.ops.ed.undo_push(message="still before")
-    bake()
-    bpy.ops.ed.undo_push(message="baked")
-    bpy.ops.ed.undo()
-    arm = bpy.data.objects["Arm"]
-    assert not action_copy.is_on(arm)
-    assert not arm.pose.bones["arm.1"].constraints[0].mute
-    np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1"]), before, atol=1e-6)
-
-
 def test_only_chains_with_selected_bones():
     arm = make_arm(3)
     constrain(arm, "arm.2", make_empty("Target", near()), chain_count=2)

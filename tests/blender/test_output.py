@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from program import disk, run_program, run_sinew, start_sinew
+from program import disk, run_sinew, start_sinew
 from sinew_addon import cli
 from sinew_addon.core import output
 from sinew_addon.core.errors import SinewError, WrongUse
@@ -430,19 +430,3 @@ def test_scratch_folders_of_killed_runs_go(tmp_path, inputs):
         for process in (alive, third):
             process.kill()
             process.communicate()
-
-
-@pytest.mark.slow
-@pytest.mark.once
-def test_a_batch_clears_away_after_one_that_was_killed(tmp_path, inputs):
-    temporary = tmp_path / "tmp"
-    temporary.mkdir()
-    command = ("reskin", inputs["FILE"], "--method", "dq", "--frames", "none", "--out", tmp_path / "out")
-    process = start_sinew(*command, env_more={"TMPDIR": str(temporary)})
-    while not list(temporary.glob("sinew-*/doing")):
-        assert process.poll() is None
-    process.kill()
-    process.wait()
-    assert list(temporary.glob("sinew-*"))
-    run_program(*command, "--overwrite", env_more={"TMPDIR": str(temporary)})
-    assert list(temporary.glob("sinew-*")) == []

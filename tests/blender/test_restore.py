@@ -8,7 +8,6 @@ import shutil
 from pathlib import Path
 
 import bpy
-import pytest
 import scenes
 import whole_file
 from conftest import REPOSITORY
@@ -147,30 +146,6 @@ def test_everything_comes_back(tmp_path):
         assert [obj for obj in bpy.data.objects if properties.has_sinew(obj)], path.name
         before = content(path)
         assert whole_file.differences(before, content(tmp_path / "restored" / path.name)) == [], path.name
-
-
-@pytest.mark.slow
-def test_a_real_character_comes_back(real_rig, tmp_path):
-    """With an upstream modifier, and as a child that its armature deforms."""
-    files.open_file(real_rig("human.blend"), load_ui=True)
-    human = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature())
-    bare = human.copy()
-    bare.name = "Child"
-    bpy.context.scene.collection.objects.link(bare)
-    bare.modifiers.clear()
-    bare.parent, bare.parent_type = human.find_armature(), "ARMATURE"
-    front = human.copy()
-    front.name = "Front"
-    bpy.context.scene.collection.objects.link(front)
-    front.modifiers.new("Solid", "SOLIDIFY").thickness = 0.02
-    front.modifiers.move(len(front.modifiers) - 1, 0)
-    names = {human.name, "Child", "Front"}
-    path = save(tmp_path / "human.blend")
-    run_sinew("reskin", path, "--method", "qv", "--out", tmp_path / "reskinned", "--no-pictures")
-    run_sinew("restore", tmp_path / "reskinned", "--out", tmp_path / "restored")
-    files.open_file(tmp_path / "reskinned" / path.name)
-    assert {obj.name for obj in bpy.data.objects if properties.has_sinew(obj)} >= names
-    assert whole_file.differences(content(path), content(tmp_path / "restored" / path.name)) == []
 
 
 def test_what_sinew_is_not_on_is_a_sentence(tmp_path):

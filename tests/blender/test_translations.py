@@ -8,7 +8,6 @@ import ast
 import string
 from pathlib import Path
 
-import in_window
 import pytest
 import sinew_addon
 from sinew_addon.ui import translations
@@ -63,37 +62,3 @@ def test_translations_end_as_their_texts_do(language):
     allowed = {"Rebound"}
     texts = translations.LANGUAGES[language].items()
     assert [text for text, other in texts if end(text) != end(other) and text not in allowed] == []
-
-
-@pytest.fixture(scope="module")
-def facts(tmp_path_factory) -> dict:
-    return in_window.facts_of("language_in_window", tmp_path_factory.mktemp("window"), "five_meshes")
-
-
-def test_blender_shows_german(facts):
-    german = translations.LANGUAGES["de"]
-    shown = facts["german"]
-    assert shown["panel"] == german["Stages and Scale"]
-    assert shown["operator"] == german["Rebind"]
-    assert shown["tooltip"] == german[facts["english"]["tooltip"]]
-    assert shown["own tooltip"] == german[facts["english"]["own tooltip"]]
-    assert shown["choice"] == german["Dual Quaternion"]
-    assert shown["put together"] == "4 Maschen"
-    assert shown["state"] == "Linear anstelle von Armature"
-    assert shown["blender's"] == "Punktgruppe"
-
-
-def test_english_comes_back(facts):
-    english = facts["english"]
-    assert english["panel"] == "Stages and Scale"
-    assert english["operator"] == "Rebind"
-    assert english["put together"] == "4 meshes"
-    assert english["state"] == "Linear Blend in the place of Armature"
-
-
-def test_translations_go_with_the_add_on(facts):
-    assert facts["without"] == "Stages and Scale"
-
-
-def test_panels_in_german_print_no_errors(facts):
-    assert facts["printed"] == []

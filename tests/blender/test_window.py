@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import bpy
+import in_window
 import pytest
 from conftest import REPOSITORY
 
@@ -42,13 +42,7 @@ class Results:
 @pytest.fixture(scope="module")
 def results(request, tmp_path_factory) -> Results:
     """Of the groups that chosen tests are about."""
-    program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
-    if not program:
-        pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
-    if not package:
-        pytest.skip("SINEW_PACKAGE is not set: the zip is not tested; ./dev package builds it")
-    if bpy.app.version < (5, 2):
-        pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
+    program, package = in_window.program_and_package()
     found = Results()
     folders = [tmp_path_factory.mktemp(name) for name in ("first", "second")]
     for folder in folders:

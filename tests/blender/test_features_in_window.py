@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Protects what only a whole Blender with a window can do: languages, the lesson, computations in the
+background, the file browsers of exporters, and operators that work in steps."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import in_window
+import pytest
+from conftest import REPOSITORY
+from sinew_addon.core.bake import EXPORTS, KINDS
+from sinew_addon.ui import translations
+
+TOLERANCE = 2e-5
+
+
+def facts_of(script: str, *others: str):
+    """A fixture with the facts that a script here prints."""
+
+    @pytest.fixture(scope="module")
+    def facts(tmp_path_factory) -> dict:
+        return in_window.facts_of(script, tmp_path_factory.mktemp("window"), *others)
+
+    return facts
+
+
+language = facts_of("language_in_window", "five_meshes")
+lesson = facts_of("lesson_in_window")
+precompute = facts_of("precompute_in_window")
+export = facts_of("export_in_window", "five_meshes")
+
+
+def test_blender_shows_german(language):
+    german = translations.LANGUAGES["de"]
+    shown = language["german"]
+    assert shown["panel"] == german["Stages and Scale"]
+    assert shown["operator"] == german["Rebind"]
+    assert shown["tooltip"] == german[language["english"]["tooltip"]]
+    assert shown["own tooltip"] == german[language["english"]["own tooltip"]]
+    assert shown["choice"] == german["Dual Quaternion"]
+    assert shown["put together"] == "4 Maschen"
+    assert shown["state"] == "Linear anstelle von Armature"
+    assert shown["blender's"] == "Punktgruppe"
+
+
+def test_english_comes_back(language):
+    english = language["english"]
+    assert english["panel"] == "Stages and Scale"
+    assert english["operator"] == "Rebind"
+    assert english["put together"] == "4 meshes"
+    assert english["state"] == "Linear Blend in the place of Armature"
+
+
+def test_translations_go_with_the_add_on(language):
+    assert language["without"] == "Stages and Scale"
+
+
+def test_panels_in_german_print_no_errors(language):
+    assert language["printed"] == []
+
+
+@pytest.mark.slow
+def test_what_is_not_saved_is_not_lost(lesson):
+    assert lesson["is dirty"] is True
+    assert lesson["asks first"] is True
+    assert lesson["kept after Esc"] is True
+    assert lesson["kept without the question"] is True
+    assert "Save this file first" in lesson["said"]
+
+
+@pytest.mark.slow
+def test_what_was_saved_makes_room_for_it(lesson):
+    """Opened as a file without a name, so that saving does not write to the extension's folder."""
+    assert lesson["opened"] == [True, "", True]
+    assert {"TEXT_EDITOR", "VIEW_3D"} <= set(lesson["reading"])
+
+
+def test_the_window_goes_on_meanwhile(precompute):
+    assert precompute["plan_at_first"] == "waiting"
+    assert precompute["ticks_meanwhile"] >= 3
+    assert precompute["watched"] == ["SINEW_OT_watch_precomputation"]
+    assert precompute["off_modifier_meanwhile"] <= TOLERANCE
+    assert precompute["plan_then"] == "in depsgraph"
+    assert precompute["off_modifier_then"] > 1e-3
+
+
+def test_esc_stops_it_and_a_button_goes_on(precompute):
+    assert precompute["plan_stopped"] == "waiting"
+    assert "stopped" in precompute["reason_stopped"]
+    assert precompute["plan_after_button"] == "in depsgraph"
+
+
+def test_a_render_waits_with_the_interface_locked_or_not(precompute):
+    assert precompute["plan_before_render"] == ["waiting", "waiting"]
+    assert max(precompute["render_off"]) <= TOLERANCE
+
+
+def test_its_thread_ends_with_the_file_and_with_blender(precompute):
+    assert precompute["running_after_load"] == 0
+    assert precompute["plan_at_the_end"] == "waiting"
+
+
+def test_the_exporter_for_gltf_has_a_check_box(export):
+    """With the exporter's own file browser, with the extension installed."""
+    assert export["printed"] == []
+    assert export["with"].keys() == export["without"].keys()
+    assert set(map(tuple, export["without"].values())) == {(None, False)}
+    assert ["cor", True] in export["with"].values()
+    # Objects parented to bones have no skin.
+    assert set(map(tuple, export["with"].values())) <= {("cor", True), (None, False)}
+    assert export["attributes"] == []
+    assert export["on"]
+    assert all(export["on"])
+
+
+@pytest.fixture
+def photographed(tmp_path, real_rig):
+    """photographed(script, *pictures, options=()): the facts that a script prints in a Blender with a
+    window that has Sinew's zip and human.blend."""
+    program, package = in_window.program_and_package()
+
+    def run(script: str, *pictures: str, options: Sequence[str] = ()) -> dict[str, object]:
+        # The whole Blender can read the temporary folder, but not the files next to this checkout.
+        shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
+        shutil.copy(package, tmp_path / "sinew.zip")
+        for name in (script, "docs/window.py"):
+            shutil.copy(REPOSITORY / name, tmp_path)
+        start = [program, "run", "--factory-startup", "--python-exit-code", "3", *options, "human.blend"]
+        result = subprocess.run(
+            [*start, "--python", Path(script).name, "--", "sinew.zip", *pictures],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=400,
+            check=False,
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+        )
+        assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
+        assert all((tmp_path / picture).stat().st_size > 20_000 for picture in pictures)
+        lines = [line for line in result.stdout.splitlines() if line.startswith("FACTS ")]
+        assert lines, result.stdout + result.stderr
+        return json.loads(lines[0][6:])
+
+    return run
+
+
+@pytest.mark.slow
+def test_blending_actions_in_a_window(photographed):
+    """In steps, between which the window is drawn: Esc restores everything, and Ctrl+Z undoes a blend."""
+    options = ["--enable-event-simulate"]
+    facts = photographed("docs/photograph_blend.py", "motion-panel.png", options=options)
+    assert facts["listed"] == ["STRAIN", "LATE"]
+    before, after = facts["stopped"]
+    assert before == after == facts["undone"]
+    assert facts["ended"]["plays"] == "Blend STRAIN LATE"
+    assert facts["ended"]["frame"] == before["frame"]
+
+
+@pytest.mark.slow
+def test_bakes_in_a_window(photographed):
+    """With the dialog: Esc in the middle of each restores everything, and Ctrl+Z undoes one that is
+    finished."""
+    script = "tests/blender/bake_in_window.py"
+    facts = photographed(script, "bake.png", options=["--enable-event-simulate"])
+    stopped, ended = facts["stopped"], facts["ended"]
+    assert stopped.keys() == ended.keys() >= {"shape-keys", "mdd", "gltf"}
+    assert not any(one["changed"] for one in stopped.values()), stopped
+    assert "baked/human_cache/.Human.mdd.unfinished" in stopped["mdd"]["files meanwhile"]
+    for kind in stopped.keys() & {"alembic", "usd", "gltf"}:
+        assert "baked/.human.unfinished.blend" in stopped[kind]["files meanwhile"], kind
+        assert stopped[kind]["blenders meanwhile"] == 1, kind
+        assert f"baked/human{EXPORTS[kind]}" in ended[kind]["files"], kind
+        assert ended[kind]["modifiers"] == ["ARMATURE", "NODES"], kind
+    assert not any(one["not undone"] for one in ended.values()), ended
+    assert (ended["shape-keys"]["keys"], ended["shape-keys"]["modifiers"]) == (True, ["ARMATURE"])
+    assert ended["mdd"]["modifiers"] == ["MESH_CACHE", "ARMATURE"]
+    assert ended["bones"]["modifiers"] == ["ARMATURE"]
+    assert stopped.keys() | facts["refused"].keys() == set(KINDS) - {"pc2"}
+    assert all("built without" in error for error in facts["refused"].values())
+    assert not any(".unfinished" in name for one in ended.values() for name in one["files"])
