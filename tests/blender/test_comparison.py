@@ -93,17 +93,9 @@ def assert_compared(obj: bpy.types.Object, frames: list[int]) -> None:
     assert np.array_equal(scenes.shapes(obj, frames), before)
 
 
-def content() -> dict[str, object]:
-    # Evaluating fills in bounds and caches, and Blender 5.2 expands attributes with a single value when they
-    # are read.
-    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
-    whole_file.of_open_file()
-    return whole_file.of_open_file()
-
-
 def assert_ends_without_trace(before: dict[str, object]) -> None:
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
-    assert whole_file.differences(before, content()) == []
+    whole_file.assert_same(before)
 
 
 def test_a_real_character(real_rig):
@@ -198,7 +190,7 @@ def test_rigs(set_up, skinned):
     bpy.context.scene.frame_set(2)
     expected = shapes_of_methods(obj, [1, 6, 11])
     bpy.context.scene.frame_set(2)
-    before = content()
+    before = whole_file.content()
     compare(obj)
     assert_copies_show(obj, [1, 6, 11], expected)
     bpy.context.scene.frame_set(2)
@@ -238,7 +230,7 @@ def test_a_full_scene_is_as_it_was(tmp_path):
     assert len(characters) >= 7
     scene.frame_set(3)
     chosen = (list(bpy.context.selected_objects), bpy.context.view_layer.objects.active)
-    before = content()
+    before = whole_file.content()
     for obj in characters:
         compare(obj)
         scene.frame_set(8)
@@ -249,7 +241,7 @@ def test_a_full_scene_is_as_it_was(tmp_path):
         obj.select_set(obj in chosen[0])
     bpy.context.view_layer.objects.active = chosen[1]
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
-    changed = whole_file.differences(before, content())
+    changed = whole_file.differences(before, whole_file.content())
     # A copy of an override that is made local adds a session user to the reference.
     assert [line for line in changed if not line.startswith("objects[Bare [props.blend]]")] == []
 
@@ -269,7 +261,7 @@ def test_save_and_reopen(tmp_path, set_up, skinned):
     compared = test_restore.save(tmp_path / "compared.blend")
     assert properties.of(copies(obj)["dq"]).error == ""
     files.open_file(original)
-    before = content()
+    before = whole_file.content()
     files.open_file(compared)
     assert state().arrangement == comparison_state.ONE_OF_TWO
     state().arrangement = comparison_state.SIDE_BY_SIDE
@@ -278,7 +270,7 @@ def test_save_and_reopen(tmp_path, set_up, skinned):
     bpy.ops.sinew.end_comparison()
     test_restore.save(tmp_path / "ended.blend")
     files.open_file(tmp_path / "ended.blend")
-    assert whole_file.differences(before, content()) == []
+    whole_file.assert_same(before)
 
 
 def test_undo_and_redo():
@@ -291,7 +283,7 @@ def test_undo_and_redo():
     # Changes that undo itself makes.
     bpy.ops.ed.undo()
     obj = bpy.data.objects["Arm"]
-    before = content()
+    before = whole_file.content()
     compare(obj, {"lbs", "dq"})
     bpy.ops.ed.undo_push(message="compare")
     compare(obj, {"qv"})
@@ -306,7 +298,7 @@ def test_undo_and_redo():
     assert_copies_show(obj, [6], expected)
     bpy.ops.ed.undo()
     assert state() is None
-    assert whole_file.differences(before, content()) == []
+    whole_file.assert_same(before)
     bpy.ops.ed.redo()
     obj = bpy.data.objects["Arm"]
     assert_copies_show(obj, [6], expected)
@@ -315,7 +307,7 @@ def test_undo_and_redo():
 
 def test_other_methods_replace_the_copies():
     obj, _armature = scenes.make_arm()
-    before = content()
+    before = whole_file.content()
     compare(obj, {"dq"})
     assert bpy.ops.sinew.compare(methods={"lbs", "qv"}) == {"FINISHED"}
     assert list(copies(obj)) == ["lbs", "qv"]
@@ -356,7 +348,7 @@ def test_copies_that_the_artist_deletes_renames_and_moves(set_up):
     obj, armature = scenes.make_arm()
     set_up(obj, armature)
     bpy.context.scene.frame_set(1)
-    before = content()
+    before = whole_file.content()
     compare(obj)
     lbs, qv, dq = (copies(obj)[name] for name in ("lbs", "qv", "dq"))
     delete(lbs)
@@ -375,7 +367,7 @@ def test_the_comparison_after_its_collection_was_deleted(copies_too):
     obj, armature = scenes.make_arm()
     mirrored_in_front(obj, armature)
     bpy.context.scene.frame_set(1)
-    before = content()
+    before = whole_file.content()
     compare(obj)
     if copies_too:
         delete(*copies(obj).values())
@@ -411,7 +403,7 @@ def test_the_original_is_deleted(tmp_path, skinned):
         # Those of a deleted object with Sinew; ending its comparison removes them, too.
         for name in [each.name for each in mesh.attributes if each.name.startswith("sinew")]:
             mesh.attributes.remove(mesh.attributes[name])
-    before = content()
+    before = whole_file.content()
     obj = opened()
     compare(obj)
     delete(obj)
@@ -419,7 +411,7 @@ def test_the_original_is_deleted(tmp_path, skinned):
     bpy.context.scene.frame_set(1)
     assert len(comparison_state.copies_of(state())) == len(METHODS)
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
-    assert whole_file.differences(before, content()) == []
+    whole_file.assert_same(before)
 
 
 def test_keys_of_the_method_are_the_originals_own():
@@ -430,7 +422,7 @@ def test_keys_of_the_method_are_the_originals_own():
     obj.keyframe_insert("sinew.method", frame=5)
     obj.keyframe_insert('modifiers["Armature"].show_expanded', frame=5)
     bpy.context.scene.frame_set(1)
-    before = content()
+    before = whole_file.content()
     compare(obj, {"qv", "dq"})
     bpy.context.scene.frame_set(11)
     got = without_offset(copies(obj)["dq"], 1)
@@ -473,7 +465,7 @@ def test_eyes_on_a_bone_stand_with_their_body():
         bpy.context.scene.collection.objects.link(obj)
     eye.parent = holder
     holder.parent, holder.parent_type, holder.parent_bone = armature, "BONE", "bone.1"
-    before = content()
+    before = whole_file.content()
     compare(body, {"lbs", "dq"})
     for frame in (1, 11):
         bpy.context.scene.frame_set(frame)
@@ -567,12 +559,12 @@ def test_what_can_not_be_compared():
     obj, _armature = scenes.make_arm()
     obj.modifiers.new("Cloth", "CLOTH")
     obj.modifiers.move(1, 0)
-    before = content()
+    before = whole_file.content()
     with pytest.raises(RuntimeError, match="simulation"):
         compare(obj)
     with pytest.raises(RuntimeError, match="at least one method"):
         bpy.ops.sinew.compare(methods=set())
-    assert whole_file.differences(before, content()) == []
+    whole_file.assert_same(before)
     fine, armature = scenes.make_arm(name="Fine")
     obj.modifiers["Armature"].object = armature
     compare(armature, {"dq"})
@@ -586,12 +578,12 @@ def test_a_linked_character(tmp_path):
     expected = shapes_of_methods(obj, [1, 11])
     test_restore.save(tmp_path / "library.blend")
     obj, _armature = scenes.link(tmp_path / "library.blend", "Arm", "Arm Rig")
-    before = content()
+    before = whole_file.content()
     compare(obj)
     assert_copies_show(obj, [1, 11], expected)
     bpy.context.scene.frame_set(1)
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
-    changed = whole_file.differences(before, content())
+    changed = whole_file.differences(before, whole_file.content())
     # Blender's record that something local used the linked mesh.
     assert [line for line in changed if "is_library_indirect" not in line] == []
 

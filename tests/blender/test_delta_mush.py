@@ -265,9 +265,7 @@ def test_a_radius_gives_the_same_shape_at_two_densities():
 
 def test_saved_copied_and_removed(tmp_path):
     obj = make_rough_arm()
-    bpy.context.view_layer.update()
-    whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
-    before = whole_file.of_open_file()
+    before = whole_file.content()
     mush(obj, iterations=8, group=GROUP)
     expected = scenes.shapes(obj, FRAMES)
     path = tmp_path / "mushed.blend"
@@ -279,8 +277,7 @@ def test_saved_copied_and_removed(tmp_path):
     bpy.data.objects.remove(copy)
     bpy.context.scene.frame_set(1)
     attach.remove(obj)
-    bpy.context.view_layer.update()
-    assert whole_file.differences(before, whole_file.of_open_file()) == []
+    whole_file.assert_same(before)
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], FRAMES), expected) < 1e-6
 
@@ -358,14 +355,11 @@ def test_it_is_measured_against_the_modifier_that_was_taken_over():
 def test_nothing_of_what_was_taken_over_stays():
     obj = make_rough_arm()
     add_corrective(obj, iterations=9)
-    bpy.context.view_layer.update()
-    whole_file.of_open_file()
-    before = whole_file.of_open_file()
+    before = whole_file.content()
     scenes.add_sinew(obj)
     bpy.ops.sinew.take_over_smooth(name=obj.name)
     attach.remove(obj)
-    bpy.context.view_layer.update()
-    assert whole_file.differences(before, whole_file.of_open_file()) == []
+    whole_file.assert_same(before)
 
 
 def bound(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:

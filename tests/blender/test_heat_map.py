@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-import snapshot
 import test_linked_data
 import whole_file
 from sinew_addon.attach import attach, properties
@@ -226,12 +225,11 @@ def test_switched_off_it_leaves_no_trace(set_up):
     if set_up is not None:
         set_up(obj)
     bpy.context.scene.frame_set(6)
-    whole_file.of_open_file()  # reading an attribute may change how 5.2 stores it
-    before_sinew = whole_file.of_open_file()
+    before_sinew = whole_file.content()
     types = color_types()
     scenes.add_sinew(obj, "dq")
     measures.of(bpy.context.scene)
-    before = whole_file.of_open_file()
+    before = whole_file.content()
     bpy.ops.sinew.heat_map()
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     assert mesh.attributes.active_color_name == heat_nodes.NAME
@@ -243,7 +241,7 @@ def test_switched_off_it_leaves_no_trace(set_up):
     bpy.ops.sinew.heat_map()
     bpy.context.view_layer.update()
     assert color_types() == types
-    assert whole_file.differences(before, whole_file.of_open_file()) == []
+    whole_file.assert_same(before)
     # It also ends when Sinew is removed while it is on.
     bpy.ops.sinew.heat_map()
     choose("bulge", range=measures.FIXED, length=0.5)
@@ -251,7 +249,7 @@ def test_switched_off_it_leaves_no_trace(set_up):
     bpy.ops.sinew.remove()
     assert color_types() == types
     assert obj.data.attributes.active_color_name == "Second"
-    assert whole_file.differences(before_sinew, whole_file.of_open_file()) == []
+    whole_file.assert_same(before_sinew)
 
 
 def test_while_sinew_is_off_views_are_as_they_were():
@@ -271,7 +269,7 @@ def test_while_sinew_is_off_views_are_as_they_were():
 def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
     obj = painted_arm()
     types = color_types()
-    before = snapshot.of_file()
+    before = whole_file.content()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(6)
     bpy.ops.sinew.heat_map()
@@ -285,7 +283,7 @@ def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
     bpy.context.scene.frame_set(1)
     bpy.ops.sinew.remove()
     assert color_types() == types
-    assert snapshot.of_file() == before
+    whole_file.assert_same(before)
     assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
 
 

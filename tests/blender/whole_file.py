@@ -90,6 +90,19 @@ def of_open_file() -> dict[str, object]:
     return found
 
 
+def content() -> dict[str, object]:
+    """The open file once it is evaluated, which fills in bounds and caches, and read, which makes Blender 5.2
+    expand attributes with a single value."""
+    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+    of_open_file()
+    return of_open_file()
+
+
+def assert_same(before: dict[str, object]) -> None:
+    """Asserts that all is as it was when content() returned this."""
+    assert differences(before, content()) == []
+
+
 def evaluated(frames: list[int]) -> dict[str, object]:
     """The final points of every mesh of every scene's view layer at these frames."""
     found = {}
