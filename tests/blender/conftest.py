@@ -30,7 +30,7 @@ OLDEST_AND_NEWEST = {
     *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_blend", "test_check"),
     "test_cluster",
     *("test_command_line", "test_compare", "test_comparison", "test_export", "test_flamenco", "test_hostile"),
-    *("test_output", "test_report", "test_restore", "test_stages_in_features"),
+    *("test_output", "test_restore", "test_stages_in_features"),
 }
 # Tests of what Sinew computes from a character, and of its panels: they only run in long-term releases. The
 # others run how Blender evaluates, stores, edits and renders.
@@ -38,8 +38,8 @@ LONG_TERM = {
     *("test_bulge_limit", "test_character", "test_corrective_key", "test_ddm", "test_delta_mush"),
     *("test_diagnostics_panel", "test_found_where_looked_for", "test_golden", "test_heat_map", "test_ik"),
     *("test_inbetween", "test_lesson", "test_mask_groups", "test_mending", "test_method_parameters"),
-    *("test_methods_against_reference", "test_mix", "test_painted_mix", "test_precomputation"),
-    *("test_preferences", "test_qv_against_reference", "test_scale_rule", "test_sdef", "test_small_meshes"),
+    *("test_methods_against_reference", "test_mix", "test_precomputation"),
+    *("test_preferences", "test_scale_rule", "test_sdef", "test_small_meshes"),
     *("test_suggest", "test_translations", "test_worst_frames"),
 }
 # Run a second time with Sinew's default for small meshes, except for tests marked by_sinew.

@@ -145,7 +145,7 @@ def test_bones_are_edited_on_the_rest_shape():
 
 
 @pytest.mark.usefixtures("route")
-def test_bones_that_another_armature_object_shares_are_in_edit_mode_after_undo():
+def test_undo_in_edit_mode_of_a_shared_armature():
     """In edit mode Blender then only shows the object that the artist edits, and the bones of both."""
     obj, armature = scenes.make_arm()
     sharing = armature.copy()
@@ -243,7 +243,7 @@ def _mute_drivers(obj: bpy.types.Object) -> None:
     ids=["group", "nodes", "links", "interface", "driver"],
 )
 @pytest.mark.usefixtures("route")
-def test_what_is_taken_of_sinews_is_made_again(take):
+def test_deleted_parts_of_sinew_are_made_again(take):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     expected = scenes.shapes(obj, [6, 11])
@@ -273,7 +273,7 @@ def test_what_is_taken_of_a_hidden_objects_group_is_made_again(heat):
     assert not properties.of(obj).error
 
 
-def test_points_that_blender_never_requests_are_counted_and_come_after_the_update(monkeypatch):
+def test_points_that_are_never_requested_are_deformed_after_the_update(monkeypatch):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     expected = scenes.shapes(obj, [3, 6, 11])
@@ -288,7 +288,7 @@ def test_points_that_blender_never_requests_are_counted_and_come_after_the_updat
 
 
 @pytest.mark.usefixtures("route")
-def test_a_character_takes_the_place_of_two_other_objects(tmp_path):
+def test_a_character_appended_in_place_of_two_objects(tmp_path):
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     expected = scenes.shapes(obj, [11])
@@ -438,7 +438,7 @@ def test_registered_with_a_driven_file_open():
 
 
 @pytest.mark.parametrize("safe", [False, True])
-def test_keys_of_a_file_that_was_on_another_frame_before_sinew(monkeypatch, safe):
+def test_registered_on_another_frame_than_the_keys(monkeypatch, safe):
     monkeypatch.setattr(safe_mode, "_forced", safe)
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
@@ -473,7 +473,7 @@ def test_a_driver_that_gives_no_method_is_said_so():
     assert session.plan_of(obj).state is State.REFUSED
 
 
-def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkeypatch):
+def test_a_new_method_reads_only_changed_weights(monkeypatch):
     obj, _armature = scenes.make_arm()
     characters.use_method(obj, "dq")
     bpy.context.scene.frame_set(11)
@@ -542,7 +542,7 @@ def test_a_bone_is_deleted_while_its_armature_is_in_edit_mode():
 
 
 @pytest.mark.parametrize("then", ["on", "off", "removed"])
-def test_keys_of_visibility_go_and_leave_the_modifier_as_they_set_it(then):
+def test_deleted_keys_of_visibility_leave_their_last_value(then):
     obj, _armature = scenes.make_arm()
     modifier = obj.modifiers["Armature"]
     for frame, shown in ((1, False), (5, True)):
@@ -563,7 +563,7 @@ def test_keys_of_visibility_go_and_leave_the_modifier_as_they_set_it(then):
 
 
 @pytest.mark.usefixtures("route")
-def test_keys_of_visibility_go_where_the_modifier_is_on():
+def test_deleted_keys_of_visibility_where_the_modifier_is_on():
     obj, _armature = scenes.make_arm()
     expected = scenes.modifier_shapes(obj, [8], True)
     bpy.context.scene.frame_set(1)
@@ -575,7 +575,7 @@ def test_keys_of_visibility_go_where_the_modifier_is_on():
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-def test_keys_of_visibility_of_a_hidden_object_begin_with_what_the_artist_had():
+def test_keys_of_visibility_on_a_hidden_object():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)
     obj.hide_viewport = True
@@ -588,7 +588,7 @@ def test_keys_of_visibility_of_a_hidden_object_begin_with_what_the_artist_had():
 
 
 @pytest.mark.by_sinew
-def test_what_is_said_of_a_deleted_modifier_stays():
+def test_the_error_of_a_deleted_modifier_stays():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)
     obj.modifiers.remove(obj.modifiers["Armature"])

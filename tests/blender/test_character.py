@@ -197,7 +197,7 @@ def test_one_mesh_can_differ_and_follow_again(armature):
     assert hair.delta_mush.enabled is False
 
 
-def test_on_off_and_remove_act_on_all_or_on_the_one_that_is_named(armature):
+def test_on_off_and_remove_for_all_or_for_one(armature):
     before = [mesh_points(obj) for obj in meshes()]
     bpy.ops.sinew.add(method="dq")
     shared().enabled = False
@@ -222,7 +222,7 @@ def test_a_mesh_that_comes_later_joins_with_the_characters_settings(armature):
     assert (shoes.method, shoes.delta_mush.enabled) == ("dq", True)
 
 
-def test_what_can_not_have_sinew_does_not_keep_the_others_from_it(armature):
+def test_add_skips_a_mesh_that_is_refused(armature):
     cloth = bpy.data.objects["Hair"].modifiers.new("Cloth", "CLOTH")
     bpy.data.objects["Hair"].modifiers.move(2, 0)
     assert cloth == bpy.data.objects["Hair"].modifiers[0]

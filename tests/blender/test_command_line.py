@@ -305,7 +305,7 @@ def test_glb_files_are_read(real_rig, tmp_path):
     assert (tmp_path / "Fox.blend").exists()
 
 
-def test_the_method_asked_for_wins_over_keys_and_any_object_name_is_written(tmp_path):
+def test_points_override_a_keyed_method(tmp_path):
     obj, _armature = scenes.make_arm(name="file")
     expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)
     scenes.add_sinew(obj, "lbs")

@@ -92,7 +92,7 @@ def test_another_radius_makes_the_data_anew(route):
         assert (scenes.worst(scenes.final_points(obj), before) < 1e-6) == is_back
 
 
-def test_in_a_window_the_shape_of_the_old_radius_stays_until_the_new_is_made(in_window):
+def test_in_a_window_the_old_radius_stays_until_the_new_is_computed(in_window):
     obj, _armature = scenes.make_arm(bones=3)
     bpy.context.scene.frame_set(FRAME)
     scenes.add_sinew(obj, "ddm")

@@ -86,7 +86,7 @@ def twisted_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
     return obj, armature
 
 
-def test_what_depends_on_poses_is_found_at_the_frame_and_in_the_action():
+def test_findings_of_poses_at_a_frame_and_in_an_action():
     obj, _armature = twisted_arm()
     scenes.add_sinew(obj, "dq")
     bpy.ops.sinew.check()
@@ -164,7 +164,7 @@ def test_select_can_be_undone():
 
 
 @pytest.mark.parametrize("skinned", [False, True])
-def test_results_go_stale_when_weights_change_and_not_before(skinned):
+def test_results_are_outdated_once_weights_change(skinned):
     obj, armature = faulty_arm()
     if skinned:
         scenes.add_sinew(obj, "dq")

@@ -39,7 +39,7 @@ def test_add_starts_with_the_method_of_the_modifier():
 
 
 @pytest.mark.parametrize("evaluated", [False, True])
-def test_what_was_moved_without_a_key_stays(evaluated):
+def test_an_unkeyed_move_of_a_keyed_object_stays(evaluated):
     obj, _armature = scenes.make_arm()
     for frame in (2, 9):
         obj.keyframe_insert("location", frame=frame)
@@ -215,7 +215,7 @@ def shared_mesh(obj):
 @pytest.mark.parametrize("by_script", [True, False])
 @pytest.mark.parametrize("heat", [False, True])
 @pytest.mark.parametrize("set_up", [None, front_modifier, shared_mesh])
-def test_what_sinew_made_for_a_deleted_mesh_goes_with_it(set_up, heat, by_script):
+def test_helpers_of_a_deleted_mesh_are_deleted(set_up, heat, by_script):
     """Its mesh, which is the artist's, has Blender's shape."""
     obj, _armature = scenes.make_arm()
     if set_up is not None:
@@ -438,7 +438,7 @@ def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
 
 @pytest.mark.parametrize("in_front", [False, True])
 @pytest.mark.parametrize("kind", ["hair", "hair on vertices", "cloth", "cloth with a rest shape"])
-def test_what_acts_otherwise_behind_sinew_is_warned_of(kind, in_front):
+def test_warnings_of_modifiers_that_act_differently_behind_sinew(kind, in_front):
     """Before it is added, too; not where a modifier in front does more than deform, as without Sinew."""
     obj, _armature = scenes.make_arm()
     if in_front:

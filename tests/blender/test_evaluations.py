@@ -154,7 +154,7 @@ def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
 
 
 @pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
-def test_what_follows_a_deformed_mesh_deforms_by_the_same_frame(set_up: Setup):
+def test_a_rig_that_follows_a_deformed_mesh_uses_the_same_frame(set_up: Setup):
     """Read in the first evaluation: a later request would make Blender evaluate the rest."""
     followed, armature = scenes.make_arm()
     set_up(followed, armature)
@@ -188,7 +188,7 @@ def test_what_follows_a_deformed_mesh_deforms_by_the_same_frame(set_up: Setup):
 
 
 @pytest.mark.parametrize("set_up", [moving_parent, moving_mesh, moving_keys])
-def test_what_stands_behind_is_evaluated_once_where_the_frame_dirties_the_mesh(set_up: Setup):
+def test_modifiers_behind_are_evaluated_once_for_a_moving_mesh(set_up: Setup):
     obj, armature = scenes.make_arm()
     obj.modifiers.new("Behind", "SUBSURF")
     set_up(obj, armature)

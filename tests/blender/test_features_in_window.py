@@ -154,8 +154,7 @@ def photographed(tmp_path, real_rig):
 def test_blending_actions_in_a_window(photographed):
     """In steps, between which the window is drawn: Esc restores everything, and Ctrl+Z undoes a blend."""
     options = ["--enable-event-simulate"]
-    facts = photographed("docs/photograph_blend.py", "motion-panel.png", options=options)
-    assert facts["listed"] == ["STRAIN", "LATE"]
+    facts = photographed("tests/blender/blend_in_window.py", "blend.png", options=options)
     before, after = facts["stopped"]
     assert before == after == facts["undone"]
     assert facts["ended"]["plays"] == "Blend STRAIN LATE"

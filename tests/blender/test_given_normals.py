@@ -280,7 +280,7 @@ OBSTACLES = {
 
 @needs_support
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_blender_computes_them_where_others_would_find_other_ones(name):
+def test_blender_computes_normals_where_other_objects_read_them(name):
     obj, _armature = make(sharp)
     assert has_given(obj)
     make_obstacle, reason = OBSTACLES[name]
@@ -349,7 +349,7 @@ def test_modifiers_that_leave_normals_to_sinew(place, kind, set_up, shading):
 
 
 @needs_support
-def test_what_stands_in_front_may_leave_a_mesh_of_another_domain():
+def test_upstream_nodes_that_change_the_domain_of_normals():
     """The mesh itself is smooth, so there is room for normals of vertices; the nodes add sharp edges."""
     obj, _armature = scenes.make_arm()
     smooth(obj)
@@ -373,7 +373,7 @@ def test_what_stands_in_front_may_leave_a_mesh_of_another_domain():
 
 
 @needs_support
-def test_a_modifier_behind_that_is_switched_off_or_deleted_is_no_obstacle():
+def test_modifiers_behind_that_are_off_allow_given_normals():
     obj, _armature = make(smooth)
     modifier = obj.modifiers.new("Cast", "CAST")
     modifier.show_viewport = modifier.show_render = False
@@ -406,7 +406,7 @@ def instance_on_faces(obj):
 @needs_support
 @pytest.mark.parametrize("act", [add_cast, switch_cast_on, instance_on_faces], ids=lambda each: each.__name__)
 @pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
-def test_what_a_handler_behind_sinews_puts_behind_is_an_obstacle_at_once(event, act):
+def test_modifiers_that_a_handler_adds_behind_end_given_normals_at_once(event, act):
     """Blender evaluates it without notification."""
     obj, _armature = make(smooth)
     off = obj.modifiers.new("Off", "CAST")
@@ -445,7 +445,7 @@ def test_free_normals_of_the_mesh_stay():
 
 @pytest.mark.parametrize("shading", SHADINGS, ids=lambda each: each.__name__)
 @pytest.mark.parametrize("how", ["apply", "convert"])
-def test_an_applied_mesh_has_no_normals_that_it_did_not_have(how, shading):
+def test_applying_adds_no_normals(how, shading):
     found = []
     for who in (LEAVE, GIVE):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -753,7 +753,7 @@ def test_skinned_normals_move_by_the_inverse_transpose_of_the_blend(shading):
 
 
 @needs_support
-def test_skinned_normals_of_what_is_not_one_blend_are_blenders():
+def test_skinned_normals_with_a_stage_are_blenders():
     obj, _armature = make(smooth)
     settings = properties.of(obj)
     settings.normals = properties.SKINNED_NORMALS

@@ -107,7 +107,7 @@ def test_mesh_in_edit_mode_is_read_as_it_was():
 
 
 @pytest.mark.parametrize("levels", [1, 3])
-def test_no_bmesh_is_made_where_it_would_read_beyond_the_shape_keys(monkeypatch, levels):
+def test_no_bmesh_of_a_mesh_with_more_vertices_than_its_keys(monkeypatch, levels):
     """For an evaluated mesh whose modifiers made more vertices than its keys have: Blender reads garbage
     there, or crashes."""
     obj = a_grid()

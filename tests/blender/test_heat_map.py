@@ -342,7 +342,7 @@ def test_a_duplicate_has_colours_of_its_own():
     assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in buffers] == [True, False]
 
 
-def test_a_point_buffer_that_is_not_filled_yet_is_left_alone():
+def test_colours_wait_for_a_point_buffer_that_is_empty():
     """As for the copy's own, until the copy is deformed."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")

@@ -62,7 +62,7 @@ def lattice_in_front(obj, _armature):
 
 
 @pytest.mark.parametrize("make", [deforming_parent, lattice_in_front])
-def test_a_multi_modifier_is_refused_where_it_mixes_with_what_sinew_never_reads(make):
+def test_a_multi_modifier_over_unread_input_is_refused(make):
     obj, armature = scenes.make_arm()
     make(obj, armature)
     modifier = obj.modifiers["Armature"]
@@ -383,7 +383,7 @@ def test_an_object_that_gets_sinew_while_it_is_hidden(event, monkeypatch):
     assert len(made) == (1 if event == "shown" else 2)
 
 
-def test_what_is_made_at_the_address_of_a_deleted_object(route):
+def test_a_proxy_at_the_address_of_a_deleted_object(route):
     """Blender finds evaluated objects by the addresses of their originals: it would return the other's."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)

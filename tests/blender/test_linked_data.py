@@ -101,7 +101,7 @@ def test_linked_meshes(tmp_path, override, skinned, front):
     assert not any(properties.is_helper(o) for o in local)
 
 
-def test_an_override_is_saved_as_a_blender_without_sinew_needs_it(tmp_path):
+def test_a_saved_override_works_without_sinew(tmp_path):
     """With settings that notify Sinew when an artist changes them."""
     save_library(tmp_path, skinned=True, front=False)
     link(tmp_path, override=True)
@@ -154,7 +154,7 @@ def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
     assert_shapes(expected)
 
 
-def test_a_duplicate_leaves_nothing_where_the_object_is_deleted_that_it_was_made_of():
+def test_remove_from_a_duplicate_after_the_original_is_deleted():
     """While Sinew is off, its modifier still refers to the other's point buffer. Blender 5.2 counts the
     buffer as used after that modifier is removed."""
     obj, _armature = scenes.make_arm()

@@ -187,7 +187,7 @@ def key_visibility(modifier: bpy.types.Modifier, *keys: tuple[int, bool]) -> Non
         modifier.keyframe_insert("show_viewport", frame=frame)
 
 
-def test_put_on_while_an_animation_has_the_first_modifier_off():
+def test_add_while_keys_hide_the_first_modifier():
     obj, armature = scenes.make_arm()
     second = obj.modifiers.new("Second", "ARMATURE")
     second.object = armature
@@ -200,7 +200,7 @@ def test_put_on_while_an_animation_has_the_first_modifier_off():
     assert scenes.worst(expected[1], expected[2]) > 0.01
 
 
-def test_one_moved_in_front_and_back_while_visibility_is_keyed():
+def test_moved_in_front_and_back_with_keyed_visibility():
     """There Sinew's modifier is after the Armature modifier, and follows it."""
     obj, _armature = scenes.make_arm()
     obj.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1

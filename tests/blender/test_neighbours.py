@@ -90,7 +90,7 @@ def edit_vertices(obj: bpy.types.Object) -> None:
 
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
 @pytest.mark.parametrize("setting", ["method", "enabled", "heat", "scale_rule"])
-def test_an_edit_after_a_setting_and_before_a_frame_is_seen(arm, setting, edit):
+def test_edit_between_a_setting_and_a_frame(arm, setting, edit):
     settings = properties.of(arm)
     if setting == "method":
         settings.method = "lbs"
@@ -108,7 +108,7 @@ def test_an_edit_after_a_setting_and_before_a_frame_is_seen(arm, setting, edit):
 
 @pytest.mark.parametrize("once", [False, True], ids=["always", "once"])
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
-def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit, once):
+def test_a_handlers_edit_after_sinews_is_in_the_frame(arm, neighbour, edit, once):
     """Blender evaluates it without notification, and skips the handler that follows one that removes
     itself."""
 
@@ -126,9 +126,7 @@ def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit
 @pytest.mark.parametrize("is_rendered", [False, True], ids=["shown", "rendered"])
 @pytest.mark.parametrize("is_first", [False, True], ids=["behind Sinew's", "before Sinew's"])
 @pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
-def test_a_group_that_a_handler_renames_is_seen(
-    arm, neighbour, rendered_points, event, is_first, is_rendered
-):
+def test_group_renamed_by_a_handler(arm, neighbour, rendered_points, event, is_first, is_rendered):
     bpy.context.scene.frame_set(10)
 
     def act() -> None:
@@ -149,7 +147,7 @@ def test_a_group_that_a_handler_renames_is_seen(
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
-def test_a_group_that_a_script_renames_before_a_frame_is_seen(arm):
+def test_group_renamed_before_a_frame(arm):
     arm.vertex_groups["bone.1"].name = "another"
     bpy.context.scene.frame_set(10)
     assert_frame_equals_modifier(arm, 10)
@@ -173,9 +171,7 @@ def beside_its_comparison(obj: bpy.types.Object) -> None:
 
 @pytest.mark.parametrize("beside", [beside_nothing, beside_a_linked_duplicate, beside_its_comparison])
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
-def test_an_edit_in_a_handler_behind_something_in_front_is_seen_with_the_next_frame(
-    arm, neighbour, edit, beside
-):
+def test_a_handlers_edit_with_an_upstream_modifier_is_in_the_next_frame(arm, neighbour, edit, beside):
     beside(arm)
     arm.modifiers.new("Front", "CAST")
     arm.modifiers.move(len(arm.modifiers) - 1, 0)
@@ -238,7 +234,7 @@ def test_what_a_handler_behind_sinews_poses_and_moves(arm, neighbour, event, act
 
 
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
-def test_an_edit_in_a_handler_of_what_was_edited_is_seen_with_the_next_event(arm, neighbour, edit):
+def test_a_handlers_edit_of_an_edited_mesh_is_in_the_next_event(arm, neighbour, edit):
     take_off = neighbour("depsgraph_update_post", lambda: edit(arm) if arm.pass_index else None)
     arm.pass_index = 1
     arm.data.update()
@@ -248,7 +244,7 @@ def test_an_edit_in_a_handler_of_what_was_edited_is_seen_with_the_next_event(arm
 
 
 @pytest.mark.parametrize("keyed", [False, True])
-def test_an_edit_of_a_mesh_with_shape_keys_before_a_frame_is_seen(route, keyed):
+def test_edit_of_a_mesh_with_shape_keys_before_a_frame(route, keyed):
     obj, _armature = scenes.make_arm()
     if keyed:
         scenes.key_shape(obj)
@@ -512,7 +508,7 @@ def test_a_mesh_that_is_off_is_rendered_as_it_is(arm, rendered_points, tmp_path)
 
 
 @pytest.mark.parametrize("keyed", ["viewport", "render"])
-def test_where_one_visibility_is_keyed_the_other_is_the_artists(arm, rendered_points, keyed):
+def test_keys_of_one_visibility_leave_the_other(arm, rendered_points, keyed):
     modifier = arm.modifiers["Armature"]
     for frame, value in ((1, True), (5, False)):
         setattr(modifier, f"show_{keyed}", value)
@@ -635,7 +631,7 @@ def test_tools_for_weights_see_the_bones_that_deform(arm):
     assert arm.modifiers["Armature"].show_render
 
 
-def test_tools_for_weights_see_them_where_visibility_is_animated(arm):
+def test_tools_for_weights_where_visibility_is_animated(arm):
     modifier = arm.modifiers["Armature"]
     for frame, is_on in ((1, False), (4, True)):
         modifier.show_viewport = is_on

@@ -300,7 +300,7 @@ def test_triangles_are_read_where_a_method_needs_them():
     assert not obj.sinew.error
 
 
-def test_outdated_centres_of_a_mesh_whose_triangles_are_no_longer_read_are_not_asked_for():
+def test_outdated_centres_need_triangles():
     """The last evaluation still has the method that needs them, so the modifier's shape is shown first."""
     obj, _armature = scenes.make_arm()
     bpy.context.scene.frame_set(11)

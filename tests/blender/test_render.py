@@ -167,7 +167,7 @@ def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
     assert np.abs(got - expected).mean() < 3e-4
 
 
-def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered(tmp_path):
+def test_renders_animate_modifiers_behind_and_other_users_of_the_mesh(tmp_path):
     """Sinew suspends modifiers between Blender's two evaluations, for which Blender copies the objects
     again."""
     obj, armature = scenes.make_arm()

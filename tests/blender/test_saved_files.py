@@ -102,7 +102,7 @@ def warnings_of(obj: bpy.types.Object) -> list[str]:
     return [warning.message for warning in getattr(stack.sinew_modifier(obj), "node_warnings", ())]
 
 
-def test_nothing_is_said_to_be_missing_where_sinew_is_there(tmp_path):
+def test_no_warning_of_a_missing_sinew_where_it_is_installed(tmp_path):
     """The nodes of the warning are in saved files alone."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
@@ -170,7 +170,7 @@ def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
     assert not bpy.data.objects["Newer"].modifiers["Armature"].show_viewport
 
 
-def test_between_the_handlers_of_saving_nothing_of_the_file_changes(tmp_path):
+def test_evaluations_while_saving_change_nothing(tmp_path):
     """A thumbnail evaluates the scene at that time: so does this handler, in background as in a window."""
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
@@ -203,7 +203,7 @@ def test_between_the_handlers_of_saving_nothing_of_the_file_changes(tmp_path):
     assert np.array_equal(scenes.shapes(obj, [11])[0], expected)
 
 
-def test_what_a_neighbour_changes_while_the_file_is_saved_is_seen(tmp_path):
+def test_edit_by_another_add_on_while_saving(tmp_path):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(11)

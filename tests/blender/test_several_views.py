@@ -95,7 +95,7 @@ def test_a_scene_that_redo_brings_back(route):
         bpy.ops.ed.undo()
 
 
-def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_path, route):
+def test_a_view_layer_that_first_shows_a_mesh_with_an_upstream_modifier(tmp_path, route):
     obj, armature = scenes.make_arm()
     obj.modifiers.new("Front", "SUBSURF").levels = 1
     obj.modifiers.move(1, 0)
@@ -122,7 +122,7 @@ def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_pa
     assert scenes.worst(shown, expected) <= 1e-5
 
 
-def test_undo_brings_back_what_a_hidden_view_layer_had_evaluated(route):
+def test_undo_with_a_view_layer_that_is_not_shown(route):
     """Blender keeps the point buffer's evaluated data from before the step that undo goes back to: points
     of another frame, or as many as another subdivision had."""
     obj, _armature = scenes.make_arm()

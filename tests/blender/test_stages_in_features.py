@@ -138,7 +138,7 @@ def test_numbers_and_worst_frames_are_of_it(arm, stage):
         assert numbers.summary().__dict__[name] == pytest.approx(value, rel=2e-4, abs=2e-5), name
 
 
-def test_copies_of_a_comparison_have_what_follows_the_blend(arm, stage):
+def test_copies_of_a_comparison_have_the_stages(arm, stage):
     obj, _path = arm
     without, shapes = with_stage(obj, stage)
     assert_copy_shows(obj, without if stage == "mix" else shapes)

@@ -57,7 +57,7 @@ def test_it_leaves_all_as_it_was():
     np.testing.assert_allclose(scenes.final_points(obj), before, atol=1e-6)
 
 
-def test_stopped_it_leaves_all_as_it_was_and_knows_nothing():
+def test_stopped_it_leaves_all_as_it_was():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(7)
