@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from contextlib import ExitStack
 from html import unescape
 from pathlib import Path
 from urllib.parse import unquote
@@ -595,60 +596,44 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
 
 @pytest.mark.slow
 @newest_only
-def test_killed_at_random(tmp_path):
-    """Kills the batch itself each time, and before that, half of the time, one of its Blenders."""
+@pytest.mark.parametrize("place", ["machine", "cluster"])
+def test_killed_at_random(tmp_path, place):
+    """Kills the batch each time, and before that often one of its Blenders, or a cluster's worker with its
+    process."""
     folder, out = tmp_path / "in", tmp_path / "out"
     paths = make_rigs(folder, 60)
     before = contents(folder)
     choose = random.Random(8)
     arguments = ("reskin", folder, "--method", "dq", "--out", out, *FAST, "--resume")
-    for _ in range(8):
-        process = start_sinew(*arguments, "--jobs", choose.randint(1, 2))
-        read_some(process, choose)
-        if choose.random() < 0.5:
-            kill_one(blenders_of(process), choose)
-            time.sleep(choose.uniform(0.0, 0.1))
-        blenders = blenders_of(process)
-        process.kill()
-        process.communicate()
-        _gone, left = psutil.wait_procs(blenders, timeout=10)
-        assert left == [], "a Blender outlived its batch"
-        check_whole(out)
-    killed = len(list(out.glob("[!.]*.blend")))
-    assert 0 < killed < 60, "the kills came too late to mean anything"
-    result = run_sinew(*arguments)
-    assert "60 of 60 files" in result.stdout
-    assert contents(folder) == before
-    check_each_once(out, paths)
-
-
-@pytest.mark.slow
-@newest_only
-def test_killed_at_random_on_a_cluster(tmp_path):
-    """Kills the batch, a worker with its current process, or a Blender."""
-    folder, out = tmp_path / "in", tmp_path / "out"
-    paths = make_rigs(folder, 60)
-    choose = random.Random(9)
-    with Cluster(tmp_path) as cluster:
-        arguments = ("reskin", folder, "--method", "dq", "--out", out, *FAST, "--resume")
-        arguments = (*arguments, "--scheduler", cluster.address)
-        lost = Counter()
+    lost: Counter[str] = Counter()
+    with ExitStack() as stack:
+        cluster = stack.enter_context(Cluster(tmp_path)) if place == "cluster" else None
+        if cluster is not None:
+            arguments = (*arguments, "--scheduler", cluster.address)
         for _ in range(8):
-            process = start_sinew(*arguments)
+            jobs = () if cluster is not None else ("--jobs", choose.randint(1, 2))
+            process = start_sinew(*arguments, *jobs)
             read_some(process, choose)
-            for kind, victims in (("worker", cluster.workers), ("Blender", cluster.blenders)):
+            own = {"Blender": lambda process=process: blenders_of(process)}
+            theirs = {} if cluster is None else {"worker": cluster.workers, "Blender": cluster.blenders}
+            for kind, victims in (theirs or own).items():
                 if choose.random() < 0.5:
                     lost[kind] += kill_one(victims(), choose)
-                    read_some(process, choose)
+                    time.sleep(choose.uniform(0.0, 0.1))
+            blenders = blenders_of(process)
             process.kill()
             process.communicate()
+            _gone, left = psutil.wait_procs(blenders, timeout=10)
+            assert left == [], "a Blender outlived its batch"
             check_whole(out)
-        assert 0 < len(list(out.glob("[!.]*.blend"))) < 60
-        assert {kind for kind, times in lost.items() if times} == {"worker", "Blender"}
-        # Two Blenders at a time can be lost with a file: it is reported, and done by the next run.
+        assert 0 < len(list(out.glob("[!.]*.blend"))) < 60, "the kills came too late to mean anything"
+        assert all(lost[kind] for kind in theirs)
+        # A file that was lost with two Blenders is reported, and done by the next run.
         process = start_sinew(*arguments)
-        _output, errors = process.communicate(timeout=120)
+        said, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
+        assert "60 of 60 files" in said
+    assert contents(folder) == before
     check_each_once(out, paths)
 
 

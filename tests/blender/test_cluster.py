@@ -4,7 +4,6 @@ others."""
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shlex
@@ -12,7 +11,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -250,16 +248,3 @@ def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
 def test_what_is_no_scheduler(address, rig, tmp_path):
     failed = run_program(*arguments(rig, tmp_path / "out", address), status=1)
     assert [line for line in failed.stderr.splitlines() if line.startswith(f"sinew: {address}: ")]
-
-
-@pytest.mark.slow
-def test_the_addresses_of_a_scheduler_file_are_taken(rig, tmp_path):
-    """In the form in which users copy them from dask's own output."""
-    file = tmp_path / "scheduler.json"
-    options = {"scheduler": ["--scheduler-file", str(file)]}
-    with cluster(tmp_path, "127.0.0.1", options) as (_address, _processes):
-        end = time.monotonic() + 60
-        while not file.exists() and time.monotonic() < end:
-            time.sleep(0.1)
-        run_program(*arguments(rig, tmp_path / "out", json.loads(file.read_text())["address"]))
-    assert_done(tmp_path / "out")

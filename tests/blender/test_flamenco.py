@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -16,7 +15,7 @@ import sinew
 from program import COMMAND, ENVIRONMENT
 from sinew_addon.attach import properties
 from sinew_addon.io import files
-from test_check import install_extension, make_other_blender, script
+from test_check import install_extension, make_other_blender
 
 pytestmark = pytest.mark.skipif(
     shutil.which("node") is None, reason="node is not installed here, which compiles the job type"
@@ -215,29 +214,3 @@ def test_a_file_with_a_problem_is_not_reskinned(two_files, tmp_path):
     assert [task["name"] for task in tasks if task["dependencies"] == ["check part-001"]] == [
         "re-skin part-001"
     ]
-
-
-def test_the_extension_in_a_whole_blender_does_it(two_files, tmp_path):
-    program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
-    if not program or not package or bpy.app.version < (5, 2):
-        pytest.skip("tested once, beside bpy 5.2, where SINEW_FULL_BLENDER and SINEW_PACKAGE are set")
-    user = tmp_path / "user"
-    blender = script(
-        tmp_path / "whole",
-        # It checks copies in another Blender, which it starts on its own machine: SINEW_FULL_BLENDER has no
-        # effect there.
-        f"#!/bin/sh\ncd {tmp_path}\nexport BLENDER_USER_RESOURCES={user}\n"
-        f'[ -x {program} ] || exec blender "$@"\nexec {program} run "$@"\n',
-    )
-    shutil.copy(package, tmp_path / "sinew.zip")
-    words = [blender, "--command", "extension", "install-file", "-r", "user_default", "-e"]
-    subprocess.run([*words, tmp_path / "sinew.zip"], check=True, capture_output=True)
-    job = {
-        "folder": str(two_files),
-        "files": files_of(job_type(), two_files),
-        "out": str(tmp_path / "copies"),
-    }
-    for task in compile_job(**job, method="dq", options="--no-pictures --frames none")["tasks"]:
-        done = run_task(task, {"{blender}": [str(blender)]})
-        assert done.returncode == 0, done.stdout + done.stderr
-    assert {method_in(path) for path in (tmp_path / "copies").rglob("*.blend")} == {"dq"}
