@@ -96,6 +96,15 @@ def modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [modifier for modifier in obj.modifiers if modifier != stack.neutral_modifier(obj)]
 
 
+def put_in_front(obj: bpy.types.Object, kind: str = "SUBSURF", name: str = "Front") -> bpy.types.Modifier:
+    """A modifier before all others; by default a subdivision."""
+    modifier = obj.modifiers.new(name, kind)
+    if kind == "SUBSURF":
+        modifier.levels = 1
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    return modifier
+
+
 def final_points(obj: bpy.types.Object) -> np.ndarray:
     """float32 [vertices, 3]: the final evaluated mesh, object space."""
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data

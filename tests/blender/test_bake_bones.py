@@ -392,8 +392,7 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
     if of == "two modifiers":
         obj.modifiers.new("Second", "ARMATURE").object = rig
     elif of == "in front":
-        obj.modifiers.new("Mirror", "MIRROR")
-        obj.modifiers.move(1, 0)
+        scenes.put_in_front(obj, "MIRROR", "Mirror")
     elif of == "bendy":
         rig.data.bones[0].bbone_segments = 4
     else:

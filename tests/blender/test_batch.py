@@ -275,8 +275,7 @@ def test_bakes_of_a_job_file(tmp_path):
 @pytest.mark.slow
 def test_a_bake_that_fails_leaves_nothing(tmp_path):
     make_heroes(tmp_path / "in")
-    bpy.data.objects["Body"].modifiers.new("Mirror", "MIRROR")
-    bpy.data.objects["Body"].modifiers.move(1, 0)
+    scenes.put_in_front(bpy.data.objects["Body"], "MIRROR", "Mirror")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in" / "plain.blend"))
     (tmp_path / "job.toml").write_text(
         'inputs = ["in"]\nout = "out"\nmethod = "lbs"\nbake = ["usd", "shape-keys"]\nbake_frames = "1-3"\n'

@@ -166,20 +166,6 @@ def test_undo_in_edit_mode_of_a_shared_armature():
     assert_follows(obj)
 
 
-def test_weight_painting_finds_the_armature():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-    bpy.context.view_layer.update()
-    bpy.context.scene.frame_set(5)
-    assert obj.find_armature() == armature
-    assert_follows(obj)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    bpy.context.scene.frame_set(4)
-    assert_follows(obj)
-
-
 def test_the_final_mesh_has_no_attribute_of_sinews():
     obj, _armature = scenes.make_arm()
     obj.modifiers.new("Subdivision", "SUBSURF")

@@ -223,8 +223,7 @@ def test_a_mesh_that_comes_later_joins_with_the_characters_settings(armature):
 
 
 def test_add_skips_a_mesh_that_is_refused(armature):
-    cloth = bpy.data.objects["Hair"].modifiers.new("Cloth", "CLOTH")
-    bpy.data.objects["Hair"].modifiers.move(2, 0)
+    cloth = scenes.put_in_front(bpy.data.objects["Hair"], "CLOTH", "Cloth")
     assert cloth == bpy.data.objects["Hair"].modifiers[0]
     assert bpy.ops.sinew.add() == {"FINISHED"}
     assert [properties.has_sinew(obj) for obj in meshes()] == [True, True, False, True, True]

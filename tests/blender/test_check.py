@@ -80,8 +80,7 @@ def test_what_is_switched_off_needs_no_sinew(tmp_path):
 
 
 def simulated(obj, armature):
-    modifier = obj.modifiers.new("Cloth", "CLOTH")
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    modifier = scenes.put_in_front(obj, "CLOTH", "Cloth")
     return f"modifier {modifier.name} in front of Armature is a simulation"
 
 

@@ -76,8 +76,7 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
 def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     """Also a mesh that its parent deforms, without a modifier."""
     first, _armature = scenes.make_arm()
-    first.modifiers.new("Front", "SUBSURF").levels = 1
-    first.modifiers.move(1, 0)
+    scenes.put_in_front(first)
     second, armature = scenes.make_arm(name="Leg")
     second.modifiers.clear()
     second.parent, second.parent_type = armature, "ARMATURE"

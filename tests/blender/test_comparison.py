@@ -135,8 +135,7 @@ def subdivided_last(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
 
 
 def mirrored_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.modifiers.new("Front", "MIRROR").use_axis = (False, False, True)
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    scenes.put_in_front(obj, "MIRROR").use_axis = (False, False, True)
 
 
 def with_shape_keys(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
@@ -557,8 +556,7 @@ def test_simulations_stay_with_the_original():
 
 def test_what_can_not_be_compared():
     obj, _armature = scenes.make_arm()
-    obj.modifiers.new("Cloth", "CLOTH")
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj, "CLOTH", "Cloth")
     before = whole_file.content()
     with pytest.raises(RuntimeError, match="simulation"):
         compare(obj)

@@ -126,8 +126,7 @@ def test_what_can_not_be_is_one_sentence(arm, case, text):
     obj, armature = arm
     bone = {"no parent": "bone.0", "at rest": "bone.1"}.get(case)
     if case == "front":
-        obj.modifiers.new("Cast", "CAST")
-        obj.modifiers.move(1, 0)
+        scenes.put_in_front(obj, "CAST", "Cast")
     if case == "absolute":
         obj.data.shape_keys.use_relative = False
     if case == "at rest":

@@ -131,8 +131,7 @@ def with_keys(obj: bpy.types.Object) -> None:
 
 def with_lattice_in_front(obj: bpy.types.Object) -> None:
     """Deforms without changing the number of vertices."""
-    obj.modifiers.new("Front", "SIMPLE_DEFORM").angle = 0.7
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    scenes.put_in_front(obj, "SIMPLE_DEFORM").angle = 0.7
 
 
 def with_two_armatures(obj: bpy.types.Object) -> None:
@@ -175,8 +174,7 @@ def test_vertices_made_in_front_rest_where_they_are_made():
     """Blender refuses to smooth these, because it does not know their original coordinates: the upstream
     modifier is applied for it."""
     obj = make_rough_arm()
-    obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    scenes.put_in_front(obj)
     expected = by_corrective_smooth(applied_in_front(obj))
     mush(obj)
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)

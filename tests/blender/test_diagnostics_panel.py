@@ -233,8 +233,7 @@ def test_vertices_that_are_no_more_are_not_selected():
 
 def test_with_modifiers_in_front_the_edited_mesh_is_checked():
     obj, _armature = faulty_arm()
-    obj.modifiers.new("Mirror", "MIRROR").use_axis = (False, False, True)
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj, "MIRROR", "Mirror").use_axis = (False, False, True)
     scenes.add_sinew(obj, "dq")
     assert len(scenes.final_points(obj)) > len(obj.data.vertices)
     bpy.ops.sinew.check()

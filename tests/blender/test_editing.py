@@ -51,8 +51,7 @@ def test_an_unkeyed_move_of_a_keyed_object_stays(evaluated):
     bpy.context.view_layer.update()
     assert obj.location.x == 5.0
     obj.location.x = 6.0
-    obj.modifiers.new("Front", "CAST")
-    obj.modifiers.move(2, 0)
+    scenes.put_in_front(obj, "CAST")
     bpy.context.view_layer.update()
     assert obj.location.x == 6.0
 
@@ -203,18 +202,13 @@ def test_armature_deleted_as_in_the_window_is_noticed():
     assert_follows(obj)
 
 
-def front_modifier(obj):
-    obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
-
-
 def shared_mesh(obj):
     bpy.context.scene.collection.objects.link(obj.copy())
 
 
 @pytest.mark.parametrize("by_script", [True, False])
 @pytest.mark.parametrize("heat", [False, True])
-@pytest.mark.parametrize("set_up", [None, front_modifier, shared_mesh])
+@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, shared_mesh])
 def test_helpers_of_a_deleted_mesh_are_deleted(set_up, heat, by_script):
     """Its mesh, which is the artist's, has Blender's shape."""
     obj, _armature = scenes.make_arm()
@@ -262,43 +256,6 @@ def test_changed_weights_rebind():
     assert_follows(obj)
     obj.vertex_groups[1].add(list(range(120, 160)), 0.3, "REPLACE")
     assert_follows(obj)
-
-
-def test_renamed_bone_takes_its_group_along():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    armature.data.bones["bone.1"].name = "forearm"
-    bpy.context.view_layer.update()
-    assert "forearm" in obj.vertex_groups
-    assert "bone.1" not in obj.vertex_groups
-    assert_follows(obj)
-
-
-def test_edited_rest_bones_rebind():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    armature.data.edit_bones["bone.1"].tail.z += 0.3
-    extra = armature.data.edit_bones.new("extra")
-    extra.head, extra.tail = (0, 0, 1), (0, 0, 2)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert_follows(obj)
-
-
-def test_another_armature_chosen_in_the_modifier_is_taken_over():
-    obj, _armature = scenes.make_arm()
-    _unused, other = scenes.make_arm(name="Other")
-    scenes.forget_keys(other)
-    scenes.bend(other, 70.0)
-    scenes.add_sinew(obj)
-    bpy.context.scene.frame_set(11)
-    obj.modifiers["Armature"].object = other
-    bpy.context.view_layer.update()
-    assert properties.of(obj).armature == other
-    got = scenes.final_points(obj)
-    properties.of(obj).enabled = False
-    assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
 
 
 @pytest.mark.by_sinew
@@ -353,15 +310,6 @@ def test_unregister_gives_the_modifiers_their_armatures():
         assert not hasattr(bpy.types.Object, "sinew")
     finally:
         sinew_addon.register()
-    bpy.context.scene.frame_set(10)
-    assert_follows(obj)
-
-
-def test_options_of_the_modifier_changed_while_at_work():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    bpy.context.scene.frame_set(11)
-    obj.modifiers["Armature"].vertex_group = "bone.1"
     bpy.context.scene.frame_set(10)
     assert_follows(obj)
 
@@ -442,8 +390,7 @@ def test_warnings_of_modifiers_that_act_differently_behind_sinew(kind, in_front)
     """Before it is added, too; not where a modifier in front does more than deform, as without Sinew."""
     obj, _armature = scenes.make_arm()
     if in_front:
-        obj.modifiers.new("Mirror", "MIRROR")
-        obj.modifiers.move(1, 0)
+        scenes.put_in_front(obj, "MIRROR", "Mirror")
     if kind.startswith("cloth"):
         modifier = obj.modifiers.new("Behind", "CLOTH")
         if kind != "cloth":

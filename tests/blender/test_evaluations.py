@@ -68,8 +68,7 @@ def moving_armature(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
 
 
 def modifier_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.modifiers.new("Front", "SOLIDIFY")
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    scenes.put_in_front(obj, "SOLIDIFY")
 
 
 def shared_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:

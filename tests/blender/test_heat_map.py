@@ -46,11 +46,6 @@ def choose(quantity: str, **settings: object) -> measures.SinewMeasures:
     return chosen
 
 
-def in_front(obj: bpy.types.Object) -> None:
-    obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
-
-
 def with_keys(obj: bpy.types.Object) -> None:
     obj.shape_key_add(name="Basis")
     block = obj.shape_key_add(name="Key")
@@ -68,7 +63,7 @@ def placed(obj: bpy.types.Object) -> None:
 
 
 @pytest.mark.parametrize("quantity", METRICS)
-@pytest.mark.parametrize("set_up", [None, in_front, with_keys, placed])
+@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, with_keys, placed])
 def test_colours_are_those_of_the_measure(quantity, set_up):
     obj, armature = scenes.make_arm()
     if set_up is not None:
@@ -167,7 +162,7 @@ def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     np.testing.assert_allclose(np.concatenate([bent, straight]), linear(scale.colours(bulge)), atol=3e-3)
 
 
-@pytest.mark.parametrize("set_up", [None, in_front])
+@pytest.mark.parametrize("set_up", [None, scenes.put_in_front])
 def test_scenes_have_ranges_of_their_own(set_up):
     first, bent = scenes.make_arm()
     scenes.key_pose(bent, 160.0)
@@ -219,7 +214,7 @@ def painted_arm() -> bpy.types.Object:
     return obj
 
 
-@pytest.mark.parametrize("set_up", [None, in_front, with_keys])
+@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, with_keys])
 def test_switched_off_it_leaves_no_trace(set_up):
     obj = painted_arm()
     if set_up is not None:

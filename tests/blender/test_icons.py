@@ -115,8 +115,7 @@ def test_every_order_of_three_clicks(rendered_points):
 
 
 def _in_front(obj: bpy.types.Object) -> None:
-    obj.modifiers.new("Front", "SMOOTH").iterations = 4
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj, "SMOOTH").iterations = 4
 
 
 def _with_keys(obj: bpy.types.Object) -> None:

@@ -51,8 +51,7 @@ def deforming_parent(obj, armature):
 
 def lattice_in_front(obj, _armature):
     """Next to Blender's edge cases: a lattice that moves the mesh, and a mask that mixes the two inputs."""
-    modifier = obj.modifiers.new("Lattice", "LATTICE")
-    obj.modifiers.move(1, 0)
+    modifier = scenes.put_in_front(obj, "LATTICE", "Lattice")
     modifier.object = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
     bpy.context.scene.collection.objects.link(modifier.object)
     modifier.object.scale = (5.0, 1.0, 1.0)
@@ -89,8 +88,7 @@ def test_exporters_do_not_find_the_proxy(tmp_path):
     """glTF's writes all children of an object, also those that are in no scene."""
     obj, armature = scenes.make_arm()
     obj.parent = armature
-    obj.modifiers.new("Mirror", "MIRROR")
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj, "MIRROR", "Mirror")
     scenes.add_sinew(obj)
     assert properties.of(obj).upstream_proxy is not None
     bpy.ops.export_scene.gltf(filepath=str(tmp_path / "arm.gltf"), export_format="GLTF_SEPARATE")
@@ -102,8 +100,7 @@ def test_mirrored_groups_take_the_other_side():
     obj, armature = scenes.make_arm(bones=2)
     for index, side in enumerate("LR"):
         armature.data.bones[index].name = f"bone.{side}"
-    obj.modifiers.new("Mirror", "MIRROR")
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj, "MIRROR", "Mirror")
     assert_equal_to_modifier(obj, FRAMES)
 
 
@@ -191,12 +188,7 @@ def absolute_keys(obj):
     obj.data.shape_keys.eval_time = 7.0
 
 
-def subdivided(obj):
-    obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
-
-
-@pytest.mark.parametrize("set_up", [absolute_keys, subdivided])
+@pytest.mark.parametrize("set_up", [absolute_keys, scenes.put_in_front])
 def test_weights_are_painted_where_visibility_is_animated(set_up):
     """In that mode the Armature modifier deforms, and upstream modifiers are not evaluated separately."""
     obj, _armature = scenes.make_arm()
@@ -288,12 +280,10 @@ def test_a_modifier_in_front_that_comes_changes_and_goes():
         assert not properties.of(obj).error
 
     check()
-    obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(2, 0)
+    scenes.put_in_front(obj)
     check()
     # As many vertices as without it.
-    obj.modifiers.new("Same", "CAST").factor = 0.4
-    obj.modifiers.move(3, 0)
+    scenes.put_in_front(obj, "CAST", "Same").factor = 0.4
     obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = False
     check()
     obj.modifiers.remove(obj.modifiers["Same"])
@@ -322,8 +312,7 @@ def test_one_update_is_enough(event):
         bpy.context.view_layer.update()
         bpy.ops.object.mode_set(mode="OBJECT")
     elif event.startswith("added"):
-        obj.modifiers.new("Added", "SUBSURF").levels = 1
-        obj.modifiers.move(len(obj.modifiers) - 1, 0)
+        scenes.put_in_front(obj, "SUBSURF", "Added")
     else:
         obj.modifiers[0].levels = 2
     if event.endswith("frame"):
@@ -347,7 +336,7 @@ def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
     scenes.add_sinew(obj)
     rig.hide_viewport = True
     bpy.context.scene.frame_set(8)
-    subdivided(obj)
+    scenes.put_in_front(obj)
     rig.hide_viewport = other.hide_viewport = False
     if at_a_frame:
         bpy.context.scene.frame_set(9)
@@ -401,7 +390,7 @@ def test_a_proxy_at_the_address_of_a_deleted_object(route):
 
     # Like another add-on's handler, before Sinew's.
     bpy.app.handlers.depsgraph_update_post.insert(0, delete)
-    subdivided(obj)
+    scenes.put_in_front(obj)
     bpy.context.view_layer.update()
     bpy.app.handlers.depsgraph_update_post.remove(delete)
     assert properties.of(obj).upstream_proxy.as_pointer() in addresses, "nothing is tested"
@@ -455,8 +444,7 @@ def test_an_armature_modifier_in_front_of_what_is_in_front():
     _other, armature = scenes.make_arm(name="Other")
     scenes.key_pose(armature, 40.0)
     scenes.add_sinew(obj, "lbs")
-    obj.modifiers.new("Smooth", "SMOOTH")
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    scenes.put_in_front(obj, "SMOOTH", "Smooth")
     first = obj.modifiers.new("First", "ARMATURE")
     first.object = armature
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
@@ -496,8 +484,7 @@ def test_one_view_layer_has_it_for_its_position_alone():
 def test_applied_with_something_in_front(what, route):
     """Two objects have the mesh: as with any such mesh, the user must make it single first."""
     obj, _armature = scenes.make_arm()
-    obj.modifiers.new("Cast", "CAST").factor = 0.3
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj, "CAST", "Cast").factor = 0.3
     obj.scale = (1.2, 1.1, 0.9)
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(8)

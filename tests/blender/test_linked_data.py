@@ -21,8 +21,7 @@ def save_library(folder: Path, skinned: bool, front: bool) -> np.ndarray:
     """A file with an arm in a collection; the arm's shapes under Preserve Volume."""
     obj, armature = scenes.make_arm()
     if front:
-        obj.modifiers.new("Front", "SUBSURF")
-        obj.modifiers.move(1, 0)
+        scenes.put_in_front(obj)
     expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
     collection = bpy.data.collections.new("Character")
     bpy.context.scene.collection.children.link(collection)

@@ -47,11 +47,6 @@ def plain(_obj: bpy.types.Object) -> None:
     pass
 
 
-def in_front(obj: bpy.types.Object) -> None:
-    obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
-
-
 def behind(obj: bpy.types.Object) -> None:
     obj.modifiers.new("Behind", "SUBSURF").levels = 1
 
@@ -60,7 +55,7 @@ def with_keys(obj: bpy.types.Object) -> None:
     scenes.key_shape(obj)
 
 
-@pytest.mark.parametrize("set_up", [plain, in_front, behind, with_keys])
+@pytest.mark.parametrize("set_up", [plain, scenes.put_in_front, behind, with_keys])
 @pytest.mark.parametrize("is_safe", [False, True])
 def test_two_modifiers_have_the_same_shape(monkeypatch, set_up, is_safe):
     obj, _armature = scenes.make_arm()

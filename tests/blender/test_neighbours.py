@@ -173,8 +173,7 @@ def beside_its_comparison(obj: bpy.types.Object) -> None:
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
 def test_a_handlers_edit_with_an_upstream_modifier_is_in_the_next_frame(arm, neighbour, edit, beside):
     beside(arm)
-    arm.modifiers.new("Front", "CAST")
-    arm.modifiers.move(len(arm.modifiers) - 1, 0)
+    scenes.put_in_front(arm, "CAST")
     bpy.context.view_layer.update()
 
     def act() -> None:

@@ -116,8 +116,7 @@ def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
 
 
 def in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.modifiers.new("Front", "SUBSURF").render_levels = 2
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj).render_levels = 2
 
 
 def second_view_layer(obj: bpy.types.Object, armature: bpy.types.Object) -> None:

@@ -95,8 +95,7 @@ def add_what_takes_helpers() -> None:
     # Objects for which Sinew needs helper objects: an upstream modifier, chained modifiers, a deforming
     # parent.
     mirrored, _ = scenes.make_arm(sides=6, rings=9, name="Mirrored")
-    mirrored.modifiers.new("Mirror", "MIRROR").use_axis = (False, False, True)
-    mirrored.modifiers.move(1, 0)
+    scenes.put_in_front(mirrored, "MIRROR", "Mirror").use_axis = (False, False, True)
     chained, chain = scenes.make_arm(sides=6, rings=9, name="Chained")
     second = chained.modifiers.new("Multi", "ARMATURE")
     second.object, second.use_multi_modifier, second.vertex_group = chain, True, "bone.1"

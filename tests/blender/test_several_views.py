@@ -97,8 +97,7 @@ def test_a_scene_that_redo_brings_back(route):
 
 def test_a_view_layer_that_first_shows_a_mesh_with_an_upstream_modifier(tmp_path, route):
     obj, armature = scenes.make_arm()
-    obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(1, 0)
+    scenes.put_in_front(obj)
     collection = bpy.data.collections.new("Character")
     scene = bpy.context.scene
     scene.collection.children.link(collection)
@@ -128,8 +127,7 @@ def test_undo_with_a_view_layer_that_is_not_shown(route):
     obj, _armature = scenes.make_arm()
     scene, first = bpy.context.scene, bpy.context.view_layer
     first_name = first.name
-    front = obj.modifiers.new("Front", "SUBSURF")
-    obj.modifiers.move(1, 0)
+    front = scenes.put_in_front(obj)
     for frame, front.levels in ((4, 1), (9, 2)):
         front.keyframe_insert("levels", frame=frame)
     bpy.context.window.view_layer = scene.view_layers.new("Second")

@@ -119,8 +119,7 @@ def test_a_method_keyed_between_frames(arm):
 
 def test_something_in_front_is_taken_up(arm):
     obj, _armature = arm
-    mirror = obj.modifiers.new("Mirror", "MIRROR")
-    obj.modifiers.move(2, 0)
+    mirror = scenes.put_in_front(obj, "MIRROR", "Mirror")
     bpy.context.view_layer.update()
     assert not session.plan_of(obj).uses_builtin
     expected = scenes.final_points(obj)

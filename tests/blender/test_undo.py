@@ -196,8 +196,7 @@ def _options(arm):
 
 
 def _in_front(arm):
-    arm.modifiers.new("Front", "CAST")
-    arm.modifiers.move(len(arm.modifiers) - 1, 0)
+    scenes.put_in_front(arm, "CAST")
 
 
 def _behind(arm):
@@ -379,6 +378,7 @@ def test_shapes_after_undo_and_redo(route, edit, tmp_path):
         bpy.ops.ed.redo()
         _assert_same(_shapes(), after)
         _assert_meshes(meshes_after)
+    _assert_same(after, _shapes(_of_modifier), near)
     bpy.ops.ed.undo()
     _assert_meshes(meshes_before)
     _assert_same(_shapes(), _shapes(_of_modifier), near)
