@@ -429,7 +429,6 @@ def test_the_command_writes_a_copy(walking, tmp_path):
     )
 
 
-@pytest.mark.slow
 def test_the_command_says_what_is_wrong(walking, tmp_path):
     out = ["--out", tmp_path / "out.blend"]
     both = ["--actions", "WALK", "RUN"]

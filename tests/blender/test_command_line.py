@@ -36,7 +36,6 @@ def arm_file(tmp_path):
     return path, expected
 
 
-@pytest.mark.slow
 @pytest.mark.once
 def test_help_everywhere():
     assert "reskin" in run_program("--help").stdout
@@ -129,7 +128,6 @@ def test_points(arm_file, tmp_path):
         assert points["frames"].tolist() == [1, 3, 4, 5, 6.5]
 
 
-@pytest.mark.slow
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("given", "status", "sentence"),
@@ -166,7 +164,11 @@ def test_reskin_writes_copies_that_use_the_method(arm_file, tmp_path):
         "--overwrite"
         in run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out", status=1).stderr
     )
-    run_sinew("reskin", path, "--method", "qv", "--out", tmp_path / "out", "--overwrite")
+    options = ("--method", "qv", "--set", "bulge_limit=on", "--overwrite")
+    run_sinew("reskin", path, *options, "--out", tmp_path / "out")
+    files.open_file(tmp_path / "out" / "arm.blend")
+    settings = properties.of(bpy.data.objects["Arm"])
+    assert (settings.method, settings.bulge_limit.enabled) == ("qv", True)
 
 
 def test_reskin_never_writes_to_the_input_folder(arm_file):
@@ -197,7 +199,6 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
         assert sum(name in line for line in result.stderr.splitlines()) == 1, result.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.once
 def test_bad_input_is_one_sentence(arm_file, tmp_path):
     path, _expected = arm_file
@@ -258,7 +259,6 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
     assert not out.exists()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["auto", "cycles"])
 def test_compare_draws_a_sheet(tmp_path, engine):
     from PIL import Image
@@ -345,7 +345,6 @@ def keyed_file(tmp_path):
     return path, expected
 
 
-@pytest.mark.slow
 def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path):
     path, expected = keyed_file
     before = path.read_bytes()
@@ -362,7 +361,6 @@ def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path):
     assert "--overwrite" in run_sinew("inbetween", path, *options, status=1).stderr
 
 
-@pytest.mark.slow
 @pytest.mark.once
 def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
     path, _expected = keyed_file

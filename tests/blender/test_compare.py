@@ -72,7 +72,6 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
     assert "<img" not in (tmp_path / "arm.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
 def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     """Also a mesh that its parent deforms, without a modifier."""
     first, _armature = scenes.make_arm()
@@ -148,7 +147,6 @@ def opaque_pixels(path):
     return pixels[pixels[:, :, 3] == 255][:, :3]
 
 
-@pytest.mark.slow
 @newest_only
 def test_a_page_holds_its_pictures_and_a_video(tmp_path):
     path = REPOSITORY / "blend_files" / "wrist.blend"

@@ -25,7 +25,6 @@ def arm_file(tmp_path):
     return path
 
 
-@pytest.mark.slow
 def test_names_are_no_html(tmp_path):
     obj, armature = scenes.make_arm(sides=6, rings=5)
     obj.name, armature.name = SCRIPT, f"{SCRIPT} Rig"
@@ -42,7 +41,6 @@ def test_names_are_no_html(tmp_path):
         assert "<b>.blend" not in text
 
 
-@pytest.mark.slow
 def test_names_do_not_steer_a_terminal(tmp_path):
     pty = pytest.importorskip("pty", reason="no terminals here")
     obj, _armature = scenes.make_arm(sides=6, rings=5)
@@ -66,7 +64,6 @@ def test_names_do_not_steer_a_terminal(tmp_path):
         assert b"\x1b[2J" not in shown
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["...blend", "..blend", "a..blend"])
 def test_names_of_files_stay_in_the_folder(name, arm_file, tmp_path):
     """The stem of "...blend" is the parent folder."""
@@ -79,7 +76,6 @@ def test_names_of_files_stay_in_the_folder(name, arm_file, tmp_path):
     assert len(list(out.glob("*/*.mdd"))) == 1
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "value"),
     [
@@ -105,7 +101,6 @@ def test_numbers_that_are_none(option, value, arm_file, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="names are text there")
 def test_names_that_are_no_text(arm_file, tmp_path):
     file = os.fsencode(tmp_path) + b"/latin\xe9.blend"
@@ -132,7 +127,6 @@ def test_names_that_are_no_text(arm_file, tmp_path):
     assert [os.fsencode(path.name) for path in (tmp_path / "out").glob("*.blend")] == [b"latin\xe9.blend"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -158,7 +152,6 @@ def test_golden_settings_from_anybody(wrong, arm_file, tmp_path):
     assert "is not what `sinew render` writes" in refused.stderr
 
 
-@pytest.mark.slow
 def test_a_journal_with_half_of_what_a_result_has(arm_file, tmp_path):
     """Such a file is processed again."""
     out = tmp_path / "out"
@@ -172,7 +165,6 @@ def test_a_journal_with_half_of_what_a_result_has(arm_file, tmp_path):
     assert "unchanged" in run_sinew(*command, "--resume").stderr
 
 
-@pytest.mark.slow
 def test_links_in_a_folder_from_elsewhere_are_not_followed(arm_file, tmp_path):
     """Half a line at a journal's end is cut off, and unfinished files have predictable names."""
     precious, out = tmp_path / "precious", tmp_path / "out"

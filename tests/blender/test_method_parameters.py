@@ -134,7 +134,6 @@ def test_a_comparison_has_it():
     bpy.ops.sinew.end_comparison()
 
 
-@pytest.mark.slow
 def test_commands_take_it_by_its_full_name(tmp_path):
     listed = json.loads(run_sinew("methods", "--json").stdout)["methods"]
     (name,) = next(row["parameters"] for row in listed if row["name"] == "sdef")

@@ -236,7 +236,6 @@ def test_standard_output_on_a_full_disk(arguments, inputs):
     assert "Exception ignored" not in errors
 
 
-@pytest.mark.slow
 @pytest.mark.once
 @pytest.mark.parametrize(
     "arguments",
@@ -343,7 +342,6 @@ def test_two_objects_of_one_name(tmp_path):
         assert arrays["Arm [library.blend]"].shape == (2, 30, 3)
 
 
-@pytest.mark.slow
 def test_names_that_blender_would_fill_in(inputs, tmp_path):
     """Blender replaces # by the frame, and from 5.0 on {…}, in the paths of what it renders."""
     name = "{blend_name} ##.blend"
@@ -359,7 +357,6 @@ def test_names_that_blender_would_fill_in(inputs, tmp_path):
     assert all_in(tmp_path) == sorted([name, out.name, *(f"{out.name}/{path}" for path in all_in(out))])
 
 
-@pytest.mark.slow
 def test_no_two_frames_have_one_picture(inputs, tmp_path):
     out = tmp_path / "out"
     run_sinew(
@@ -369,7 +366,6 @@ def test_no_two_frames_have_one_picture(inputs, tmp_path):
     assert len(list(out.glob("*.png"))) == 5
 
 
-@pytest.mark.slow
 @pytest.mark.once
 def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
     picture = tmp_path / "0006.png"

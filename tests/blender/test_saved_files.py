@@ -62,7 +62,6 @@ def save(path: Path, **options: object) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(path), **options)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("safe", [False, True])
 @pytest.mark.parametrize(
     ("method", "preserve_volume"), [("lbs", False), ("dq", True), ("qv", False)], ids=["lbs", "dq", "qv"]

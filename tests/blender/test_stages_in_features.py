@@ -87,7 +87,6 @@ def measured(obj: bpy.types.Object, frame: int, shape: np.ndarray) -> Measured:
     return found
 
 
-@pytest.mark.slow
 def test_compare_measures_the_shapes_with_it(arm, stage, tmp_path):
     obj, path = arm
     _without, shapes = with_stage(obj, stage)
@@ -183,7 +182,6 @@ def assert_copy_shows(obj: bpy.types.Object, shapes: np.ndarray) -> None:
         assert scenes.worst(found, expected) < 1e-5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["shape-keys", "mdd"])
 def test_a_bake_plays_it_elsewhere(arm, stage, kind, tmp_path):
     obj, path = arm
@@ -201,7 +199,6 @@ def test_the_bake_operator_takes_what_is_set(arm, stage):
     assert scenes.worst(scenes.shapes(obj, FRAMES), shapes) <= test_bake.TOLERANCE * scenes.diagonal(obj)
 
 
-@pytest.mark.slow
 def test_points_and_job_files_take_it(arm, stage, tmp_path):
     obj, path = arm
     _without, shapes = with_stage(obj, stage)
