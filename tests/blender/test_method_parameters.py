@@ -7,7 +7,6 @@ import json
 
 import bpy
 import numpy as np
-import pytest
 import scenes
 import sinew
 from program import run_sinew
