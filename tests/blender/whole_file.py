@@ -100,7 +100,8 @@ def content() -> dict[str, object]:
 
 def assert_same(before: dict[str, object]) -> None:
     """Asserts that all is as it was when content() returned this."""
-    assert differences(before, content()) == []
+    changed = differences(before, content())
+    assert not changed, "\n".join(changed)
 
 
 def evaluated(frames: list[int]) -> dict[str, object]:
