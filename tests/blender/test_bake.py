@@ -92,7 +92,6 @@ def test_a_blend_file_plays_the_same_elsewhere(arm, tmp_path, kind, method):
     assert names == ({"arm.blend"} if kind == "shape-keys" else {"arm.blend", f"Arm.{kind}"})
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["shape-keys", "mdd", "pc2"])
 def test_chosen_frames_and_straight_lines_between(arm, tmp_path, kind):
     obj, path = arm
@@ -125,7 +124,6 @@ def test_exports_are_the_final_meshes(arm, tmp_path, kind):
     assert scenes.worst(points, expected) <= TOLERANCE * scenes.diagonal(obj)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mdd", "pc2"])
 def test_caches_follow_what_stands_in_front_and_behind(arm, tmp_path, kind):
     obj, path = arm
@@ -313,7 +311,6 @@ def test_files_of_one_name_do_not_meet(arm, tmp_path):
     assert caches == {"arm_cache/Arm.mdd", "other_cache/Arm.mdd"}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("in_strip", [False, True])
 @pytest.mark.parametrize("kind", ["mdd", "usd"])
 def test_keyed_visibility(arm, tmp_path, kind, in_strip):
@@ -364,7 +361,6 @@ def world_shapes(objects, frames):
     return [np.stack(found[name]) for name in sorted(found)]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("stretched", [False, True])
 @pytest.mark.parametrize("kind", EXACT)
 def test_several_moving_objects(arm, tmp_path, kind, stretched):
@@ -403,7 +399,6 @@ def test_several_moving_objects(arm, tmp_path, kind, stretched):
         assert scenes.worst(points, expected) <= 3e-6 * scenes.diagonal(first)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", core.EXPORTS)
 def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
     """A hat on a bone and a feather on the hat; not objects parented to the armature itself, nor hidden
@@ -436,7 +431,6 @@ def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
         assert scenes.worst(points, wanted[:, nearest]) <= 3e-6 * scenes.diagonal(obj)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", EXACT)
 def test_frames_before_zero(arm, tmp_path, kind):
     obj, path = arm
@@ -503,7 +497,6 @@ def textured(folder, colours):
     return path
 
 
-@pytest.mark.slow
 def test_textures_of_one_name_do_not_meet(tmp_path):
     """In USD, whose exporter has one folder for all."""
     red, green, blue = (1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1)

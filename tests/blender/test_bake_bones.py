@@ -100,7 +100,6 @@ def pose_anew(rig):
             bone.keyframe_insert("rotation_euler", frame=frame)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("method", "share"), [(METHOD, 0.25), ("cor", 0.35)])
 @pytest.mark.parametrize("scaled", [False, True])
 def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, scaled, method, share):
@@ -226,7 +225,6 @@ def skinned_by_gltf(glb, frames, rate):
     return points
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "method"), [("keys", METHOD), ("scaled-keys", METHOD), ("pose", METHOD), ("pose", "cor")]
 )
@@ -249,7 +247,6 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     assert scenes.worst(played[0], played[-1]) > 0.5
 
 
-@pytest.mark.slow
 @pytest.mark.once
 def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
     """For a glTF of human.blend: equals a Blender without Sinew, and Sinew's shape up to the reported
@@ -373,7 +370,6 @@ bpy.ops.wm.save_as_mainfile(filepath=fbx + ".blend")
 """
 
 
-@pytest.mark.slow
 def test_fbx_plays_to_the_stated_error_once_it_is_imported(arm, tmp_path):
     obj, path = arm
     scenes.add_sinew(obj, METHOD)

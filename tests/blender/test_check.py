@@ -99,7 +99,6 @@ def without_settings(obj, armature):
     return "has the modifier Sinew of Sinew without its settings"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("harm", [simulated, without_armature, without_armature_modifier, without_settings])
 def test_what_sinew_can_not_drive(harm, tmp_path):
     obj, armature = scenes.make_arm()
@@ -110,7 +109,6 @@ def test_what_sinew_can_not_drive(harm, tmp_path):
     assert all(problem.startswith("Arm") for problem in report["problems"])
 
 
-@pytest.mark.slow
 def test_an_armature_modifier_that_was_left_off(tmp_path):
     """The state of a file that lost Sinew's settings: object and modifier are otherwise complete."""
     obj, _armature = scenes.make_arm()
@@ -153,7 +151,6 @@ def test_linked_without_an_override(tmp_path):
     assert any("hero.blend is missing" in note for note in report["notes"])
 
 
-@pytest.mark.slow
 def test_what_can_not_be_read_does_not_stop_the_others(tmp_path):
     scenes.make_arm()
     save(tmp_path / "a.blend")

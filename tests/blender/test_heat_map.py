@@ -262,17 +262,22 @@ def test_while_sinew_is_off_views_are_as_they_were():
 
 
 def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
-    obj = painted_arm()
+    path = str(tmp_path / "heat.blend")
+
+    def saved_and_opened() -> bpy.types.Object:
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
+        return bpy.data.objects["Arm"]
+
+    painted_arm()
+    obj = saved_and_opened()
     types = color_types()
     before = whole_file.content()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(6)
     bpy.ops.sinew.heat_map()
     colours = shown_colours(obj)
-    path = str(tmp_path / "heat.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
-    obj = bpy.data.objects["Arm"]
+    obj = saved_and_opened()
     np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
     assert set(color_types()) == {"VERTEX"}
     bpy.context.scene.frame_set(1)
