@@ -38,7 +38,6 @@ import bpy
 import numpy as np
 import routes
 import scenes
-import snapshot
 from mathutils import Euler, Matrix, Vector
 from sinew_addon.attach import attach, properties, stage_settings
 from sinew_addon.core import skin_stack
@@ -49,6 +48,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import fuzz_reference
 import reference
 import sinew
+import whole_file
 
 MARGIN = 1e-3
 # For float32 numbers after a few operations, relative to the diagonal.
@@ -602,7 +602,7 @@ def must_be_refused(obj: bpy.types.Object) -> bool:
 def check_refusal(
     obj: bpy.types.Object, expected: dict[str, np.ndarray], outcome: Outcome, route: str
 ) -> None:
-    before, sentence = snapshot.of_file(), ""
+    before, sentence = whole_file.content(), ""
     try:
         scenes.add_sinew(obj)
     except SinewError as error:
@@ -611,8 +611,8 @@ def check_refusal(
     error = scenes.worst(scenes.final_points(obj), expected[method])
     if not sentence.startswith(f"{obj.name}: "):
         error, outcome.reason = float("inf"), f"not refused with a sentence: {sentence!r}"
-    elif snapshot.of_file() != before:
-        error, outcome.reason = float("inf"), "something stays of what was refused"
+    elif stays := whole_file.differences(before, whole_file.content()):
+        error, outcome.reason = float("inf"), f"of what was refused stays: {stays[0]}"
     outcome.errors[route, method] = error / scenes.diagonal(obj)
 
 
