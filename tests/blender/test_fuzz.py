@@ -23,7 +23,7 @@ QUICK = 25 if IS_NEWEST else 15
 
 
 @pytest.fixture(autouse=True)
-def any_route(none_left_to_blender):
+def any_route(small_meshes_as_users_have_them):
     yield
     routes.release()
 
