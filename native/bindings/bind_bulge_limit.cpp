@@ -124,9 +124,9 @@ void bind_bulge_limit(py::module_& m) {
         m, "BulgeLimit",
         R"(The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
 them farther away than they are at rest (Kim, Han 2014, and a continuous form). Can be pickled.)")
-        .def(py::init(&make_from_weights), py::arg("rest_points"), py::arg("influence_offsets"),
-             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("heads"), py::arg("tails"),
-             py::kw_only(), py::arg("bones_from_model") = py::none(), py::arg("weights") = py::none(),
+        .def(py::init(&make_from_weights), "rest_points"_a, "influence_offsets"_a, "influence_bones"_a,
+             "influence_weights"_a, "heads"_a, "tails"_a, py::kw_only(), "bones_from_model"_a = py::none(),
+             "weights"_a = py::none(),
              R"(rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.
 heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
 bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
@@ -140,13 +140,11 @@ weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; c
              })
         .def(py::pickle(&state_of, &of_state))
         .def(
-            "set_rest_points", &set_rest_points, py::arg("rest_points"),
-            py::arg("bones_from_model") = py::none(),
+            "set_rest_points", &set_rest_points, "rest_points"_a, "bones_from_model"_a = py::none(),
             R"(Sets other rest points, float32 [vertices, 3], or another space of the bones. Measures distances at
 rest again, which takes about as long as apply().)")
-        .def("apply", &apply, py::arg("points"), py::arg("bone_transforms"), py::arg("out") = py::none(),
-             py::kw_only(), py::arg("strength") = 1.0, py::arg("form") = "continuous",
-             py::arg("threads") = py::none(),
+        .def("apply", &apply, "points"_a, "bone_transforms"_a, "out"_a = py::none(), py::kw_only(),
+             "strength"_a = 1.0, "form"_a = "continuous", "threads"_a = py::none(),
              R"(The limited points, float32 [vertices, 3], model space.
 
 points: float32 [vertices, 3], deformed, model space.

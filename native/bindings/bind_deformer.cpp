@@ -329,9 +329,8 @@ void bind_deformer(py::module_& m) {
                         R"(A mesh bound to bones. Immutable; the deformers made from it share its memory.
 
 Can be pickled: the bound mesh, with normalised weights.)")
-        .def(py::init(&make_binding), py::arg("rest_points"), py::arg("influence_offsets"),
-             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("rest_bones") = py::none(),
-             py::arg("vertex_data") = py::none(),
+        .def(py::init(&make_binding), "rest_points"_a, "influence_offsets"_a, "influence_bones"_a,
+             "influence_weights"_a, "rest_bones"_a = py::none(), "vertex_data"_a = py::none(),
              R"(rest_points: float32 [vertices, 3], model space.
 influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.
 influence_bones: int32 [influences].
@@ -354,16 +353,14 @@ At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,
                                 R"(A binding and a method, ready to deform any pose.
 
 Can be pickled, with its current rest points and its own binding.)")
-        .def(py::init(&make_deformer_of), py::arg("binding"), py::arg("method") = "lbs",
-             py::arg("mix") = py::none(),
+        .def(py::init(&make_deformer_of), "binding"_a, "method"_a = "lbs", "mix"_a = py::none(),
              R"(binding: a Binding; not copied.
 method: the name of one of sinew.methods().
 mix: None, or (name of another method, weights): weights float32 [vertices] are the share of the other method
     at each vertex, from 0 (none) to 1 (all); clamped. This is the stage `mix`.)")
-        .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
-             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
-             py::arg("rest_bones") = py::none(), py::arg("vertex_data") = py::none(),
-             "Constructs its own binding, from the arguments of Binding.")
+        .def(py::init(&make_deformer), "rest_points"_a, "influence_offsets"_a, "influence_bones"_a,
+             "influence_weights"_a, "method"_a = "lbs", "rest_bones"_a = py::none(),
+             "vertex_data"_a = py::none(), "Constructs its own binding, from the arguments of Binding.")
         .def_property_readonly(
             "method", [](const Timed<Deformer>& deformer) { return std::string(deformer.method().name); },
             "The name of the method.")
@@ -382,12 +379,11 @@ mix: None, or (name of another method, weights): weights float32 [vertices] are 
         .def(py::pickle([](const Timed<Deformer>& deformer) { return state_of(deformer); },
                         &deformer_of_state))
         .def(
-            "set_rest_points", &set_rest_points, py::arg("rest_points"),
+            "set_rest_points", &set_rest_points, "rest_points"_a,
             R"(Sets the rest points of this deformer alone, float32 [vertices, 3], such as when shape keys change.
 Other threads may deform meanwhile: each of their results has either the old points or the new ones.)")
-        .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
-             py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
-             py::arg("rest_inverses") = py::none(), py::arg("parameters") = py::none(),
+        .def("deform", &deform, "bone_transforms"_a, "out"_a = py::none(), "threads"_a = py::none(),
+             "bones_from_model"_a = py::none(), "rest_inverses"_a = py::none(), "parameters"_a = py::none(),
              R"(The deformed points, float32 [vertices, 3], model space.
 
 bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.

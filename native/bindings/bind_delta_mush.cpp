@@ -126,11 +126,10 @@ void bind_delta_mush(py::module_& m) {
         m, "DeltaMush",
         R"(The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
 (Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.)")
-        .def(py::init(&make), py::arg("rest_points"), py::arg("face_offsets"), py::arg("corner_vertices"),
-             py::arg("edges"), py::kw_only(), py::arg("iterations") = initial.iterations,
-             py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
-             py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
-             py::arg("weights") = py::none(),
+        .def(py::init(&make), "rest_points"_a, "face_offsets"_a, "corner_vertices"_a, "edges"_a,
+             py::kw_only(), "iterations"_a = initial.iterations, "radius"_a = initial.radius,
+             "factor"_a = initial.factor, "smooth_type"_a = type, "pin_boundary"_a = initial.pin_boundary,
+             "weights"_a = py::none(),
              R"(rest_points: float32 [vertices, 3], without shape keys; at most 2^29 - 1 vertices.
 face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
 corner_vertices: int32 [corners], the vertex of each corner.
@@ -149,15 +148,13 @@ weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; 
         .def("__repr__", &text_of)
         .def(py::pickle(&state_of, &of_state))
         .def(
-            "bind", &bind, py::arg("rest_points"), py::kw_only(), py::arg("iterations") = initial.iterations,
-            py::arg("radius") = initial.radius, py::arg("factor") = initial.factor,
-            py::arg("smooth_type") = type, py::arg("pin_boundary") = initial.pin_boundary,
-            py::arg("weights") = py::none(),
+            "bind", &bind, "rest_points"_a, py::kw_only(), "iterations"_a = initial.iterations,
+            "radius"_a = initial.radius, "factor"_a = initial.factor, "smooth_type"_a = type,
+            "pin_boundary"_a = initial.pin_boundary, "weights"_a = py::none(),
             R"(Sets other rest points and settings for the same faces and edges, which takes about as long as apply().
 
 The arguments and errors are those of the constructor; after an error the object is unchanged.)")
-        .def("apply", &apply, py::arg("points"), py::arg("out") = py::none(), py::arg("scale") = 1.0f,
-             py::arg("threads") = py::none(),
+        .def("apply", &apply, "points"_a, "out"_a = py::none(), "scale"_a = 1.0f, "threads"_a = py::none(),
              R"(The smoothed points, float32 [vertices, 3].
 
 points: float32 [vertices, 3], deformed, in the space of the rest points.

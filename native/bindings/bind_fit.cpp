@@ -208,10 +208,9 @@ NamedTuple<"Averaged"> average_poses(const ArrayLike& any_poses, const OptionalA
 void bind_fit(py::module_& m) {
     auto fit = m.def_submodule("fit");
     fit.attr("METHODS") = names_in_python(names_of(RigidFits{}));
-    fit.def("rigid", &rigid, py::arg("source"), py::arg("target"), py::arg("weights") = py::none(),
-            py::kw_only(), py::arg("source_directions") = py::none(),
-            py::arg("target_directions") = py::none(), py::arg("direction_weights") = py::none(),
-            py::arg("method") = "horn",
+    fit.def("rigid", &rigid, "source"_a, "target"_a, "weights"_a = py::none(), py::kw_only(),
+            "source_directions"_a = py::none(), "target_directions"_a = py::none(),
+            "direction_weights"_a = py::none(), "method"_a = "horn",
             R"(The rigid transform that maps `source` to `target` with the smallest weighted sum of squared
 distances.
 
@@ -231,7 +230,7 @@ Not defined: points on one line or all in one position, a mirror image with a sy
 (the identity). For points in a plane the fit is defined. is_mirrored: a mirror image would fit better; the
 result is still the best rotation.)");
     fit.def(
-        "hand_eye", &solve_hand_eye, py::arg("a"), py::arg("b"), py::arg("weights") = py::none(),
+        "hand_eye", &solve_hand_eye, "a"_a, "b"_a, "weights"_a = py::none(),
         R"(Solves a x = x b for x: the pose of one of two bodies that are fixed to each other, seen from the
 other.
 
@@ -245,8 +244,7 @@ Uses dual quaternions, which give rotation and translation at once (Daniilidis 1
 translation again, by least squares for that rotation (Park, Martin 1994), which is less sensitive to noise.
 Not defined: fewer than two motions, rotations only about parallel axes, only rotations by 180 degrees, no
 positive weight.)");
-    fit.def("average", &average_poses, py::arg("poses"), py::arg("weights") = py::none(), py::kw_only(),
-            py::arg("robust") = false,
+    fit.def("average", &average_poses, "poses"_a, "weights"_a = py::none(), py::kw_only(), "robust"_a = false,
             R"(The mean of n poses, in their layout. Signs of quaternions and the order do not matter.
 
 poses: [.., n, 4, 4], [.., n, 3, 4], [.., n, 7] or [.., n, 8], n >= 1. A matrix's linear part is replaced by

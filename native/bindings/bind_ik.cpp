@@ -245,9 +245,8 @@ rotations: [.., 4]; signs and lengths do not matter. For a swing by 180 degrees 
     py::class_<Solver>(
         ik, "Solver",
         "A solver for one tree of bones with its limits and effectors. solve() allocates only its result.")
-        .def(py::init(&make), py::arg("parents"), py::arg("effectors"), py::kw_only(),
-             py::arg("locked") = py::none(), py::arg("limits") = py::none(),
-             py::arg("stiffness") = py::none(),
+        .def(py::init(&make), "parents"_a, "effectors"_a, py::kw_only(), "locked"_a = py::none(),
+             "limits"_a = py::none(), "stiffness"_a = py::none(),
              R"(parents: int32 [bones], the index of each bone's parent, -1 for a root; parents precede their
     children.
 effectors: at least one.
@@ -257,10 +256,9 @@ limits: [bones, 3, 2], the smallest and the largest angle about x, y and z, radi
     IK limits. With limits of x and z a bone's swing stays within an ellipse through the four. Bones with
     limits or locks swing by at most 177.7 degrees.
 stiffness: [bones, 3], 0 to below 1: how much less the bone rotates about an axis than about others.)")
-        .def("solve", &solve, py::arg("rest"), py::arg("tips"), py::arg("goals"),
-             py::arg("poles") = py::none(), py::kw_only(), py::arg("rotations") = py::none(),
-             py::arg("root") = py::none(), py::arg("method") = "dls", py::arg("tolerance") = 1e-6,
-             py::arg("iterations") = 100,
+        .def("solve", &solve, "rest"_a, "tips"_a, "goals"_a, "poles"_a = py::none(), py::kw_only(),
+             "rotations"_a = py::none(), "root"_a = py::none(), "method"_a = "dls", "tolerance"_a = 1e-6,
+             "iterations"_a = 100,
              R"(Finds rotations that bring the tips to the goals.
 
 rest: [.., bones, 4, 4], [.., bones, 3, 4], [.., bones, 7] or [.., bones, 8]: each bone relative to its

@@ -193,14 +193,13 @@ Blended hermite_spline(const ArrayLike& keys, const ArrayLike& tangents, const A
 void bind_interpolate(py::module_& m) {
     auto interpolate = m.def_submodule("interpolate");
     interpolate.attr("METHODS") = names_in_python(names_of(Interpolations{}));
-    interpolate.def("between", &between, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method") = "dlb",
+    interpolate.def("between", &between, "a"_a, "b"_a, "t"_a, "method"_a = "dlb",
                     R"(Interpolates from `a` at t = 0 to `b` at t = 1; other t extrapolate.
 
 a, b: in the layout of the method, with rotations of unit length.
 t: [..] or a number.)");
     interpolate.def(
-        "blend", &blend, py::arg("transforms"), py::arg("weights"), py::arg("method") = "dlb",
-        py::arg("signs") = "heaviest",
+        "blend", &blend, "transforms"_a, "weights"_a, "method"_a = "dlb", "signs"_a = "heaviest",
         R"(The blend of the n transforms along the last leading axis; the axes before it broadcast.
 
 transforms: [.., n, 7] and so on, in the layout of the method, n >= 1, with rotations of unit length.
@@ -214,7 +213,7 @@ running_sum  each in the hemisphere of the sum of those before it, as Blender's 
 as_given     unchanged: for transforms that are aligned already, such as along a spline)");
     auto splines = m.def_submodule("spline");
     splines.def(
-        "catmull_rom", &spline, py::arg("keys"), py::arg("times"), py::arg("at"), py::arg("method") = "dlb",
+        "catmull_rom", &spline, "keys"_a, "times"_a, "at"_a, "method"_a = "dlb",
         R"(Blend form: the keys blended by `method` with the weights of the spline (Smith 2013, section 3.2.2).
 
 Rigid for every method except matrix_linear. The keys are in the layout of the method.
@@ -222,13 +221,12 @@ Rigid for every method except matrix_linear. The keys are in the layout of the m
 If keys are more than about 100 degrees apart, the negative weights may keep the iterations of qv_slerp and dib
 from converging: the result is then not defined, finite, and may jump.)");
     splines.def(
-        "catmull_rom_vector", &spline_of_vectors, py::arg("keys"), py::arg("times"), py::arg("at"),
+        "catmull_rom_vector", &spline_of_vectors, "keys"_a, "times"_a, "at"_a,
         R"(Vector form: the components as a vector of 12, 7, 8 or, for points, 3 numbers (Smith 2013, algorithm
 3).
 
 Rigid only at the keys; the layout's normalized() makes it rigid everywhere.)");
-    splines.def("hermite", &hermite_spline, py::arg("keys"), py::arg("tangents"), py::arg("times"),
-                py::arg("at"),
+    splines.def("hermite", &hermite_spline, "keys"_a, "tangents"_a, "times"_a, "at"_a,
                 R"(The cubic Hermite spline through keys with arbitrary tangents (Smith 2013, section 2.3.2).
 
 keys: [n, 3], points, or [n, 8], rigid transforms.

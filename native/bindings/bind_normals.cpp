@@ -128,9 +128,9 @@ void bind_normals(py::module_& m) {
         m, "Normals",
         R"(Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices weighted
 by the angles of corners, of corners by fans between sharp edges. Can be pickled.)")
-        .def(py::init(&make), py::arg("vertex_count"), py::arg("face_offsets"), py::arg("corner_vertices"),
-             py::arg("edges") = py::none(), py::kw_only(), py::arg("sharp_edges") = py::none(),
-             py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
+        .def(py::init(&make), "vertex_count"_a, "face_offsets"_a, "corner_vertices"_a, "edges"_a = py::none(),
+             py::kw_only(), "sharp_edges"_a = py::none(), "sharp_faces"_a = py::none(),
+             "custom_normals"_a = py::none(),
              R"(vertex_count: number of vertices, at most 2^29 - 1.
 face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
 corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.
@@ -150,8 +150,8 @@ face is flat or every edge sharp, else "corner" if anything is sharp, else "vert
         .def_property_readonly("face_count", count_of(NormalDomain::face), "Number of faces.")
         .def("__repr__", &text_of)
         .def(py::pickle(&state_of, &of_state))
-        .def("compute", &compute, py::arg("points"), py::arg("domain") = py::none(),
-             py::arg("out") = py::none(), py::arg("threads") = py::none(),
+        .def("compute", &compute, "points"_a, "domain"_a = py::none(), "out"_a = py::none(),
+             "threads"_a = py::none(),
              R"(Unit vectors, float32 [vertices, corners or faces, 3].
 
 points: float32 [vertices, 3], deformed.

@@ -103,9 +103,9 @@ Rows moments(const ArrayLike& rest_points, const ArrayLike& influence_offsets,
 }  // namespace
 
 void bind_precompute(py::module_& m) {
-    m.def("centres_of_rotation", &centres, py::arg("rest_points"), py::arg("influence_offsets"),
-          py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::kw_only(),
-          py::arg("exact") = false, py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+    m.def("centres_of_rotation", &centres, "rest_points"_a, "influence_offsets"_a, "influence_bones"_a,
+          "influence_weights"_a, "triangles"_a, py::kw_only(), "exact"_a = false, "threads"_a = py::none(),
+          "progress"_a = py::none(),
           R"(The vertex data of the method "cor": the optimised centre of rotation of each vertex, float32
 [vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest points.
 
@@ -116,10 +116,9 @@ threads: at most so many; None or 0: as many as useful. They give way to all oth
 progress: None, or a callable that is called on this thread with the completed share, 0 to 1. If it returns
     False, the work is cancelled and the result is None. An exception that it raises is passed on.)");
     m.def(
-        "direct_delta_mush", &moments, py::arg("rest_points"), py::arg("influence_offsets"),
-        py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::arg("radius"),
-        py::kw_only(), py::arg("exact") = false, py::arg("threads") = py::none(),
-        py::arg("progress") = py::none(),
+        "direct_delta_mush", &moments, "rest_points"_a, "influence_offsets"_a, "influence_bones"_a,
+        "influence_weights"_a, "triangles"_a, "radius"_a, py::kw_only(), "exact"_a = false,
+        "threads"_a = py::none(), "progress"_a = py::none(),
         R"(The vertex data of the method "ddm": the moments of each bone's smoothed weights around each vertex (Le,
 Lewis 2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x,
 y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments).

@@ -174,7 +174,7 @@ void bind_skeleton(py::module_& m) {
 Its methods take each bone relative to its parent, in any layout of sinew.affine, sinew.quat_vec and
 sinew.dual_quat. Can be pickled.)")
         .def(
-            py::init(&make_skeleton), py::arg("parents"),
+            py::init(&make_skeleton), "parents"_a,
             R"(parents: int32 [bones], the index of each bone's parent, -1 for a root. ValueError if a parent does not
     precede its child.)")
         .def_property_readonly("bone_count", &Skeleton::bone_count, "Number of bones.")
@@ -184,20 +184,20 @@ sinew.dual_quat. Can be pickled.)")
              })
         .def(py::pickle([](const Skeleton& skeleton) { return py::make_tuple(array_of(skeleton.parents())); },
                         [](const py::object& state) { return make_skeleton(part_of(state, 1, 0)); }))
-        .def("root_relative", &relative_to_root, py::arg("transforms"), py::arg("root") = py::none(),
+        .def("root_relative", &relative_to_root, "transforms"_a, "root"_a = py::none(),
              R"(Each bone relative to the root, in the layout of `transforms` (Smith 2013, algorithm 1).
 
 transforms: [bones, 4, 4] or [bones, 3, 4], for which the result is [bones, 4, 4]; [bones, 7]; [bones, 8].
 root: None, or a transform that is applied after that of every bone without a parent.)")
         .def(
-            "update_branch", &branch_updated, py::arg("root_relative"), py::arg("transforms"),
-            py::arg("bone"), py::arg("root") = py::none(),
+            "update_branch", &branch_updated, "root_relative"_a, "transforms"_a, "bone"_a,
+            "root"_a = py::none(),
             R"(The result of root_relative() after a change of one bone: computes only that bone and its descendants.
 
 root_relative: the result before the change, in the layout of `transforms`.
 transforms, root: as for root_relative().
 bone: the index of the changed bone.)")
-        .def("interpolate", &interpolate, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method") = "dlb",
+        .def("interpolate", &interpolate, "a"_a, "b"_a, "t"_a, "method"_a = "dlb",
              R"((transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
 
 a, b: [bones, ..] in the layout of the method, at t = 0 and t = 1.
@@ -207,8 +207,7 @@ method: one of sinew.interpolate.METHODS.
 is_defined is False if the result is not defined for some bone, which then has the result that
 sinew.interpolate specifies.)")
         .def(
-            "spline", &spline, py::arg("keyframes"), py::arg("times"), py::arg("time"),
-            py::arg("method") = "dlb",
+            "spline", &spline, "keyframes"_a, "times"_a, "time"_a, "method"_a = "dlb",
             R"((transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend form (Smith
 2013, algorithm 3 and section 3.2.2).
 
@@ -217,7 +216,7 @@ times: [keys], non-decreasing; keys of equal time are a cut.
 time: a number, or [..], for which the results are [.., bones, ..] and [..]; constant before the first key and
     after the last.
 method: one of sinew.interpolate.METHODS.)")
-        .def("spline_vector", &spline_vector_form, py::arg("keyframes"), py::arg("times"), py::arg("time"),
+        .def("spline_vector", &spline_vector_form, "keyframes"_a, "times"_a, "time"_a,
              R"(As spline(), in vector form (Smith 2013, algorithm 3): not rigid between keys.
 
 keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].)");

@@ -83,8 +83,8 @@ void bind_skinned_normals(py::module_& m) {
         R"(Normals and tangents that move with the skin, as in engines: each is transformed by the blend of its
 vertex, normals by the inverse transpose. The effect of weights that change from vertex to vertex is not
 included. A frame is a normal and, if there are tangents, its tangent.)")
-        .def(py::init(&make), py::arg("binding"), py::arg("normals"), py::arg("tangents") = py::none(),
-             py::arg("vertices") = py::none(), py::arg("method") = "lbs", py::arg("mix") = py::none(),
+        .def(py::init(&make), "binding"_a, "normals"_a, "tangents"_a = py::none(), "vertices"_a = py::none(),
+             "method"_a = "lbs", "mix"_a = py::none(),
              R"(binding: a Binding; not copied.
 normals: float32 [frames, 3], at rest, of any length.
 tangents: None, or float32 [frames, 3], at rest, of any length.
@@ -95,19 +95,17 @@ method, mix: as for Deformer.)")
                                "Number of frames: as many as normals at rest.")
         .def("__repr__", &text_of)
         .def(
-            "deform", &deform, py::arg("bone_transforms"), py::arg("threads") = py::none(),
-            py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
-            py::arg("parameters") = py::none(),
+            "deform", &deform, "bone_transforms"_a, "threads"_a = py::none(),
+            "bones_from_model"_a = py::none(), "rest_inverses"_a = py::none(), "parameters"_a = py::none(),
             R"((points, normals, tangents): the deformed points, float32 [vertices, 3]; normals of unit length, float32
 [frames, 3]; the same for tangents, or None.
 
 The arguments are those of Deformer.deform(). Where the blend mirrors, a normal points to the side given by the
 order of a face's vertices. Where the blend collapses the plane of a normal to a line, that normal is 0.)")
         .def(
-            "deform_normals", &deform_normals, py::arg("bone_transforms"), py::arg("points"),
-            py::arg("out") = py::none(), py::arg("threads") = py::none(),
-            py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
-            py::arg("parameters") = py::none(),
+            "deform_normals", &deform_normals, "bone_transforms"_a, "points"_a, "out"_a = py::none(),
+            "threads"_a = py::none(), "bones_from_model"_a = py::none(), "rest_inverses"_a = py::none(),
+            "parameters"_a = py::none(),
             R"(The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
 
 points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.

@@ -10,20 +10,24 @@
 namespace sinew::bindings {
 
 /// How a value of the library is stored in the last axes of an array:
-///   kShape      those axes as text       kSize        number of numbers read
-///   dimensions  sizes of an output       read, write  conversion
+///   kShape       those axes as text       kSize        number of numbers read
+///   kDimensions  sizes of an output       read, write  conversion
 template <class Value>
 struct Item;
 
 template <class T>
 using Scalar = T;
 
-template <class T>
-struct PlainItem {
+template <class T, std::size_t... dimensions>
+struct Numbers {
     using Element = T;
+    static constexpr std::size_t kSize = (1 * ... * dimensions);
+    static constexpr std::array<std::size_t, sizeof...(dimensions)> kDimensions{dimensions...};
+};
+
+template <class T>
+struct PlainItem : Numbers<T> {
     static constexpr const char* kShape = "[..]";
-    static constexpr std::size_t kSize = 1;
-    static constexpr std::array<std::size_t, 0> kDimensions{};
     static T read(const T* from) { return *from; }
     static void write(T value, T* to) { *to = value; }
 };
@@ -36,11 +40,8 @@ template <>
 struct Item<bool> : PlainItem<bool> {};
 
 template <class T>
-struct Item<Vec3<T>> {
-    using Element = T;
+struct Item<Vec3<T>> : Numbers<T, 3> {
     static constexpr const char* kShape = "[.., 3]";
-    static constexpr std::size_t kSize = 3;
-    static constexpr std::array<std::size_t, 1> kDimensions{3};
     static Vec3<T> read(const T* from) { return {from[0], from[1], from[2]}; }
     static void write(const Vec3<T>& v, T* to) {
         for (int i = 0; i < 3; ++i) to[i] = v[i];
@@ -48,11 +49,8 @@ struct Item<Vec3<T>> {
 };
 
 template <class T>
-struct Item<Mat3<T>> {
-    using Element = T;
+struct Item<Mat3<T>> : Numbers<T, 3, 3> {
     static constexpr const char* kShape = "[.., 3, 3]";
-    static constexpr std::size_t kSize = 9;
-    static constexpr std::array<std::size_t, 2> kDimensions{3, 3};
     static Mat3<T> read(const T* from) {
         Mat3<T> m;
         for (int row = 0; row < 3; ++row) {
@@ -69,11 +67,9 @@ struct Item<Mat3<T>> {
 
 /// Read from three or four rows, without using a fourth one; written with four.
 template <class T>
-struct Item<Affine<T>> {
-    using Element = T;
+struct Item<Affine<T>> : Numbers<T, 4, 4> {
     static constexpr const char* kShape = "[.., 4, 4] or [.., 3, 4]";
     static constexpr std::size_t kSize = 12;
-    static constexpr std::array<std::size_t, 2> kDimensions{4, 4};
     static Affine<T> read(const T* from) {
         Affine<T> a;
         for (int row = 0; row < 3; ++row) {
@@ -106,21 +102,15 @@ void write_quat(const Quat<T>& q, T* to) {
 }
 
 template <class T>
-struct Item<Quat<T>> {
-    using Element = T;
+struct Item<Quat<T>> : Numbers<T, 4> {
     static constexpr const char* kShape = "[.., 4]";
-    static constexpr std::size_t kSize = 4;
-    static constexpr std::array<std::size_t, 1> kDimensions{4};
     static Quat<T> read(const T* from) { return read_quat(from); }
     static void write(const Quat<T>& q, T* to) { write_quat(q, to); }
 };
 
 template <class T>
-struct Item<QuatVec<T>> {
-    using Element = T;
+struct Item<QuatVec<T>> : Numbers<T, 7> {
     static constexpr const char* kShape = "[.., 7]";
-    static constexpr std::size_t kSize = 7;
-    static constexpr std::array<std::size_t, 1> kDimensions{7};
     static QuatVec<T> read(const T* from) { return {read_quat(from), Item<Vec3<T>>::read(from + 4)}; }
     static void write(const QuatVec<T>& a, T* to) {
         write_quat(a.rotation, to);
@@ -129,11 +119,8 @@ struct Item<QuatVec<T>> {
 };
 
 template <class T>
-struct Item<DualQuat<T>> {
-    using Element = T;
+struct Item<DualQuat<T>> : Numbers<T, 8> {
     static constexpr const char* kShape = "[.., 8]";
-    static constexpr std::size_t kSize = 8;
-    static constexpr std::array<std::size_t, 1> kDimensions{8};
     static DualQuat<T> read(const T* from) { return {read_quat(from), read_quat(from + 4)}; }
     static void write(const DualQuat<T>& a, T* to) {
         write_quat(a.real, to);
@@ -142,11 +129,8 @@ struct Item<DualQuat<T>> {
 };
 
 template <class T>
-struct Item<Twist<T>> {
-    using Element = T;
+struct Item<Twist<T>> : Numbers<T, 6> {
     static constexpr const char* kShape = "[.., 6]";
-    static constexpr std::size_t kSize = 6;
-    static constexpr std::array<std::size_t, 1> kDimensions{6};
     static Twist<T> read(const T* from) { return {Item<Vec3<T>>::read(from), Item<Vec3<T>>::read(from + 3)}; }
     static void write(const Twist<T>& a, T* to) {
         Item<Vec3<T>>::write(a.angular, to);
@@ -155,11 +139,8 @@ struct Item<Twist<T>> {
 };
 
 template <class T>
-struct Item<Dual<T>> {
-    using Element = T;
+struct Item<Dual<T>> : Numbers<T, 2> {
     static constexpr const char* kShape = "[.., 2]";
-    static constexpr std::size_t kSize = 2;
-    static constexpr std::array<std::size_t, 1> kDimensions{2};
     static Dual<T> read(const T* from) { return {from[0], from[1]}; }
     static void write(const Dual<T>& a, T* to) {
         to[0] = a.real;

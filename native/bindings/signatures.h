@@ -10,6 +10,7 @@
 namespace sinew::bindings {
 
 namespace py = pybind11;
+using namespace pybind11::literals;  // "name"_a for arguments
 
 /// Text as a template argument.
 template <std::size_t size>

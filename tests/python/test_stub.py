@@ -5,8 +5,10 @@ everything."""
 import ast
 import subprocess
 from pathlib import Path
+from typing import get_args
 
 import pytest
+import sinew
 
 ROOT = Path(__file__).resolve().parents[2]
 STUB = ROOT / "native" / "python" / "sinew" / "_native"
@@ -31,3 +33,10 @@ def test_everything_is_described(path):
     for node in described:
         if node.name == "__init__" or not node.name.startswith("_"):
             assert ast.get_docstring(node), node.name
+
+
+@pytest.mark.parametrize(
+    "module", [sinew.fit, sinew.ik, sinew.interpolate], ids=lambda module: module.__name__
+)
+def test_the_type_of_names_has_all_methods(module):
+    assert get_args(module.Method) == module.METHODS
