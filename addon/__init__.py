@@ -21,17 +21,17 @@ def unregister() -> None:
 
 def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
     """Called before an export."""
-    from .deform import exporters
+    from .deform import lifecycle
     from .features.gltf import feature
 
-    feature.before_export(export_settings, exporters.before_export)
+    feature.before_export(export_settings, lifecycle.before_export)
 
 
 def glTF2_post_export_callback(export_settings: dict) -> None:  # noqa: N802
     """Called after an export."""
-    from .deform import exporters
+    from .deform import lifecycle
 
-    exporters.after_export(export_settings)
+    lifecycle.after_export(export_settings)
 
 
 def glTF2ExportUserExtension() -> object:  # noqa: N802

@@ -28,7 +28,7 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from .deform import exporters, handlers, lifecycle
+    from .deform import lifecycle
 
     # The order of the panels.
     parts, features = _parts(), _features()
@@ -36,9 +36,7 @@ def register() -> None:
         _register_classes(each.classes)
     for part in parts:
         part.register()
-    handlers.register()
     lifecycle.register()
-    exporters.register()
     for feature in features:
         feature.register()
     lifecycle.adopt_open_file()
@@ -51,14 +49,12 @@ def unregister() -> None:
         # Blender as a module unregisters its extensions only after _end().
         return
     if hasattr(bpy.types.Object, "sinew"):
-        from .deform import exporters, handlers, lifecycle
+        from .deform import lifecycle
 
         lifecycle.leave_open_file()
         for feature in reversed(_features()):
             feature.unregister()
-        exporters.unregister()
         lifecycle.unregister()
-        handlers.unregister()
         for part in reversed(_parts()):
             part.unregister()
     while _registered:

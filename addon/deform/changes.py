@@ -10,7 +10,7 @@ import bpy
 
 from ..attach import node_group
 from ..core.rig import Bones
-from .originals import Find
+from .events import Find
 
 
 @dataclass
@@ -79,7 +79,7 @@ class Changes:
         original: Find,
         after_step: bool = False,
     ) -> Changes:
-        """original: a function that finds originals (originals.py)."""
+        """original: a function that finds originals (events.finder)."""
         updates = depsgraph.updates
         meshes = _changed_meshes(updates, _uid_by(original)) - {GONE}
         changes = cls(frame=frame, complete=complete, after_step=after_step, meshes=meshes)

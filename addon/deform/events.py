@@ -91,3 +91,36 @@ def subscribe_all(handlers: Mapping[str, Callable]) -> None:
 def unsubscribe_all(handlers: Mapping[str, Callable]) -> None:
     for event, function in handlers.items():
         unsubscribe(event, function)
+
+
+# --- The originals of what an evaluation lists
+
+Find = Callable[[bpy.types.ID], bpy.types.ID | None]
+
+_LISTS = (
+    (bpy.types.Object, "objects"),
+    (bpy.types.Mesh, "meshes"),
+    (bpy.types.Key, "shape_keys"),
+    (bpy.types.Armature, "armatures"),
+)
+
+
+def finder(event: str, function: Callable) -> Find:
+    """Returns a function that finds the original of an evaluated object, mesh, shape key or armature,
+    for use in `function`, which Blender calls at the event. The function returns None where another add-on's
+    function may have deleted or renamed the original.
+
+    Blender frees at once what a handler deletes, but goes on listing its evaluated copy. The `original` of
+    that is a dangling pointer, and reading it can crash Blender.
+    """
+    return _by_name if others_precede(event, function) else _at_once
+
+
+def _at_once(evaluated: bpy.types.ID) -> bpy.types.ID:
+    return evaluated.original
+
+
+def _by_name(evaluated: bpy.types.ID) -> bpy.types.ID | None:
+    name = next(name for kind, name in _LISTS if isinstance(evaluated, kind))
+    library = evaluated.library
+    return getattr(bpy.data, name).get((evaluated.name, library.filepath if library is not None else None))

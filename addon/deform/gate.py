@@ -40,7 +40,7 @@ class Gate:
     """The modifiers that are suspended between Blender's two rounds."""
 
     def __init__(self) -> None:
-        self._suspended: list[_Suspended] = []
+        self.suspended: list[_Suspended] = []
 
     def suspend(self, obj: bpy.types.Object, is_playing: bool) -> None:
         """is_playing: a window plays the animation, so Blender writes its values to the originals, too. Other
@@ -53,13 +53,13 @@ class Gate:
                 and not node_group.is_sinew(modifier)
                 and not is_visibility_animated(obj, modifier)
             ):
-                self._suspended.append(
+                self.suspended.append(
                     _Suspended(obj, modifier.persistent_uid, modifier.show_viewport, modifier.show_render)
                 )
                 modifier.show_viewport = modifier.show_render = False
 
     def restore(self) -> None:
-        suspended, self._suspended = self._suspended, []
+        suspended, self.suspended = self.suspended, []
         for each in suspended:
             # Its object may be gone.
             with contextlib.suppress(ReferenceError):

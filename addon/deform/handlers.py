@@ -19,7 +19,7 @@ from ..attach.updates import (
     phase,
     reaction,
 )
-from . import events, originals, session
+from . import events, session
 from .changes import Changes, names_of_changed_meshes
 from .session import current
 
@@ -57,7 +57,7 @@ def _react_to_update(depsgraph: bpy.types.Depsgraph) -> None:
     with reaction() as may_react:
         if current.is_idle:
             return
-        original = originals.finder("depsgraph_update_post", on_depsgraph_update)
+        original = events.finder("depsgraph_update_post", on_depsgraph_update)
         _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
     _end_event()
     _note_seen("depsgraph_update_post", depsgraph)
@@ -102,9 +102,10 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
         notify(subscribers.frame_shown)
         return
     with reaction() as may_react:
-        current.gate.restore()
+        if current.gate.suspended:
+            current.gate.restore()
         if not current.is_idle:
-            original = originals.finder("frame_change_post", on_frame_change)
+            original = events.finder("frame_change_post", on_frame_change)
             if not session.were_all_deformed(depsgraph, original):
                 _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
     _end_event()
@@ -133,7 +134,7 @@ def _end_event() -> None:
         state.evaluation.is_event_known = state.evaluation.was_tagged
 
 
-def _read_changes(depsgraph: bpy.types.Depsgraph, original: originals.Find, frame: bool) -> Changes:
+def _read_changes(depsgraph: bpy.types.Depsgraph, original: events.Find, frame: bool) -> Changes:
     """An evaluation's list of updates is complete only where the one before was seen, too: a render has a
     depsgraph of its own."""
     same = current.depsgraph == depsgraph.as_pointer()

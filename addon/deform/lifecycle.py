@@ -18,10 +18,12 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, reaction, updates_suspended
 from ..core.precompute import precomputations
 from ..io.animation_paths import animated_paths
-from . import apply_plan, events, precompute_watch, precomputing, session
+from . import apply_plan, events, handlers, precompute_watch, precomputing, session
 from .changes import Changes
 
 log = logging.getLogger("sinew")
+
+_FBX, _GLTF = "EXPORT_SCENE_OT_fbx", "EXPORT_SCENE_OT_gltf"
 
 
 def _handler(function: Callable[[bool], None]) -> Callable[..., None]:
@@ -128,18 +130,54 @@ def on_saved(may_react: bool) -> None:
 
 
 @_handler
-def begin_export(may_react: bool) -> None:
-    """From here to end_export() the file is as in a saved state, and frames do without Sinew."""
+def before_export(may_react: bool) -> None:
+    """From here to after_export() the file is as in a saved state, and frames do without Sinew."""
     if may_react and may_change_file() and not session.current.is_idle:
         _begin_saving()
         note.remove()
         if not bpy.app.background:
             # An exporter that fails does not announce its end.
-            bpy.app.timers.register(end_export, first_interval=0.0)
+            bpy.app.timers.register(on_saved, first_interval=0.0)
 
 
-def end_export() -> None:
+def after_export(*_settings: object) -> None:
+    notify(subscribers.exported)
     on_saved()
+
+
+def _wrap_exporters() -> None:
+    """Wraps those of Blender's exporters of skins that are registered and not wrapped yet: they need Armature
+    modifiers that deform, and use them to bring the mesh to rest.
+
+    The glTF exporter calls extensions before an export, but afterwards only if it did not fail. The FBX
+    exporter, also written in Python, calls nobody (seen on 4.2 to 5.2). So both operators are wrapped.
+    """
+    for name in (_FBX, _GLTF):
+        operator = getattr(bpy.types, name, None)
+        if operator is not None and not hasattr(operator.execute, "__wrapped__"):
+            operator.execute = _without_sinew(operator.execute, is_announced=name == _GLTF)
+
+
+def _without_sinew(execute: Callable, is_announced: bool) -> Callable:
+    """is_announced: the exporter itself calls before_export()."""
+
+    @functools.wraps(execute)
+    def execute_without_sinew(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+        if not is_announced:
+            before_export()
+        try:
+            return execute(self, context)
+        finally:
+            after_export()
+
+    return execute_without_sinew
+
+
+def _unwrap_exporters() -> None:
+    for name in (_FBX, _GLTF):
+        operator = getattr(bpy.types, name, None)
+        if operator is not None and hasattr(operator.execute, "__wrapped__"):
+            operator.execute = operator.execute.__wrapped__
 
 
 def prepare_for_save() -> None:
@@ -264,11 +302,20 @@ _HANDLERS = {
 }
 
 
+_SUBSCRIPTIONS = (
+    (subscribers.precomputation_requested, precompute_watch.begin),
+    (subscribers.before_removal, session.forget_object),
+    (subscribers.loaded, _wrap_exporters),
+)
+
+
 def register() -> None:
     precomputing.begin()
-    subscribers.precomputation_requested.append(precompute_watch.begin)
-    subscribers.before_removal.append(session.forget_object)
+    for functions, function in _SUBSCRIPTIONS:
+        functions.append(function)
+    handlers.register()
     events.subscribe_all(_HANDLERS)
+    _wrap_exporters()
 
 
 def adopt_open_file() -> None:
@@ -290,9 +337,11 @@ def leave_open_file() -> None:
 
 
 def unregister() -> None:
+    _unwrap_exporters()
     precomputing.end()
-    subscribers.precomputation_requested.remove(precompute_watch.begin)
-    subscribers.before_removal.remove(session.forget_object)
+    for functions, function in _SUBSCRIPTIONS:
+        functions.remove(function)
     if bpy.app.timers.is_registered(precompute_watch.check):
         bpy.app.timers.unregister(precompute_watch.check)
     events.unsubscribe_all(_HANDLERS)
+    handlers.unregister()

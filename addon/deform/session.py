@@ -27,7 +27,6 @@ from .bound import uid
 from .changes import GONE, Changes
 from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
-from .originals import Find
 from .plan import UNSEEN, Plan, State
 from .skinned_object import SkinnedObject
 from .update import update
@@ -336,7 +335,7 @@ def waiting() -> set[tuple[int, int]]:
     }
 
 
-def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
+def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: events.Find) -> bool:
     """Whether the evaluation gave all skinned objects their points, and nothing else has to be checked."""
     if (
         current.objects is None

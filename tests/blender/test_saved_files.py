@@ -15,7 +15,7 @@ import pytest
 import scenes
 from program import checked, without_sinew
 from sinew_addon.attach import attach, node_group, note, properties, stack, updates
-from sinew_addon.deform import apply_plan, exporters, safe_mode, session, small_meshes
+from sinew_addon.deform import apply_plan, lifecycle, safe_mode, session, small_meshes
 from sinew_addon.io import armature_io
 from sinew_addon.ui import state_text
 
@@ -381,10 +381,10 @@ def test_an_export_has_blenders_own_modifiers_and_frames(tmp_path):
     expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
     scenes.add_sinew(obj, "dq")
     ours = scenes.shapes(obj, FRAMES)
-    exporters.before_export()
+    lifecycle.before_export()
     assert obj.find_armature() == armature
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-    exporters.after_export()
+    lifecycle.after_export()
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
 
 
