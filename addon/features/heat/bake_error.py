@@ -74,8 +74,6 @@ def rms(objects: Sequence[bpy.types.Object], quantity: str) -> float:
 def scale_of(settings: measures.SinewMeasures, objects: Sequence[bpy.types.Object]) -> HeatScale:
     """Returns one range for the errors before and after, so that the two can be compared."""
     most = max(summary_of(obj.data).most for obj in objects)
-    if settings.range == measures.FIXED:
-        return HeatScale.fixed(settings.metric, settings.length, 0.0, most)
     return HeatScale.over_values(settings.metric, 0.0, most, 0.0)
 
 

@@ -162,7 +162,7 @@ class SINEW_PT_measures(Sidebar, OfHeatMap, bpy.types.Panel):
                 row.operator_menu_enum("sinew.fit_heat_range", "over", text="Fit")
 
 
-class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
+class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Numbers"
     bl_parent_id = "SINEW_PT_measures"
     bl_options = {"DEFAULT_CLOSED"}
@@ -234,7 +234,7 @@ def distances(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str
     return [("Distance", tr("at most {value}", value=most)), ("Distance, RMS", rms)]
 
 
-class SINEW_PT_worst_frames(Sidebar, bpy.types.Panel):
+class SINEW_PT_worst_frames(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Worst Frames"
     bl_parent_id = "SINEW_PT_measures"
     bl_options = {"DEFAULT_CLOSED"}

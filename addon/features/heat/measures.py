@@ -103,7 +103,7 @@ class SinewMeasures(bpy.types.PropertyGroup):
     @property
     def end(self) -> str:
         """The setting with the end of a fixed range; empty for measures that need none."""
-        return {"length": "length", "ratio": "ratio", "share": ""}[self.metric.unit]
+        return self.metric.unit if self.metric.unit != "share" and self.quantity in METRICS else ""
 
     def fix(self, scale: HeatScale) -> None:
         """Fixes the range to that of a scale."""
