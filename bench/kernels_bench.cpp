@@ -55,7 +55,7 @@ void bulge_limit(benchmark::State& state, const Shape& shape) {
         const auto z = static_cast<float>(bone);
         segments.push_back({{0, 0, z}, {0, 0, z + 1}});
     }
-    const BulgeLimit limit({scene.data(), segments});
+    const BulgeLimit limit(Binding(scene.data()), {segments});
     (void)bound(shape).deformer(Dq::info).deform(scene.pose, {{}, 1}, scene.points);
     for (Vec3<float>& point : scene.points) point *= 1.01f;
     for (auto _ : state) {

@@ -138,7 +138,7 @@ Scene make_scene(const Shape& shape) {
 }
 
 std::vector<Variant> variants_of(const MethodInfo& method) {
-    if (!method.keeps_moments) return {};
+    if (!method.rows_by_bone) return {};
     // The first parameter is the index of the variant.
     return {{std::string(method.name) + "2", {1.0}}, {std::string(method.name) + "4", {2.0}}};
 }

@@ -51,7 +51,7 @@ struct Scene {
         BindData bound = data();
         if (method.vertex_floats == 0) return bound;
         method_values.clear();
-        if (method.keeps_moments) {
+        if (method.rows_by_bone) {
             add_moments();
         } else {
             for (const glm::vec3& rest : plain.rest_points) {

@@ -221,7 +221,7 @@ def tube_numbers(variant: Variant, tube: tubes.Tube) -> tuple[float, ...]:
     offsets = np.arange(0, 4 * len(around) + 1, 4)
     mush = sinew.DeltaMush(tube.mesh[0], offsets, around.ravel(), edges, iterations=20)
     ends = np.float32([[0, 0, 0], [0, 0, 2]]), np.float32([[0, 0, 2], [0, 0, 4]])
-    limit = sinew.BulgeLimit(*tube.mesh, *ends)
+    limit = sinew.BulgeLimit(sinew.Binding(*tube.mesh), *ends)
     names = [name for name, _values in variant.stages]
 
     def deformed(axis: Sequence[float], degrees: float) -> tuple[np.ndarray, np.ndarray]:

@@ -96,10 +96,7 @@ class BulgeLimit:
             points = transformed(points, bones_from_model)
         influences = weighting.influences_over_joints(points)
         return sinew.BulgeLimit(
-            rest_points,
-            influences.offsets,
-            influences.bones,
-            influences.weights,
+            sinew.Binding(rest_points, influences.offsets, influences.bones, influences.weights),
             *segments(weighting.bones),
             bones_from_model=bones_from_model.astype(np.float32),
             weights=self._weights(modifier),

@@ -18,7 +18,7 @@ from .scale_rule import BLENDER_4, IGNORED
 from .spaces import is_same_space, transformed
 from .stage_mesh import StageMesh
 from .stages import StagesAfter, StageValues
-from .vertex_data import PROVIDERS, VertexData
+from .vertex_data import METHODS, PROVIDERS, VertexData
 
 LINEAR = "lbs"
 # The purpose of the deformer that gives a mesh its shape, where there is only one.
@@ -256,17 +256,18 @@ class SkinDeformer:
             frame.bones_from_model, last.bones_from_model
         )
 
-    def _vertex_data_of(self, frame: Frame) -> dict[str, np.ndarray]:
-        """Returns the data by the name of the method."""
+    def _vertex_data_of(self, frame: Frame) -> dict[str, np.ndarray | None]:
+        """Returns the data by the name of the method. None for a mesh without data of MikuMikuDance: it is
+        blended linearly."""
+        names = [name for name in (frame.method, frame.mix) if name and METHODS[name].vertex_floats]
         if self.vertex_data is None:
-            return {}
-        for name in (frame.method, frame.mix):
+            return {name: None for name in names if name not in PROVIDERS}
+        for name in names:
             self.vertex_data.take_parameters(name, frame.parameters)
-        made = {name: self.vertex_data.of(name, frame.bones_from_model) for name in (frame.method, frame.mix)}
-        return {name: data for name, data in made.items() if data is not None}
+        return {name: self.vertex_data.of(name, frame.bones_from_model) for name in names}
 
     def _pack(
-        self, frame: Frame, rest_points: np.ndarray, vertex_data: dict[str, np.ndarray]
+        self, frame: Frame, rest_points: np.ndarray, vertex_data: dict[str, np.ndarray | None]
     ) -> sinew.Binding:
         points = frame.rest_points
         if self.weighting.depends_on_points:

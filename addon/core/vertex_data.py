@@ -293,7 +293,7 @@ class VertexData:
 
 def _fits(method: sinew.Method, found: np.ndarray, points: np.ndarray, influences: Influences) -> bool:
     """Whether stored data can be that of the mesh: centres and first moments are means of the rest points."""
-    rows = len(found) if method.keeps_moments else len(points)
+    rows = len(found) if method.rows_by_bone else len(points)
     if found.shape != (rows, method.vertex_floats) or found.dtype != np.float32:
         return False
     owners = np.repeat(np.arange(len(points)), np.diff(influences.offsets))
@@ -304,7 +304,7 @@ def _fits(method: sinew.Method, found: np.ndarray, points: np.ndarray, influence
     diagonal = float(np.linalg.norm(highest - lowest))
     margin = 1e-3 * diagonal + 1e-6 * float(np.abs(points).max())
     weights, means, squares = np.ones((rows, 1)), found[:, :3], found[:, 3:]
-    if method.keeps_moments:
+    if method.rows_by_bone:
         vertices, bones, weights = found[:, 0], found[:, 1], found[:, 2:3]
         means, squares = found[:, 3:6], found[:, 6:]
         is_sound = bool(

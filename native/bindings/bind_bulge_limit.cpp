@@ -21,11 +21,8 @@ const Parameter& parameter_of(std::string_view id) {
     throw std::logic_error("BulgeLimitStage has no such parameter");
 }
 
-Timed<BulgeLimit> make(const py::object& rest_points, const py::object& influence_offsets,
-                       const py::object& influence_bones, const py::object& influence_weights,
-                       const py::object& heads, const py::object& tails, const py::object& bones_from_model,
-                       const py::object& weights, bool is_normalised) {
-    const MeshArguments mesh(rest_points, influence_offsets, influence_bones, influence_weights);
+Timed<BulgeLimit> make(const Binding& binding, const ArrayLike& heads, const ArrayLike& tails,
+                       const OptionalArrayLike& bones_from_model, const OptionalArrayLike& weights) {
     const auto first = checked_points(heads, "heads");
     const auto last = checked_points(tails, "tails");
     if (first.shape(0) != last.shape(0)) {
@@ -36,27 +33,17 @@ Timed<BulgeLimit> make(const py::object& rest_points, const py::object& influenc
     for (std::size_t bone = 0; bone < as_points(first).size(); ++bone) {
         segments.push_back({as_points(first)[bone], as_points(last)[bone]});
     }
-    BulgeLimitData data{mesh.data(), segments, checked_affine(bones_from_model, "bones_from_model")};
-    data.mesh.is_normalised = is_normalised;
+    BulgeLimitData data{segments, checked_affine(bones_from_model, "bones_from_model")};
     py::array_t<float> mask;
     if (!weights.is_none()) {
         mask = checked<float>(weights, "weights", 1, "None or float32 [vertices]", kMaxVertices);
-        if (mask.shape(0) != mesh.points.shape(0)) {
-            fail("weights", "None or float32 [" + std::to_string(mesh.points.shape(0)) + "]",
+        if (static_cast<std::size_t>(mask.shape(0)) != binding.vertex_count()) {
+            fail("weights", "None or float32 [" + std::to_string(binding.vertex_count()) + "]",
                  describe(weights));
         }
         data.weights = as_span(mask);
     }
-    return BulgeLimit(data);
-}
-
-Timed<BulgeLimit> make_from_weights(const ArrayLike& rest_points, const ArrayLike& influence_offsets,
-                                    const ArrayLike& influence_bones, const ArrayLike& influence_weights,
-                                    const ArrayLike& heads, const ArrayLike& tails,
-                                    const OptionalArrayLike& bones_from_model,
-                                    const OptionalArrayLike& weights) {
-    return make(rest_points, influence_offsets, influence_bones, influence_weights, heads, tails,
-                bones_from_model, weights, false);
+    return BulgeLimit(binding, data);
 }
 
 void set_rest_points(Timed<BulgeLimit>& limit, const ArrayLike& rest_points,
@@ -106,15 +93,14 @@ py::tuple state_of(const Timed<BulgeLimit>& limit) {
     space.write(0, parts.bones_from_model);
     py::object weights = py::none();
     if (!parts.weights.empty()) weights = array_of(std::span(parts.weights));
-    return py::make_tuple(
-        array_of(std::span<const Vec3<float>>(parts.mesh.rest_points)),
-        array_of(std::span(parts.mesh.influence_offsets)), array_of(std::span(parts.mesh.influence_bones)),
-        array_of(std::span(parts.mesh.influence_weights)), array_of(std::span<const Vec3<float>>(heads)),
-        array_of(std::span<const Vec3<float>>(tails)), space.take(), weights);
+    return py::make_tuple(mesh_state(parts.mesh), array_of(std::span<const Vec3<float>>(heads)),
+                          array_of(std::span<const Vec3<float>>(tails)), space.take(), weights);
 }
 
 Timed<BulgeLimit> of_state(const py::object& state) {
-    return from_state<8>(state, [](const auto&... parts) { return make(parts..., true); });
+    return from_state<5>(state, [](const py::object& mesh, const auto&... parts) {
+        return make(binding_of_state(mesh), parts...);
+    });
 }
 
 }  // namespace
@@ -124,10 +110,9 @@ void bind_bulge_limit(py::module_& m) {
         m, "BulgeLimit",
         R"(The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
 them farther away than they are at rest (Kim, Han 2014, and a continuous form). Can be pickled.)")
-        .def(py::init(&make_from_weights), "rest_points"_a, "influence_offsets"_a, "influence_bones"_a,
-             "influence_weights"_a, "heads"_a, "tails"_a, py::kw_only(), "bones_from_model"_a = py::none(),
-             "weights"_a = py::none(),
-             R"(rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.
+        .def(py::init(&make), "binding"_a, "heads"_a, "tails"_a, py::kw_only(),
+             "bones_from_model"_a = py::none(), "weights"_a = py::none(),
+             R"(binding: the mesh. Its memory is shared.
 heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
 bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
 weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.)")

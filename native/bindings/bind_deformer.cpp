@@ -69,9 +69,13 @@ void add_vertex_data(const py::object& vertex_data, BindArguments& arrays) {
     }
     for (const auto& [name, values] : py::reinterpret_borrow<py::dict>(vertex_data)) {
         const MethodInfo method = checked_method(py::reinterpret_borrow<py::object>(name), "vertex_data");
+        if (values.is_none()) {
+            arrays.vertex_data.push_back({method, {}, true});
+            continue;
+        }
         const auto floats = static_cast<py::ssize_t>(method.vertex_floats);
         const std::string wanted = "of " + std::string(method.name) +
-                                   (method.keeps_moments ? " float32 [rows, " : " float32 [vertices, ") +
+                                   (method.rows_by_bone ? " float32 [rows, " : " float32 [vertices, ") +
                                    std::to_string(floats) + "]";
         const auto array = checked<float>(values, "vertex_data", 2, wanted, kMaxVertices);
         if (array.shape(1) != floats) fail("vertex_data", wanted, describe(values));
@@ -133,7 +137,9 @@ Timed<Deformer> make_deformer_of(const Binding& binding, const Name& method, con
 
 // --- Pickles: the data that a Binding keeps, as arrays; for a Deformer also its method and mix.
 
-py::tuple state_of(const BoundMesh& mesh) {
+}  // namespace
+
+py::tuple mesh_state(const BoundMesh& mesh) {
     py::object rest_bones = py::none();
     if (!mesh.rest_bones.empty()) {
         Output<Affine<float>> output({static_cast<py::ssize_t>(mesh.rest_bones.size())});
@@ -145,11 +151,11 @@ py::tuple state_of(const BoundMesh& mesh) {
     py::object vertex_data = py::none();
     if (!mesh.vertex_data.empty()) {
         py::dict by_method;
-        for (const auto& [method, values] : mesh.vertex_data) {
+        for (const auto& [method, values, is_linear] : mesh.vertex_data) {
             const auto floats = static_cast<py::ssize_t>(method.vertex_floats);
             const auto rows = static_cast<py::ssize_t>(values.size()) / floats;
             by_method[py::str(std::string(method.name))] =
-                array_of(std::span(values)).reshape({rows, floats});
+                is_linear ? py::object(py::none()) : array_of(std::span(values)).reshape({rows, floats});
         }
         vertex_data = by_method;
     }
@@ -158,17 +164,23 @@ py::tuple state_of(const BoundMesh& mesh) {
                           array_of(std::span(mesh.influence_weights)), rest_bones, vertex_data);
 }
 
+namespace {
+
 py::tuple state_of(const Deformer& deformer) {
     py::object mix = py::none();
     if (const MethodInfo* const mixed = deformer.mixed_method(); mixed != nullptr) {
         mix = py::make_tuple(std::string(mixed->name), array_of<float>(deformer.mix_weights()));
     }
-    return py::make_tuple(state_of(deformer.unpack()), std::string(deformer.method().name), mix);
+    return py::make_tuple(mesh_state(deformer.unpack()), std::string(deformer.method().name), mix);
 }
 
 BindArguments arrays_of_state(const py::object& state) { return from_state<6>(state, &checked_arrays); }
 
+}  // namespace
+
 Binding binding_of_state(const py::object& state) { return Binding(arrays_of_state(state).data(true)); }
+
+namespace {
 
 Timed<Deformer> deformer_of_state(const py::object& state) {
     const BindArguments arrays = arrays_of_state(part_of(state, 3, 0));
@@ -338,16 +350,16 @@ influence_weights: float32 [influences], >= 0, any sum (they are normalised).
 rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space of the bone
     transforms. Read by sbs, and by other rigid methods where a bone is scaled. None: identity.
 vertex_data: a dict of the vertex data of methods, float32 [vertices, Method.vertex_floats] by the method's
-    name: {"cor": sinew.centres_of_rotation(...)}. A method without its data falls back: under cor each vertex
-    is its own centre, which is linear blending.
+    name: {"cor": sinew.centres_of_rotation(...)}. A Deformer of such a method needs it. None in its place asks
+    for linear blending: {"cor": None}.
 
 At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,576 bones.)")
         .def_property_readonly("vertex_count", &Binding::vertex_count, kVertexCount)
         .def_property_readonly("influence_count", &Binding::influence_count, kInfluenceCount)
         .def_property_readonly("bone_count", &Binding::bone_count, kBoneCount)
         .def("__repr__", [](const Binding& binding) { return "<sinew.Binding: " + counts_of(binding); })
-        .def(
-            py::pickle([](const Binding& binding) { return state_of(binding.unpack()); }, &binding_of_state));
+        .def(py::pickle([](const Binding& binding) { return mesh_state(binding.unpack()); },
+                        &binding_of_state));
 
     py::class_<Timed<Deformer>>(m, "Deformer",
                                 R"(A binding and a method, ready to deform any pose.

@@ -120,7 +120,7 @@ are computed; "precomputation", a function that computes them.)")
             "vertex_floats", [](const MethodInfo& row) { return row.vertex_floats; },
             "How many numbers its vertex data has for each vertex, or in each row; 0 if it has none.")
         .def_property_readonly(
-            "keeps_moments", [](const MethodInfo& row) { return row.keeps_moments; },
+            "rows_by_bone", [](const MethodInfo& row) { return row.rows_by_bone; },
             "Whether its vertex data is rows, any number for each vertex: see direct_delta_mush.");
 
     py::class_<StageInfo> stage(m, "Stage", "The facts about a stage. Stages run after a method.");

@@ -24,6 +24,10 @@ struct MeshArguments {
     }
 };
 
+// Pickles of bindings: the data that a Binding keeps, as arrays.
+py::tuple mesh_state(const BoundMesh& mesh);
+Binding binding_of_state(const py::object& state);
+
 /// The method with this name. ValueError that names `argument`; TypeError if it is no str.
 MethodInfo checked_method(const py::object& method, const char* argument);
 

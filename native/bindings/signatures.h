@@ -49,7 +49,7 @@ using Name = Typed<"str">;
 using Number = Typed<"float">;
 using Flag = Typed<"bool">;
 using Mix = Typed<"tuple[str, numpy.typing.ArrayLike] | None">;
-using VertexArrays = Typed<"collections.abc.Mapping[str, numpy.typing.ArrayLike] | None">;
+using VertexArrays = Typed<"collections.abc.Mapping[str, numpy.typing.ArrayLike | None] | None">;
 using ParameterValues = Typed<"collections.abc.Mapping[str, float | bool | str] | None">;
 
 /// A named tuple of sinew._types.

@@ -6,15 +6,14 @@
 #include <span>
 #include <vector>
 
-#include "sinew/deformer.h"
+#include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 namespace sinew {
 
-/// The data that a BulgeLimit is constructed from. No reference is kept.
+/// What a BulgeLimit is constructed from besides a Binding. No reference is kept.
 struct BulgeLimitData {
-    BindData mesh;                                 // rest bones and vertex data are not read
     std::span<const BoneSegment<float>> segments;  // [bones] at rest, in the space of posed_from_rest
     Affine<float> bones_from_model{};              // maps rest points to that space; invertible
     std::span<const float> weights{};  // [vertices] of the vertex group, clamped to 0 to 1; empty: all 1
@@ -32,10 +31,12 @@ struct BulgeLimitOptions {
 /// other. A moved-from object can only be assigned to or destroyed.
 class SINEW_EXPORT BulgeLimit {
 public:
-    /// Throws std::invalid_argument that names the field, what was expected and what was given: as Binding does,
-    /// and for fewer segments than bones, values that are not finite, a singular transform, weights that are NaN,
-    /// and a number of weights other than that of vertices.
-    explicit BulgeLimit(const BulgeLimitData& data);
+    /// Shares the memory of `binding`.
+    ///
+    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: fewer segments
+    /// than bones; values that are not finite; a singular transform; weights that are NaN; a number of weights
+    /// other than that of vertices.
+    BulgeLimit(const Binding& binding, const BulgeLimitData& data);
 
     BulgeLimit(BulgeLimit&&) noexcept;
     BulgeLimit& operator=(BulgeLimit&&) noexcept;
@@ -63,7 +64,7 @@ public:
 
     /// The data that the object was constructed from. An object made of it gives the same bits.
     struct Parts {
-        BoundMesh mesh;
+        BoundMesh mesh;  // with the current rest points, without rest bones and vertex data
         std::vector<BoneSegment<float>> segments;
         Affine<float> bones_from_model;
         std::vector<float> weights;

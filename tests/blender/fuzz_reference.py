@@ -154,7 +154,7 @@ def _by_one_method(
     spans = [slice(influences.offsets[v], influences.offsets[v + 1]) for v in vertices]
     kept = None if deformer.vertex_data is None else deformer.vertex_data.of(method, space)
     data: dict[str, np.ndarray] = {}
-    if kept is not None and METHODS[method].keeps_moments:
+    if kept is not None and METHODS[method].rows_by_bone:
         data = {method: _moments(kept.astype(np.float64), vertices, space, influences, in_armature)}
     elif kept is not None:
         data = {method: _points_kept(space, kept[vertices].astype(np.float64))}
@@ -174,7 +174,7 @@ def _by_one_method(
 
     deformed, margins = by(data)
     decided = margins > MARGINS.get(method, MARGIN)
-    if data and METHODS[method].keeps_moments:
+    if data and METHODS[method].rows_by_bone:
         decided &= _have_same_extents(kept.astype(np.float64), data[method], vertices)
         # Bones that move far apart amplify the rounding of a small neighbourhood's moments.
         rounded = {name: _with_other_rounding(rows) for name, rows in data.items()}

@@ -290,8 +290,9 @@ def _blend(
     shapes = []
     for name in (method,) if mix is None else (method, mix[0]):
         data = {}
-        if name == "sdef" and read.sdef_keys is not None:
-            data[name] = _spheres(read.sdef_keys, armature)
+        if name == "sdef":
+            keys = read.sdef_keys
+            data[name] = None if keys is None else _spheres(keys, armature)
         elif name == "cor":
             data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles)
         elif name == "ddm":
@@ -337,10 +338,7 @@ def _limit(read: _Read, points: np.ndarray, options: Mapping[str, Any] | None) -
         mask = whole if mask is None else whole * mask
     own = armature.influences
     stage = sinew.BulgeLimit(
-        read.rest,
-        own.offsets,
-        own.bones,
-        own.weights,
+        sinew.Binding(read.rest, own.offsets, own.bones, own.weights),
         *armature.ends,
         bones_from_model=armature.bones_from_model,
         weights=mask,

@@ -92,7 +92,7 @@ TEST_P(LimitBulge, kernel_agrees_with_the_definition) {
     for (const std::uint32_t seed : {1u, 2u, 3u}) {
         const Scene scene = scene_of_sets(seed);
         const auto segments = segments_of(scene);
-        const BulgeLimit limit({scene.data(), segments});
+        const BulgeLimit limit(Binding(scene.data()), {segments});
         for (const BulgeForm form : {BulgeForm::continuous, BulgeForm::kim_han}) {
             const auto before = bulging(scene);
             auto points = before;
@@ -111,7 +111,7 @@ TEST_P(LimitBulge, kernel_agrees_with_the_definition) {
 TEST_P(LimitBulge, threads_change_no_bit_and_the_rest_pose_stays) {
     const Scene scene = scene_of_sets(4);
     const auto segments = segments_of(scene);
-    const BulgeLimit limit({scene.data(), segments});
+    const BulgeLimit limit(Binding(scene.data()), {segments});
     for (const BulgeForm form : {BulgeForm::continuous, BulgeForm::kim_han}) {
         auto one = bulging(scene);
         auto many = one;
@@ -128,7 +128,7 @@ TEST_P(LimitBulge, threads_change_no_bit_and_the_rest_pose_stays) {
 TEST(BulgeLimit, options_become_valid_and_points_of_another_number_stay) {
     const Scene scene = scene_of_sets(6);
     const auto segments = segments_of(scene);
-    const BulgeLimit limit({scene.data(), segments});
+    const BulgeLimit limit(Binding(scene.data()), {segments});
     const auto before = bulging(scene);
     const auto by = [&](float strength) {
         auto points = before;

@@ -77,5 +77,49 @@ TEST(Centres, progress_cancels_and_throws) {
     EXPECT_EQ(tube.centres().size(), tube.scene.rest_points.size());
 }
 
+TEST(VertexData, that_is_missing_is_never_taken_for_linear_blending) {
+    Tube tube(2, 5, 4);
+    tube.scene.posed_from_rest = {
+        Affine<float>{}, cast<float>(to_affine(QuatVec<double>{test::about<double>({0, 0, 1}, 80.0), {}}))};
+    BindData bound = tube.scene.data();
+    const std::vector<float> values(60);
+    const VertexData centres{Cor::info, values};
+    bound.vertex_data = std::span(&centres, 1);
+    const BoundMesh mesh = Binding(bound).unpack();
+    const auto refused = [&](const std::optional<MixData>& mix, const MethodInfo& method) -> std::string {
+        try {
+            const Deformer deformer(mesh.data(), method, mix);
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "nothing thrown";
+    };
+    const std::string wanted =
+        "vertex_data: expected that of cor, or cor by name without data, for linear blending, got none";
+    EXPECT_EQ(refused({}, Cor::info), wanted);
+    const std::vector<float> weights(20);
+    EXPECT_EQ(refused(MixData{Cor::info, weights}, Lbs::info), wanted);
+    EXPECT_EQ(refused({}, Lbs::info), "nothing thrown");
+
+    // By name, and also in what a Binding keeps.
+    const VertexData linear{Cor::info, {}, true};
+    BindData data = mesh.data();
+    data.vertex_data = std::span(&linear, 1);
+    const BoundMesh kept = Binding(data).unpack();
+    ASSERT_EQ(kept.vertex_data.size(), 1u);
+    EXPECT_TRUE(kept.vertex_data.front().is_linear);
+    const auto linear_points = test::deformed(Deformer(data, Lbs::info), tube.scene);
+    const auto furthest = [&](const BindData& from) {
+        const auto points = test::deformed(Deformer(from, Cor::info), tube.scene);
+        float most = 0.0f;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            most = std::max(most, glm::length(points[i] - linear_points[i]));
+        }
+        return most;
+    };
+    EXPECT_LT(furthest(data), 1e-5f);
+    EXPECT_GT(furthest(bound), 0.1f);
+}
+
 }  // namespace
 }  // namespace sinew

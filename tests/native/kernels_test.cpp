@@ -178,7 +178,7 @@ TEST_P(Kernels, round_as_a_plain_sum_does_for_bones_of_unlike_size) {
     if (test::kRunsSlowly) GTEST_SKIP();
     std::uint32_t seed = 100;
     // First moments are stored as products that were rounded.
-    const double times = method().keeps_moments ? 8.0 : 4.0;
+    const double times = method().rows_by_bone ? 8.0 : 4.0;
     for (const double farthest : {1.0, 1e3, 1e5, 1e7}) {
         for (const std::size_t vertices : {1, 7, 40}) {
             for (const bool scaled : {false, true}) {
@@ -218,7 +218,7 @@ TEST_P(Kernels, a_far_bone_of_little_weight_costs_no_digits) {
 
 TEST_P(Kernels, place_in_the_mesh_changes_no_bit) {
     // Its blocks contain all bones of their vertices, and the first of these is added whole.
-    if (method().keeps_moments) GTEST_SKIP() << "other vertices of a block change the rounding";
+    if (method().rows_by_bone) GTEST_SKIP() << "other vertices of a block change the rounding";
     for (const bool scaled : {false, true}) {
         Scene scene = scene_of_sets(3, 20, 37, 6, scaled);
         const Scene more = scene_of_sets(4, 400, 1, 6, scaled);

@@ -60,7 +60,7 @@ std::vector<T> moments_at(const Scene& scene, std::size_t vertex) {
 /// The vertex data that a method keeps for a vertex.
 template <class T>
 std::vector<T> numbers_of(const Scene& scene, std::size_t vertex, const MethodInfo& method) {
-    if (method.keeps_moments) return moments_at<T>(scene, vertex);
+    if (method.rows_by_bone) return moments_at<T>(scene, vertex);
     const auto first =
         scene.vertex_numbers.begin() + static_cast<std::ptrdiff_t>(Scene::kVertexNumbers * vertex);
     return {first, first + static_cast<std::ptrdiff_t>(method.vertex_floats)};
@@ -101,7 +101,7 @@ BindData Scene::data() const {
         if (method.vertex_floats == 0) continue;
         std::vector<float>& values = vertex_values_.emplace_back();
         for (std::size_t vertex = 0; vertex < rest_points.size(); ++vertex) {
-            if (method.keeps_moments && total_weight(*this, vertex) == 0.0) continue;
+            if (method.rows_by_bone && total_weight(*this, vertex) == 0.0) continue;
             const auto numbers = numbers_of<float>(*this, vertex, method);
             values.insert(values.end(), numbers.begin(), numbers.end());
         }

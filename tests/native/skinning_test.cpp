@@ -75,7 +75,7 @@ std::vector<double> moments(const std::vector<Influence<double>>& influences, co
 template <class Method>
 Vec3<double> skinned(const Bones<Method>& bones, const std::vector<Influence<double>>& influences,
                      const Vec3<double>& rest, const Vec3<double>& centre = Vec3<double>(0.0)) {
-    if constexpr (Method::info.keeps_moments) {
+    if constexpr (Method::info.rows_by_bone) {
         return Method::template deform_vertex<double>(bones, influences, rest,
                                                       std::span<const double>(moments(influences, centre)));
     } else if constexpr (Method::info.vertex_floats > 0) {
@@ -179,7 +179,7 @@ TYPED_TEST(RigidSkinning, antipodal_quaternions_do_not_cancel) {
 TYPED_TEST(RigidSkinning, a_vanishing_blend_turns_with_the_heaviest) {
     if (std::is_same_v<TypeParam, Log>) GTEST_SKIP() << "logarithms that vanish are those of the identity";
     if (std::is_same_v<TypeParam, Sdef>) GTEST_SKIP() << "vertices of three bones are blended linearly";
-    if (TypeParam::info.keeps_moments) GTEST_SKIP() << "moments have weights of sum 1";
+    if (TypeParam::info.rows_by_bone) GTEST_SKIP() << "moments have weights of sum 1";
     Rig rig = rigid_rig(16);
     for (Affine<double>& bone : rig.posed_from_rest) bone.translation = Vec3<double>(0.0);
     const Bones<TypeParam> bones = prepared<TypeParam>(rig);

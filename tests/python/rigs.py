@@ -10,6 +10,9 @@ from reference import rotation
 
 METHODS = {method.name for method in sinew.methods()}
 
+# As vertex data: methods blend linearly that keep some.
+LINEAR = {method.name: None for method in sinew.methods() if method.vertex_floats}
+
 
 def random_rotation(rng):
     q = rng.normal(size=4)

@@ -32,7 +32,7 @@ def test_agrees_with_the_reference(form, scaled, most):
     heads, tails = bones_of(rig)
     points = rig.deform("dq") * np.float32(1.3)
     mask = np.linspace(-0.5, 1.5, len(points)).astype(np.float32)
-    limit = sinew.BulgeLimit(*rig.mesh, heads, tails, weights=mask)
+    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), heads, tails, weights=mask)
     got = limit.apply(points, rig.transforms, form=form, strength=0.8)
     expected = bulge_limit_reference.limit(points, *rig.mesh, heads, tails, rig.transforms, 0.8, form, mask)
     assert (np.abs(expected - points).max(axis=1) > 0.01).mean() > 0.1
@@ -49,11 +49,13 @@ def test_bones_may_have_another_space(form):
     rest, moved = (
         transform(back, p.astype(np.float64)).astype(np.float32) for p in (rig.rest_points, points)
     )
-    here = sinew.BulgeLimit(*rig.mesh, heads, tails).apply(points, rig.transforms, form=form)
-    limit = sinew.BulgeLimit(rest, *rig.mesh[1:], heads, tails, bones_from_model=bones_from_model)
+    here = sinew.BulgeLimit(sinew.Binding(*rig.mesh), heads, tails).apply(points, rig.transforms, form=form)
+    limit = sinew.BulgeLimit(
+        sinew.Binding(rest, *rig.mesh[1:]), heads, tails, bones_from_model=bones_from_model
+    )
     there = limit.apply(moved, rig.transforms, form=form)
     np.testing.assert_allclose(transform(bones_from_model, there), here, atol=20 * TOLERANCE)
-    again = sinew.BulgeLimit(*rig.mesh, heads, tails)
+    again = sinew.BulgeLimit(sinew.Binding(*rig.mesh), heads, tails)
     again.set_rest_points(rest, bones_from_model)
     np.testing.assert_array_equal(again.apply(moved, rig.transforms, form=form), there)
 
@@ -61,7 +63,7 @@ def test_bones_may_have_another_space(form):
 @every_form
 def test_rest_poses_and_rigid_motions_change_nothing(form):
     rig = random_rig(5)
-    limit = sinew.BulgeLimit(*rig.mesh, *bones_of(rig))
+    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *bones_of(rig))
     identity = np.tile(np.eye(4, dtype=np.float32), (len(rig.transforms), 1, 1))
     np.testing.assert_array_equal(limit.apply(rig.rest_points, identity, form=form), rig.rest_points)
     motion = random_motion(np.random.default_rng(6)).astype(np.float32)
@@ -73,14 +75,14 @@ def test_rest_poses_and_rigid_motions_change_nothing(form):
 @every_form
 def test_vertices_of_one_bone_and_scaled_bones_keep_their_place(form):
     single = random_rig(7, most_influences=1, scaled=True)
-    limit = sinew.BulgeLimit(*single.mesh, *bones_of(single))
+    limit = sinew.BulgeLimit(sinew.Binding(*single.mesh), *bones_of(single))
     points = single.deform("lbs")
     np.testing.assert_array_equal(limit.apply(points, single.transforms, form=form), points)
     # All bones have the same scale, with which the limit grows.
     rig = random_rig(8)
     larger = np.tile(np.diag([2.0, 2.0, 2.0, 1.0]).astype(np.float32), (len(rig.transforms), 1, 1))
     points = 2.0 * rig.rest_points
-    limit = sinew.BulgeLimit(*rig.mesh, *bones_of(rig))
+    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *bones_of(rig))
     np.testing.assert_allclose(limit.apply(points, larger, form=form), points, atol=TOLERANCE)
 
 
@@ -88,13 +90,13 @@ def test_strength_and_weights_say_how_much():
     rig = random_rig(9)
     ends = bones_of(rig)
     points = rig.deform("dq") * np.float32(1.3)
-    limit = sinew.BulgeLimit(*rig.mesh, *ends)
+    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *ends)
     full = limit.apply(points, rig.transforms)
     np.testing.assert_array_equal(limit.apply(points, rig.transforms, strength=0.0), points)
     half = limit.apply(points, rig.transforms, strength=0.5)
     np.testing.assert_allclose(half, 0.5 * (points + full), atol=TOLERANCE)
     mask = np.where(np.arange(len(points)) % 2, 0.0, 1.0).astype(np.float32)
-    masked = sinew.BulgeLimit(*rig.mesh, *ends, weights=mask).apply(points, rig.transforms)
+    masked = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *ends, weights=mask).apply(points, rig.transforms)
     np.testing.assert_array_equal(masked[1::2], points[1::2])
     np.testing.assert_array_equal(masked[::2], full[::2])
 
@@ -104,7 +106,7 @@ def test_threads_out_and_pickles_change_no_bit(form):
     rig = random_rig(10, vertices=3000)
     mask = np.random.default_rng(11).uniform(size=3000).astype(np.float32)
     space = random_motion(np.random.default_rng(12))
-    limit = sinew.BulgeLimit(*rig.mesh, *bones_of(rig), weights=mask, bones_from_model=space)
+    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *bones_of(rig), weights=mask, bones_from_model=space)
     points = rig.deform("dq") * np.float32(1.3)
     expected = limit.apply(points, rig.transforms, form=form, threads=1)
     np.testing.assert_array_equal(limit.apply(points, rig.transforms, form=form, threads=7), expected)
@@ -121,10 +123,12 @@ def test_degenerate_bones_and_points_are_finite(form):
     heads, tails = bones_of(rig)
     motions = rig.transforms.copy()
     motions[::2, :3, :3] = 0.0
-    limit = sinew.BulgeLimit(*rig.mesh, heads, heads)
+    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), heads, heads)
     assert np.isfinite(limit.apply(rig.rest_points, motions, form=form)).all()
     assert np.isfinite(limit.apply(np.tile(heads[:1], (50, 1)), motions, form=form)).all()
-    assert np.isfinite(sinew.BulgeLimit(*rig.mesh, heads, tails).apply(rig.rest_points, motions)).all()
+    assert np.isfinite(
+        sinew.BulgeLimit(sinew.Binding(*rig.mesh), heads, tails).apply(rig.rest_points, motions)
+    ).all()
 
 
 @pytest.mark.parametrize(
@@ -145,7 +149,7 @@ def test_wrong_data_is_refused(change, message):
     rig = random_rig(14)
     heads, tails = bones_of(rig)
     with pytest.raises(ValueError, match=message):
-        sinew.BulgeLimit(*rig.mesh, **({"heads": heads, "tails": tails} | change))
+        sinew.BulgeLimit(sinew.Binding(*rig.mesh), **({"heads": heads, "tails": tails} | change))
 
 
 @pytest.mark.parametrize(
@@ -163,7 +167,9 @@ def test_wrong_data_is_refused(change, message):
 def test_wrong_options_are_refused(change, message):
     rig = random_rig(15)
     with pytest.raises(ValueError, match=message):
-        sinew.BulgeLimit(*rig.mesh, *bones_of(rig)).apply(rig.rest_points, rig.transforms, **change)
+        sinew.BulgeLimit(sinew.Binding(*rig.mesh), *bones_of(rig)).apply(
+            rig.rest_points, rig.transforms, **change
+        )
 
 
 # --- A tube that bends by 90 degrees, of radius 0.5 and length 4
@@ -192,7 +198,7 @@ def tear(made, before, after):
 def test_an_elbow_with_misaligned_weights_keeps_its_thickness_and_its_surface():
     made, points, bones = elbow(0.25)
     assert bulge(points, bones) > 1.2
-    limit = sinew.BulgeLimit(*made.mesh, *SEGMENTS)
+    limit = sinew.BulgeLimit(sinew.Binding(*made.mesh), *SEGMENTS)
     continuous = limit.apply(points, bones)
     assert bulge(continuous, bones) <= 1.08
     assert tear(made, points, continuous) <= 0.5
@@ -204,7 +210,7 @@ def test_an_elbow_with_misaligned_weights_keeps_its_thickness_and_its_surface():
 
 def test_an_elbow_with_good_weights_keeps_its_thickness():
     made, points, bones = elbow(0.0)
-    limit = sinew.BulgeLimit(*made.mesh, *SEGMENTS)
+    limit = sinew.BulgeLimit(sinew.Binding(*made.mesh), *SEGMENTS)
     assert bulge(points, bones) > 1.08
     assert bulge(limit.apply(points, bones), bones) <= 1.02
     assert bulge(limit.apply(points, bones, form="kim_han"), bones) <= 1.001

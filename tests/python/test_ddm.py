@@ -215,9 +215,9 @@ def test_half_turns_are_finite_and_near(variant, degrees, axis):
     assert np.abs(points).max() < 10.0
 
 
-def test_without_its_data_it_is_linear_blending():
+def test_it_is_linear_blending_if_asked_to():
     rig = random_rig(3, scaled=True)
-    points = sinew.Deformer(*rig.mesh, "ddm", rig.rest_bones).deform(rig.transforms)
+    points = sinew.Deformer(*rig.mesh, "ddm", rig.rest_bones, {"ddm": None}).deform(rig.transforms)
     np.testing.assert_allclose(points, rig.deform("lbs"), atol=2e-5)
 
 
@@ -275,11 +275,11 @@ GOOD = [0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]
     ("rows", "wanted", "got"),
     [
         (np.zeros((2, 3), np.float32), "of ddm float32 [rows, 12]", "float32 [2, 3]"),
-        ([[*GOOD[:5], np.nan, *GOOD[6:]]], "finite values", "NaN or infinity of ddm in row 0"),
-        ([[2, *GOOD[1:]]], "numbers of vertices", "another of ddm in row 0"),
-        ([[0, 0.5, *GOOD[2:]]], "numbers of bones", "another of ddm in row 0"),
-        ([[0, 0, -0.5, *GOOD[3:]]], "weights of 0 and more", "a negative one of ddm in row 0"),
-        ([GOOD, GOOD], "rising vertices and bones", "others of ddm in row 1"),
+        ([[*GOOD[:5], np.inf, *GOOD[6:]]], "finite values in column 5 of ddm", "inf in row 0"),
+        ([[2, *GOOD[1:]]], "numbers of vertices in column 0 of ddm", "2.000000 in row 0"),
+        ([[0, 0.5, *GOOD[2:]]], "numbers of bones in column 1 of ddm", "0.500000 in row 0"),
+        ([[0, 0, -0.5, *GOOD[3:]]], "weights of 0 and more in column 2 of ddm", "-0.500000 in row 0"),
+        ([GOOD, GOOD], "rows of ddm in ascending order of vertices and bones", "another order in row 1"),
     ],
 )
 def test_rows_that_are_refused(rows, wanted, got):

@@ -2,6 +2,7 @@
 """Protects the deformer: its methods compared with float64 reference code, its threads, its errors."""
 
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 import reference
 import sinew
-from rigs import about, random_motion, random_rig, transform, translation
+from rigs import LINEAR, about, random_motion, random_rig, transform, translation
 
 METHODS = [method.name for method in sinew.methods()]
 # Methods that a build may lack.
@@ -117,8 +118,8 @@ def test_agrees_with_the_reference_with_sheared_bones(method):
 def test_agrees_with_the_reference_with_identity_rest_bones(method):
     rig = random_rig(22, scaled=True)
     expected, margins = reference.deform(method, *rig.mesh, rig.transforms)
-    # The same for vertex data: without it cor rotates each vertex about itself.
-    points = sinew.Deformer(*rig.mesh, method).deform(rig.transforms)
+    # Without vertex data cor rotates each vertex about itself.
+    points = sinew.Deformer(*rig.mesh, method, vertex_data=LINEAR).deform(rig.transforms)
     np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=TOLERANCE)
 
 
@@ -178,6 +179,7 @@ def test_finite_for_whatever_is_finite(method, size):
     rest = rng.uniform(-size, size, (len(counts), 3)).astype(np.float32)
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     data = {"cor": rng.uniform(-size, size, rest.shape), "sdef": rng.uniform(-size, size, (len(rest), 10))}
+    data = LINEAR | data
     deformer = sinew.Deformer(rest, offsets, bones, weights, method, vertex_data=data)
     assert np.isfinite(deformer.deform(motions.astype(np.float32))).all()
 
@@ -244,7 +246,7 @@ def test_opposite_twists_give_finite_points(method, degrees, axis):
         np.column_stack([1 - weights, weights]).ravel(),
     )
     twist = np.array([np.eye(4), about(axis, degrees)], np.float32)
-    points = sinew.Deformer(*mesh, method).deform(twist)
+    points = sinew.Deformer(*mesh, method, vertex_data=LINEAR).deform(twist)
     assert np.isfinite(points).all()
     assert (np.linalg.norm(points, axis=1) <= np.linalg.norm(rest, axis=1) + 1e-6).all()
     np.testing.assert_allclose(points[0], rest[0], atol=1e-6)
@@ -270,13 +272,26 @@ def test_bones_scaled_to_nothing_give_finite_points(method, zeros):
 def test_vertices_without_weight_stay_to_the_bit(method):
     rest = np.float32([[0.1, 0.2, 0.3], [1e-20, -1e20, 7.0], [1.0, 2.0, 3.0]])
     deformer = sinew.Deformer(
-        rest, np.int32([0, 0, 2, 3]), np.int32([0, 1, 1]), np.float32([0, 0, 1]), method
+        rest, [0, 0, 2, 3], [0, 1, 1], np.float32([0, 0, 1]), method, vertex_data=LINEAR
     )
     motions = np.array([random_motion(np.random.default_rng(i)) for i in range(2)], np.float32)
     for space in (None, about((1, 2, 3), 40).astype(np.float32)):
         points = deformer.deform(motions, bones_from_model=space)
         np.testing.assert_array_equal(points[:2], rest[:2])
         assert np.abs(points[2] - rest[2]).max() > 0.1
+
+
+@pytest.mark.parametrize("method", LINEAR)
+def test_missing_vertex_data_is_never_taken_for_linear_blending(method):
+    rig = random_rig(34)
+    wanted = f"that of {method}, or {method} by name without data, for linear blending, got none"
+    for arguments in ((method,), ("lbs", (method, np.zeros(len(rig.rest_points))))):
+        with pytest.raises(ValueError, match=f"^vertex_data: expected {wanted}$"):
+            sinew.Deformer(sinew.Binding(*rig.mesh), *arguments)
+    linear = sinew.Deformer(sinew.Binding(*rig.mesh, vertex_data={method: None}), method)
+    np.testing.assert_allclose(linear.deform(rig.transforms), rig.deform("lbs"), atol=4 * TOLERANCE)
+    again = pickle.loads(pickle.dumps(linear))
+    np.testing.assert_array_equal(again.deform(rig.transforms), linear.deform(rig.transforms))
 
 
 def test_linear_blend_is_the_default():
@@ -384,7 +399,7 @@ def test_more_bones_than_needed_change_nothing(method):
 @every_method
 def test_empty_mesh_works(method):
     deformer = sinew.Deformer(
-        np.empty((0, 3), np.float32), np.int32([0]), np.empty(0, np.int32), np.empty(0, np.float32), method
+        np.empty((0, 3), np.float32), [0], np.empty(0, np.int32), [], method, vertex_data=LINEAR
     )
     for motions in (np.empty((0, 4, 4), np.float32), np.eye(4, dtype=np.float32)[None]):
         points = deformer.deform(motions)
@@ -546,7 +561,7 @@ deformer = sinew.Deformer(*skin, "dq")
 mush = sinew.DeltaMush(rest, *faces, iterations=20)
 normals = sinew.Normals(count, *faces)
 skinned = sinew.SkinnedNormals(sinew.Binding(*skin), np.tile(np.float32([0, 0, 1]), (count, 1)))
-limit = sinew.BulgeLimit(*skin, [[0, 0, 0]], [[0, 1, 0]])
+limit = sinew.BulgeLimit(sinew.Binding(*skin), [[0, 0, 0]], [[0, 1, 0]])
 solver = sinew.ik.Solver([-1, *range(59)], [sinew.ik.Effector(59)])
 chains = np.tile([1.0, 0, 0, 0, 0, 0, 0.5, 0], (500, 60, 1))
 GOAL = [1, 0, 0, 0, 0, 3, 4, 0]

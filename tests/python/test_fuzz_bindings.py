@@ -601,7 +601,9 @@ def test_bulge_limits(data):
     }
     known = {*MESH, "heads", "tails", "segments", *more}
     limit = attempt(
-        lambda *given: sinew.BulgeLimit(*given, **more), [given for given, _ in given_data], known
+        lambda *given: sinew.BulgeLimit(sinew.Binding(*given[:4]), *given[4:], **more),
+        [given for given, _ in given_data],
+        known,
     )
     if limit is None:
         return

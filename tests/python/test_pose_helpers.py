@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sinew
-from rigs import about
+from rigs import LINEAR, about
 from sinew_addon.core import pose_helpers, pose_samples
 from sinew_addon.core.helper_bones import Motion, Wanted
 from sinew_addon.core.pose_samples import Joints
@@ -80,7 +80,7 @@ def test_a_helper_bone_moves_as_the_method_blends(method, head_method, size):
         point = blend.head.astype(np.float32)[None]
         bones, weights = blend.bones.astype(np.int32), blend.weights.astype(np.float32)
         offsets = np.array([0, len(bones)], np.int32)
-        deformer = sinew.Deformer(point, offsets, bones, weights, head_method, rest_bones=REST)
+        deformer = sinew.Deformer(point, offsets, bones, weights, head_method, REST, LINEAR)
         for own, matrix in zip(motion.bones, moved, strict=True):
             posed = np.concatenate([own, np.tile([[[0.0, 0.0, 0.0, 1.0]]], (2, 1, 1))], axis=1) @ REST
             expected = deformer.deform(posed.astype(np.float32), rest_inverses=np.linalg.inv(REST))[0]

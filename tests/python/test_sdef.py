@@ -41,9 +41,10 @@ def test_nlerp_is_the_default_and_slerp_another_shape():
     assert np.abs(rig.deform("sdef", parameters=SLERP) - nlerp).max() > 0.01
 
 
-def test_without_its_data_it_is_linear_blending():
+def test_it_is_linear_blending_if_asked_to():
     rig = pairs(3, scaled=True)
-    points = sinew.Deformer(*rig.mesh, "sdef", rig.rest_bones).deform(rig.transforms, parameters=SLERP)
+    deformer = sinew.Deformer(*rig.mesh, "sdef", rig.rest_bones, {"sdef": None})
+    points = deformer.deform(rig.transforms, parameters=SLERP)
     np.testing.assert_allclose(points, rig.deform("lbs"), atol=4 * TOLERANCE)
 
 

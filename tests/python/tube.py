@@ -3,7 +3,7 @@
 
 import numpy as np
 import sinew
-from rigs import about, transform, translation
+from rigs import LINEAR, about, transform, translation
 
 # The radius of ddm's smoothing.
 RADIUS = 0.26
@@ -47,7 +47,7 @@ class Tube:
             return {method: self.centres()}
         if method == "ddm":
             return {method: sinew.direct_delta_mush(*self.mesh, self.triangles, RADIUS)}
-        return {}
+        return LINEAR
 
     def deformed(self, method, axis, degrees):
         bones = self.bones(axis, degrees)

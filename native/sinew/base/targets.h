@@ -17,23 +17,13 @@
     (HWY_AVX3_DL | (HWY_AVX3_DL - 1) | HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | \
      HWY_RVV | SINEW_OTHER_NEON)
 
-// Kernel::targets, the fastest first. The last is the target that the compiler may use everywhere.
+// An array of pointers to the versions of a function, the fastest first. The last is that of the target that the
+// compiler may use everywhere.
 //
 // Highway's own choice (HWY_DYNAMIC_DISPATCH) needs libhwy, which Debian ships only as a shared library: a wheel
 // would then need it on the user's machine. Highway's headers alone do not need it, so targets.cpp makes the
 // choice.
-#define SINEW_TARGETS(deform, prepare)                                         \
-    {                                                                          \
-        {                                                                      \
-            {HWY_CHOOSE_AVX3(deform), HWY_CHOOSE_AVX3(prepare)},               \
-                {HWY_CHOOSE_AVX2(deform), HWY_CHOOSE_AVX2(prepare)},           \
-                {HWY_CHOOSE_SSE4(deform), HWY_CHOOSE_SSE4(prepare)},           \
-                {&HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare)}, \
-        }                                                                      \
-    }
-
-// The same for a single function: an array of pointers to its versions.
-#define SINEW_TARGETS_OF(function)                                                       \
+#define SINEW_TARGETS(function)                                                          \
     {                                                                                    \
         HWY_CHOOSE_AVX3(function), HWY_CHOOSE_AVX2(function), HWY_CHOOSE_SSE4(function), \
             &HWY_STATIC_DISPATCH(function)                                               \

@@ -57,7 +57,7 @@ HWY_INLINE Blend<D, kNumbers> begin_blend(D d, const float* row, Vec<D> weight, 
 /// Adds the weighted difference of `row` from `base`, with `row` in the hemisphere of the blend. `base` is the
 /// first row, or kNoBase. Returns the weight, negative where the row was negated.
 ///
-/// The products and sums of the dot product are rounded one by one, in the order of the mixed kernel, because
+/// The products and sums of the dot product are rounded one by one, in the order of blend_vertex(), because
 /// both must decide ties alike.
 template <class Rigid, class D>
 HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight,

@@ -100,18 +100,20 @@ HWY_INLINE Quats rotations(const Motions& m) {
     return {hn::Mul(scale, q.w), {hn::Mul(scale, q.v.x), hn::Mul(scale, q.v.y), hn::Mul(scale, q.v.z)}};
 }
 
-/// TargetKernel::prepare for a rigid method.
-template <class Rigid>
-void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                   Palette& palette) {
+/// Kernel::bone_rows for a method that blends rotations.
+///
+/// Rows  write_row(rotation, translation, row) writes the numbers of a rigid motion
+template <class Rows>
+void rigid_bone_rows(const Bones& of, Palette& palette) {
     const BoneTag d;
+    const std::span<const std::int32_t> used = of.used;
     constexpr std::size_t kMax = hn::MaxLanes(BoneTag());
     for (std::size_t i = 0; i < used.size(); i += kMax) {
         const auto bones = used.subspan(i, std::min(kMax, used.size() - i));
-        const Motions motions = load_motions(posed_from_rest, bones);
-        constexpr std::size_t kNumbers = Rigid::kNumbers;
+        const Motions motions = load_motions(of.posed_from_rest, bones);
+        constexpr std::size_t kNumbers = Rows::kNumbers;
         BoneVec row[kNumbers];
-        Rigid::write_row(rotations(motions), motions.translation, row);
+        Rows::write_row(rotations(motions), motions.translation, row);
         alignas(64) double numbers[kNumbers][kMax];
         alignas(64) double rigid[kMax];
         for (std::size_t k = 0; k < kNumbers; ++k) hn::Store(row[k], d, numbers[k]);

@@ -14,12 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// The common part of these kernels. A row is the rotation (w, x, y, z), then the displacement rows of the
-/// motion. A kernel has these members, too:
-///
-/// kVertexFloats  numbers of vertex data
-/// centre         the point at which motions are blended, from the vertex data, if there is some
-/// finish         the deformed point, from the motion at the centre
+/// The common part of these kernels. A row is the rotation (w, x, y, z), then the displacement rows of the motion.
 struct CentreRows {
     static constexpr std::size_t kNumbers = 16;
 
@@ -85,11 +80,11 @@ HWY_INLINE Motion<D> motion_at(const Sum<D, CentreRows::kNumbers>& sum, const Po
 
 /// Linear blending, for vertices without data of the method.
 struct LinearRows : CentreRows {
-    static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 0;
 
     template <class D>
-    static HWY_INLINE Points<D> centre(D, const float*, const float*, const Points<D>& p) {
+    static HWY_INLINE Points<D> centre(D, const MeshPointers&, const Spaces&, std::size_t, std::size_t,
+                                       const Points<D>& p) {
         return p;
     }
 

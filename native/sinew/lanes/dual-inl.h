@@ -16,7 +16,6 @@ namespace HWY_NAMESPACE {
 
 struct DqKernel {
     static constexpr std::size_t kNumbers = kRow;
-    static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 2;
 
     /// Adds the displacement by the bone's scale to the dual part: + 1/2 real * displacement.

@@ -12,7 +12,7 @@
 #include <cstring>
 
 #include "hwy/highway.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
@@ -32,7 +32,7 @@ struct MeshPointers {
     const Block* blocks;
     const Lanes<float>* rest_points;
     const Lanes<float>* weights;
-    const Lanes<float>* vertex_rows;
+    const Lanes<float>* vertex_rows;  // PackedVertexData::rows; null if there is no vertex data
     const Lanes<std::int32_t>* vertices;
     const Run* runs;
     Vec3<float>* points;
@@ -40,11 +40,13 @@ struct MeshPointers {
 
 HWY_INLINE MeshPointers pointers_of(const Frame& frame) {
     const PackedMesh& mesh = *frame.mesh;
-    return {mesh.blocks.data(),   frame.rest_points, mesh.weights.data(), frame.vertex_rows,
-            mesh.vertices.data(), mesh.runs.data(),  frame.points};
+    return {mesh.blocks.data(),   frame.rest_points,
+            mesh.weights.data(),  frame.vertex_data == nullptr ? nullptr : frame.vertex_data->rows.data(),
+            mesh.vertices.data(), mesh.runs.data(),
+            frame.points};
 }
 
-/// The weights of the first influence in block `b`, which must not be mixed.
+/// The weights of the first influence in block `b`, whose vertices have the same bones.
 HWY_INLINE const float* first_weights_of(const Frame& frame, std::size_t b) {
     return frame.mesh->first_weights[b].lane.data();
 }
@@ -65,7 +67,14 @@ HWY_INLINE Points<D> load_points(D d, const MeshPointers& pointers, std::size_t 
             hn::Load(d, rows[2].lane.data() + lane)};
 }
 
-/// The weights of block `b`: of all influences if it is mixed, otherwise of those after the first.
+/// Three consecutive rows of numbers as points.
+template <class D>
+HWY_INLINE Points<D> load_row_points(D d, const float* rows) {
+    return {hn::Load(d, rows), hn::Load(d, rows + kLanes), hn::Load(d, rows + 2 * kLanes)};
+}
+
+/// The weights of block `b`: of all influences if its vertices have own bones, otherwise of those
+/// after the first.
 HWY_INLINE const float* weights_of(const MeshPointers& pointers, std::size_t b) {
     return pointers.weights[pointers.blocks[b].first_weight].lane.data();
 }
@@ -104,6 +113,16 @@ HWY_INLINE Points<D> displacement(D d, const float* rows, const Points<D>& p) {
 template <class D>
 HWY_INLINE Points<D> displaced(D d, const float* rows, const Points<D>& p) {
     return add<D>(p, displacement(d, rows, p));
+}
+
+/// A vector plus its displacement: translations do not apply.
+template <class D>
+HWY_INLINE Points<D> displaced_vector(D d, const float* rows, const Points<D>& v) {
+    const auto along = [d, &v](const float* r, Vec<D> own) HWY_ATTR {
+        return hn::MulAdd(hn::Set(d, r[0]), v.x,
+                          hn::MulAdd(hn::Set(d, r[1]), v.y, hn::MulAdd(hn::Set(d, r[2]), v.z, own)));
+    };
+    return {along(rows, v.x), along(rows + 4, v.y), along(rows + 8, v.z)};
 }
 
 template <class D>
@@ -322,31 +341,6 @@ HWY_INLINE bool is_plain(const Palette& palette, const std::int32_t* bones, std:
     float least = first;
     for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette.sizes[bones[k]]);
     return sinew::is_plain(first, least);
-}
-
-/// Writes the rest points of blocks [begin, end), which have no bones.
-inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
-    const Full d;
-    const MeshPointers pointers = pointers_of(frame);
-    for (std::size_t b = begin; b < end; ++b) {
-        const Block& block = pointers.blocks[b];
-        const std::size_t lanes = lanes_end(d, block);
-        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            store_points(d, pointers, b, lane, load_points(d, pointers, b, lane));
-        }
-    }
-}
-
-/// The first block after `b` with other bones, or `end`.
-inline std::size_t end_of_set(const Frame& frame, std::size_t b, std::size_t end) {
-    const Block* const blocks = frame.mesh->blocks.data();
-    std::size_t after = b + 1;
-    // A set without bones has no entry in PackedMesh::bones, so the numbers of influences are compared, too.
-    while (after < end && !blocks[after].mixed && blocks[after].first_bone == blocks[b].first_bone &&
-           blocks[after].influences == blocks[b].influences) {
-        ++after;
-    }
-    return after;
 }
 
 }  // namespace HWY_NAMESPACE

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
+#include "sinew/mesh/bone_sets.h"
 
 namespace sinew {
 
@@ -30,10 +31,34 @@ bool is_identity(const Affine<float>& a) noexcept {
     return a.linear == Mat3<float>(1.0f) && a.translation == Vec3<float>(0.0f);
 }
 
-void prepare(const Kernel& kernel, const Bones& bones, Palette& palette) noexcept {
+namespace {
+
+/// Prepares all bones one by one, for rows of sets.
+void prepare_posed(const Bones& bones, Palette& palette) noexcept {
+    for (std::size_t bone = 0; bone < bones.used.size(); ++bone) {
+        const auto number = static_cast<std::size_t>(bones.used[bone]);
+        palette.posed[bone] = {};
+        if (number >= bones.posed_from_rest.size()) continue;
+        palette.posed[bone] =
+            scaled_rigid(cast<double>(bones.posed_from_rest[number]), bones.rest_bone(bone));
+        palette.any_scale = palette.any_scale || palette.posed[bone].has_scale;
+    }
+    if (palette.any_scale) std::fill_n(palette.has_scale, bones.sets->bones.size(), std::uint8_t{0});
+}
+
+}  // namespace
+
+void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bones,
+                  Palette& palette) noexcept {
     palette.scaled_count = 0;
     palette.any_scale = false;
-    if (kernel.set_bone_size > 0) return kernel.prepare(kernel, bones, palette);
+    if (kernel.set_rows != nullptr) {
+        prepare_posed(bones, palette);
+        kernel.set_rows(bones, palette);
+        // Pairs are pairs of bones, but these rows belong to sets, so each set has to be tested.
+        std::fill_n(palette.may_be_plain, bones.sets->bones.size(), std::uint8_t{1});
+        return;
+    }
     // Nearly always all of them are posed.
     std::size_t posed = bones.used.size();
     while (posed > 0 && static_cast<std::size_t>(bones.used[posed - 1]) >= bones.posed_from_rest.size()) {
@@ -41,13 +66,20 @@ void prepare(const Kernel& kernel, const Bones& bones, Palette& palette) noexcep
     }
     Bones of_pose = bones;
     of_pose.used = bones.used.first(posed);
-    kernel.prepare(kernel, of_pose, palette);
+    if (kernel.scaled_bone_rows != nullptr) {
+        for (const std::int32_t index : bones.stretched) {
+            if (static_cast<std::size_t>(index) < posed) palette.scaled[palette.scaled_count++] = index;
+        }
+    }
+    kernel.bone_rows[target_in_use()](of_pose, palette);
+    if (kernel.scaled_bone_rows != nullptr) kernel.scaled_bone_rows(of_pose, palette);
     const std::size_t size = kernel.rest_row.size();
     for (std::size_t i = posed; i < bones.used.size(); ++i) {
         std::ranges::copy(kernel.rest_row, palette.bones + size * i);
         if (palette.any_scale) palette.has_scale[i] = 0;
         palette.sizes[i] = kMinSize * kMinSize;
     }
+    find_plain(pairs, bones.used.size(), palette);
 }
 
 }  // namespace sinew

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "sinew/mesh/packed_mesh.h"
-#include "sinew/transform/affine.h"
+#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
 
@@ -38,10 +38,13 @@ inline constexpr float kLong = 64.0f;
 /// Sizes are written in groups of this many; there is room for one less after the last bone.
 inline constexpr std::size_t kSizesAtOnce = 8;
 
+/// A bone's motion in double.
+using PosedBone = ScaledRigid<QuatVec<double>, double>;
+
 /// The bones of one frame in the form that a kernel reads, indexed as Frame::bones. A PaletteStore owns the
 /// memory.
 struct Palette {
-    Float4* bones = nullptr;  // Kernel::rest_row.size() for each bone
+    Float4* bones = nullptr;  // Kernel::rest_row.size() for each row
     // squared lengths of the translations, at least kMinSize squared; infinite beyond kLong
     float* sizes = nullptr;
     // Whether some vertex whose first bone is this one may be added plainly.
@@ -49,7 +52,7 @@ struct Palette {
     Float4* scales = nullptr;           // kDisplacementRows for each bone, valid where it has scale
     std::uint8_t* has_scale = nullptr;  // not written if no bone has scale
     std::int32_t* scaled = nullptr;     // indices of bones that are to be prepared one by one
-    std::byte* set_bones = nullptr;     // Kernel::set_bone_size for each bone
+    PosedBone* posed = nullptr;         // each bone, for Kernel::set_rows
     std::size_t scaled_count = 0;
     bool any_scale = false;
 };
@@ -64,7 +67,12 @@ struct Bones {
     std::span<const Affine<float>> posed_from_rest;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity
     Affine<float> bones_from_model;
-    const BoneSets* sets;  // null unless the kernel needs them
+    const BoneSets* sets;  // empty unless a kernel has rows for sets
+
+    /// Orthonormal, for an index into `used`.
+    [[nodiscard]] Affine<double> rest_bone(std::size_t bone) const noexcept {
+        return rest_bones.empty() ? Affine<double>{} : cast<double>(rest_bones[bone]);
+    }
 };
 
 template <class T>
@@ -86,6 +94,10 @@ void write_displacement(const Affine<double>& a, Float4* rows) noexcept;
 [[nodiscard]] inline bool is_plain(float first, float least) noexcept {
     return !(first < kAlike * kAlike * least);
 }
+
+/// Fills Palette::may_be_plain from the sizes, once per frame for each pair of bones, so that the test runs for
+/// few vertices.
+void find_plain(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept;
 
 [[nodiscard]] bool is_identity(const Affine<float>& a) noexcept;
 

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "sinew/base/fork_safe.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 
 namespace sinew {
 

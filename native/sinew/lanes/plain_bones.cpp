@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/palette.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sinew/lanes/plain_bones.cpp"
@@ -48,7 +48,7 @@ namespace {
 
 using Mark = void(const BonePairs& pairs, Palette& palette);
 
-constexpr std::array<Mark*, kTargetCount> kTargets SINEW_TARGETS_OF(mark_plain);
+constexpr std::array<Mark*, kTargetCount> kTargets SINEW_TARGETS(mark_plain);
 
 }  // namespace
 

@@ -9,23 +9,51 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstring>
 #include <type_traits>
 
+#include "sinew/lanes/block_loop-inl.h"
 #include "sinew/lanes/centre-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// In this file, Rigid is a method's kernel with these members:
+/// A row of numbers for each bone, which are summed by weights. A row's first four numbers are the quaternion, or
+/// numbers without a sign. Numbers after the first kRow are the same in all rows of a set of bones, except in
+/// CentreRows.
 ///
-/// kNumbers        numbers in a bone's row, a multiple of 4; the first four are the quaternion, or numbers
-///                 without a sign. Numbers after the first kRow are the same in all rows of a set of bones,
-///                 except in CentreRows
+/// kNumbers        numbers in a row, a multiple of 4
 /// kSignedFloat4s  how many Float4 of a row change sign with the quaternion: 0 to 2
-/// add_scale       adds the effect of a bone's scale to a sum
-/// finish          the points, from their sum and rest points; for CentreRows as described there
+/// add_scale       adds the effect of a bone's scale to a sum, with the weight and with the weight that has the sign
+///                 of the row
+template <class Rows>
+concept BlendedRows = Rows::kNumbers % 4 == 0 && Rows::kSignedFloat4s <= 2 &&
+                      requires(Full d, const Palette& palette, Vec<Full> w, Points<Full> p,
+                               Sum<Full, Rows::kNumbers> sum) {
+    Rows::add_scale(d, palette, std::int32_t{0}, w, w, p, sum);
+};
+
+/// Computes the deformed points from sums and rest points.
+template <class Rows>
+concept SumKernel = BlendedRows<Rows> && requires(Full d, Points<Full> p, Sum<Full, Rows::kNumbers> sum) {
+    { Rows::finish(d, sum, p) } -> std::same_as<Points<Full>>;
+};
+
+/// CentreRows, which are summed at a centre, a point of the space of the bones. Computes the deformed points from the
+/// motion of the centre, the centre and the rest points.
+template <class Rows>
+concept CentreKernel = BlendedRows<Rows> && std::is_base_of_v<CentreRows, Rows> &&
+    requires(Full d, Points<Full> p, MeshPointers pointers, Spaces spaces, Motion<Full> motion) {
+    { Rows::centre(d, pointers, spaces, std::size_t{0}, std::size_t{0}, p) } -> std::same_as<Points<Full>>;
+    { Rows::finish(d, motion, p, p) } -> std::same_as<Points<Full>>;
+};
+
+/// What deform_rigid() takes.
+template <class Rows>
+concept RigidKernel = SumKernel<Rows> || CentreKernel<Rows>;
+
 template <class Rigid>
 inline constexpr std::size_t kRowFloat4s = Rigid::kNumbers / 4;
 
@@ -258,17 +286,6 @@ HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, cons
     return blend.sum;
 }
 
-/// Displacements between model space and the space of the bones, as in Frame; null if the spaces are the same.
-struct Spaces {
-    const float* bones_from_model;
-    const float* model_from_bones;
-};
-
-HWY_INLINE Spaces spaces_of(const Frame& frame) {
-    if (frame.bones_from_model == nullptr) return {nullptr, nullptr};
-    return {frame.bones_from_model->value.data(), frame.model_from_bones->value.data()};
-}
-
 /// Lanes of the first vertex data number; the others follow, kLanes apart. Null if there are none.
 template <std::size_t kVertexFloats>
 HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t b, std::size_t lane) {
@@ -276,42 +293,18 @@ HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t
     return pointers.vertex_rows[kVertexFloats * b].lane.data() + lane;
 }
 
-template <class D>
-HWY_INLINE void map_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
-                              std::size_t lane, Points<D> points) {
-    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
-    store_points(d, pointers, b, lane, points);
-}
-
-template <class Rigid>
-inline constexpr bool kHasCentre = std::is_base_of_v<CentreRows, Rigid>;
-
-template <class Rigid, class D>
-HWY_INLINE Points<D> centre_of(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
-                               std::size_t lane, const Points<D>& rest) {
-    return Rigid::centre(d, vertex_rows_of<Rigid::kVertexFloats>(pointers, b, lane), spaces.bones_from_model,
-                         rest);
-}
-
 template <class Rigid, class D>
 HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
                                  std::size_t lane, const Sum<D, Rigid::kNumbers>& sum,
                                  const Points<D>& rest) {
     Points<D> points;
-    if constexpr (kHasCentre<Rigid>) {
-        const Points<D> centre = centre_of<Rigid>(d, pointers, spaces, b, lane, rest);
+    if constexpr (CentreKernel<Rigid>) {
+        const Points<D> centre = Rigid::centre(d, pointers, spaces, b, lane, rest);
         points = Rigid::finish(d, motion_at(sum, centre), centre, rest);
     } else {
         points = Rigid::finish(d, sum, rest);
     }
-    map_and_store(d, pointers, spaces, b, lane, points);
-}
-
-template <class D>
-HWY_INLINE Points<D> load_rest(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
-                               std::size_t lane) {
-    const Points<D> rest = load_points(d, pointers, b, lane);
-    return spaces.bones_from_model == nullptr ? rest : displaced(d, spaces.bones_from_model, rest);
+    store_in_model(d, pointers, spaces, b, lane, points);
 }
 
 /// Deforms lanes [lane, lane + kVectors * N) of a block with resolved signs.
@@ -321,20 +314,20 @@ HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers,
     const Full d;
     const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
     const float* const weights = weights_of(pointers, b) + lane;
-    if constexpr (kHasCentre<Rigid>) {
+    if constexpr (CentreKernel<Rigid>) {
         Points<Full> rest[kVectors];
         Points<Full> centres[kVectors];
         Motion<Full> motions[kVectors];
         const std::size_t step = hn::Lanes(d);
         for (std::size_t v = 0; v < kVectors; ++v) {
             rest[v] = load_rest(d, pointers, spaces, b, lane + v * step);
-            centres[v] = centre_of<Rigid>(d, pointers, spaces, b, lane + v * step, rest[v]);
+            centres[v] = Rigid::centre(d, pointers, spaces, b, lane + v * step, rest[v]);
         }
         blend_motions<kVectors, kCount, kPlain>(d, bone_rows, count, first_weights, weights, centres,
                                                 motions);
         for (std::size_t v = 0; v < kVectors; ++v) {
-            map_and_store(d, pointers, spaces, b, lane + v * step,
-                          Rigid::finish(d, motions[v], centres[v], rest[v]));
+            store_in_model(d, pointers, spaces, b, lane + v * step,
+                           Rigid::finish(d, motions[v], centres[v], rest[v]));
         }
     } else {
         const auto sum =
@@ -349,9 +342,9 @@ HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers,
 template <class Rigid, std::size_t kCount, bool kPlain = false>
 void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
     const Full d;
-    constexpr std::size_t kVectors = kHasCentre<Rigid> ? kVectorsAtOnce : 1;
+    constexpr std::size_t kVectors = CentreKernel<Rigid> ? kVectorsAtOnce : 1;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     const std::size_t influences = pointers.blocks[begin].influences;
     for (std::size_t b = begin; b < end; ++b) {
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
@@ -371,7 +364,7 @@ template <class Rigid>
 void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, bool plain) {
     const Full d;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     const std::size_t influences = pointers.blocks[begin].influences;
     const std::int32_t* const bones = frame.bones + pointers.blocks[begin].first_bone;
     for (std::size_t b = begin; b < end; ++b) {
@@ -419,12 +412,12 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// Deforms a mixed block vertex by vertex: for bones with scale, or without vectors.
+/// Deforms a block whose vertices have own bones one by one: for bones with scale, or without vectors.
 template <class Rigid>
 void deform_one_by_one(const Frame& frame, std::size_t b) {
     const One d;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     const Block& block = pointers.blocks[b];
     const float* const weights_of_block = weights_of(pointers, b);
     const std::int32_t* const bones = frame.bones + block.first_bone;
@@ -441,7 +434,7 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// Blends one vertex of a mixed block. A bone's row is added as it is in memory, Float4 by Float4.
+/// Blends one vertex that has its own bones. A bone's row is added as it is in memory, Float4 by Float4.
 ///
 /// weights  of each influence, kLanes apart
 /// sums     receives the sum's Float4s, 4 * kLanes apart
@@ -484,11 +477,11 @@ HWY_NOINLINE void blend_vertex_plainly(const Palette& palette, const std::int32_
     blend_vertex<Rigid, true>(palette, bones, count, weights, sums);
 }
 
-/// Deforms a mixed block. The sums of all vertices are transposed into lanes.
+/// Deforms a block whose vertices have own bones. The sums of all vertices are transposed into lanes.
 template <class Rigid>
-void deform_mixed(const Frame& frame, std::size_t b) {
+void deform_own_bones(const Frame& frame, std::size_t b) {
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     const Block& block = pointers.blocks[b];
     const float* const weights_of_block = weights_of(pointers, b);
     const std::int32_t* bones = frame.bones + block.first_bone;
@@ -517,27 +510,30 @@ void deform_mixed(const Frame& frame, std::size_t b) {
 #else
 
 template <class Rigid>
-void deform_mixed(const Frame& frame, std::size_t b) {
+void deform_own_bones(const Frame& frame, std::size_t b) {
     deform_one_by_one<Rigid>(frame, b);
 }
 
 #endif
 
-template <class Rigid>
+template <RigidKernel Rigid>
 void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
     const bool scaled = frame.palette->any_scale;
-    for (std::size_t b = begin; b < end;) {
-        const Block& block = frame.mesh->blocks[b];
-        if (block.mixed) {
-            scaled ? deform_one_by_one<Rigid>(frame, b) : deform_mixed<Rigid>(frame, b);
-            ++b;
-            continue;
-        }
-        const std::size_t after = end_of_set(frame, b, end);
-        block.influences == 0 ? keep_blocks(frame, b, after) : deform_set<Rigid>(frame, b, after);
-        b = after;
-    }
+    for_each_set(
+        frame, begin, end,
+        [&](std::size_t b, std::size_t after) HWY_ATTR { deform_set<Rigid>(frame, b, after); },
+        [&](std::size_t b)
+            HWY_ATTR { scaled ? deform_one_by_one<Rigid>(frame, b) : deform_own_bones<Rigid>(frame, b); });
 }
+
+// Defines the functions of a kernel that are compiled for each instruction set, for one that is deform_rigid().
+#ifndef SINEW_RIGID_FUNCTIONS
+#define SINEW_RIGID_FUNCTIONS(Rows)                                       \
+    void deform(const Frame& frame, std::size_t begin, std::size_t end) { \
+        deform_rigid<Rows>(frame, begin, end);                            \
+    }                                                                     \
+    void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<Rows>(bones, palette); }
+#endif
 
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew

@@ -16,7 +16,7 @@ public:
     BoneSets run() {
         for (const Block& block : mesh_.blocks) {
             if (block.influences == 0) continue;
-            if (!block.mixed) {
+            if (!block.own_bones) {
                 add(block.first_bone, block.influences, block.influences);
                 continue;
             }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sinew/base/fail.h"
-#include "sinew/deformer.h"
+#include "sinew/binding.h"
 #include "sinew/mesh/influence.h"
 #include "sinew/mesh/packed_mesh.h"
 

@@ -8,7 +8,7 @@
 namespace sinew {
 namespace {
 
-// A block costs the same however few of its lanes are used: as much as two to six vertices of a mixed one,
+// A block costs the same however few of its lanes are used: as much as two to six vertices with own bones,
 // depending on the processor. This also bounds the memory: 16 / 6 of 24 bytes for each vertex with four
 // influences.
 constexpr std::size_t kMinLanes = 6;
@@ -16,9 +16,9 @@ constexpr std::size_t kMinLanes = 6;
 // A run takes three masked stores. With more runs than this, one store for each vertex is as fast.
 constexpr std::size_t kMaxRuns = 5;
 
-class BoneSets {
+class VertexSets {
 public:
-    BoneSets(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences)
+    VertexSets(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences)
         : offsets_(offsets), influences_(influences), set_of_(offsets.size() - 1), slots_(1024, kNone) {
         for (std::size_t vertex = 0; vertex < set_of_.size(); ++vertex) {
             // Adjacent vertices mostly have the same bones.
@@ -101,7 +101,7 @@ public:
     PackedMesh run(std::span<const Vec3<float>> rest_points, std::span<const std::int32_t> more_bones) {
         std::vector<std::uint32_t> order;
         std::vector<std::uint32_t> starts;
-        BoneSets(offsets_, influences_).order(order, starts);
+        VertexSets(offsets_, influences_).order(order, starts);
         mesh_.blocks.reserve(order.size() / kLanes + starts.size());
         mesh_.vertices.reserve(order.size() / kLanes + starts.size());
         std::vector<std::uint32_t> scattered;
@@ -111,7 +111,7 @@ public:
         // Vertices with similar numbers of influences become adjacent, which minimises padding.
         std::ranges::stable_sort(scattered, {}, [this](std::uint32_t vertex) { return count(vertex); });
         for (std::size_t i = 0; i < scattered.size(); i += kLanes) {
-            add_mixed(std::span(scattered).subspan(i, std::min(kLanes, scattered.size() - i)));
+            add_own_bones(std::span(scattered).subspan(i, std::min(kLanes, scattered.size() - i)));
         }
         fill(rest_points);
         number_used_bones(more_bones);
@@ -148,7 +148,7 @@ private:
         }
     }
 
-    void add_mixed(std::span<const std::uint32_t> vertices) {
+    void add_own_bones(std::span<const std::uint32_t> vertices) {
         const std::size_t influences = count(vertices.back());
         const auto first_bone = static_cast<std::uint32_t>(mesh_.bones.size());
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -161,22 +161,22 @@ private:
     }
 
     void add_block(std::span<const std::uint32_t> vertices, std::uint32_t first_bone, std::size_t influences,
-                   bool mixed) {
+                   bool own_bones) {
         Lanes<std::int32_t> numbers;
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             numbers.lane[lane] = static_cast<std::int32_t>(vertices[std::min(lane, vertices.size() - 1)]);
         }
         // Vertices ascend within a set, and within a number of influences.
         const bool consecutive =
-            !mixed && vertices.size() == kLanes && vertices.back() - vertices.front() == kLanes - 1;
+            !own_bones && vertices.size() == kLanes && vertices.back() - vertices.front() == kLanes - 1;
         const std::size_t runs = consecutive ? 0 : add_runs(vertices);
         const auto output =
             consecutive ? vertices.front() : static_cast<std::uint32_t>(mesh_.runs.size() - runs);
         mesh_.blocks.push_back({weight_count_, first_bone, static_cast<std::uint32_t>(influences), output,
                                 static_cast<std::uint8_t>(vertices.size()), static_cast<std::uint8_t>(runs),
-                                mixed, consecutive});
+                                own_bones, consecutive});
         mesh_.vertices.push_back(numbers);
-        weight_count_ += static_cast<std::uint32_t>(mixed ? influences : weights_kept(influences));
+        weight_count_ += static_cast<std::uint32_t>(own_bones ? influences : weights_kept(influences));
     }
 
     static std::size_t weights_kept(std::size_t influences) {
@@ -216,7 +216,7 @@ private:
                 const std::size_t end = offsets_[vertex + 1];
                 if (first == end) continue;
                 Lanes<float>* row = weights;
-                (block.mixed ? *row++ : mesh_.first_weights[b]).lane[lane] = influences_[first].weight;
+                (block.own_bones ? *row++ : mesh_.first_weights[b]).lane[lane] = influences_[first].weight;
                 for (std::size_t i = first + 1; i < end; ++i) (row++)->lane[lane] = influences_[i].weight;
             }
         }
@@ -254,8 +254,8 @@ private:
             if (block.influences == 0) continue;
             const bool as_before = before != nullptr && *before == block.first_bone;
             before = &block.first_bone;
-            if (as_before && !block.mixed) continue;
-            const std::size_t vertices = block.mixed ? block.vertices : 1;
+            if (as_before && !block.own_bones) continue;
+            const std::size_t vertices = block.own_bones ? block.vertices : 1;
             for (std::uint32_t i = 0; i < vertices; ++i) {
                 const std::uint32_t begin = block.first_bone + i * block.influences;
                 sets.push_back({begin, begin + block.influences});
@@ -330,14 +330,14 @@ UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rest_p
             const Lanes<float>* const weights = &mesh.weights[block.first_weight];
             for (std::size_t lane = 0; lane < block.vertices; ++lane) {
                 const auto weight_of = [&](std::size_t k) {
-                    if (block.mixed) return weights[k].lane[lane];
+                    if (block.own_bones) return weights[k].lane[lane];
                     return k == 0 ? mesh.first_weights[b].lane[lane] : weights[k - 1].lane[lane];
                 };
-                const std::size_t first = block.first_bone + (block.mixed ? lane * block.influences : 0);
+                const std::size_t first = block.first_bone + (block.own_bones ? lane * block.influences : 0);
                 const auto vertex = static_cast<std::size_t>(mesh.vertices[b].lane[lane]);
                 result.rest_points[vertex] = {xyz[0].lane[lane], xyz[1].lane[lane], xyz[2].lane[lane]};
                 for (std::size_t k = 0; k < block.influences; ++k) {
-                    // Influences of weight 0 are padding in a mixed block.
+                    // Influences of weight 0 are padding in a block with own bones.
                     if (weight_of(k) == 0.0f) continue;
                     const auto bone = static_cast<std::size_t>(mesh.bones[first + k]);
                     call(vertex, Influence<float>{mesh.used_bones[bone], weight_of(k)});

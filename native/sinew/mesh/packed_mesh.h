@@ -26,15 +26,15 @@ struct alignas(kLanes * sizeof(T)) Lanes {
 
 /// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
 struct Block {
-    // Into PackedMesh::weights, in the order of the blocks: [influences]; unless mixed, without the first.
+    // Into PackedMesh::weights, in the order of the blocks: [influences]; unless it has own bones, without the first.
     std::uint32_t first_weight;
-    std::uint32_t first_bone;  // into PackedMesh::bones: [influences], or if mixed [kLanes][influences]
+    std::uint32_t first_bone;  // into PackedMesh::bones: [influences], or with own bones [kLanes][influences]
     std::uint32_t influences;
     std::uint32_t output;  // if consecutive, the first vertex; otherwise the first run
     std::uint8_t vertices;
     std::uint8_t runs;  // 0: too many runs to be worthwhile
-    bool mixed;  // every lane has its own bones; vertices with fewer influences are padded with weight 0
-    bool consecutive;  // kLanes vertices that are consecutive in the mesh as well
+    bool own_bones;     // every lane has its own; vertices with fewer influences are padded with weight 0
+    bool consecutive;   // kLanes vertices that are consecutive in the mesh as well
 };
 
 /// Lanes of a block whose vertices are consecutive in the mesh.
@@ -56,9 +56,10 @@ struct PackedMesh {
     std::vector<Block> blocks;
     // Rest points and weights are stored separately: other rest points may replace these, and a method that keeps
     // weights of its own reads only the points.
-    std::vector<Lanes<float>> rest_points;      // [blocks][kPointRows]
-    std::vector<Lanes<float>> weights;          // and one more row, which blocks without weights point to
-    std::vector<Lanes<float>> first_weights;    // [blocks] separate, as rarely read; unused for mixed blocks
+    std::vector<Lanes<float>> rest_points;  // [blocks][kPointRows]
+    std::vector<Lanes<float>> weights;      // and one more row, which blocks without weights point to
+    std::vector<Lanes<float>>
+        first_weights;  // [blocks] separate, as rarely read; unused for blocks with own bones
     std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the vertex of each lane
     std::vector<Run> runs;
     std::vector<std::int32_t> bones;       // indices into used_bones

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "sinew/lanes/palette.h"
-#include "sinew/methods/scaled_rigid.h"
+#include "sinew/lanes/rigid_bones.h"
 
 namespace sinew {
 

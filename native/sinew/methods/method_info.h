@@ -105,8 +105,9 @@ struct MethodInfo {
     std::string_view source;       // the papers
     Needs needs;
     std::span<const Parameter> parameters{};  // numbers and choices, with values set for each frame
-    std::size_t vertex_floats = 0;  // numbers kept for each vertex or, if keeps_moments, for each row
-    bool keeps_moments = false;  // vertex data is rows, any number for each vertex: see methods/ddm/moments.h
+    std::size_t vertex_floats = 0;  // numbers kept for each vertex or, if rows_by_bone, for each row
+    // Vertex data is rows, any number for each vertex: its number, that of a bone, the weight, and more numbers.
+    bool rows_by_bone = false;
 };
 
 /// Methods are identified by their number.
@@ -123,7 +124,7 @@ struct StageInfo {
     std::span<const Parameter> parameters{};
 };
 
-/// How the library deforms whole meshes with a method: see lanes/kernels.h.
+/// How the library deforms whole meshes with a method: see lanes/kernel.h.
 struct Kernel;
 
 }  // namespace sinew

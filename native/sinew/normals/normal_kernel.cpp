@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 #include "sinew/normals/normal_mesh.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -419,11 +419,11 @@ namespace {
 
 using Compute = void(const NormalFrame& frame, std::size_t begin, std::size_t end);
 
-constexpr std::array<Compute*, kTargetCount> kFaces SINEW_TARGETS_OF(faces);
-constexpr std::array<Compute*, kTargetCount> kCorners SINEW_TARGETS_OF(corners);
-constexpr std::array<Compute*, kTargetCount> kSum SINEW_TARGETS_OF(sum);
-constexpr std::array<Compute*, kTargetCount> kSumGroups SINEW_TARGETS_OF(sum_groups);
-constexpr std::array<Compute*, kTargetCount> kCustomise SINEW_TARGETS_OF(customise);
+constexpr std::array<Compute*, kTargetCount> kFaces SINEW_TARGETS(faces);
+constexpr std::array<Compute*, kTargetCount> kCorners SINEW_TARGETS(corners);
+constexpr std::array<Compute*, kTargetCount> kSum SINEW_TARGETS(sum);
+constexpr std::array<Compute*, kTargetCount> kSumGroups SINEW_TARGETS(sum_groups);
+constexpr std::array<Compute*, kTargetCount> kCustomise SINEW_TARGETS(customise);
 
 }  // namespace
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sinew/normals/skinned_normal_kernel.cpp"
@@ -138,9 +138,9 @@ namespace {
 
 using Compute = SkinnedNormalKernel::Compute;
 
-constexpr std::array<Compute*, kTargetCount> kOfVertices SINEW_TARGETS_OF(of_vertices);
-constexpr std::array<Compute*, kTargetCount> kCofactors SINEW_TARGETS_OF(cofactors);
-constexpr std::array<Compute*, kTargetCount> kOfFrames SINEW_TARGETS_OF(of_frames);
+constexpr std::array<Compute*, kTargetCount> kOfVertices SINEW_TARGETS(of_vertices);
+constexpr std::array<Compute*, kTargetCount> kCofactors SINEW_TARGETS(cofactors);
+constexpr std::array<Compute*, kTargetCount> kOfFrames SINEW_TARGETS(of_frames);
 
 }  // namespace
 

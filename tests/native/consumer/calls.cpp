@@ -96,7 +96,7 @@ void limit_bulges() {
     const std::vector<std::int32_t> offsets{0, 2}, bones{0, 1};
     const std::vector<float> weights{0.5f, 0.5f};
     const std::vector<sinew::BoneSegment<float>> segments{{{-1, 0, 0}, {0, 0, 0}}, {{0, 0, 0}, {1, 0, 0}}};
-    const sinew::BulgeLimit limit({{rest, offsets, bones, weights}, segments});
+    const sinew::BulgeLimit limit(sinew::Binding({rest, offsets, bones, weights}), {segments});
     std::vector<sinew::Vec3<float>> points{{0, 3, 0}};
     expect(limit.apply(points, std::vector<sinew::Affine<float>>(2)), "sizes fit");
     expect(glm::length(points[0] - rest[0]) < 1e-5f, "a vertex is no further from its bones than at rest");

@@ -85,11 +85,6 @@ class Method:
         The heading of its group in menus.
         """
     @property
-    def keeps_moments(self) -> bool:
-        """
-        Whether its vertex data is rows, any number for each vertex: see direct_delta_mush.
-        """
-    @property
     def label(self) -> str:
         """
         The name in the interface.
@@ -115,6 +110,11 @@ class Method:
     def parameters(self) -> tuple[Parameter, ...]:
         """
         Its settings.
+        """
+    @property
+    def rows_by_bone(self) -> bool:
+        """
+        Whether its vertex data is rows, any number for each vertex: see direct_delta_mush.
         """
     @property
     def source(self) -> str:
@@ -231,7 +231,7 @@ class Binding:
     """
     def __getstate__(self) -> tuple:
         ...
-    def __init__(self, rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike | None = None, vertex_data: collections.abc.Mapping[str, numpy.typing.ArrayLike] | None = None) -> None:
+    def __init__(self, rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike | None = None, vertex_data: collections.abc.Mapping[str, numpy.typing.ArrayLike | None] | None = None) -> None:
         """
         rest_points: float32 [vertices, 3], model space.
         influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.
@@ -240,8 +240,8 @@ class Binding:
         rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space of the bone
             transforms. Read by sbs, and by other rigid methods where a bone is scaled. None: identity.
         vertex_data: a dict of the vertex data of methods, float32 [vertices, Method.vertex_floats] by the method's
-            name: {"cor": sinew.centres_of_rotation(...)}. A method without its data falls back: under cor each vertex
-            is its own centre, which is linear blending.
+            name: {"cor": sinew.centres_of_rotation(...)}. A Deformer of such a method needs it. None in its place asks
+            for linear blending: {"cor": None}.
 
         At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,576 bones.
         """
@@ -281,7 +281,7 @@ class Deformer:
             at each vertex, from 0 (none) to 1 (all); clamped. This is the stage `mix`.
         """
     @typing.overload
-    def __init__(self, rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, method: str = 'lbs', rest_bones: numpy.typing.ArrayLike | None = None, vertex_data: collections.abc.Mapping[str, numpy.typing.ArrayLike] | None = None) -> None:
+    def __init__(self, rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, method: str = 'lbs', rest_bones: numpy.typing.ArrayLike | None = None, vertex_data: collections.abc.Mapping[str, numpy.typing.ArrayLike | None] | None = None) -> None:
         """
         Constructs its own binding, from the arguments of Binding.
         """
@@ -343,9 +343,9 @@ class BulgeLimit:
     """
     def __getstate__(self) -> tuple:
         ...
-    def __init__(self, rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, *, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None) -> None:
+    def __init__(self, binding: Binding, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, *, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None) -> None:
         """
-        rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.
+        binding: the mesh. Its memory is shared.
         heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
         bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
         weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sinew/base/precompute_options.h"
-#include "sinew/deformer.h"
+#include "sinew/binding.h"
 #include "sinew/export.h"
 
 namespace sinew {

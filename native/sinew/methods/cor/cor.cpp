@@ -4,7 +4,6 @@
 #include "sinew/methods/cor/cor.h"
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
 #include "sinew/methods/centre_rows.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -12,7 +11,6 @@
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
-#include "sinew/lanes/centre-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -20,16 +18,15 @@ namespace sinew {
 namespace HWY_NAMESPACE {
 
 struct CorKernel : CentreRows {
-    static constexpr std::size_t kVertexFloats = 3;
     static constexpr std::size_t kSignedFloat4s = 1;
 
-    /// data  the centre's x, y and z, kLanes apart, in model space; if null, each vertex is its own centre
+    /// Without vertex data, each vertex is its own centre.
     template <class D>
-    static HWY_INLINE Points<D> centre(D d, const float* data, const float* bones_from_model,
-                                       const Points<D>& p) {
+    static HWY_INLINE Points<D> centre(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                                       std::size_t lane, const Points<D>& p) {
+        const float* const data = vertex_rows_of<Cor::info.vertex_floats>(pointers, b, lane);
         if (data == nullptr) return p;
-        const Points<D> c{hn::Load(d, data), hn::Load(d, data + kLanes), hn::Load(d, data + 2 * kLanes)};
-        return bones_from_model == nullptr ? c : displaced(d, bones_from_model, c);
+        return to_bones(d, spaces, load_row_points(d, data));
     }
 
     template <class D>
@@ -40,31 +37,21 @@ struct CorKernel : CentreRows {
     }
 };
 
-void deform_cor(const Frame& frame, std::size_t begin, std::size_t end) {
-    deform_rigid<CorKernel>(frame, begin, end);
-}
+namespace {
 
-void prepare_cor(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                 Palette& palette) {
-    prepare_rigid<CorKernel>(used, posed_from_rest, palette);
-}
+SINEW_RIGID_FUNCTIONS(CorKernel)
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
-namespace {
 
-constexpr Kernel kKernel{kCentreRestRow, true, 0, prepare_rigid_method<Cor, write_centre_bone>,
-                         SINEW_TARGETS(deform_cor, prepare_cor)};
-
-}  // namespace
-
-const Kernel& Cor::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Cor, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+             .scaled_bone_rows = scaled_bone_rows<Cor, 4, write_centre_bone>,
+             .pack_vertex_data = VertexNumbers<Cor::info.vertex_floats>::pack)
 
 }  // namespace sinew
-
 #endif

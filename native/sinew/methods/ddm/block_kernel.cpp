@@ -5,7 +5,7 @@
 #include <array>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 #include "sinew/methods/ddm/block_factor.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -220,7 +220,7 @@ HWY_AFTER_NAMESPACE();
 namespace sinew {
 namespace {
 
-constexpr std::array<SolveBlocks*, kTargetCount> kSolve SINEW_TARGETS_OF(solve);
+constexpr std::array<SolveBlocks*, kTargetCount> kSolve SINEW_TARGETS(solve);
 
 }  // namespace
 

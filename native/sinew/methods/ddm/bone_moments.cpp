@@ -69,11 +69,11 @@ private:
         const Lanes<float>* const xyz = &mesh_.rest_points[kPointRows * b];
         const Lanes<float>* const weights = &mesh_.weights[block.first_weight];
         for (std::size_t k = 0; k < block.influences; ++k) {
-            const float weight = block.mixed ? weights[k].lane[lane]
-                                 : k == 0    ? mesh_.first_weights[b].lane[lane]
-                                             : weights[k - 1].lane[lane];
+            const float weight = block.own_bones ? weights[k].lane[lane]
+                                 : k == 0        ? mesh_.first_weights[b].lane[lane]
+                                                 : weights[k - 1].lane[lane];
             if (weight == 0.0f) continue;
-            const std::size_t bone = block.first_bone + (block.mixed ? lane * block.influences : 0) + k;
+            const std::size_t bone = block.first_bone + (block.own_bones ? lane * block.influences : 0) + k;
             const Row row{weight, weight * xyz[0].lane[lane], weight * xyz[1].lane[lane],
                           weight * xyz[2].lane[lane]};
             const auto same = std::ranges::find(found, mesh_.bones[bone], &BoneRow::bone);
@@ -94,7 +94,7 @@ class MomentPacker {
 public:
     MomentPacker(const PackedMesh& mesh, std::span<const float> rows) : mesh_(mesh), by_vertex_(mesh, rows) {}
 
-    BoneMoments run() {
+    std::unique_ptr<const PackedVertexData> run() {
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             if (mesh_.blocks[b].influences == 0) {
                 moments_.blocks.push_back({{}, 0, 0, false});
@@ -102,7 +102,7 @@ public:
                 add_block(b);
             }
         }
-        return std::move(moments_);
+        return std::move(packed_);
     }
 
 private:
@@ -117,7 +117,7 @@ private:
         std::ranges::sort(bones);
         bones.erase(std::unique(bones.begin(), bones.end()), bones.end());
         MomentBlock block{{}, 0, static_cast<std::uint32_t>(bones.size()), bones.size() > kMaxShared * most};
-        if (block.mixed) {
+        if (block.own_bones) {
             block.bones = static_cast<std::uint32_t>(most);
             bones = own_bones(most);
         }
@@ -144,10 +144,10 @@ private:
     }
 
     std::uint32_t place_of(const std::vector<std::int32_t>& bones, const MomentBlock& block) {
-        if (!block.mixed && !moments_.blocks.empty()) {
+        if (!block.own_bones && !moments_.blocks.empty()) {
             const MomentBlock& before = moments_.blocks.back();
             const std::span known(moments_.bones);
-            if (!before.mixed && before.bones == block.bones &&
+            if (!before.own_bones && before.bones == block.bones &&
                 std::ranges::equal(known.subspan(before.first_bone, before.bones), bones)) {
                 return before.first_bone;
             }
@@ -167,7 +167,7 @@ private:
         for (std::size_t i = 0; i < lanes_[lane].size(); ++i) {
             const BoneRow& row = lanes_[lane][i];
             const std::size_t k =
-                block.mixed
+                block.own_bones
                     ? i
                     : static_cast<std::size_t>(std::ranges::lower_bound(bones, row.bone) - bones.begin());
             for (std::size_t n = 0; n < kMomentNumbers; ++n) {
@@ -184,38 +184,31 @@ private:
 
     const PackedMesh& mesh_;
     RowsByVertex by_vertex_;
-    BoneMoments moments_;
+    std::unique_ptr<BoneMoments> packed_ = std::make_unique<BoneMoments>();
+    BoneMoments& moments_ = *packed_;
     std::array<std::vector<BoneRow>, kLanes> lanes_;
 };
 
 }  // namespace
 
-std::vector<std::int32_t> bones_of_moments(std::span<const float> rows) {
-    std::vector<std::int32_t> bones;
-    for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
-        if (!is_empty(&rows[i])) bones.push_back(bone_of(&rows[i]));
-    }
-    return bones;
-}
-
-BoneMoments pack_moments(const PackedMesh& mesh, std::span<const float> rows) {
+std::unique_ptr<const PackedVertexData> pack_moments(const PackedMesh& mesh, std::span<const float> rows) {
     return MomentPacker(mesh, rows).run();
 }
 
-std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& moments) {
+std::vector<float> BoneMoments::unpack(const PackedMesh& mesh, std::size_t) const {
     using Full = std::array<float, kMomentFloats>;
     std::vector<Full> found;
-    for (std::size_t b = 0; b < moments.blocks.size(); ++b) {
-        const MomentBlock& block = moments.blocks[b];
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+        const MomentBlock& block = blocks[b];
         for (std::size_t lane = 0; lane < mesh.blocks[b].vertices; ++lane) {
             for (std::size_t k = 0; k < block.bones; ++k) {
-                const std::size_t bone = block.first_bone + (block.mixed ? lane * block.bones : 0) + k;
+                const std::size_t bone = block.first_bone + (block.own_bones ? lane * block.bones : 0) + k;
                 Full row{static_cast<float>(mesh.vertices[b].lane[lane]),
-                         static_cast<float>(mesh.used_bones[static_cast<std::size_t>(moments.bones[bone])])};
+                         static_cast<float>(mesh.used_bones[static_cast<std::size_t>(bones[bone])])};
                 for (std::size_t n = 0; n < kMomentNumbers; ++n) {
                     const MomentPosition position = moment_position(k, n);
                     const auto part = static_cast<std::size_t>(position.part);
-                    row[2 + n] = moments.parts[part][row_of(block, position)].lane[lane];
+                    row[2 + n] = parts[part][row_of(block, position)].lane[lane];
                 }
                 if (!is_empty(row.data())) found.push_back(row);
             }
@@ -223,10 +216,10 @@ std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& mom
     }
     std::ranges::sort(found,
                       [](const Full& a, const Full& b) { return a[0] != b[0] ? a[0] < b[0] : a[1] < b[1]; });
-    std::vector<float> rows;
-    rows.reserve(kMomentFloats * found.size());
-    for (const Full& row : found) rows.insert(rows.end(), row.begin(), row.end());
-    return rows;
+    std::vector<float> values;
+    values.reserve(kMomentFloats * found.size());
+    for (const Full& row : found) values.insert(values.end(), row.begin(), row.end());
+    return values;
 }
 
 }  // namespace sinew

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "sinew/mesh/packed_mesh.h"
+#include "sinew/lanes/kernel.h"
 #include "sinew/methods/ddm/moments.h"
 
 namespace sinew {
@@ -45,15 +45,18 @@ inline constexpr std::size_t kMomentNumbers = kMomentFloats - 2;
 /// The moments of one block of a packed mesh.
 struct MomentBlock {
     std::array<std::uint32_t, kMomentParts> first_rows;  // into BoneMoments::parts
-    std::uint32_t first_bone;  // into BoneMoments::bones: [bones], or if mixed [kLanes][bones]
+    std::uint32_t first_bone;  // into BoneMoments::bones: [bones], or with own bones [kLanes][bones]
     std::uint32_t bones;       // ascending; a vertex without one of them has moments of 0
-    bool mixed;                // every lane has its own bones
+    bool own_bones;            // every lane has its own
 };
 
 /// The moments of a mesh's vertices, in the order of its blocks. Consecutive blocks with the same bones share one
 /// list of them.
-struct BoneMoments {
-    std::vector<MomentBlock> blocks;  // [blocks]; empty if the method has none
+struct BoneMoments final : PackedVertexData {
+    /// Without rows that are all 0.
+    [[nodiscard]] std::vector<float> unpack(const PackedMesh& mesh, std::size_t vertices) const override;
+
+    std::vector<MomentBlock> blocks;  // [blocks]
     std::array<std::vector<Lanes<float>>, kMomentParts> parts;
     std::vector<std::int32_t> bones;  // indices into PackedMesh::used_bones
 };
@@ -63,17 +66,11 @@ struct BoneMoments {
     return block.first_rows[static_cast<std::size_t>(position.part)] + position.row;
 }
 
-/// The bones of the rows [any number][kMomentFloats], in any order and possibly repeated. Rows that are all 0 are
-/// left out.
-[[nodiscard]] std::vector<std::int32_t> bones_of_moments(std::span<const float> rows);
-
 /// Packs the moments in the order of the mesh's blocks.
 ///
 /// rows  [any number][kMomentFloats] in ascending order of vertices and bones, each pair once; their bones are
 ///       among mesh.used_bones. The neighbourhood of a vertex without rows is its own rest point.
-[[nodiscard]] BoneMoments pack_moments(const PackedMesh& mesh, std::span<const float> rows);
-
-/// The inverse of pack_moments(), without rows that are all 0.
-[[nodiscard]] std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& moments);
+[[nodiscard]] std::unique_ptr<const PackedVertexData> pack_moments(const PackedMesh& mesh,
+                                                                   std::span<const float> rows);
 
 }  // namespace sinew

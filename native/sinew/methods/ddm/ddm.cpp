@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Direct delta mush on lanes. Rows are those of CentreRows. The vertex data is Frame::moments.
+// Direct delta mush on lanes. Rows are those of CentreRows. The vertex data is BoneMoments.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/ddm/ddm.h"
 
@@ -7,7 +7,6 @@
 #include <cstring>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
 #include "sinew/methods/centre_rows.h"
 #include "sinew/methods/ddm/bone_moments.h"
 
@@ -17,12 +16,12 @@
 //
 #include "hwy/cache_control.h"
 #include "hwy/highway.h"
-#include "sinew/lanes/centre-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
+namespace {
 
 // The nearest rotation is found if the two parts of a step, tangents of half angles, have at most this squared
 // product.
@@ -55,7 +54,7 @@ public:
     HWY_INLINE MomentBones(const Frame& frame, const std::int32_t* bones, std::size_t bone_count)
         : palette_(*frame.palette),
           bones_(bones),
-          from_model_(frame.bones_from_model == nullptr ? nullptr : frame.bones_from_model->value.data()),
+          from_model_(frame.spaces.bones_from_model),
           count(bone_count) {
         if (count == 0) return;
         float least = palette_.sizes[bones[0]];
@@ -136,6 +135,10 @@ public:
     bool is_resolved = false;
 };
 
+HWY_INLINE const BoneMoments& moments_of(const Frame& frame) {
+    return static_cast<const BoneMoments&>(*frame.vertex_data);
+}
+
 /// The parts of a block's moments, from the current lanes on.
 struct MomentRows {
     const float* first_weight;
@@ -157,7 +160,7 @@ HWY_INLINE MomentRows rows_of(const BoneMoments& moments, std::size_t b, std::si
 /// Prefetches the moments of block `b`, if it exists. The hardware prefetcher does not, because the rows of the
 /// first bone are skipped: apart from sums over all bones they are not needed.
 HWY_INLINE void prefetch_moments(const Frame& frame, std::size_t b) {
-    const BoneMoments& moments = *frame.moments;
+    const BoneMoments& moments = moments_of(frame);
     if (b >= moments.blocks.size()) return;
     const std::size_t bones = moments.blocks[b].bones;
     const MomentRows rows = rows_of(moments, b, 0);
@@ -350,16 +353,6 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
     return sum;
 }
 
-/// The row r plus the row r times the transposed displacement `from_model`.
-template <class D>
-HWY_INLINE Points<D> in_space(D d, const Points<D>& r, const float* from_model) {
-    const auto along = [d, &r](const float* m, Vec<D> own) HWY_ATTR {
-        return hn::MulAdd(hn::Set(d, m[0]), r.x,
-                          hn::MulAdd(hn::Set(d, m[1]), r.y, hn::MulAdd(hn::Set(d, m[2]), r.z, own)));
-    };
-    return {along(from_model, r.x), along(from_model + 4, r.y), along(from_model + 8, r.z)};
-}
-
 template <class D>
 HWY_INLINE Vec<D> largest(const Points<D>& r) {
     return hn::Max(hn::Abs(r.x), hn::Max(hn::Abs(r.y), hn::Abs(r.z)));
@@ -493,8 +486,8 @@ HWY_NOINLINE void find_others(D d, const Rows3<D>& matrix, hn::Mask<D> is_found,
 template <class D>
 HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const float* from_model, Vec<D>* q) {
     if (from_model != nullptr) {
-        matrix = {in_space(d, matrix.x, from_model), in_space(d, matrix.y, from_model),
-                  in_space(d, matrix.z, from_model)};
+        matrix = {displaced_vector(d, from_model, matrix.x), displaced_vector(d, from_model, matrix.y),
+                  displaced_vector(d, from_model, matrix.z)};
     }
     // Scaled, so that the cubes of its entries fit into floats.
     const Vec<D> size = hn::Max(largest(matrix.x), hn::Max(largest(matrix.y), largest(matrix.z)));
@@ -528,14 +521,14 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
                                 const Points<D>& rest, const Points<D>& sum) {
     Points<D> total = sum;
     const Block& block = frame.mesh->blocks[b];
-    // Lanes of mixed blocks are processed one by one.
+    // Vertices with own bones are processed one by one.
     const std::int32_t* const bones =
-        frame.bones + block.first_bone + (block.mixed ? block.influences * lane : 0);
+        frame.bones + block.first_bone + (block.own_bones ? block.influences * lane : 0);
     const float* weights = weights_of(pointers_of(frame), b) + lane;
     for (std::size_t k = 0; k < block.influences; ++k) {
-        const float* const of_bone = block.mixed ? weights + kLanes * k
-                                     : k == 0    ? first_weights_of(frame, b) + lane
-                                                 : weights + kLanes * (k - 1);
+        const float* const of_bone = block.own_bones ? weights + kLanes * k
+                                     : k == 0        ? first_weights_of(frame, b) + lane
+                                                     : weights + kLanes * (k - 1);
         Points<D> by;
         if (!scaled(d, *frame.palette, bones[k], rest, by)) continue;
         const Points<D> rotated = rotated_by(d, row_of<kDdmNumbers>(*frame.palette, bones[k]), by);
@@ -549,7 +542,7 @@ template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0,
           class D>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                              const MomentBones& bones, std::size_t b, std::size_t lane) {
-    const MomentRows rows = rows_of(*frame.moments, b, lane);
+    const MomentRows rows = rows_of(moments_of(frame), b, lane);
     const std::size_t step = hn::Lanes(d);
     Points<D> centroids[kVectors];
     Motion<D> motions[kVectors];
@@ -569,13 +562,11 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     }
     for (std::size_t v = 0; v < kVectors; ++v, lane += step) {
         const Points<D> rest = load_rest(d, pointers, spaces, b, lane);
-        Points<D> centroid = centroids[v];
         Points<D> displacement = motions[v].displacement;
-        if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
         if (frame.palette->any_scale) displacement = add_scales(d, frame, b, lane, rest, displacement);
-        const Points<D> from_centroid = subtract<D>(rest, centroid);
-        map_and_store(d, pointers, spaces, b, lane,
-                      add<D>(rest, add_rotation<D>(d, displacement, motions[v].rotation, from_centroid)));
+        const Points<D> from_centroid = subtract<D>(rest, to_bones(d, spaces, centroids[v]));
+        store_in_model(d, pointers, spaces, b, lane,
+                       add<D>(rest, add_rotation<D>(d, displacement, motions[v].rotation, from_centroid)));
     }
 }
 
@@ -588,7 +579,7 @@ void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t beg
     // The matrices of variant 0 leave no registers for a second vector.
     constexpr std::size_t kVectors = kResolved && kVariant != Variant::nearest ? kVectorsAtOnce : 1;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     for (std::size_t b = begin; b < end; ++b) {
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         if (kVariant == Variant::nearest) prefetch_moments(frame, b + 1);
@@ -605,8 +596,8 @@ void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t beg
 
 template <Variant kVariant>
 void deform_set_of(const Frame& frame, std::size_t begin, std::size_t end) {
-    const MomentBlock& block = frame.moments->blocks[begin];
-    const MomentBones bones(frame, &frame.moments->bones[block.first_bone], block.bones);
+    const MomentBlock& block = moments_of(frame).blocks[begin];
+    const MomentBones bones(frame, &moments_of(frame).bones[block.first_bone], block.bones);
     if (HWY_UNLIKELY(bones.is_plain)) return deform_blocks<kVariant, true, false>(frame, bones, begin, end);
     if (!bones.is_resolved) return deform_blocks<kVariant, false, false>(frame, bones, begin, end);
     switch (bones.count) {
@@ -623,11 +614,11 @@ template <Variant kVariant>
 void deform_lane_by_lane(const Frame& frame, std::size_t b) {
     const One d;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
-    const MomentBlock& block = frame.moments->blocks[b];
+    const Spaces spaces = frame.spaces;
+    const MomentBlock& block = moments_of(frame).blocks[b];
     for (std::size_t lane = 0; lane < pointers.blocks[b].vertices; ++lane) {
-        const std::size_t first = block.first_bone + (block.mixed ? block.bones * lane : 0);
-        const MomentBones bones(frame, &frame.moments->bones[first], block.bones);
+        const std::size_t first = block.first_bone + (block.own_bones ? block.bones * lane : 0);
+        const MomentBones bones(frame, &moments_of(frame).bones[first], block.bones);
         if (bones.is_plain) {
             deform_lanes<kVariant, true, false>(d, frame, pointers, spaces, bones, b, lane);
         } else if (bones.is_resolved) {
@@ -640,9 +631,9 @@ void deform_lane_by_lane(const Frame& frame, std::size_t b) {
 
 template <Variant kVariant>
 void deform_by(const Frame& frame, std::size_t begin, std::size_t end) {
-    const std::vector<MomentBlock>& blocks = frame.moments->blocks;
+    const std::vector<MomentBlock>& blocks = moments_of(frame).blocks;
     const auto is_alone = [&](std::size_t b) {
-        return blocks[b].mixed || (frame.palette->any_scale && frame.mesh->blocks[b].mixed);
+        return blocks[b].own_bones || (frame.palette->any_scale && frame.mesh->blocks[b].own_bones);
     };
     for (std::size_t b = begin; b < end;) {
         std::size_t after = b + 1;
@@ -661,8 +652,8 @@ void deform_by(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-void deform_ddm(const Frame& frame, std::size_t begin, std::size_t end) {
-    if (frame.moments == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
+void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+    if (frame.vertex_data == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
     switch (static_cast<int>(frame.parameters[0])) {
         case 1: return deform_by<Variant::quaternion>(frame, begin, end);
         case 2: return deform_by<Variant::weights>(frame, begin, end);
@@ -670,27 +661,19 @@ void deform_ddm(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-void prepare_ddm(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                 Palette& palette) {
-    prepare_rigid<CentreRows>(used, posed_from_rest, palette);
-}
+void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<CentreRows>(bones, palette); }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
-namespace {
 
-constexpr Kernel kKernel{kCentreRestRow, true, 0, prepare_rigid_method<Ddm, write_centre_bone>,
-                         SINEW_TARGETS(deform_ddm, prepare_ddm)};
-
-}  // namespace
-
-const Kernel& Ddm::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Ddm, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+             .scaled_bone_rows = scaled_bone_rows<Ddm, 4, write_centre_bone>,
+             .pack_vertex_data = pack_moments)
 
 }  // namespace sinew
-
 #endif

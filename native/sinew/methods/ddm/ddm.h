@@ -10,8 +10,8 @@
 #include "sinew/methods/ddm/moments.h"
 #include "sinew/methods/method_info.h"
 #include "sinew/methods/rotation_about.h"
-#include "sinew/methods/scaled_rigid.h"
 #include "sinew/transform/nearest_rotation.h"
+#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
 

@@ -17,13 +17,13 @@
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
-#include "sinew/lanes/centre-inl.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
+namespace {
 
 /// By which share of lengths a point may be off.
 inline constexpr float kSettled = 2e-7f;
@@ -281,62 +281,70 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
 }
 
 template <class D, class BonesOf>
-HWY_INLINE void deform_lanes_of_dib(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
-                                    std::size_t lane, const BonesOf& bones, std::size_t count,
-                                    const float* first_weight, const float* weights) {
+HWY_INLINE void deform_lanes(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                             std::size_t lane, const BonesOf& bones, std::size_t count,
+                             const float* first_weight, const float* weights) {
     const Points<D> rest = load_rest(d, pointers, spaces, b, lane);
-    map_and_store(d, pointers, spaces, b, lane,
-                  blend_iteratively(d, bones, count, first_weight, weights, rest));
+    store_in_model(d, pointers, spaces, b, lane,
+                   blend_iteratively(d, bones, count, first_weight, weights, rest));
 }
 
-void deform_dib_block(const Frame& frame, std::size_t b) {
+/// Deforms blocks [begin, end) with the same bones.
+void deform_shared(const Frame& frame, std::size_t begin, std::size_t end) {
+    const Full d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Spaces spaces = frame.spaces;
+    const std::size_t influences = pointers.blocks[begin].influences;
+    const SharedBones<Full> bones{*frame.palette, frame.bones + pointers.blocks[begin].first_bone};
+    for (std::size_t b = begin; b < end; ++b) {
+        const float* const weights = weights_of(pointers, b);
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            deform_lanes(d, pointers, spaces, b, lane, bones, influences, first_weights_of(frame, b) + lane,
+                         weights + lane);
+        }
+    }
+}
+
+/// Deforms a block whose vertices have own bones.
+void deform_own(const Frame& frame, std::size_t b) {
     const Full d;
     const One one;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     const Block& block = pointers.blocks[b];
     const float* const weights = weights_of(pointers, b);
     const std::int32_t* const bones = frame.bones + block.first_bone;
-    if (!block.mixed) {
-        const std::size_t lanes = lanes_end(d, block);
-        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            deform_lanes_of_dib(d, pointers, spaces, b, lane, SharedBones<Full>{*frame.palette, bones},
-                                block.influences, first_weights_of(frame, b) + lane, weights + lane);
-        }
-    } else if (frame.palette->any_scale) {
+    if (frame.palette->any_scale) {
         for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-            const std::int32_t* const of_vertex = bones + block.influences * lane;
-            deform_lanes_of_dib(one, pointers, spaces, b, lane, SharedBones<One>{*frame.palette, of_vertex},
-                                block.influences, weights + lane, weights + kLanes + lane);
+            const SharedBones<One> of_vertex{*frame.palette, bones + block.influences * lane};
+            deform_lanes(one, pointers, spaces, b, lane, of_vertex, block.influences, weights + lane,
+                         weights + kLanes + lane);
         }
-    } else {
-        const std::size_t lanes = lanes_end(d, block);
-        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            const std::int32_t* const of_lanes = bones + block.influences * lane;
-            deform_lanes_of_dib(d, pointers, spaces, b, lane,
-                                OwnBones<Full>{*frame.palette, of_lanes, block.influences}, block.influences,
-                                weights + lane, weights + kLanes + lane);
-        }
+        return;
+    }
+    const std::size_t lanes = lanes_end(d, block);
+    for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+        const OwnBones<Full> of_lanes{*frame.palette, bones + block.influences * lane, block.influences};
+        deform_lanes(d, pointers, spaces, b, lane, of_lanes, block.influences, weights + lane,
+                     weights + kLanes + lane);
     }
 }
 
-void deform_dib(const Frame& frame, std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) {
-        frame.mesh->blocks[b].influences == 0 ? keep_blocks(frame, b, b + 1) : deform_dib_block(frame, b);
-    }
+void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+    for_each_set(
+        frame, begin, end, [&](std::size_t b, std::size_t after) HWY_ATTR { deform_shared(frame, b, after); },
+        [&](std::size_t b) HWY_ATTR { deform_own(frame, b); });
 }
 
-void prepare_dib(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                 Palette& palette) {
-    prepare_rigid<CentreRows>(used, posed_from_rest, palette);
-}
+void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<CentreRows>(bones, palette); }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
 namespace {
 
@@ -344,13 +352,10 @@ void write_bone(const IterativeDq::Bone<double>& bone, Float4* row, Float4* scal
     write_centre_bone({to_quat_vec(bone.rigid), bone.scale, bone.has_scale}, row, scale);
 }
 
-constexpr Kernel kKernel{kCentreRestRow, true, 0, prepare_rigid_method<IterativeDq, write_bone>,
-                         SINEW_TARGETS(deform_dib, prepare_dib)};
-
 }  // namespace
 
-const Kernel& IterativeDq::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(IterativeDq, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+             .scaled_bone_rows = scaled_bone_rows<IterativeDq, 4, write_bone>)
 
 }  // namespace sinew
-
 #endif

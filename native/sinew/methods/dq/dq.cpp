@@ -18,22 +18,16 @@
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
+namespace {
 
-void deform_dq(const Frame& frame, std::size_t begin, std::size_t end) {
-    deform_rigid<DqKernel>(frame, begin, end);
-}
+SINEW_RIGID_FUNCTIONS(DqKernel)
 
-void prepare_dq(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                Palette& palette) {
-    prepare_rigid<DqKernel>(used, posed_from_rest, palette);
-}
-
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
 namespace {
 
@@ -45,13 +39,10 @@ void write_bone(const Dq::Bone<double>& bone, Float4* row, Float4* scale) {
     write_displacement(bone.scale, scale);
 }
 
-constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Dq, write_bone>,
-                         SINEW_TARGETS(deform_dq, prepare_dq)};
-
 }  // namespace
 
-const Kernel& Dq::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Dq, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+             .scaled_bone_rows = scaled_bone_rows<Dq, 2, write_bone>)
 
 }  // namespace sinew
-
 #endif

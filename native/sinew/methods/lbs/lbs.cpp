@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 #include "sinew/transform/convert.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -16,11 +16,19 @@
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
-#include "sinew/lanes/lanes-inl.h"
+#include "sinew/lanes/block_loop-inl.h"
+
+namespace sinew {
+
+/// Kernel::bone_rows for bones that are posed in another space, in double.
+void linear_rows_between_spaces(const Bones& bones, Palette& palette);
+
+}  // namespace sinew
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
+namespace {
 
 /// Returns `v`, and keeps GCC from loading it again for each of its uses. On AVX-512, where the kernel is bound
 /// by loads, the reloads cost a tenth of its time.
@@ -92,7 +100,7 @@ HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Poin
     add_along<kVectors, kWeighted>(d, bone, 2, &Points<D>::z, weight, p, sum);
 }
 
-/// Deforms lanes [lane, lane + kVectors * N) of block `b`, which must not be mixed.
+/// Deforms lanes [lane, lane + kVectors * N) of block `b`, whose vertices have the same bones.
 ///
 /// rest      its rest points from these lanes on, kLanes apart
 /// weights   the same for its weights, without those of the first bone
@@ -229,7 +237,7 @@ inline HWY_NOINLINE void deform_plain_vertex(const Frame& frame, const std::int3
     deform_vertex<true>(frame, bones, count, rest, weights, to);
 }
 
-inline void deform_mixed(const Frame& frame, std::size_t b) {
+inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const Block& block = frame.mesh->blocks[b];
     const float* const rest = frame.rest_points[kPointRows * b].lane.data();
     const float* const weights = frame.mesh->weights[block.first_weight].lane.data();
@@ -246,7 +254,7 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
 
 #else
 
-inline void deform_mixed(const Frame& frame, std::size_t b) {
+inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const One d;
     const MeshPointers pointers = pointers_of(frame);
     const Block& block = pointers.blocks[b];
@@ -272,48 +280,42 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
 
 #endif
 
-void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end;) {
-        const Block& block = frame.mesh->blocks[b];
-        if (block.mixed) {
-            deform_mixed(frame, b++);
-            continue;
-        }
-        const std::size_t after = end_of_set(frame, b, end);
-        if (block.influences > 0 &&
-            is_plain(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
-            deform_plain_set(frame, b, after);
-            b = after;
-            continue;
-        }
-        // With a fixed count the loop is unrolled.
-        switch (block.influences) {
-            case 0: keep_blocks(frame, b, after); break;
-            case 1: deform_set<1>(frame, b, after); break;
-            case 2: deform_set<2>(frame, b, after); break;
-            case 3: deform_set<3>(frame, b, after); break;
-            case 4: deform_set<4>(frame, b, after); break;
-            case 5: deform_set<5>(frame, b, after); break;
-            case 6: deform_set<6>(frame, b, after); break;
-            case 7: deform_set<7>(frame, b, after); break;
-            case 8: deform_set<8>(frame, b, after); break;
-            default: deform_set<0>(frame, b, after); break;
-        }
-        b = after;
+void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
+    const Block& block = frame.mesh->blocks[begin];
+    if (is_plain(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
+        return deform_plain_set(frame, begin, end);
     }
+    // With a fixed count the loop is unrolled.
+    switch (block.influences) {
+        case 1: return deform_set<1>(frame, begin, end);
+        case 2: return deform_set<2>(frame, begin, end);
+        case 3: return deform_set<3>(frame, begin, end);
+        case 4: return deform_set<4>(frame, begin, end);
+        case 5: return deform_set<5>(frame, begin, end);
+        case 6: return deform_set<6>(frame, begin, end);
+        case 7: return deform_set<7>(frame, begin, end);
+        case 8: return deform_set<8>(frame, begin, end);
+        default: return deform_set<0>(frame, begin, end);
+    }
+}
+
+void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+    for_each_set(
+        frame, begin, end, [&](std::size_t b, std::size_t after) HWY_ATTR { deform_sets(frame, b, after); },
+        [&](std::size_t b) HWY_ATTR { deform_own_bones(frame, b); });
 }
 
 #if HWY_TARGET != HWY_SCALAR
 
 /// Writes the columns of each bone's displacement.
-void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                 Palette& palette) {
+void rows_in_model(const Bones& bones, Palette& palette) {
+    const std::span<const std::int32_t> used = bones.used;
     const hn::CappedTag<float, 4> d;
     const auto three = hn::FirstN(d, 3);
     // The identity's columns as whole vectors, so that each takes one load.
     alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     for (std::size_t i = 0; i < used.size(); ++i) {
-        const float* const from = &posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+        const float* const from = &bones.posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
         float* const to = palette.bones[kLbsColumns * i].value.data();
         auto squares = hn::Zero(d);
         for (std::size_t c = 0; c < 3; ++c) {
@@ -334,10 +336,10 @@ void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<floa
 
 #else
 
-void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                 Palette& palette) {
+void rows_in_model(const Bones& bones, Palette& palette) {
+    const std::span<const std::int32_t> used = bones.used;
     for (std::size_t i = 0; i < used.size(); ++i) {
-        const Affine<float>& motion = posed_from_rest[static_cast<std::size_t>(used[i])];
+        const Affine<float>& motion = bones.posed_from_rest[static_cast<std::size_t>(used[i])];
         const Mat3<float> m = motion.linear - Mat3<float>(1.0f);
         Float4* const to = &palette.bones[kLbsColumns * i];
         for (int c = 0; c < 3; ++c) to[c] = {{m[c].x, m[c].y, m[c].z, 0.0f}};
@@ -351,27 +353,29 @@ void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<floa
 
 #endif
 
+void bone_rows(const Bones& bones, Palette& palette) {
+    is_identity(bones.bones_from_model) ? rows_in_model(bones, palette)
+                                        : linear_rows_between_spaces(bones, palette);
+}
+
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
-namespace {
 
-using HWY_NAMESPACE::kLbsColumns;
+static constexpr Float4 kRestRow[HWY_NAMESPACE::kLbsColumns] = {};
 
-constexpr Float4 kRestRow[kLbsColumns] = {};
-
-void prepare_between_spaces(const Bones& bones, Palette& palette) {
+void linear_rows_between_spaces(const Bones& bones, Palette& palette) {
     const auto bones_from_model = cast<double>(bones.bones_from_model);
     const Affine<double> model_from_bones = inverse(bones_from_model);
     for (std::size_t i = 0; i < bones.used.size(); ++i) {
         const Affine<float>& posed = bones.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
         const Affine<double> motion = model_from_bones * cast<double>(posed) * bones_from_model;
         const Mat3<double> m = motion.linear - Mat3<double>(1.0);
-        Float4* const columns = &palette.bones[kLbsColumns * i];
+        Float4* const columns = &palette.bones[std::size(kRestRow) * i];
         for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
         const Vec3<double>& translation = motion.translation;
         columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
@@ -380,20 +384,7 @@ void prepare_between_spaces(const Bones& bones, Palette& palette) {
     }
 }
 
-void prepare_bones(const Kernel& kernel, const Bones& bones, Palette& palette) {
-    if (is_identity(bones.bones_from_model)) {
-        kernel.target().prepare(bones.used, bones.posed_from_rest, palette);
-    } else {
-        prepare_between_spaces(bones, palette);
-    }
-}
-
-constexpr Kernel kKernel{kRestRow, false, 0, prepare_bones, SINEW_TARGETS(deform_lbs, prepare_lbs)};
-
-}  // namespace
-
-const Kernel& Lbs::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Lbs, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows))
 
 }  // namespace sinew
-
 #endif

@@ -21,7 +21,6 @@ namespace HWY_NAMESPACE {
 
 struct LogKernel {
     static constexpr std::size_t kNumbers = kRow;
-    static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 0;
 
     /// Adds the change of the linear part by the bone's scale, which Palette::scales holds.
@@ -104,21 +103,16 @@ struct LogKernel {
     }
 };
 
-void deform_log(const Frame& frame, std::size_t begin, std::size_t end) {
-    deform_rigid<LogKernel>(frame, begin, end);
-}
+namespace {
 
-void prepare_log(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                 Palette& palette) {
-    prepare_rigid<LogKernel>(used, posed_from_rest, palette);
-}
+SINEW_RIGID_FUNCTIONS(LogKernel)
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
 namespace {
 
@@ -138,13 +132,10 @@ void write_bone(const Log::Bone<double>& bone, Float4* row, Float4* scale) {
                        scale);
 }
 
-constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Log, write_bone>,
-                         SINEW_TARGETS(deform_log, prepare_log)};
-
 }  // namespace
 
-const Kernel& Log::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Log, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+             .scaled_bone_rows = scaled_bone_rows<Log, 2, write_bone>)
 
 }  // namespace sinew
-
 #endif

@@ -20,7 +20,6 @@ namespace HWY_NAMESPACE {
 
 struct QvKernel {
     static constexpr std::size_t kNumbers = kRow;
-    static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 1;
 
     /// Adds the displacement by the bone's scale, rotated, to the translation.
@@ -54,21 +53,16 @@ struct QvKernel {
     }
 };
 
-void deform_qv(const Frame& frame, std::size_t begin, std::size_t end) {
-    deform_rigid<QvKernel>(frame, begin, end);
-}
+namespace {
 
-void prepare_qv(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                Palette& palette) {
-    prepare_rigid<QvKernel>(used, posed_from_rest, palette);
-}
+SINEW_RIGID_FUNCTIONS(QvKernel)
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
 namespace {
 
@@ -81,13 +75,10 @@ void write_bone(const Qv::Bone<double>& bone, Float4* row, Float4* scale) {
     write_displacement(bone.scale, scale);
 }
 
-constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Qv, write_bone>,
-                         SINEW_TARGETS(deform_qv, prepare_qv)};
-
 }  // namespace
 
-const Kernel& Qv::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Qv, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+             .scaled_bone_rows = scaled_bone_rows<Qv, 2, write_bone>)
 
 }  // namespace sinew
-
 #endif

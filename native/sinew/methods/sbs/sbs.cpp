@@ -6,7 +6,7 @@
 #include "sinew/methods/sbs/sbs.h"
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
+#include "sinew/lanes/kernel.h"
 #include "sinew/mesh/bone_sets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -22,7 +22,6 @@ namespace HWY_NAMESPACE {
 
 struct SbsKernel {
     static constexpr std::size_t kNumbers = 12;
-    static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 1;
 
     /// Adds the bone's scale; Palette::scales holds displacements that are already rotated.
@@ -44,54 +43,42 @@ struct SbsKernel {
     }
 };
 
-void deform_sbs(const Frame& frame, std::size_t begin, std::size_t end) {
+namespace {
+
+void deform(const Frame& frame, std::size_t begin, std::size_t end) {
     deform_rigid<SbsKernel>(frame, begin, end);
 }
 
-/// Does nothing: rows depend on sets, so prepare_sets() makes them.
-void prepare_sbs(std::span<const std::int32_t>, std::span<const Affine<float>>, Palette&) {}
-
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
 namespace {
 
 constexpr Float4 kRestRow[] = {{{1, 0, 0, 0}}, {{0, 0, 0, 0}}, {{0, 0, 0, 0}}};
 
-void prepare_sets(const Kernel& kernel, const Bones& bones, Palette& palette) {
+void set_rows(const Bones& bones, Palette& palette) {
     const BoneSets& sets = *bones.sets;
-    const std::size_t entries = sets.bones.size();
-    const auto prepared = [&bones](std::size_t bone) {
-        const auto number = static_cast<std::size_t>(bones.used[bone]);
-        const Affine<float> rest_bone = bones.rest_bones.empty() ? Affine<float>{} : bones.rest_bones[bone];
-        // Bones that the pose lacks stay at rest.
-        if (number >= bones.posed_from_rest.size()) {
-            return Sbs::Bone<double>{{}, Vec3<double>(rest_bone.translation)};
-        }
-        return Sbs::prepare(cast<double>(bones.posed_from_rest[number]), cast<double>(rest_bone));
-    };
-    auto* const of_bones = reinterpret_cast<Sbs::Bone<double>*>(palette.set_bones);
-    for (std::size_t bone = 0; bone < bones.used.size(); ++bone) {
-        of_bones[bone] = prepared(bone);
-        palette.any_scale = palette.any_scale || of_bones[bone].has_scale;
-    }
-    if (palette.any_scale) std::fill_n(palette.has_scale, entries, std::uint8_t{0});
     for (std::size_t set = 0; set + 1 < sets.offsets.size(); ++set) {
         const std::size_t begin = sets.offsets[set];
         const std::size_t end = sets.offsets[set + 1];
-        const auto bone_at = [&](std::size_t i) -> const Sbs::Bone<double>& {
-            return of_bones[sets.bones[begin + i]];
+        struct BoneAt {
+            const QuatVec<double>& rigid;
+            Vec3<double> head;
+        };
+        const auto bone_at = [&](std::size_t i) -> BoneAt {
+            const std::size_t bone = sets.bones[begin + i];
+            return {palette.posed[bone].rigid, bones.rest_bone(bone).translation};
         };
         const Vec3<double> centre = Sbs::rotation_centre(end - begin, bone_at);
         for (std::size_t i = begin; i < end; ++i) {
-            const Sbs::Bone<double>& bone = of_bones[sets.bones[i]];
+            const PosedBone& bone = palette.posed[sets.bones[i]];
             const Vec3<double> moved =
                 rotation_displacement(bone.rigid.rotation, centre) + bone.rigid.translation;
-            Float4* const row = palette.bones + kernel.rest_row.size() * i;
+            Float4* const row = palette.bones + std::size(kRestRow) * i;
             row[0] = float4(bone.rigid.rotation);
             row[1] = float4(moved.x, moved.y, moved.z, 0.0);
             row[2] = float4(centre.x, centre.y, centre.z, 0.0);
@@ -105,13 +92,9 @@ void prepare_sets(const Kernel& kernel, const Bones& bones, Palette& palette) {
     }
 }
 
-constexpr Kernel kKernel{kRestRow, true, sizeof(Sbs::Bone<double>), prepare_sets,
-                         SINEW_TARGETS(deform_sbs, prepare_sbs)};
-
 }  // namespace
 
-const Kernel& Sbs::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Sbs, .rest_row = kRestRow, .set_rows = set_rows)
 
 }  // namespace sinew
-
 #endif

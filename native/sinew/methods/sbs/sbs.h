@@ -8,7 +8,7 @@
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
 #include "sinew/methods/rotation_about.h"
-#include "sinew/methods/scaled_rigid.h"
+#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
 
@@ -61,7 +61,7 @@ struct Sbs {
     /// rotations agree (kSameRotation) count as free.
     ///
     /// count    number of bones
-    /// bone_at  bone_at(i) returns the Bone<double> i, 0 <= i < count
+    /// bone_at  bone_at(i) has the `rigid` and the `head` of bone i, 0 <= i < count
     template <class BoneAt>
     [[nodiscard]] static Vec3<double> rotation_centre(std::size_t count, const BoneAt& bone_at) noexcept;
 
@@ -126,19 +126,19 @@ Vec3<double> Sbs::rotation_centre(std::size_t count, const BoneAt& bone_at) noex
     const auto n = static_cast<double>(count);
     // Differences of the motions from the first one, with the mean of the heads as origin, lose no digits where
     // all motions are alike. The sum over pairs is n times the sum of squared differences from the mean.
-    const Bone<double> first = bone_at(0);
+    const QuatVec<double> first = bone_at(0).rigid;
     Vec3<double> origin(0.0);
     for (std::size_t i = 0; i < count; ++i) origin += (1.0 / n) * bone_at(i).head;
-    const Mat3<double> first_rotation = to_mat3(first.rigid.rotation);
+    const Mat3<double> first_rotation = to_mat3(first.rotation);
     const auto difference = [&](std::size_t i) {
         const auto& bone = bone_at(i);
         const Mat3<double> rotation = to_mat3(bone.rigid.rotation) - first_rotation;
-        return Affine<double>{rotation, rotation * origin + bone.rigid.translation - first.rigid.translation};
+        return Affine<double>{rotation, rotation * origin + bone.rigid.translation - first.translation};
     };
     if (count == 2) {
         // With v the vector part of the rotation from one bone to the other, the matrix (R_a - R_b)^T (R_a - R_b)
         // is 4 |v|^2 times the projection perpendicular to v.
-        const Vec3<double> v = vector_part(glm::conjugate(first.rigid.rotation) * bone_at(1).rigid.rotation);
+        const Vec3<double> v = vector_part(glm::conjugate(first.rotation) * bone_at(1).rigid.rotation);
         const double squared = glm::dot(v, v);
         if (squared < kSameRotation * kSameRotation) return origin;
         const Affine<double> second = difference(1);

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
 #include "sinew/methods/centre_rows.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -15,13 +14,13 @@
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
-#include "sinew/lanes/centre-inl.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
+namespace {
 
 /// The two bones of a vertex.
 struct Pair {
@@ -62,11 +61,9 @@ HWY_INLINE Vec<D> slerp_weight(D d, Vec<D> weight, float squared_angle) {
 /// spheres  the vertex data, kLanes apart, model space
 template <bool kSlerp, class D>
 HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, const Vec<D>* weights,
-                                 const Points<D>& rest, const float* spheres, const float* bones_from_model) {
+                                 const Points<D>& rest, const float* spheres, const Spaces& spaces) {
     const auto point_at = [&](std::size_t i) HWY_ATTR {
-        const float* const from = spheres + 3 * kLanes * i;
-        const Points<D> p{hn::Load(d, from), hn::Load(d, from + kLanes), hn::Load(d, from + 2 * kLanes)};
-        return bones_from_model == nullptr ? p : displaced(d, bones_from_model, p);
+        return to_bones(d, spaces, load_row_points(d, spheres + 3 * kLanes * i));
     };
     const Points<D> centre = point_at(0);
     const Points<D> first = point_at(1);
@@ -110,11 +107,10 @@ HWY_INLINE void deform_and_store(D d, const Frame& frame, const MeshPointers& po
                                  const Pair& pair, std::size_t b, std::size_t lane,
                                  const float* first_weights, const float* second_weights) {
     const Vec<D> weights[2] = {hn::Load(d, first_weights), hn::Load(d, second_weights)};
-    Points<D> points = deformed_by<kSlerp>(
-        d, *frame.palette, pair, weights, load_rest(d, pointers, spaces, b, lane),
-        vertex_rows_of<Sdef::info.vertex_floats>(pointers, b, lane), spaces.bones_from_model);
-    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
-    store_points(d, pointers, b, lane, points);
+    const Points<D> points =
+        deformed_by<kSlerp>(d, *frame.palette, pair, weights, load_rest(d, pointers, spaces, b, lane),
+                            vertex_rows_of<Sdef::info.vertex_floats>(pointers, b, lane), spaces);
+    store_in_model(d, pointers, spaces, b, lane, points);
 }
 
 /// Deforms blocks [begin, end) with the same two bones.
@@ -122,7 +118,7 @@ template <bool kSlerp>
 void deform_pairs(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     const Pair pair(frame, frame.bones + pointers.blocks[begin].first_bone);
     for (std::size_t b = begin; b < end; ++b) {
         const float* const weights = weights_of(pointers, b);
@@ -134,12 +130,12 @@ void deform_pairs(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// Deforms the vertices of two bones in a mixed block, one by one, since each has its own bones.
+/// Deforms those vertices of a block that have two bones, one by one, since each has its own.
 template <bool kSlerp>
 void deform_pairs_among(const Frame& frame, std::size_t b) {
     const One d;
     const MeshPointers pointers = pointers_of(frame);
-    const Spaces spaces = spaces_of(frame);
+    const Spaces spaces = frame.spaces;
     const Block& block = pointers.blocks[b];
     if (block.influences < 2) return;
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
@@ -153,46 +149,37 @@ void deform_pairs_among(const Frame& frame, std::size_t b) {
 
 template <bool kSlerp>
 void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end;) {
-        const Block& block = frame.mesh->blocks[b];
-        const std::size_t after = block.mixed ? b + 1 : end_of_set(frame, b, end);
-        if (!block.mixed && block.influences == 2) {
-            deform_pairs<kSlerp>(frame, b, after);
-        } else {
-            deform_rigid<LinearRows>(frame, b, after);
-            if (block.mixed) deform_pairs_among<kSlerp>(frame, b);
-        }
-        b = after;
-    }
+    for_each_set(
+        *frame.mesh, begin, end,
+        [&](std::size_t b, std::size_t after) HWY_ATTR {
+            frame.mesh->blocks[b].influences == 2 ? deform_pairs<kSlerp>(frame, b, after)
+                                                  : deform_rigid<LinearRows>(frame, b, after);
+        },
+        [&](std::size_t b) HWY_ATTR {
+            deform_rigid<LinearRows>(frame, b, b + 1);
+            deform_pairs_among<kSlerp>(frame, b);
+        });
 }
 
-void deform_sdef(const Frame& frame, std::size_t begin, std::size_t end) {
-    if (frame.vertex_rows == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
+void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+    if (frame.vertex_data == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
     const bool by_slerp = frame.parameters[0] == 1.0;
     by_slerp ? deform_blocks<true>(frame, begin, end) : deform_blocks<false>(frame, begin, end);
 }
 
-void prepare_sdef(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                  Palette& palette) {
-    prepare_rigid<CentreRows>(used, posed_from_rest, palette);
-}
+void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<CentreRows>(bones, palette); }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-
 namespace sinew {
-namespace {
 
-constexpr Kernel kKernel{kCentreRestRow, true, 0, prepare_rigid_method<Sdef, write_centre_bone>,
-                         SINEW_TARGETS(deform_sdef, prepare_sdef)};
-
-}  // namespace
-
-const Kernel& Sdef::kernel() noexcept { return kKernel; }
+SINEW_KERNEL(Sdef, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+             .scaled_bone_rows = scaled_bone_rows<Sdef, 4, write_centre_bone>,
+             .pack_vertex_data = VertexNumbers<Sdef::info.vertex_floats>::pack)
 
 }  // namespace sinew
-
 #endif

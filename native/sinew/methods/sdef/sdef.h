@@ -9,7 +9,7 @@
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
 #include "sinew/methods/rotation_about.h"
-#include "sinew/methods/scaled_rigid.h"
+#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
 

@@ -12,7 +12,7 @@
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
-#include "sinew/lanes/lanes-inl.h"
+#include "sinew/lanes/block_loop-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
@@ -95,8 +95,7 @@ template <BulgeForm kForm, bool kStretched, class D, class BoneOf, class WeightO
 HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::size_t lane, std::size_t count,
                              const BoneOf& bone_of, const WeightOf& weight_of, const Points<D>& point,
                              bool& changes) {
-    Points<D> p = point;
-    if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
+    const Points<D> p = to_bones(d, frame.spaces, point);
     Points<D> nearest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     Vec<D> stretched = hn::Zero(d);
     Vec<D> most = hn::Zero(d);
@@ -116,11 +115,11 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
             stretched = hn::IfThenElse(heavier, stretch, stretched);
         }
     }
-    const Points<D> to_bones = subtract<D>(nearest, p);
+    const Points<D> to_nearest = subtract<D>(nearest, p);
     const float* const distances = frame.distances[static_cast<std::size_t>(kForm)][b].lane.data() + lane;
     Vec<D> allowed = hn::Load(d, distances);
     if constexpr (kStretched) allowed = hn::Mul(allowed, stretched);
-    const Vec<D> squared = squared_length(to_bones);
+    const Vec<D> squared = squared_length(to_nearest);
     const auto bulges = hn::Gt(squared, hn::Mul(allowed, allowed));
     changes = !hn::AllFalse(d, bulges);
     if (!changes) return point;
@@ -128,17 +127,7 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
     if (frame.weights != nullptr) amount = hn::Mul(amount, hn::Load(d, frame.weights[b].lane.data() + lane));
     const Vec<D> less = hn::NegMulAdd(allowed, inverse_root(d, squared), hn::Set(d, 1.0f));
     const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
-    if (frame.model_from_bones == nullptr) return add_scaled<D>(point, share, to_bones);
-    const float* const rows = frame.model_from_bones->value.data();
-    // A vector: the translation does not apply.
-    const auto rotated = [&](const float* row, Vec<D> of) HWY_ATTR {
-        return hn::MulAdd(
-            hn::Set(d, row[0]), to_bones.x,
-            hn::MulAdd(hn::Set(d, row[1]), to_bones.y, hn::MulAdd(hn::Set(d, row[2]), to_bones.z, of)));
-    };
-    return add_scaled<D>(
-        point, share,
-        {rotated(rows, to_bones.x), rotated(rows + 4, to_bones.y), rotated(rows + 8, to_bones.z)});
+    return add_scaled<D>(point, share, vector_to_model(d, frame.spaces, to_nearest));
 }
 
 /// Limits blocks [begin, end) with the same bones, two or more.
@@ -170,9 +159,9 @@ void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_
     }
 }
 
-/// Limits a mixed block, vertex by vertex.
+/// Limits a block whose vertices have own bones, vertex by vertex.
 template <BulgeForm kForm, bool kStretched>
-void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t b) {
+void limit_own_bones(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t b) {
     const One d;
     const Block& block = pointers.blocks[b];
     if (block.influences < 2) return;
@@ -193,16 +182,6 @@ void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::siz
     }
 }
 
-std::size_t end_of_same_bones(const PackedMesh& mesh, std::size_t b, std::size_t end) {
-    const Block* const blocks = mesh.blocks.data();
-    std::size_t after = b + 1;
-    while (after < end && !blocks[after].mixed && blocks[after].first_bone == blocks[b].first_bone &&
-           blocks[after].influences == blocks[b].influences) {
-        ++after;
-    }
-    return after;
-}
-
 MeshPointers pointers_of(const BulgeFrame& frame) {
     const PackedMesh& mesh = *frame.mesh;
     return {mesh.blocks.data(),   mesh.rest_points.data(), mesh.weights.data(), nullptr,
@@ -212,23 +191,19 @@ MeshPointers pointers_of(const BulgeFrame& frame) {
 template <BulgeForm kForm, bool kStretched>
 void limit_blocks(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
     const MeshPointers pointers = pointers_of(frame);
-    for (std::size_t b = begin; b < end;) {
-        const Block& block = pointers.blocks[b];
-        if (block.mixed) {
-            limit_mixed<kForm, kStretched>(frame, pointers, b++);
-            continue;
-        }
-        const std::size_t after = end_of_same_bones(*frame.mesh, b, end);
-        switch (block.influences) {
-            case 0:
-            case 1: break;
-            case 2: limit_set<kForm, kStretched, 2>(frame, pointers, b, after); break;
-            case 3: limit_set<kForm, kStretched, 3>(frame, pointers, b, after); break;
-            case 4: limit_set<kForm, kStretched, 4>(frame, pointers, b, after); break;
-            default: limit_set<kForm, kStretched, 0>(frame, pointers, b, after);
-        }
-        b = after;
-    }
+    for_each_set(
+        *frame.mesh, begin, end,
+        [&](std::size_t b, std::size_t after) HWY_ATTR {
+            switch (pointers.blocks[b].influences) {
+                case 0:
+                case 1: break;
+                case 2: limit_set<kForm, kStretched, 2>(frame, pointers, b, after); break;
+                case 3: limit_set<kForm, kStretched, 3>(frame, pointers, b, after); break;
+                case 4: limit_set<kForm, kStretched, 4>(frame, pointers, b, after); break;
+                default: limit_set<kForm, kStretched, 0>(frame, pointers, b, after);
+            }
+        },
+        [&](std::size_t b) HWY_ATTR { limit_own_bones<kForm, kStretched>(frame, pointers, b); });
 }
 
 void limit(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
@@ -252,17 +227,16 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
         const float* const weights = weights_of(pointers, b);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const std::int32_t* const bones =
-                frame.mesh->bones.data() + block.first_bone + (block.mixed ? block.influences * lane : 0);
-            Points<One> p = load_deformed(d, pointers, b, lane);
-            if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
+                frame.mesh->bones.data() + block.first_bone + (block.own_bones ? block.influences * lane : 0);
+            const Points<One> p = to_bones(d, frame.spaces, load_deformed(d, pointers, b, lane));
             float mean = 0.0f;
             Points<One> nearest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
             float of_heaviest = 0.0f;
             float most = 0.0f;
             for (std::size_t k = 0; k < block.influences; ++k) {
-                const float weight = block.mixed ? weights[kLanes * k + lane]
-                                     : k == 0    ? frame.mesh->first_weights[b].lane[lane]
-                                                 : weights[kLanes * (k - 1) + lane];
+                const float weight = block.own_bones ? weights[kLanes * k + lane]
+                                     : k == 0        ? frame.mesh->first_weights[b].lane[lane]
+                                                     : weights[kLanes * (k - 1) + lane];
                 const auto own = nearest_of_segment(d, frame.bones[static_cast<std::size_t>(bones[k])], p);
                 nearest = add_scaled<One>(nearest, hn::Set(d, weight), own);
                 const float distance = length_of(subtract<One>(own, p));
@@ -289,8 +263,8 @@ namespace sinew {
 namespace {
 
 using OfBlocks = void(const BulgeFrame& frame, std::size_t begin, std::size_t end);
-constexpr std::array<OfBlocks*, kTargetCount> kLimit SINEW_TARGETS_OF(limit);
-constexpr std::array<OfBlocks*, kTargetCount> kMeasure SINEW_TARGETS_OF(measure);
+constexpr std::array<OfBlocks*, kTargetCount> kLimit SINEW_TARGETS(limit);
+constexpr std::array<OfBlocks*, kTargetCount> kMeasure SINEW_TARGETS(measure);
 
 }  // namespace
 

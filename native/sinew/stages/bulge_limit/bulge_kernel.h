@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 namespace sinew {
@@ -25,9 +25,8 @@ struct BulgeFrame {
     const Lanes<float>* weights;  // [blocks]; null if all are 1
     BulgeForm form;
     float strength;
-    bool is_stretched;               // some bone has a stretch other than 1
-    const Float4* bones_from_model;  // displacements, as in Frame
-    const Float4* model_from_bones;
+    bool is_stretched;  // some bone has a stretch other than 1
+    Spaces spaces;
     Vec3<float>* points;
 };
 

@@ -10,9 +10,8 @@
 #include "sinew/base/fork_safe.h"
 #include "sinew/base/thread_pool.h"
 #include "sinew/mesh/check_bind_data.h"
-#include "sinew/mesh/packed_mesh.h"
+#include "sinew/methods/packed_binding.h"
 #include "sinew/stages/bulge_limit/bulge_kernel.h"
-#include "sinew/transform/convert.h"
 #include "sinew/transform/split_scale.h"
 
 namespace sinew {
@@ -74,36 +73,27 @@ bool is_orthonormal(const Mat3<double>& m) {
 }  // namespace
 
 struct BulgeLimit::State {
-    explicit State(const BulgeLimitData& data);
+    State(const Binding& binding, const BulgeLimitData& data);
 
-    void measure(std::span<const Vec3<float>> rest_points, const Affine<float>& space);
+    void measure(std::span<const Vec3<float>> points, const Affine<float>& space);
     [[nodiscard]] BulgeFrame frame(std::span<Vec3<float>> points) const;
 
-    PackedMesh mesh;
-    std::size_t vertex_count = 0;
-    std::size_t bone_count = 0;
+    std::shared_ptr<const PackedBinding> packed;
+    const PackedMesh& mesh = packed->mesh;
+    std::vector<Vec3<float>> rest_points;
     std::vector<BoneSegment<float>> segments;  // for each of mesh.used_bones
     std::vector<Lanes<float>> weights;         // [blocks], or empty
     std::vector<Lanes<float>> distances[2];    // as in BulgeFrame
     Affine<float> bones_from_model;
-    bool same_space = true;
-    Float4 to_bones[kDisplacementRows];
-    Float4 to_model[kDisplacementRows];
+    SpaceRows space_rows{Affine<float>{}};
     mutable std::vector<BulgeBone> bones;  // scratch for one call
     mutable ForkSafeMutex mutex;
 };
 
-BulgeLimit::State::State(const BulgeLimitData& data) {
-    check(data.mesh);
-    vertex_count = data.mesh.rest_points.size();
-    for (const std::int32_t bone : data.mesh.influence_bones) {
-        bone_count = std::max(bone_count, static_cast<std::size_t>(bone) + 1);
-    }
-    check_segments(data.segments, bone_count);
-    check_weights(data.weights, vertex_count);
+BulgeLimit::State::State(const Binding& binding, const BulgeLimitData& data) : packed(binding.packed()) {
+    check_segments(data.segments, packed->bone_count);
+    check_weights(data.weights, packed->vertex_count);
     check_space(data.bones_from_model);
-    const NormalisedInfluences normalised = normalised_influences(data.mesh);
-    mesh = pack(data.mesh.rest_points, normalised.offsets, normalised.influences);
     for (const std::int32_t bone : mesh.used_bones) {
         segments.push_back(data.segments[static_cast<std::size_t>(bone)]);
     }
@@ -115,7 +105,7 @@ BulgeLimit::State::State(const BulgeLimitData& data) {
             for (float& weight : block.lane) weight = std::clamp(weight, 0.0f, 1.0f);
         }
     }
-    measure(data.mesh.rest_points, data.bones_from_model);
+    measure(unpack(mesh, mesh.rest_points, packed->vertex_count).rest_points, data.bones_from_model);
 }
 
 BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
@@ -127,29 +117,26 @@ BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
             BulgeForm::continuous,
             1.0f,
             false,
-            same_space ? nullptr : to_bones,
-            same_space ? nullptr : to_model,
+            space_rows.spaces(),
             points.data()};
 }
 
-void BulgeLimit::State::measure(std::span<const Vec3<float>> rest_points, const Affine<float>& space) {
+void BulgeLimit::State::measure(std::span<const Vec3<float>> points, const Affine<float>& space) {
     bones_from_model = space;
-    same_space = is_identity(space);
-    write_displacement(cast<double>(space), to_bones);
-    write_displacement(inverse(cast<double>(space)), to_model);
-    pack_points(mesh, rest_points, mesh.rest_points);
+    space_rows = SpaceRows(space);
+    rest_points.assign(points.begin(), points.end());
     for (std::size_t i = 0; i < bones.size(); ++i) {
         bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
     }
-    std::vector<Vec3<float>> points(rest_points.begin(), rest_points.end());
-    const BulgeFrame all = frame(points);
+    const BulgeFrame all = frame(rest_points);
     parallel_for(
-        mesh.blocks.size(), useful_threads(0, vertex_count, kVerticesWorthAThread),
+        mesh.blocks.size(), useful_threads(0, points.size(), kVerticesWorthAThread),
         [&all](std::size_t begin, std::size_t end) { bulge_kernel().measure(all, begin, end); },
         kBlocksOfAChunk);
 }
 
-BulgeLimit::BulgeLimit(const BulgeLimitData& data) : state_(std::make_unique<State>(data)) {}
+BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
+    : state_(std::make_unique<State>(binding, data)) {}
 
 BulgeLimit::BulgeLimit(BulgeLimit&&) noexcept = default;
 BulgeLimit& BulgeLimit::operator=(BulgeLimit&&) noexcept = default;
@@ -166,13 +153,13 @@ void BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
     state_->measure(rest_points, bones_from_model);
 }
 
-std::size_t BulgeLimit::vertex_count() const noexcept { return state_->vertex_count; }
-std::size_t BulgeLimit::bone_count() const noexcept { return state_->bone_count; }
+std::size_t BulgeLimit::vertex_count() const noexcept { return state_->packed->vertex_count; }
+std::size_t BulgeLimit::bone_count() const noexcept { return state_->packed->bone_count; }
 
 bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                        const BulgeLimitOptions& options) const noexcept {
     const State& state = *state_;
-    if (points.size() != state.vertex_count) return false;
+    if (points.size() != vertex_count()) return false;
     const std::scoped_lock lock(state.mutex);
     bool is_stretched = false;
     for (std::size_t i = 0; i < state.bones.size(); ++i) {
@@ -204,15 +191,16 @@ bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
 BulgeLimit::Parts BulgeLimit::parts() const {
     const State& state = *state_;
     const std::scoped_lock lock(state.mutex);
-    Parts parts{bound_mesh(state.mesh, state.mesh.rest_points, state.vertex_count, state.bone_count),
+    Parts parts{bound_mesh(state.mesh, state.mesh.rest_points, vertex_count(), bone_count()),
                 {},
                 state.bones_from_model,
                 {}};
-    parts.segments.resize(state.bone_count);
+    parts.mesh.rest_points = state.rest_points;
+    parts.segments.resize(bone_count());
     for (std::size_t i = 0; i < state.segments.size(); ++i) {
         parts.segments[static_cast<std::size_t>(state.mesh.used_bones[i])] = state.segments[i];
     }
-    if (!state.weights.empty()) parts.weights = unpack_values(state.mesh, state.weights, state.vertex_count);
+    if (!state.weights.empty()) parts.weights = unpack_values(state.mesh, state.weights, vertex_count());
     return parts;
 }
 

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 #include "sinew/stages/delta_mush/mush_mesh.h"
 
@@ -504,10 +504,10 @@ using Smooth = void(const MushFrame& frame, std::size_t begin, std::size_t end);
 using Take = void(const MushFrame& frame, const Float4* rest, MushDetails* details, std::size_t begin,
                   std::size_t end);
 
-constexpr std::array<Smooth*, kTargetCount> kSmooth SINEW_TARGETS_OF(smooth);
-constexpr std::array<Smooth*, kTargetCount> kSmoothByLength SINEW_TARGETS_OF(smooth_by_length);
-constexpr std::array<Smooth*, kTargetCount> kFinish SINEW_TARGETS_OF(finish);
-constexpr std::array<Take*, kTargetCount> kTake SINEW_TARGETS_OF(take_details);
+constexpr std::array<Smooth*, kTargetCount> kSmooth SINEW_TARGETS(smooth);
+constexpr std::array<Smooth*, kTargetCount> kSmoothByLength SINEW_TARGETS(smooth_by_length);
+constexpr std::array<Smooth*, kTargetCount> kFinish SINEW_TARGETS(finish);
+constexpr std::array<Take*, kTargetCount> kTake SINEW_TARGETS(take_details);
 
 }  // namespace
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/stages/mix/mixed_blocks.h"
+#include "sinew/stages/mix/mix_blocks.h"
 
 #include <algorithm>
 
@@ -27,9 +27,10 @@ void mix_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Fr
     };
     // Both kernels write to the points themselves, since a kernel has no other output.
     std::array<Vec3<float>, kBlocksAtOnce * kLanes> by_first;
-    kernels[0]->target().deform(frames[0], begin, end);
+    const std::size_t target = target_in_use();
+    kernels[0]->deform[target](frames[0], begin, end);
     for_each_vertex([&](const Vec3<float>& point, std::size_t i, float) { by_first[i] = point; });
-    kernels[1]->target().deform(frames[1], begin, end);
+    kernels[1]->deform[target](frames[1], begin, end);
     for_each_vertex([&](Vec3<float>& point, std::size_t i, float weight) {
         point = Mix::deform_vertex(by_first[i], point, weight);
     });
@@ -48,15 +49,15 @@ MixWeights pack_mix(const PackedMesh& mesh, std::span<const float> weights) {
     return mix;
 }
 
-void deform_mixed_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
-                         const MixWeights& mix, std::size_t begin, std::size_t end) noexcept {
+void deform_mix(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
+                const MixWeights& mix, std::size_t begin, std::size_t end) noexcept {
     for (std::size_t b = begin; b < end;) {
         const Share share = mix.shares[b];
         std::size_t after = b + 1;
         while (after < end && mix.shares[after] == share) ++after;
         switch (share) {
-            case Share::none: kernels[0]->target().deform(frames[0], b, after); break;
-            case Share::all: kernels[1]->target().deform(frames[1], b, after); break;
+            case Share::none: kernels[0]->deform[target_in_use()](frames[0], b, after); break;
+            case Share::all: kernels[1]->deform[target_in_use()](frames[1], b, after); break;
             case Share::some:
                 for (std::size_t i = b; i < after; i += kBlocksAtOnce) {
                     mix_blocks(kernels, frames, mix, i, std::min(i + kBlocksAtOnce, after));

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "sinew/lanes/kernels.h"
+#include "sinew/lanes/kernel.h"
 
 namespace sinew {
 
@@ -28,7 +28,7 @@ struct MixWeights {
 /// share in a block does not run for it, so the other kernel's bits are unchanged there.
 ///
 /// frames  one for each kernel, with the same mesh and the same points to write
-void deform_mixed_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
-                         const MixWeights& mix, std::size_t begin, std::size_t end) noexcept;
+void deform_mix(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
+                const MixWeights& mix, std::size_t begin, std::size_t end) noexcept;
 
 }  // namespace sinew

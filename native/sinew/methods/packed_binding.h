@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sinew/binding.h"
+#include "sinew/lanes/kernel.h"
+
+namespace sinew {
+
+/// What a Binding is: the mesh, packed once for all deformers and stages that it is given to.
+struct PackedBinding {
+    explicit PackedBinding(const BindData& data);
+
+    /// rest_points  mesh.rest_points, or others
+    [[nodiscard]] BoundMesh unpack(std::span<const Lanes<float>> rest_points) const;
+
+    PackedMesh mesh;
+    std::vector<Affine<float>> rest_bones;  // for each of mesh.used_bones; empty: all identity
+    // indices into mesh.used_bones of bones whose axes are not of unit length
+    std::vector<std::int32_t> stretched_bones;
+    // for each method; null: none, or the method is to blend linearly
+    std::array<std::unique_ptr<const PackedVertexData>, kMethodCount> vertex_data;
+    std::array<bool, kMethodCount> is_linear{};
+    std::size_t vertex_count;
+    std::size_t influence_count;
+    std::size_t bone_count = 0;
+};
+
+/// The kernel of a method.
+///
+/// method  an index into Methods
+[[nodiscard]] const Kernel& kernel_at(std::size_t method) noexcept;
+
+/// The index in Methods of a method. Throws if it is none of them.
+[[nodiscard]] std::size_t checked_method(const std::string& argument, const MethodInfo& method);
+
+/// The same for a method that is to deform a binding, which must have its vertex data.
+[[nodiscard]] std::size_t checked_method(const std::string& argument, const MethodInfo& method,
+                                         const PackedBinding& binding);
+
+}  // namespace sinew
