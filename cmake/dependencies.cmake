@@ -13,8 +13,8 @@ if(NOT TARGET glm::glm)
   add_library(glm::glm ALIAS sinew_fetched_glm)
 endif()
 
-# Highway's headers alone: Debian has its library as a shared one only, which a wheel can not count on, and
-# targets.cpp chooses among the instruction sets itself.
+# Only Highway's headers. Debian has its library as a shared one, which a wheel would then need on the user's machine;
+# targets.cpp chooses the instruction set instead.
 add_library(hwy_headers INTERFACE)
 find_path(HWY_INCLUDE_DIR hwy/foreach_target.h)
 if(NOT HWY_INCLUDE_DIR)

@@ -33,8 +33,8 @@ struct MixData {
 
 /// A binding and a method, ready to deform any pose. A constructed object is valid; deform() can not fail, and
 /// allocates only when more threads than ever before deform at once. Any number of threads may use one Deformer at
-/// once; if more than 16 deform at the same time, some wait. A child that is forked meanwhile can go on with it, but
-/// has to set rest points again that were being set. A moved-from object can only be assigned to or destroyed.
+/// once; if more than 16 deform at the same time, some wait. A child that is forked meanwhile can use it, too, but must
+/// set rest points again that were being set. A moved-from object can only be assigned to or destroyed.
 class SINEW_EXPORT Deformer {
 public:
     /// Throws std::invalid_argument as Binding does, and for a method that is not in the list of methods, a method

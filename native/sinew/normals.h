@@ -31,9 +31,9 @@ struct Sharpness {
 /// results equal Blender's to the last bit, except for the order in which a fan's corners are summed.
 ///
 ///   face    by Newell's method; (0, 0, 1) for a face without area (squared doubled area at most 1e-35)
-///   vertex  the normalised sum of the normals of its faces, each weighted by the angle of the face's corner
-///           there, which is computed by Blender's polynomial for acos; 0 where they cancel. Without faces: the
-///           direction of its point
+///   vertex  the sum of the normals of its faces, each times the angle of the face's corner at the vertex (by
+///           Blender's polynomial for acos), normalised; 0 where they cancel. Without faces: the direction of its
+///           point
 ///   corner  the same sum over the corners of its fan; the face's normal if it is a fan by itself. A fan is a set
 ///           of corners of a vertex whose faces meet there at smooth edges. An edge is smooth if it is not sharp,
 ///           is not an edge of a flat face, and has exactly two faces that traverse it in opposite directions. If

@@ -30,8 +30,8 @@ struct RestFrames {
 /// Blender. The result is 0 where M collapses the plane of n to a line or a point, and where M u is 0. Tangents
 /// perpendicular to their normals stay perpendicular.
 ///
-/// M is computed from differences of four points that the deformer's kernels move, with 22 bits where the mesh
-/// moves by its own size.
+/// M is computed from the images of four points, which the deformer's kernels move. It has 22 correct bits where
+/// the mesh moves by its own size.
 ///
 /// A constructed object is valid; deforming can not fail and does not allocate. Concurrent calls on one object
 /// wait for each other. A moved-from object can only be assigned to or destroyed.

@@ -21,8 +21,7 @@ namespace sinew {
 
 /// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), on at most `threads` threads
 /// including the caller, and returns when all are done. 0 threads: one for each chunk, as far as the machine has
-/// them. Only one call at a time uses the pool; a call made
-/// meanwhile runs on its caller's thread alone.
+/// them. Only one call at a time uses the pool; a call made meanwhile runs on its caller's thread alone.
 ///
 /// If work throws on any thread, the first exception is rethrown here once no thread is working any more; some
 /// chunks may then have been skipped.

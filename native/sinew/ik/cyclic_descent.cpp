@@ -5,11 +5,11 @@
 // preserved. FABRIK moves points; rotations have to be found for them afterwards, and limits repaired in each
 // pass.
 //
-// The best rotation of one bone about an axis n brings all of its tips and their goal directions nearest at once:
-// for pairs (a, b) its angle is atan2(n . sum a x b, sum (a . b - (n . a) (n . b))). Of all axes, the direction
-// of the sum of the moments a x b reduces the error fastest; for one tip it gives exactly the rotation to its
-// goal. A bone's rotation affects only its descendants, so going from the tips to the root the dual quaternions
-// of bones are evaluated once per sweep.
+// For pairs (a, b) of directions from a bone's head to its tips and to their goals, the best rotation about an axis n
+// has the angle atan2(n . sum a x b, sum (a . b - (n . a) (n . b))). Of all axes, the direction of the sum of the
+// moments a x b reduces the error fastest; for one tip it gives exactly the rotation to its goal. A bone's rotation
+// affects only its descendants, so from the tips to the root the dual quaternions of bones are evaluated once in each
+// sweep.
 #include <glm/gtc/matrix_access.hpp>
 
 #include "sinew/ik/state.h"

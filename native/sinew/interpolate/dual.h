@@ -17,7 +17,6 @@ namespace sinew {
 /// Not defined if two transforms are 180 degrees apart (the signs as given then decide), or if |t| exceeds 0.001
 /// / epsilon. A blend of n is not defined where Dlb is not, if the iteration does not converge, or if a rotation
 /// is 180 degrees from the result.
-/// iteration does not settle, or where a rotation is 180 degrees from its result.
 struct Sclerp {
     static constexpr std::string_view name = "sclerp";
     template <class T>

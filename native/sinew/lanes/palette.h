@@ -61,8 +61,8 @@ struct BoneSets;
 
 /// The bones of a mesh in one pose.
 struct Bones {
-    std::span<const std::int32_t> used;  // in the pose's numbering
-    // indices into `used` of bones whose rest axes are not of unit length
+    std::span<const std::int32_t> used;  // their numbers in the pose
+    // indices into `used` of those whose rest axes do not have unit length
     std::span<const std::int32_t> stretched;
     std::span<const Affine<float>> posed_from_rest;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity

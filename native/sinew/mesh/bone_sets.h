@@ -9,8 +9,7 @@
 
 namespace sinew {
 
-/// The sets of bones that a mesh's vertices have, each once. For methods that compute something for each set
-/// (Sbs).
+/// The sets of bones that a mesh's vertices have, each once: for methods whose rows depend on them.
 struct BoneSets {
     std::vector<std::uint32_t> offsets{0};  // [sets + 1] into `bones`
     std::vector<std::uint32_t> bones;       // [entries] indices into PackedMesh::used_bones

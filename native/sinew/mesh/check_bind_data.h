@@ -19,7 +19,7 @@ void check_points(std::span<const Vec3<float>> points);
 /// bone_count  one more than the highest bone index in the influences
 void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
 
-/// Throws as Binding does, except for rest bones and vertex data, which are not checked.
+/// Throws as Binding does. Does not check rest bones and vertex data.
 void check(const BindData& data);
 
 /// Influences of positive weight. The weights of each vertex that has any have sum 1.

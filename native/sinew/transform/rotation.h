@@ -33,7 +33,7 @@ template <class T>
     return hypot(v.x, v.y, v.z);
 }
 
-/// What to divide `q`, of length `length`, by so that the squares of its components have full precision: 1 if
+/// The divisor of `q`, of length `length`, that gives the squares of its components full precision: 1 if
 /// they do already, else its largest absolute component, which is 0 only if all are.
 template <class T>
 [[nodiscard]] T prescale(const Quat<T>& q, T length) noexcept {

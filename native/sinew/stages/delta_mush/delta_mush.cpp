@@ -145,8 +145,8 @@ struct DeltaMush::State {
     std::vector<std::int32_t> edges;
 
     MushMesh mesh;
-    std::unique_ptr<const Bound>
-        bound;  // one pointer: a child that is forked during bind() has all or nothing of it
+    // One pointer: a child that is forked during bind() has all or nothing of it.
+    std::unique_ptr<const Bound> bound;
 
     // Scratch for one call at a time. Elements beyond the vertices stay 0.
     mutable ForkSafeMutex mutex;
