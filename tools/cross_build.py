@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the library for another platform with zig: wheels for several Pythons, or the C++ tests.
+"""Builds the extension for another platform with zig: a zip with wheels for several Pythons.
 
-The Python that runs this needs ziglang, pybind11, scikit-build-core and auditwheel. Prints the paths of what
-it built. The module is one file that contains the library: two files, each with its own standard library,
+The Python that runs this needs ziglang, pybind11, scikit-build-core and auditwheel. Prints the zip's path.
+The module is one file that contains the library: two files, each with its own standard library,
 could not throw exceptions to each other.
 """
 
@@ -345,21 +345,35 @@ def build_wheels(platform: Platform, pythons: list[Python], out: Path) -> list[P
     return made
 
 
+def build_package(platform: Platform, pythons: list[Python], validator: Path) -> None:
+    """Builds the wheels, and the extension's zip with them, which Blender's program checks."""
+    out, tools = ROOT / "dist/platforms" / platform.name, ROOT / "tools"
+    shutil.rmtree(out, ignore_errors=True)
+    build_wheels(platform, pythons, out)
+    words = [sys.executable, "-I", tools / "package.py", "--platform", platform.name]
+    made = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
+    subprocess.run([validator, tools / "split_package.py", made], check=True)
+    subprocess.run([sys.executable, "-I", tools / "sbom.py", made], check=True, stdout=sys.stderr)
+    print(made)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("platform", choices=PLATFORMS)
-    parser.add_argument("--tests", action="store_true", help="the programs of the C++ tests")
-    parser.add_argument(
-        "--python", type=Path, action="append", default=[], help="a Python to make a wheel for"
-    )
-    parser.add_argument("--out", type=Path, default=ROOT / "dist/platforms", help="folder for the wheels")
+    parser.add_argument("platform", choices=(*PLATFORMS, "all"))
+    parser.add_argument("--python", type=Path, action="append", help="a Python to make a wheel for")
+    parser.add_argument("--validator", type=Path, required=True, help="a Python with bpy")
     options = parser.parse_args()
-    platform = PLATFORMS[options.platform]
-    if options.tests:
-        print(*build_tests(platform), sep="\n")
-    if options.python:
-        out = options.out / platform.name
-        print(*build_wheels(platform, [python_of(path) for path in options.python], out), sep="\n")
+    failed = []
+    for name in PLATFORMS if options.platform == "all" else [options.platform]:
+        print(f"building the library for {name}", file=sys.stderr, flush=True)
+        # A failure does not prevent the others from being built.
+        try:
+            build_package(PLATFORMS[name], [python_of(path) for path in options.python], options.validator)
+        except (SystemExit, subprocess.CalledProcessError) as error:
+            print(error, file=sys.stderr)
+            failed.append(name)
+    if failed:
+        fail(f"not built: {', '.join(failed)}")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Packs the extension and the library's wheels into dist/sinew-VERSION.zip, and prints its path.
 
-Includes the wheels of this version in dist/wheels/, wherever they were built; or only those of one platform,
+Includes the wheels that are given, or all of this version in dist/wheels/; or only those of one platform,
 built by tools/cross_build.py, into dist/platforms/sinew-VERSION-PLATFORM.zip, with Blender's name of the
 platform. The zip's manifest lists them (`wheels`) and their systems (`platforms`). The same files always
 give the same bytes.
@@ -11,7 +11,6 @@ give the same bytes.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import os
 import re
 import sys
@@ -66,33 +65,15 @@ class Wheel:
         return not any(tag.startswith("linux_") for tag in self.tags)
 
 
-def recorded_wheels(stamps: Path | None) -> dict[str, tuple[str, str]]:
-    """The wheels that ./dev built: wheel's name -> (digest of the native sources, digest of the wheel)."""
-    records = {}
-    for stamp in sorted(stamps.glob("wheel-*")) if stamps else []:
-        inputs, name, digest = stamp.read_text().splitlines()
-        records[name] = (inputs.split()[-1], digest)
-    return records
-
-
-def select_wheels(folder: Path, version: str, stamps: Path | None, sources: str | None) -> list[Wheel]:
-    records = recorded_wheels(stamps)
+def select_wheels(paths: list[Path], version: str) -> list[Wheel]:
+    """Those of this version; of two for the same, the one that runs on more systems."""
     chosen: dict[tuple[str, tuple[str, ...]], Wheel] = {}
-    for path in sorted(folder.glob("*.whl")):
-        wheel = Wheel(path)
-        if wheel.version != version:
-            continue
-        built_from, digest = records.get(path.name, (None, None))
-        # Wheels remain after their Python is removed; wheels that were copied here by hand have no such
-        # record.
-        if built_from and built_from != sources and digest == hashlib.sha256(path.read_bytes()).hexdigest():
-            print(f"package: leaving out {path.name}, built from older sources", file=sys.stderr)
-            continue
+    for wheel in map(Wheel, sorted(paths)):
         key = (wheel.python, tuple(wheel.platforms))
-        if key not in chosen or wheel.is_portable:
+        if wheel.version == version and (key not in chosen or wheel.is_portable):
             chosen[key] = wheel
     if not chosen:
-        raise SystemExit(f"package: {folder.relative_to(ROOT)}/ holds no wheel of version {version}")
+        raise SystemExit(f"package: there is no wheel of version {version}")
     return [chosen[key] for key in sorted(chosen)]
 
 
@@ -153,8 +134,7 @@ def write_zip(target: Path, files: dict[str, bytes]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--stamps", type=Path, help="folder of ./dev's records of the wheels that it built")
-    parser.add_argument("--sources", help="digest of the native sources as they are now")
+    parser.add_argument("wheels", type=Path, nargs="*", help="these in place of all in the folder")
     parser.add_argument("--platform", choices=sorted(ALL_PLATFORMS), help="the only one that the zip is for")
     options = parser.parse_args()
 
@@ -167,7 +147,7 @@ def main() -> None:
     if options.platform:
         folder = ROOT / "dist/platforms" / options.platform
         name = f"platforms/sinew-{version}-{options.platform.replace('-', '_')}.zip"
-    wheels = select_wheels(folder, version, options.stamps, options.sources)
+    wheels = select_wheels(options.wheels or [*folder.glob("*.whl")], version)
     if options.platform and any(wheel.platforms != [options.platform] for wheel in wheels):
         raise SystemExit(f"package: {folder.relative_to(ROOT)}/ holds a wheel for another platform")
     warn_of_gaps(wheels)

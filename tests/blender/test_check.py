@@ -304,6 +304,7 @@ def test_another_blender_that_does_not_answer(text, wanted, skinned, tmp_path):
     assert subprocess.run(["pgrep", "-f", "sleep 314.159"], capture_output=True, check=False).stdout == b""
 
 
+@pytest.mark.window
 def test_a_whole_blender(skinned, plain, tmp_path):
     """A real one, with its own program, as users have it."""
     program = os.environ.get("SINEW_FULL_BLENDER")

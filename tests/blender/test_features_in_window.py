@@ -17,6 +17,8 @@ from conftest import REPOSITORY
 from sinew_addon.core.bake import EXPORTS, KINDS
 from sinew_addon.ui import translations
 
+pytestmark = pytest.mark.window
+
 TOLERANCE = 2e-5
 
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 import in_window
 import pytest
 
+pytestmark = pytest.mark.window
+
 
 @pytest.fixture(scope="module")
 def facts(tmp_path_factory) -> dict:

@@ -18,6 +18,8 @@ import in_window
 import pytest
 from conftest import REPOSITORY
 
+pytestmark = pytest.mark.window
+
 SCRIPTS = (REPOSITORY / "docs" / "window.py", *Path(__file__).parent.glob("window_*.py"))
 OPTIONS = ("--enable-event-simulate", "--python-exit-code", "3", "--python")
 # Two Blenders at a time. The second one is restarted with what it saved last.

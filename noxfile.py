@@ -1,0 +1,566 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Environments and jobs as sessions of nox, and the commands of ./dev: docs/dev.md."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+
+import nox
+from filelock import FileLock
+
+sys.path.append(str(Path(__file__).parent / "tools"))
+from platforms import PLATFORMS
+
+ROOT = Path(__file__).resolve().parent
+os.chdir(ROOT)
+VERSION = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+PACKAGE = ROOT / f"dist/sinew-{VERSION}.zip"
+
+# The Blenders that are tested, as bpy, and the Python that each is built for.
+BLENDERS = {"4.2": "3.11", "4.5": "3.11", "5.0": "3.11", "5.1": "3.13", "5.2": "3.13"}
+OLDEST, NEWEST = "4.2", "5.2"
+# Supported for months: what does not differ between versions is left to the others (conftest.py).
+SHORT_TERM = ("5.0", "5.1")
+WHEEL_PYTHONS = ("3.11", "3.13", "3.14")
+WHEEL_SOURCES = ("CMakeLists.txt", "pyproject.toml", "requirements/build.txt", "cmake", "native")
+# Packages that Sinew is compared with, not locked; one that does not install is left out. Of libigl the last
+# release with direct delta mush in Python.
+BENCH_PACKAGES, BENCH_PEERS = ("numpy>=2", "matplotlib>=3.8"), ("libigl==2.5.1", "usd-core>=24")
+# What `./dev test --all` runs of the other commands, in a folder: each must work in a fresh checkout.
+SMALL = (
+    "help; lint; site --out {0}/site; stub {0}/stub; package; wheel; lock --out {0}/requirements build; "
+    "release --dry-run minor; demo; golden {0}/golden; pictures --only wrist --out {0}/pictures; "
+    "report --quick --out {0}/report; bench --quick --kernels --name=small"
+)
+PROCESSORS = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+LOGS = ROOT / "build/test-logs"
+# A Blender that hangs must not prevent the others' results from being shown.
+LIMIT = "timeout --foreground --kill-after=20 3600 " if sys.platform == "linux" else ""
+# Set by ./dev test for its jobs.
+IS_ALL, IS_QUICK = "SINEW_TEST_ALL" in os.environ, "SINEW_TEST_QUICK" in os.environ
+
+nox.options.default_venv_backend = "uv"
+nox.options.reuse_venv = "yes"
+nox.options.envdir = ".venvs"
+nox.options.allow_parallel = True
+nox.options.error_on_missing_interpreters = True
+
+# Debian's Python comes first, and pyenv's own: its programs on PATH fail for what is not switched on.
+PYENV = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
+SEARCHED = ["/usr/bin", *map(str, sorted(PYENV.glob("versions/3.1[1-9]*/bin"), reverse=True))]
+SEARCHED += [folder for folder in os.environ["PATH"].split(":") if not folder.startswith(f"{PYENV}/")]
+os.environ.setdefault("UV_PYTHON_SEARCH_PATH", ":".join(SEARCHED))
+os.environ["PATH"] = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+# Pythons name the compiler differently; under a single name, ccache recognises what it has compiled.
+os.environ.setdefault("CXX", "c++")
+# The sloppiness has it also cache files that are compiled with a precompiled header.
+os.environ |= {"CCACHE_DIR": str(ROOT / "build/ccache"), "CCACHE_BASEDIR": str(ROOT), "CCACHE_NOHASHDIR": "1"}
+os.environ |= {"CCACHE_SLOPPINESS": "pch_defines,time_macros"}
+os.environ |= {"CMAKE_CXX_COMPILER_LAUNCHER": "ccache"} if shutil.which("ccache") else {}
+# Python stores compiled files of Blender and of packages: this halves start-up times.
+os.environ["PYTHONDONTWRITEBYTECODE"] = ""
+
+
+def say(text: str) -> None:
+    print(f"dev: {text}", file=sys.stderr, flush=True)
+
+
+def call(line: str, *others: object, must: bool = False) -> int:
+    """Runs a program: a line, and further words."""
+    status = subprocess.run([*line.split(), *map(str, others)], check=False).returncode
+    return sys.exit(status) if must and status else status
+
+
+def output_of(line: str, *others: object) -> str:
+    done = subprocess.run([*line.split(), *map(str, others)], stdout=subprocess.PIPE, text=True, check=False)
+    return done.stdout.strip() if not done.returncode else sys.exit(done.returncode)
+
+
+@functools.cache
+def python_of(version: str) -> str | None:
+    """The Python of this machine that has this version."""
+    if version == f"{sys.version_info.major}.{sys.version_info.minor}":
+        return f"{sys.base_prefix}/bin/python{version}"
+    words = ["uv", "python", "find", "--system", "--no-python-downloads", version]
+    return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip() or None
+
+
+# .venv has the newest long-term release for the Python that runs this, whose headers the system has.
+EVERYDAY_PYTHON = next((v for v in ("3.11", "3.13") if sys.version.startswith(v)), None)
+EVERYDAY_PYTHON = EVERYDAY_PYTHON or ("3.11" if python_of("3.11") and not python_of("3.13") else "3.13")
+EVERYDAY = {"3.11": "4.5", "3.13": "5.2"}[EVERYDAY_PYTHON]
+
+
+# --- Environments
+
+
+def environment_of(name: str) -> Path:
+    """The folder that nox gives an environment."""
+    return Path(".venvs", name.replace(".", "-"))
+
+
+def python_in(name: str) -> str:
+    return f"{environment_of(name)}/bin/python"
+
+
+def wheel_of(version: str) -> Path | None:
+    """The library's wheel that was built here for a Python."""
+    tag, system = "cp" + version.replace(".", ""), {"darwin": "macosx"}.get(sys.platform, sys.platform)
+    return next(Path("dist/wheels").glob(f"sinew_skinning-{VERSION}-{tag}-{tag}-{system}_*.whl"), None)
+
+
+def is_current(wheel: Path | None) -> bool:
+    found = [path for name in WHEEL_SOURCES for path in (Path(name), *Path(name).rglob("*"))]
+    changed = max(path.stat().st_mtime for path in found if "__pycache__" not in path.parts)
+    return wheel is not None and wheel.stat().st_mtime > changed
+
+
+def sync(session: nox.Session, lock: str, *here: str) -> None:
+    """Has an environment contain what a lock has, and this of the checkout, and nothing else."""
+    words = [f"requirements/{lock}.txt", *(() if here else ("--require-hashes",))]
+    if here:
+        words.append(str(Path(session.virtualenv.location, "here.txt")))
+        Path(words[-1]).write_text("\n".join(here) + "\n", encoding="utf-8")
+    built = "--build-constraints", "requirements/wheels.txt"
+    session.run_install("uv", "pip", "sync", "--quiet", *built, *words)
+
+
+# The Pythons here that the extension's zip has wheels for.
+FOUND = [version for version in WHEEL_PYTHONS if python_of(version)]
+for _version in ("3.11", "3.12", "3.13", "3.14"):
+    # After the first one, as the compiler's cache then has the library.
+    _first = [f"wheel-{version}" for version in FOUND[:1] if version != _version]
+
+    @nox.session(name=f"wheel-{_version}", python=python_of(_version) or _version, requires=_first)
+    def make_wheel(session: nox.Session, version: str = _version) -> None:
+        """The library's wheel for a Python, built where sources are newer."""
+        sync(session, "build")
+        if not is_current(wheel_of(version)):
+            # CMake remembers the folder that a whole Blender's wheel takes the library from.
+            env = {"SKBUILD_CMAKE_DEFINE": f"SINEW_BUILT={os.environ.get('SINEW_BUILT', '')}"}
+            words, start = "uv build --quiet --wheel --no-build-isolation --out-dir dist/wheels", time.time()
+            session.run_install(*words.split(), env=env, silent=True)
+            # What changes meanwhile is newer.
+            os.utime(wheel_of(version), (start, start))
+
+
+# Name, lock, Python, whether it has the library, whether the extension. bpy contains Blender's program for
+# zips; what makes the site and the stub imports the library.
+ENVIRONMENTS = [(f"bpy-{bpy}", f"bpy-{bpy}", python, True, True) for bpy, python in BLENDERS.items()]
+ENVIRONMENTS += [("bundle", f"bpy-{EVERYDAY}", EVERYDAY_PYTHON, False, False)]
+ENVIRONMENTS += [("site", "site", EVERYDAY_PYTHON, True, False)]
+ENVIRONMENTS += [(name, name, EVERYDAY_PYTHON, False, False) for name in ("cross", "lint", "shaders")]
+for _name, _lock, _version, _library, _addon in ENVIRONMENTS:
+    _wheel = [f"wheel-{_version}"] * _library
+
+    @nox.session(name=_name, python=python_of(_version) or _version, requires=_wheel)
+    def environment(session: nox.Session, its: tuple = (_name, _lock, _version, _library, _addon)) -> None:
+        """What a lock has, and of the checkout what belongs to it."""
+        name, lock, version, library, addon = its
+        sync(session, lock, *[f"./{wheel_of(version)}"] * library, *["-e ./addon"] * addon)
+        # So documents call them.
+        for link in (Path(".venvs", name), *[Path(".venv")] * (name == f"bpy-{EVERYDAY}")):
+            if link != environment_of(name) and not link.is_symlink():
+                shutil.rmtree(link, ignore_errors=True)
+                link.symlink_to(os.path.relpath(environment_of(name), link.parent))
+
+
+@nox.session(name="bench", python=python_of(EVERYDAY_PYTHON), requires=[f"wheel-{EVERYDAY_PYTHON}"])
+def bench_environment(session: nox.Session) -> None:
+    """What Sinew is compared with."""
+    install = "uv", "pip", "install", "--quiet"
+    session.run_install(*install, *BENCH_PACKAGES, f"./{wheel_of(EVERYDAY_PYTHON)}")
+    for peer in BENCH_PEERS:
+        session.run_install(*install, peer, success_codes=range(3))
+
+
+@nox.session(python=False)
+def fetch(session: nox.Session) -> None:
+    """Has uv keep what environments to make will have, while the first wheel is built."""
+    for name, lock, version, library, _addon in ENVIRONMENTS:
+        if library and name in session.posargs and not environment_of(name).exists():
+            words = f"uv pip install --quiet --require-hashes --python {python_of(version)} --target".split()
+            with tempfile.TemporaryDirectory(dir="build") as place:
+                session.run(*words, place, "-r", f"requirements/{lock}.txt")
+
+
+@nox.session(python=False, requires=[f"wheel-{version}" for version in FOUND])
+def package(session: nox.Session) -> None:
+    """The extension's zip with a wheel for each Python, and its bill of materials."""
+    versions = list(FOUND)
+    if full := os.environ.get("SINEW_FULL_BLENDER"):
+        # It has its own Python in its own system, so its wheel is built there, but for the library.
+        words = "shell", "python3", "-c", "import sys; print('%d.%d' % sys.version_info[:2])"
+        version = session.run(full, *words, silent=True, stderr=subprocess.DEVNULL).split()[-1]
+        if version not in versions:
+            library = max(ROOT.glob("build/wheel-*/native/sinew/libsinew.so"), key=os.path.getmtime)
+            words = "shell", "env", f"SINEW_BUILT={library.parents[2]}", "./dev", "wheel", "python3"
+            session.run(full, *words, silent=True)
+            versions.append(version)
+    wheels = [str(wheel_of(version)) for version in versions]
+    session.run(sys.executable, "-I", "tools/package.py", *wheels)
+    session.run(sys.executable, "-I", "tools/sbom.py", str(PACKAGE))
+
+
+def build(session: nox.Session, preset: str, *targets: str) -> None:
+    session.run("cmake", "--preset", preset, silent=True)
+    chosen = ("--target", *targets) if targets else ()
+    session.run("cmake", "--build", "--preset", preset, *chosen, silent=True)
+
+
+for _preset in ("bench", "experiments"):
+
+    @nox.session(name=f"{_preset}-programs", python=False, requires=[f"wheel-{EVERYDAY_PYTHON}"])
+    def programs(session: nox.Session, preset: str = _preset) -> None:
+        """What CMake builds for measurements, after a wheel, whose library the compiler's cache has."""
+        build(session, preset)
+
+
+# --- Jobs of ./dev test: nox runs two at a time, each in its own process
+
+
+def job(name: str, *requires: str) -> Callable[[Callable[[nox.Session], None]], None]:
+    """Has nox run a function, with its output in a file, too, while it runs."""
+
+    def add(function: Callable[[nox.Session], None]) -> None:
+        @nox.session(name=name, python=False, requires=requires)
+        def run(session: nox.Session) -> None:
+            LOGS.mkdir(parents=True, exist_ok=True)
+            shown = os.dup(1), os.dup(2)
+            try:
+                with (LOGS / f"{name}.log").open("wb") as log:
+                    os.dup2(log.fileno(), 1), os.dup2(log.fileno(), 2)
+                function(session)
+            finally:
+                sys.stdout.flush()
+                os.dup2(shown[0], 1), os.dup2(shown[1], 2)
+                print((LOGS / f"{name}.log").read_text(encoding="utf-8", errors="replace"), flush=True)
+
+    return add
+
+
+def pytest(session: nox.Session, name: str, folder: str, marks: str = "", **others: object) -> None:
+    marks = " and ".join(filter(None, [marks, "" if IS_ALL or session.posargs else "not slow"]))
+    line = f"{LIMIT}{python_in(name)} -X faulthandler -m pytest -p no:cacheprovider --durations=25"
+    words = [*line.split(), "--durations-min=4", "-m", marks, folder, *session.posargs]
+    # With options such as -k, a suite may have no test to run.
+    session.run(*words, success_codes=[0, 5] if session.posargs else [0], **others)
+
+
+@job("native")
+def native(session: nox.Session) -> None:
+    """C++ tests, as shipped; all: also with sanitizers, and without vectors. Those leave out what takes long,
+    what counts memory, which they replace, and what depends neither on vectors nor on threads."""
+    if IS_ALL:
+        programs = {"asan": "sinew_deform_tests sinew_tests", "tsan": "sinew_deform_tests"}
+        for preset, targets in (programs | {"scalar": "sinew_deform_tests"}).items():
+            build(session, preset, *targets.split())
+            # Randomised addresses sometimes collide with the thread sanitizer's own memory.
+            fixed = preset == "tsan" and sys.platform == "linux" and not call("setarch -R true")
+            for target in targets.split():
+                words = f"build/{preset}/tests/native/{target}", "--gtest_brief=1"
+                session.run(*(("setarch", "-R") if fixed else ()), *words)
+    build(session, "dev")
+    words = f"ctest --preset dev -j {PROCESSORS} {'' if IS_ALL else '-LE slow'}".split()
+    print(*session.run(*words, silent=True).splitlines()[-5:], sep="\n")
+
+
+NEWEST_TESTED = os.environ.get("SINEW_TESTED", NEWEST).split()[-1]
+job("window", "package")(
+    functools.partial(pytest, name=f"bpy-{NEWEST_TESTED}", folder="tests/blender", marks="window")
+)
+job("python")(functools.partial(pytest, name=f"bpy-{EVERYDAY}", folder="tests/python"))
+job("shader")(functools.partial(pytest, name="shaders", folder="tests/shaders"))
+
+for _bpy in BLENDERS:
+
+    @job(f"blender-{_bpy}", "package")
+    def blender(session: nox.Session, bpy: str = _bpy) -> None:
+        """Unless options choose tests, those marked `once` run only in the newest; without --all, so do those
+        of what does not depend on the version. Each keeps to a processor, but for .venv's, which test
+        threads."""
+        is_newest, is_chosen = bpy == NEWEST_TESTED, bool(session.posargs)
+        left = [("SINEW_NOT_NEWEST", True), ("SINEW_BETWEEN", not IS_ALL or bpy not in (OLDEST, NEWEST))]
+        left += [("SINEW_SHORT_TERM", not IS_ALL or bpy in SHORT_TERM)]
+        env = {name: "1" for name, is_left in left if is_left and not (is_newest or is_chosen)}
+        is_whole = not (is_chosen or IS_QUICK)
+        if is_whole and (is_newest or bpy != EVERYDAY) and PROCESSORS > 1 and sys.platform == "linux":
+            # Blender's threads wait for each other by giving up their processor: two suites on the same two
+            # processors take twice the processor time.
+            os.sched_setaffinity(0, {sorted(os.sched_getaffinity(0))[0 if is_newest else 1]})
+        pytest(session, f"bpy-{bpy}", "tests/blender", "not window" * (is_whole and is_newest), env=env)
+
+
+@job("installed")
+def installed(session: nox.Session) -> None:
+    """Both wheels in an environment of their own, away from the checkout, and what README says of them."""
+    python = ROOT / python_in("installed")
+    words = f"uv venv --quiet --clear {environment_of('installed')} --python".split()
+    session.run(*words, python_of(EVERYDAY_PYTHON))
+    with tempfile.TemporaryDirectory() as place:
+        # A copy: setuptools writes beside the sources, and would have it in the next wheel.
+        unwanted = shutil.ignore_patterns("__pycache__", "build", "*.egg-info")
+        sources = shutil.copytree("addon", f"{place}/addon", ignore=unwanted)
+        words = "uv build --quiet --wheel --require-hashes --build-constraints requirements/wheels.txt"
+        session.run(*words.split(), "--out-dir", place, sources)
+        # Given as files: packages with our names in the registry may not be ours.
+        (addon,) = Path(place).glob("*.whl")
+        wanted = f"./{wheel_of(EVERYDAY_PYTHON)}", f"sinew-blender[cluster] @ {addon.as_uri()}"
+        install = "uv", "pip", "install", "--quiet", "--python", str(python)
+        session.run(*install, *wanted, f"bpy=={EVERYDAY}.*", "pytest")
+        for name in ("tests/installed/test_installed.py", "blend_files/wrist.blend"):
+            shutil.copy(name, place)
+        with session.chdir(place):
+            words = f"{LIMIT}{python} -m pytest -p no:cacheprovider -ra test_installed.py"
+            session.run(*words.split(), env={"PYTHONPATH": None})
+
+
+@job("commands")
+def commands(session: nox.Session) -> None:
+    """All: each command of ./dev, small."""
+    with tempfile.TemporaryDirectory() as place:
+        for line in SMALL.split("; ") if IS_ALL else ["lint --fast"]:
+            session.run("./dev", *line.format(place).split(), silent=True)
+
+
+# --- The commands of ./dev
+
+
+def set_up(*sessions: str, options: str = "") -> None:
+    """Has nox make environments and the like; ends this if one fails."""
+    tell_uv_of_the_registry()
+    Path("build").mkdir(exist_ok=True)
+    words = f"-m nox {'--parallel 4' if len(sessions) > 1 else ''} {options} --session".split()
+    # One ./dev at a time, but for the one in a whole Blender. Standard output is for results.
+    with nullcontext() if "SINEW_BUILT" in os.environ else FileLock("build/set-up.lock"):
+        done = subprocess.run([sys.executable, *words, *sessions], stdout=sys.stderr, check=False)
+    if done.returncode:
+        sys.exit(done.returncode)
+
+
+def tell_uv_of_the_registry() -> None:
+    """Has uv take packages from where pip takes them."""
+    names = {"index-url": "UV_DEFAULT_INDEX", "extra-index-url": "UV_INDEX", "find-links": "UV_FIND_LINKS"}
+    names |= {"trusted-host": "UV_INSECURE_HOST", "cert": "SSL_CERT_FILE"}
+    listed = output_of(f"{sys.executable} -m pip config list")
+    for name, value in re.findall(r"^[\w:]+\.([\w-]+)='(.*)'$", listed, re.MULTILINE):
+        if name in names:
+            joined = ("," if name == "find-links" else " ").join(value.replace("\\n", " ").split())
+            os.environ.setdefault(names[name], joined)
+    # As pip: the best of all, whichever registry has it.
+    os.environ.setdefault("UV_INDEX_STRATEGY", "unsafe-best-match")
+
+
+def in_blender(words: list[str], program: str) -> int:
+    """Runs a program in the bpy of .venv, or in that of --blender VERSION."""
+    parser = argparse.ArgumentParser(prog="./dev", add_help=False, allow_abbrev=False)
+    parser.add_argument("--blender", choices=BLENDERS, default=EVERYDAY)
+    chosen, others = parser.parse_known_args(words)
+    set_up(f"bpy-{chosen.blender}")
+    return call(python_in(f"bpy-{chosen.blender}"), program, *others)
+
+
+def demo(_words: list[str]) -> int:
+    set_up(f"bpy-{EVERYDAY}")
+    say("re-skinning blend_files/ with quaternion-vector skinning")
+    call(".venv/bin/sinew reskin blend_files --method qv --out build/demo --overwrite", must=True)
+    say("drawing a wrist under three methods, turned by half a turn, where they differ most")
+    sheet = ROOT / "build/demo/comparison.png"
+    output_of(".venv/bin/sinew compare blend_files/wrist.blend --frame 24 --out", sheet)
+    print(f"Re-skinned files: {sheet.parent}/*.blend\nComparison sheet: {sheet}")
+    return 0
+
+
+def bring(version: str) -> str | None:
+    """A Python that uv brings, where it can."""
+    env = os.environ | {"UV_HTTP_TIMEOUT": "20", "UV_HTTP_RETRIES": "0"}
+    subprocess.run(["uv", "python", "install", "--quiet", version], env=env, check=False)
+    python_of.cache_clear()
+    if not python_of(version):
+        say(f"no Python {version} here: not testing in its Blenders")
+    return python_of(version)
+
+
+def test(words: list[str]) -> int:
+    if words and words[0].startswith("--platform"):
+        set_up("cross")
+        words = words[0].split("=")[1:] + words[1:]
+        return call(f"{python_in('cross')} tools/platform_tests.py", *words)
+    is_all, is_quick = "--all" in words, "--quick" in words
+    options = [word for word in words if word not in ("--all", "--quick")]
+    is_whole = not (is_quick or options)
+    wanted = [*BLENDERS] if is_all else [EVERYDAY] if is_quick else [OLDEST, EVERYDAY, NEWEST]
+    pythons = {version for version in {BLENDERS[b] for b in wanted} if python_of(version) or bring(version)}
+    tested = [bpy for bpy, python in BLENDERS.items() if bpy in wanted and python in pythons]
+    others = ["experiments-programs"] * is_all + ["lint"] * is_whole
+    environments = [f"bpy-{bpy}" for bpy in tested]
+    set_up("fetch", *environments, "site", "shaders", *others, "--", *environments)
+    os.environ |= {"SINEW_PACKAGE": str(PACKAGE), "SINEW_TESTED": " ".join(tested)}
+    os.environ |= {"SINEW_TEST_QUICK": "1"} if is_quick else {}
+    if is_all:
+        os.environ |= {"SINEW_TEST_ALL": "1", "SINEW_EXPERIMENTS": f"{ROOT}/build/experiments/experiments"}
+    # The longest first.
+    jobs = ["native"] * (not options) + ["window"] * is_whole
+    jobs += [*(f"blender-{bpy}" for bpy in reversed(tested)), "python", "shader"]
+    jobs += ["installed", "commands"] * is_whole
+    for name in {"SINEW_RIGS", "SINEW_FULL_BLENDER"} - {*os.environ}:
+        say(f"{name} is not set: tests that need it are skipped")
+    shutil.rmtree(LOGS, ignore_errors=True)
+    # nox ends its jobs when it is interrupted: so it is by what ends programs, too.
+    start = "import signal, nox.__main__ as n; signal.signal(15, signal.default_int_handler); n.main()"
+    words = ["--parallel", str(min(PROCESSORS, 2)), "--session", *jobs, "--", *options]
+    os.execv(sys.executable, [sys.executable, "-c", start, *words])
+
+
+def bench(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="./dev bench", allow_abbrev=False)
+    parts = ["kernels", "peers", "frames", "counts", "plots"]
+    for flag in [*parts, "quick", "million", "accept", "simd", "name"]:
+        takes = {} if flag in ("simd", "name") else {"action": "store_const", "const": f"--{flag}"}
+        parser.add_argument(f"--{flag}", default="", **takes)
+    its = parser.parse_args(words)
+    kernels, prefix = "build/bench/bench/sinew_kernels_bench", f"{its.name}-" if its.name else ""
+    simd = f"--simd={its.simd}" if its.simd else ""
+    own, everyday, peers = python_of(EVERYDAY_PYTHON), python_in(f"bpy-{EVERYDAY}"), python_in("bench")
+    lines = {
+        "kernels": f"{own} bench/kernels.py {kernels} --name {prefix}kernels {its.quick} {simd}",
+        "peers": f"{peers} bench/peers.py --name {prefix}peers {its.quick}",
+        "frames": f"{everyday} bench/frames.py --name {prefix}frames {its.quick} {its.million}",
+        "counts": f"{own} bench/counts.py build/bench/bench/sinew_counts {its.accept}",
+        "plots": f"{peers} bench/plots.py {kernels} --name {prefix}costs",
+    }
+    chosen = [part for part in parts if getattr(its, part)] or parts[:-1]
+    needed = {"frames": [f"bpy-{EVERYDAY}"], "peers": ["bench"], "plots": ["bench", "bench-programs"]}
+    set_up(*{name for part in chosen for name in needed.get(part, ["bench-programs"])})
+    # A part that fails does not prevent the others from running.
+    return int(any([call(lines[part]) for part in chosen]))
+
+
+def report(words: list[str]) -> int:
+    set_up(f"bpy-{EVERYDAY}", "experiments-programs")
+    os.environ["PYTHONPATH"] = "experiments"
+    line = ".venv/bin/python -m smith_2013 --out build/report --blend-files blend_files"
+    return call(f"{line} --programs build/experiments/experiments", *words)
+
+
+def site(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="./dev site")
+    parser.add_argument("--out", type=Path, default="build/site")
+    out = parser.parse_args(words).out.resolve()
+    set_up("site")
+    # Leaves out an announcement. Not --quiet: mkdocs then counts no warnings, and strict has no effect.
+    os.environ["NO_MKDOCS_2_WARNING"] = "1"
+    call(f"{python_in('site')} -m mkdocs build --site-dir", out, must=True)
+    print(out / "index.html")
+    return 0
+
+
+def stub(words: list[str]) -> int:
+    set_up("site")
+    return call(f"{python_in('site')} tools/make_stub.py", *words)
+
+
+def lint(words: list[str]) -> int:
+    set_up("lint")
+    programs, folders = environment_of("lint") / "bin", ("native", "tests/native", "bench", "experiments")
+    cpp = [path for folder in folders for path in Path(folder).rglob("*") if path.suffix in (".h", ".cpp")]
+    lines = ["ruff check .", "ruff format --check .", "mypy --no-error-summary", "reuse lint --lines"]
+    lines += ["check-jsonschema --quiet --builtin-schema vendor.dependabot .github/dependabot.yml"]
+    lines += ["zizmor --quiet --offline --no-progress --min-severity medium .github"]
+    statuses = [call(f"{programs}/{line}") for line in lines]
+    workflows = f"{programs}/check-jsonschema --quiet --builtin-schema vendor.github-workflows"
+    statuses.append(call(workflows, *Path(".github/workflows").glob("*.yml")))
+    statuses.append(call(f"{programs}/clang-format --dry-run -Werror", *cpp))
+    if "--fast" not in words:
+        # The library as it is compiled; native/.clang-tidy lists the checks.
+        output_of("cmake --preset release -B build/tidy -DSINEW_BUILD_TESTS=OFF -DSINEW_ONE_TARGET=ON")
+        line = f"{programs}/run-clang-tidy.py -quiet -hide-progress -config-file native/.clang-tidy"
+        statuses.append(call(f"{line} -p build/tidy -clang-tidy-binary {programs}/clang-tidy native/sinew"))
+    # No registry that ./dev installs from has actionlint.
+    if shutil.which("actionlint"):
+        statuses.append(call("actionlint"))
+    return int(any(statuses))
+
+
+def package_command(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="./dev package")
+    parser.add_argument("--bundle", action="store_true")
+    parser.add_argument("--platform", choices=(*PLATFORMS, "all"))
+    parser.add_argument("--python", choices=WHEEL_PYTHONS, action="append")
+    options = parser.parse_args(words)
+    if not options.bundle and not options.platform:
+        set_up("package")
+        print(PACKAGE.relative_to(ROOT))
+        return 0
+    # Blender's own program splits and checks zips.
+    set_up("bundle", *["cross"] * bool(options.platform))
+    if options.platform:
+        pythons = [python_of(version) for version in options.python or WHEEL_PYTHONS if python_of(version)]
+        line = f"{python_in('cross')} tools/cross_build.py {options.platform} --validator"
+        return call(f"{line} {python_in('bundle')}", *(f"--python={python}" for python in pythons))
+    shutil.rmtree("dist/zips", ignore_errors=True)
+    made = output_of(f"{sys.executable} -I tools/package.py")
+    call(f"{python_in('bundle')} tools/split_package.py {made} --out dist/zips", must=True)
+    return call(f"{sys.executable} -I tools/sbom.py", *Path("dist/zips").glob("*.zip"))
+
+
+def wheel(words: list[str]) -> int:
+    version = EVERYDAY_PYTHON
+    if words:
+        program = shutil.which(words[0]) or sys.exit(f"dev: there is no {words[0]}.")
+        version = output_of(program, "-c", "import sys; print('%d.%d' % sys.version_info[:2])")
+        os.environ["UV_PYTHON_SEARCH_PATH"] = f"{Path(program).parent}:{os.environ['UV_PYTHON_SEARCH_PATH']}"
+    # Without those before it: a whole Blender has no other Pythons.
+    set_up(f"wheel-{version}", options="--no-dependencies")
+    print(wheel_of(version))
+    return 0
+
+
+def lock(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="./dev lock")
+    parser.add_argument("--out", type=Path, default="requirements")
+    known = sorted(path.stem for path in Path("requirements").glob("*.in"))
+    parser.add_argument("names", nargs="*", metavar="name", help=", ".join(known))
+    options = parser.parse_args(words)
+    options.out.mkdir(parents=True, exist_ok=True)
+    tell_uv_of_the_registry()
+    for name in options.names or known:
+        say(f"{options.out}/{name}.txt")
+        # For all systems, and all Pythons from the oldest that takes it. Without addresses of a registry:
+        # users may have another one.
+        python = BLENDERS.get(name.removeprefix("bpy-"), "3.11")
+        line = f"uv pip compile --quiet --upgrade --universal --python-version {python} --generate-hashes"
+        line += " --no-emit-index-url --no-emit-find-links --no-header --output-file"
+        call(line, options.out / f"{name}.txt", f"requirements/{name}.in", must=True)
+    return 0
+
+
+PROGRAMS = {
+    "fuzz": "tests/blender/fuzz_parity.py",
+    "walk": "tests/blender/walk.py",
+    "soak": "tests/blender/soak.py",
+    "pictures": "docs/draw_methods.py",
+    "golden": "tests/blender/make_golden.py",
+}
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    **{name: functools.partial(in_blender, program=program) for name, program in PROGRAMS.items()},
+    **{"demo": demo, "test": test, "bench": bench, "report": report, "site": site, "stub": stub},
+    **{"lint": lint, "package": package_command, "wheel": wheel, "lock": lock},
+    "release": lambda words: call(f"{sys.executable} -I tools/release.py", *words),
+}
+
+if __name__ == "__main__":
+    command, *given = sys.argv[1:]
+    sys.exit(COMMANDS[command](given) if command in COMMANDS else f"dev: no {command}: see ./dev help")
