@@ -53,7 +53,7 @@ LEFT_OUT: dict[str, dict[str, str]] = {
         "tests/blender/test_batch.py::test_200_files_on_one_machine_and_on_a_cluster": (
             "it makes a folder that nobody may write in, as Linux knows them"
         ),
-        "tests/blender/test_batch.py::test_killed_at_random_on_a_cluster": "dask by wine has not been tried",
+        "tests/blender/test_batch.py::test_killed_at_random[cluster]": "dask by wine has not been tried",
     },
 }
 BPY = "bpy==4.5.*"
