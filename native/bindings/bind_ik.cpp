@@ -64,7 +64,10 @@ IkEffector checked_effector(const py::handle& value) {
     }
     const auto parts = py::reinterpret_borrow<py::tuple>(value);
     const int has_pole = PyObject_IsTrue(parts[3].ptr());
-    if (has_pole < 0) throw py::error_already_set();
+    if (has_pole < 0) {
+        PyErr_Clear();
+        fail("effectors", "has_pole true or false", describe(parts[3]));
+    }
     const auto number = [&](std::size_t part) {
         return checked_number(parts[part], "effectors", "weights and an angle that are numbers");
     };

@@ -205,6 +205,3 @@ def test_skeletons_can_be_pickled():
 def test_states_of_other_things_are_refused(of, state, message):
     with pytest.raises(ValueError, match=message):
         of.__new__(of).__setstate__(state)
-
-
-# --- Representations as text

@@ -87,6 +87,14 @@ def test_bones_of_a_vertex_may_repeat_in_any_order():
     np.testing.assert_allclose(twice, expected, atol=1e-5)
 
 
+def test_triangles_without_area_count_for_nothing():
+    tube = three_bones()
+    flat = np.concatenate([tube.triangles, tube.triangles[:, [0, 1, 1]]])
+    for exact in (False, True):
+        found = sinew.centres_of_rotation(*tube.mesh, flat, exact=exact)
+        np.testing.assert_array_equal(found, tube.centres(exact=exact))
+
+
 # --- What both precomputations share
 
 
