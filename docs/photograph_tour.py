@@ -32,12 +32,7 @@ STAGES, MESHES = (790, 252), (790, 278)
 # Panels' headers while all are closed.
 HEADERS = {
     name: (850, 97 + 28 * number)
-    for number, name in enumerate(
-        (
-            *("Sinew", "Suggest", "Blend Actions"),
-            *("Compare", "Heat Map", "Diagnostics"),
-        )
-    )
+    for number, name in enumerate(("Sinew", "Suggest", "Compare", "Heat Map", "Diagnostics"))
 }
 
 

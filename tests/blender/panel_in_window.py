@@ -30,8 +30,8 @@ VIEW = (400, 500)
 # Positions in the sidebar.
 ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
 # Headers of panels while all are closed; what Diagnostics has below its own.
-HEADER, DIAGNOSTICS = (850, 97), (850, 237)
-CHECK, MEND = (830, 294), (835, 445)
+HEADER, DIAGNOSTICS = (850, 97), (850, 209)
+CHECK, MEND = (830, 266), (835, 417)
 # The header of Suggest, and the best method at the first measure.
 SUGGEST, BEST = (850, 125), (950, 229)
 # The height of the status bar in pixels.
