@@ -86,7 +86,7 @@ def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFact
 
 def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
     """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
-    if wanted.state is State.LINKED:
+    if obj.library is not None:
         # Its own file was saved so that its Armature modifier deforms it.
         return
     if wanted.uses_builtin:

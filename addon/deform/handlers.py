@@ -83,10 +83,9 @@ def suspend_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) 
     """Called last, and restore_modifiers() first, so that other add-ons never see a suspended modifier."""
     is_playing = is_playing_in_window() and not phase.is_rendering
     with reaction() as may_react, contextlib.suppress(ReferenceError):
-        for obj in current.objects or () if may_react and may_change_file() else ():
-            state = session.state_of(obj)
+        for obj, state in current.pairs if may_react and may_change_file() else ():
             # Objects that their Armature modifiers deform are not evaluated twice.
-            if state is not None and state.dirtied_by_frames and properties.of(obj).replaces_modifiers:
+            if state.dirtied_by_frames and properties.of(obj).replaces_modifiers:
                 current.gate.suspend(obj, is_playing)
 
 

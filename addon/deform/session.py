@@ -104,7 +104,8 @@ def forget_object(obj: bpy.types.Object) -> None:
     """Forgets an object that Sinew is taken off; others stay bound."""
     gone = _forget_known(obj)
     current.objects, current.all_use_builtin = None, False
-    _set_pairs([(other, state) for other, state in current.pairs if state is not gone])
+    current.pairs = [(other, state) for other, state in current.pairs if state is not gone]
+    name_requests()
 
 
 def forget_for_step(changed: set[int]) -> None:
@@ -122,12 +123,11 @@ def forget_for_step(changed: set[int]) -> None:
 
 def adopt_after_step() -> None:
     """Called after undo and redo: the next evaluation deforms the objects that are still known."""
-    objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
-    _set_pairs([(obj, state) for obj in objects if (state := state_of(obj)) is not None])
+    _find_pairs([obj for obj in bpy.data.objects if properties.has_sinew(obj)])
 
 
-def _set_pairs(pairs: Pairs) -> None:
-    current.pairs = pairs
+def _find_pairs(objects: list[bpy.types.Object]) -> None:
+    current.pairs = [(obj, state) for obj in objects if (state := state_of(obj)) is not None]
     name_requests()
 
 
@@ -267,16 +267,13 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         _remove_groups_taken_apart(changes)
         _adopt_copied_modifiers(changes)
         _note_readers(changes)
+        for state in current.skinned.values():
+            state.needs_recheck |= changes.lost
         for obj in objects_with_sinew(changes):
-            state = state_of(obj)
-            if state is not None:
-                state.needs_recheck |= changes.lost
             _update(obj, depsgraph, changes)
-            state = state_of(obj)
-            if state is not None and obj.data.session_uid in read_later:
-                state.needs_recheck = True
-        states = [(obj, state_of(obj)) for obj in objects_with_sinew(Changes())]
-        _set_pairs([(obj, state) for obj, state in states if state is not None])
+        _find_pairs(objects_with_sinew(Changes()))
+        for obj, state in current.pairs:
+            state.needs_recheck |= obj.data.session_uid in read_later
         current.all_use_builtin = _do_all_use_builtin()
         notify(subscribers.deformed, current.objects or [], depsgraph)
         notify(subscribers.frame_shown)
