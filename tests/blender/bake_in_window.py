@@ -2,7 +2,7 @@
 """Bakes human.blend from the panel's dialog in a Blender with a window: each kind once with Esc in the
 middle, then to its end, and Ctrl+Z. Keys are simulated, which needs --enable-event-simulate.
 
-    blender --factory-startup OPTION human.blend --python bake_in_window.py -- sinew-VERSION.zip bake.png
+    blender --factory-startup --enable-event-simulate --python bake_in_window.py -- sinew.zip FOLDER
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 import window
 
-ZIP, PICTURE = window.arguments()
-FOLDER = PICTURE.parent / "baked"
+ZIP, HERE = window.arguments()
+PICTURE, FOLDER = HERE / "bake.png", HERE / "baked"
 # Blender's folder for the user's files.
-USER = PICTURE.parent / "user"
+USER = HERE / "user"
 FRAME = 16
 # Long enough to be stopped in between.
 LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "gltf": 1500, "bones": 2000}
@@ -79,8 +79,8 @@ def state() -> dict[str, object]:
         "armatures": len(bpy.data.armatures),
         "method": obj.sinew.method,
         "points": hashlib.sha256(window.final_points(obj)).hexdigest(),
-        "files": sorted(str(p.relative_to(PICTURE.parent)) for p in FOLDER.rglob("*")),
-        "folder": sorted(p.name for p in PICTURE.parent.iterdir() if p not in (PICTURE, USER)),
+        "files": sorted(str(p.relative_to(HERE)) for p in FOLDER.rglob("*")),
+        "folder": sorted(p.name for p in HERE.iterdir() if p not in (PICTURE, USER)),
         "blenders": blenders(),
     }
 
@@ -96,6 +96,8 @@ def start(kind: str, frames: str) -> Iterator[None]:
 def steps() -> Iterator[None]:
     facts = {"stopped": {}, "ended": {}, "refused": {}}
     window.install(ZIP)
+    bpy.ops.wm.open_mainfile(filepath=str(HERE / "human.blend"))
+    yield from window.wait()
     scene, obj = bpy.context.scene, bpy.data.objects["Human"]
     window.select_only(obj)
     with window.in_view3d():

@@ -1,25 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blends actions in the window of a real Blender, on human.blend, and photographs the dialog. Esc stops a
-long blend, the next goes to its end, and Ctrl+Z undoes it: it takes --enable-event-simulate.
-
-    blender --factory-startup OPTION human.blend --python tests/blender/blend_in_window.py -- sinew.zip
-    blend.png
-"""
+"""Part of features_in_window.py: blends actions on human.blend. Esc stops a long blend, the next goes to its
+end, and Ctrl+Z undoes it."""
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Generator
 
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 import window
 
-ZIP, PICTURE = window.arguments()
-TICK = 0.1
+_ZIP, FOLDER = window.arguments()
 # Long enough to be stopped.
 LONG = 20_000
 
@@ -57,9 +47,10 @@ CHOSEN = {
 }
 
 
-def steps() -> Iterator[None]:
+def steps() -> Generator[None, None, dict]:
     facts = {}
-    window.install(ZIP)
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "human.blend"))
+    yield from window.wait()
     armature = rig()
     window.select_only(armature)
     strain = armature.animation_data.action
@@ -80,7 +71,7 @@ def steps() -> Iterator[None]:
     blend()
     yield
     yield
-    window.photograph(PICTURE)
+    window.photograph(FOLDER / "blend.png")
     middle = bpy.context.window_manager.windows[0]
     window.press("ESC", (middle.width // 2, middle.height // 2))
     yield
@@ -101,7 +92,4 @@ def steps() -> Iterator[None]:
     window.press("Z", (middle.width // 2, middle.height // 2), ctrl=True)
     yield from window.until(lambda: len(bpy.data.actions) == 2, "undo")
     facts["undone"] = state()
-    print("FACTS " + json.dumps(facts), flush=True)
-
-
-window.run(steps(), TICK)
+    return facts

@@ -1,26 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: exports glTF with the file browser, whose side bar has a check box.
-
-Prints "FACTS" and a line of JSON, and saves pictures of the browser in the folder.
-
-    blender --factory-startup --enable-event-simulate --python export_in_window.py -- sinew.zip FOLDER
-"""
+"""Part of features_in_window.py: exports glTF with the file browser, whose side bar has a check box."""
 
 from __future__ import annotations
 
 import json
 import struct
-import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 import five_meshes
 import window
 
-ZIP, FOLDER = window.arguments()
+_ZIP, FOLDER = window.arguments()
 # In a picture of a window of 1280 x 800.
 CHECK_BOX, EXPORT = (1145, 307), (1207, 757)
 
@@ -54,10 +46,9 @@ def of_sinew(path: Path) -> dict[str, object]:
     }
 
 
-def steps() -> Iterator[None]:
+def steps() -> Generator[None, None, dict]:
     # In the main window, so that a picture of the screen shows it.
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    window.install(ZIP)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     five_meshes.make(vertices=2000)
     with window.in_view3d():
@@ -73,7 +64,4 @@ def steps() -> Iterator[None]:
         a.name for mesh in bpy.data.meshes for a in mesh.attributes if a.name.startswith("_SINEW")
     ]
     facts["on"] = [obj.sinew.enabled for obj in bpy.data.objects if obj.sinew.replaced_modifiers]
-    print("FACTS " + json.dumps(facts), flush=True)
-
-
-window.run(steps())
+    return facts

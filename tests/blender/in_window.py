@@ -42,7 +42,7 @@ def facts_of(script: str, folder: Path, *others: str) -> dict:
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=400,
+        timeout=900,
         check=False,
         env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1280x800"},
     )

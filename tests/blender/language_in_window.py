@@ -1,25 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: its texts in German, and after a change of language.
-
-Prints "FACTS" and a line of JSON, and saves a picture of the panel in the folder.
-
-    blender --factory-startup --enable-event-simulate --python language_in_window.py -- sinew.zip FOLDER
-"""
+"""Part of features_in_window.py: Sinew's texts in German, and after a change of language."""
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Generator
 
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 import five_meshes
 import window
 
-ZIP, FOLDER = window.arguments()
+_ZIP, FOLDER = window.arguments()
 ADDON = "bl_ext.user_default.sinew"
 
 
@@ -44,11 +34,10 @@ def texts() -> dict[str, str]:
     }
 
 
-def steps() -> Iterator[None]:
+def steps() -> Generator[None, None, dict]:
     view = bpy.context.preferences.view
     view.language = "de_DE"
     view.use_translate_interface = view.use_translate_tooltips = view.use_translate_reports = True
-    window.install(ZIP)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     five_meshes.make(vertices=6000)
     bpy.context.scene.frame_set(12)
@@ -67,7 +56,6 @@ def steps() -> Iterator[None]:
     bpy.ops.preferences.addon_disable(module=ADDON)
     facts["without"] = bpy.app.translations.pgettext_iface("Stages and Scale")
     yield
-    print("FACTS " + json.dumps(facts), flush=True)
-
-
-window.run(steps())
+    view.language = "en_US"
+    bpy.ops.preferences.addon_enable(module=ADDON)
+    return facts

@@ -1,23 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: the lesson is opened while something is not saved, and once all is. Prints
-"FACTS" and a line of JSON; pictures lie in the folder.
-
-    blender --factory-startup --enable-event-simulate --python lesson_in_window.py -- sinew.zip FOLDER
-"""  # noqa: E501
+"""Part of features_in_window.py: the lesson is opened while something is not saved, and once all is."""
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Generator
 
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
 import window
 
-ZIP, FOLDER = window.arguments()
+_ZIP, FOLDER = window.arguments()
 VIEW = (500, 450)
 facts: dict[str, object] = {}
 
@@ -35,9 +26,7 @@ def is_own() -> bool:
     return "Unsaved" in bpy.data.objects and "Lesson" not in bpy.data.texts
 
 
-def steps() -> Iterator[None]:
-    window.install(ZIP)
-    yield from window.wait()
+def steps() -> Generator[None, None, dict]:
     bpy.data.objects.new("Unsaved", None)
     bpy.ops.ed.undo_push(message="work")
     facts["is dirty"] = bpy.data.is_dirty
@@ -62,7 +51,4 @@ def steps() -> Iterator[None]:
     facts["opened"] = ["Lesson" in bpy.data.texts, bpy.data.filepath, hasattr(bpy.types.Object, "sinew")]
     facts["reading"] = [area.type for area in bpy.context.window_manager.windows[0].screen.areas]
     window.photograph(FOLDER / "lesson.png")
-    print("FACTS " + json.dumps(facts), flush=True)
-
-
-window.run(steps())
+    return facts

@@ -1,30 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: centres of rotation are computed in the background.
-
-The window stays responsive, Esc stops the computation, a button resumes it, and a render waits for it.
-Prints "FACTS" and a line of JSON.
-
-    blender --factory-startup --enable-event-simulate --python precompute_in_window.py -- sinew.zip FOLDER
-"""
+"""Part of features_in_window.py: centres of rotation are computed in the background. The window stays
+responsive, Esc stops the computation, a button resumes it, and a render waits for it."""
 
 from __future__ import annotations
 
 import importlib
-import json
-import sys
 import time
 from collections.abc import Generator, Iterator
-from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
 import window
 import window_scene
 
-ZIP, FOLDER = window.arguments()
-VERTICES, TICK = 120_000, 0.05
+_ZIP, FOLDER = window.arguments()
+VERTICES, PATIENCE = 120_000, 300.0
 facts: dict[str, object] = {}
 
 
@@ -90,17 +80,16 @@ def forget() -> None:
         bpy.ops.sinew.rebind("EXEC_DEFAULT")
 
 
-def steps() -> Iterator[None]:
+def steps() -> Generator[None, None, dict]:
     yield from add_sinew()
     found = yield from see_it_found()
     yield from stop_and_go_on()
     yield from render(found)
     yield from end_while_it_runs()
-    print("FACTS " + json.dumps(facts), flush=True)
+    return facts
 
 
 def add_sinew() -> Iterator[None]:
-    window.install(ZIP)
     bpy.context.preferences.filepaths.temporary_directory = str(FOLDER)
     scene = bpy.context.window.scene
     make_hero()
@@ -148,7 +137,7 @@ def stop_and_go_on() -> Iterator[None]:
     window.photograph(FOLDER / "stopped.png")
     with window.in_view3d():
         bpy.ops.sinew.precompute("INVOKE_DEFAULT")
-    yield from window.until(lambda: plan() == "in depsgraph", "its shape")
+    yield from window.until(lambda: plan() == "in depsgraph", "its shape", PATIENCE)
     facts["plan_after_button"] = plan()
 
 
@@ -168,10 +157,10 @@ def render(found: np.ndarray) -> Iterator[None]:
         facts.setdefault("plan_before_render", []).append(plan())
         with window.in_view3d():
             bpy.ops.render.render("INVOKE_DEFAULT")
-        yield from window.until(lambda: KeepingEngine.points is not None, "the render")
+        yield from window.until(lambda: KeepingEngine.points is not None, "the render", PATIENCE)
         yield from window.until(lambda: not bpy.app.is_job_running("RENDER"), "the end of the render")
         facts.setdefault("render_off", []).append(window_scene.worst(KeepingEngine.points, found))
-        yield from window.until(lambda: plan() == "in depsgraph", "its shape")
+        yield from window.until(lambda: plan() == "in depsgraph", "its shape", PATIENCE)
 
 
 def end_while_it_runs() -> Iterator[None]:
@@ -189,6 +178,3 @@ def end_while_it_runs() -> Iterator[None]:
     sinew("attach.attach").add(hero(), "cor")
     sinew("deform.session").refresh(bpy.context)
     facts["plan_at_the_end"] = plan()
-
-
-window.run(steps(), TICK)
