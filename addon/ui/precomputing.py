@@ -112,8 +112,9 @@ def _show() -> None:
 
 
 def _watch() -> None:
-    windows = bpy.context.window_manager.windows
-    if bpy.app.background or not windows or any(_watcher_of(window) for window in windows):
+    # An operator can not be started in the screen of a window such as a render's.
+    windows = [each for each in bpy.context.window_manager.windows if not each.screen.is_temporary]
+    if bpy.app.background or not windows or any(map(_watcher_of, bpy.context.window_manager.windows)):
         return
     with bpy.context.temp_override(window=windows[0], screen=windows[0].screen, area=None, region=None):
         bpy.ops.sinew.watch_precomputation("INVOKE_DEFAULT")
