@@ -112,11 +112,11 @@ def _show() -> None:
 
 
 def _watch() -> None:
-    # An operator can not be started in the screen of a window such as a render's.
+    # One in a window such as a render's would end with it.
     windows = [each for each in bpy.context.window_manager.windows if not each.screen.is_temporary]
     if bpy.app.background or not windows or any(map(_watcher_of, bpy.context.window_manager.windows)):
         return
-    with bpy.context.temp_override(window=windows[0], screen=windows[0].screen, area=None, region=None):
+    with bpy.context.temp_override(window=windows[0], area=None, region=None):
         bpy.ops.sinew.watch_precomputation("INVOKE_DEFAULT")
 
 
