@@ -16,6 +16,7 @@ import pytest
 import sinew
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rigs import LINEAR
 
 REFUSALS = (ValueError, TypeError, MemoryError, OverflowError)
 EXAMPLES = int(os.environ.get("SINEW_FUZZ_EXAMPLES", "8000"))
@@ -460,7 +461,7 @@ def test_meshes(data):
     each, bones = data.draw(st.integers(0, 4)), data.draw(st.integers(1, 4))
     d = Draw(data.draw, 16)
     mesh = [*d.skin(vertices, each, bones), d.array(bones, 4, 4, optional=True)]
-    binding = attempt(sinew.Binding, [given for given, _ in mesh], MESH)
+    binding = attempt(sinew.Binding, [*(given for given, _ in mesh), LINEAR], MESH)
     if binding is None:
         return
     repr(binding)
@@ -483,7 +484,7 @@ def test_meshes(data):
     if result is None:
         return
     assert result.shape == (binding.vertex_count, 3)
-    plain = sinew.Deformer(sinew.Binding(*plain_mesh(mesh)), method, mix)
+    plain = sinew.Deformer(sinew.Binding(*plain_mesh(mesh), LINEAR), method, mix)
     if moved:
         plain.set_rest_points(np.array(points[1], np.float32, order="C"))
     types = (np.float32, np.float32, np.float64)
@@ -563,7 +564,7 @@ def test_skinned_normals(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 5, 20])), data.draw(st.integers(1, 4))
     d = Draw(data.draw, 11)
     mesh = np.zeros((vertices, 3)), range(vertices + 1), np.arange(vertices) % bones, np.ones(vertices)
-    binding = sinew.Binding(*mesh)
+    binding = sinew.Binding(*mesh, vertex_data=LINEAR)
     frames = data.draw(st.sampled_from([vertices, 3 * vertices]))
     of_frames = None if frames == vertices else [i % vertices for i in range(frames)]
     given_data = [binding, d.array(frames, 3)[0], d.array(frames, 3, optional=True)[0]]
