@@ -150,7 +150,7 @@ for _version in ("3.11", "3.12", "3.13", "3.14"):
         if not is_current(wheel_of(version)):
             # CMake remembers the folder that a whole Blender's wheel takes the library from.
             env = {"SKBUILD_CMAKE_DEFINE": f"SINEW_BUILT={os.environ.get('SINEW_BUILT', '')}"}
-            words, start = "uv build --quiet --wheel --no-build-isolation --out-dir dist/wheels", time.time()
+            words, start = "uv build --wheel --no-build-isolation --out-dir dist/wheels", time.time()
             session.run_install(*words.split(), env=env, silent=True)
             # What changes meanwhile is newer.
             os.utime(wheel_of(version), (start, start))
@@ -352,13 +352,17 @@ def set_up(*sessions: str, options: str = "") -> None:
 
 def tell_uv_of_the_registry() -> None:
     """Has uv take packages from where pip takes them."""
-    names = {"index-url": "UV_DEFAULT_INDEX", "extra-index-url": "UV_INDEX", "find-links": "UV_FIND_LINKS"}
+    names = {"index-url": "UV_DEFAULT_INDEX", "extra-index-url": "UV_INDEX"}
     names |= {"trusted-host": "UV_INSECURE_HOST", "cert": "SSL_CERT_FILE"}
     listed = output_of(f"{sys.executable} -m pip config list")
     for name, value in re.findall(r"^[\w:]+\.([\w-]+)='(.*)'$", listed, re.MULTILINE):
+        words = value.replace("\\n", " ").split()
         if name in names:
-            joined = ("," if name == "find-links" else " ").join(value.replace("\\n", " ").split())
-            os.environ.setdefault(names[name], joined)
+            os.environ.setdefault(names[name], " ".join(words))
+        if name == "find-links":
+            # As pip, without folders that are not here, such as in a whole Blender's system.
+            found = [word for word in words if "://" in word or Path(word).exists()]
+            os.environ["UV_FIND_LINKS"] = ",".join(found)
     # As pip: the best of all, whichever registry has it.
     os.environ.setdefault("UV_INDEX_STRATEGY", "unsafe-best-match")
 
