@@ -84,11 +84,14 @@ std::unique_ptr<Solver> make(const ArrayLike& any_parents, const Effectors& any_
                              const OptionalArrayLike& locked, const OptionalArrayLike& limits,
                              const OptionalArrayLike& stiffness) {
     const auto parents = checked<std::int32_t>(any_parents, "parents", 1, "int32 [bones]");
-    if (!py::isinstance<py::sequence>(any_effectors)) {
+    // An array of no dimensions says that it is a sequence, too.
+    const auto items = py::reinterpret_steal<py::object>(PySequence_Fast(any_effectors.ptr(), ""));
+    if (!items) {
+        PyErr_Clear();
         fail("effectors", "a sequence of Effectors", describe(any_effectors));
     }
     std::vector<IkEffector> effectors;
-    for (const py::handle effector : any_effectors) effectors.push_back(checked_effector(effector));
+    for (const py::handle effector : items) effectors.push_back(checked_effector(effector));
     const Skeleton skeleton(as_span(parents));
     const std::size_t bone_count = skeleton.bone_count();
     const bool has_pole = effectors.size() == 1 && effectors[0].has_pole;

@@ -234,6 +234,7 @@ def test_poles_bend_to_their_side():
         ("effectors", lambda: ik.Solver([-1], [])),
         ("effectors", lambda: ik.Solver([-1], [ik.Effector(1)])),
         ("effectors", lambda: ik.Solver([-1], [ik.Effector(0, has_pole=np.zeros(2))])),
+        ("effectors", lambda: ik.Solver([-1], np.array({}, dtype=object))),
         ("weights", lambda: ik.Solver([-1], [ik.Effector(0, -1.0)])),
         ("parents", lambda: ik.Solver([0], [ik.Effector(0)])),
         ("limits", lambda: chain([-1, 0], limits=np.zeros((2, 3)))),
