@@ -19,7 +19,8 @@ IS_NEWEST = not os.environ.get("SINEW_NOT_NEWEST")
 RIGS = 100 if IS_NEWEST else 40
 FIRST = 0 if IS_NEWEST else RIGS * (10 * bpy.app.version[0] + bpy.app.version[1])
 # `./dev test` runs these many of them, `./dev test --all` the rest, too. Of fewer, one rig decides what share
-# of the vertices rounding leaves undecided: of the first 15 of 4.2 it is 15 %, of 25 it is 7 %, of 40 it is 5 %.
+# of the vertices rounding leaves undecided: of the first 15 of 4.2 it is 15 %, of 25 it is 7 %, and of 40 it
+# is 5 %.
 QUICK = 25
 
 
