@@ -106,7 +106,9 @@ class BlenderProcess:
 
     def run(self, task: dict, limits: Limits) -> dict:
         """Returns the outcome of the task. Raises BlenderLost; the process cannot be used any more then."""
-        *_reports, outcome = self.follow(task, limits)
+        self.send(task, limits)
+        while (outcome := self.poll()) is None:
+            wait_for_any([self])
         return outcome
 
     def follow(self, task: dict, limits: Limits) -> Iterator[dict]:
@@ -139,8 +141,8 @@ class BlenderProcess:
         """Returns the outcome of the task, or None while it is at work. Raises BlenderLost, and SinewError
         where it cannot be started; the process cannot be used any more then."""
         has_ended = False
-        while pipes.can_read(self._replies) and not has_ended:
-            received = os.read(self._replies.fileno(), 2**16)
+        while not has_ended and pipes.can_read(self.replies):
+            received = os.read(self.replies, 2**16)
             self._received += received
             has_ended = not received
         # A file that is done in time is kept.

@@ -150,8 +150,7 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
     nodes.show_in_editmode = False
     _show(nodes, False, False)
     # Not to the end of the stack, where the artist may have pinned other modifiers.
-    modifiers = list(obj.modifiers)
-    obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[-1]) + 1)
+    stack.move_behind(obj, nodes, run[-1])
     settings.had_animation = obj.animation_data is not None
     settings.method = method or method_of(run[0])
     properties.make_groups(settings)
@@ -559,12 +558,10 @@ def position_modifier(obj: bpy.types.Object) -> None:
     """Moves Sinew's modifier behind the Armature modifiers that it replaces: it sets each vertex to its point
     regardless of the modifiers before it. In front of them or between them, even one that is off would
     decide what a Multi Modifier mixes with."""
-    run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
+    run, nodes = stack.armature_modifiers(obj), sinew_modifier(obj)
     if nodes is None or not run:
         return
-    own, last = modifiers.index(nodes), modifiers.index(run[-1])
-    if own != last + 1:
-        obj.modifiers.move(own, last if own < last else last + 1)
+    stack.move_behind(obj, nodes, run[-1])
     undeformed.position(obj)
 
 

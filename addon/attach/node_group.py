@@ -38,7 +38,9 @@ _WARNING, _WARNING_USER = "Sinew Is Missing", "User of Sinew Is Missing"
 # Inputs that name a helper object, or an attribute where there is no helper.
 _HELPER_INPUTS = ("Points", "Upstream")
 
-# The inputs that say how undeformed.py marks the deformed mesh.
+# Blender's attribute of Add Rest Position, by which undeformed.py marks the deformed mesh.
+REST_POSITION = "rest_position"
+# The inputs that say whether it does, and which attribute is not needed behind.
 IS_MARKED, MARK_TO_REMOVE = "Is Marked", "Mark to Remove"
 _MARK_SOCKETS = {
     IS_MARKED: (
@@ -302,7 +304,7 @@ def _is_deformed(group: bpy.types.NodeTree, source: bpy.types.Node) -> bpy.types
         "FunctionNodeBooleanMath",
         "FunctionNodeBooleanMath",
     )
-    named.data_type, named.inputs["Name"].default_value = "FLOAT_VECTOR", "rest_position"
+    named.data_type, named.inputs["Name"].default_value = "FLOAT_VECTOR", REST_POSITION
     implied.operation, either.operation = "IMPLY", "OR"
     link = group.links.new
     link(source.outputs[IS_MARKED], implied.inputs[0])

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds Sinew's modifier, the Armature modifiers, and those before and behind them in an object's stack.
-Changes nothing."""
+"""Finds Sinew's modifier, the Armature modifiers, and those before and behind them in an object's stack."""
 
 from __future__ import annotations
 
@@ -122,6 +121,13 @@ def _deforms(modifier: bpy.types.Modifier) -> bool:
 
 def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
     return next((i for i, m in enumerate(obj.modifiers) if m == modifier), len(obj.modifiers))
+
+
+def move_behind(obj: bpy.types.Object, modifier: bpy.types.Modifier, other: bpy.types.Modifier) -> None:
+    """Moves a modifier directly behind another one, where it is not there."""
+    own, ahead = _index(obj, modifier), _index(obj, other)
+    if own != ahead + 1:
+        obj.modifiers.move(own, ahead if own < ahead else ahead + 1)
 
 
 def visibility_is_animated(obj: bpy.types.Object) -> bool:

@@ -18,9 +18,6 @@ import bpy
 from ..io import mesh_io
 from . import node_group, properties, stack
 
-# Blender's attribute of Add Rest Position.
-_REST_POSITION = "rest_position"
-
 
 def ensure(obj: bpy.types.Object) -> dict[str, object]:
     """Makes the modifier behind Sinew's, and returns inputs of Sinew's."""
@@ -29,7 +26,10 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
     position(obj)
     can_mark = _can_mark(obj)
     keeps = properties.of(obj).adds_rest_position or not can_mark
-    return {node_group.IS_MARKED: can_mark, node_group.MARK_TO_REMOVE: "" if keeps else _REST_POSITION}
+    return {
+        node_group.IS_MARKED: can_mark,
+        node_group.MARK_TO_REMOVE: "" if keeps else node_group.REST_POSITION,
+    }
 
 
 def _make(obj: bpy.types.Object) -> None:
@@ -46,12 +46,9 @@ def _make(obj: bpy.types.Object) -> None:
 
 def position(obj: bpy.types.Object) -> None:
     """Moves it directly behind Sinew's modifier."""
-    nodes, neutral, modifiers = stack.sinew_modifier(obj), stack.neutral_modifier(obj), list(obj.modifiers)
-    if nodes is None or neutral is None:
-        return
-    own, ahead = modifiers.index(neutral), modifiers.index(nodes)
-    if own != ahead + 1:
-        obj.modifiers.move(own, ahead if own < ahead else ahead + 1)
+    nodes, neutral = stack.sinew_modifier(obj), stack.neutral_modifier(obj)
+    if nodes is not None and neutral is not None:
+        stack.move_behind(obj, neutral, nodes)
 
 
 def mark(obj: bpy.types.Object, is_marked: bool) -> None:
@@ -69,7 +66,7 @@ def mark(obj: bpy.types.Object, is_marked: bool) -> None:
 
 def _can_mark(obj: bpy.types.Object) -> bool:
     # Blender's would replace one of the artist's.
-    return mesh_io.find_attribute(obj.data, _REST_POSITION) is None
+    return mesh_io.find_attribute(obj.data, node_group.REST_POSITION) is None
 
 
 def remove(obj: bpy.types.Object) -> None:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Waits for pipes of child processes without threads. select() takes no pipes on Windows."""
+"""Waits for pipes of child processes without threads; a pipe is a file descriptor. select() takes none on
+Windows."""
 
 from __future__ import annotations
 
 import sys
 import time
 from collections.abc import Sequence
-from typing import IO
 
 if sys.platform == "win32":
     import ctypes
@@ -16,9 +16,9 @@ if sys.platform == "win32":
     # Seconds between two looks.
     _PAUSE = 0.01
 
-    def can_read(pipe: IO[bytes] | int) -> bool:
+    def can_read(pipe: int) -> bool:
         """Whether reading does not wait: there are bytes, or the other end is closed."""
-        handle = msvcrt.get_osfhandle(pipe if isinstance(pipe, int) else pipe.fileno())
+        handle = msvcrt.get_osfhandle(pipe)
         count = wintypes.DWORD()
         peek = ctypes.windll.kernel32.PeekNamedPipe
         return not peek(wintypes.HANDLE(handle), None, 0, None, ctypes.byref(count), None) or count.value > 0
@@ -32,7 +32,7 @@ if sys.platform == "win32":
 else:
     import select
 
-    def can_read(pipe: IO[bytes] | int) -> bool:
+    def can_read(pipe: int) -> bool:
         """Whether reading does not wait: there are bytes, or the other end is closed."""
         # Not select(), which takes no descriptors from 1024 on.
         poll = select.poll()

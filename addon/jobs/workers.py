@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, TypeAlias
 
 import sinew
 
@@ -45,7 +45,6 @@ Steps: TypeAlias = Generator[BlenderProcess, None, dict]
 """Yields the Blender that is at work, for the caller to wait for it, and returns the outcome."""
 
 _engine = cache(default_engine)
-_Outcome = TypeVar("_Outcome")
 
 
 class _Blenders:
@@ -185,15 +184,14 @@ class _Running:
         self.go_on()
 
     def go_on(self) -> None:
-        def step() -> dict | None:
-            try:
-                self.blender = next(self._steps)
-            except StopIteration as end:
-                return end.value
-            return None
-
-        if self.outcome is None:
-            self.outcome = _outcome(self.task, step)
+        if self.outcome is not None:
+            return
+        try:
+            self.blender = next(self._steps)
+        except StopIteration as end:
+            self.outcome = end.value
+        except Exception as error:
+            self.outcome = _failure(self.task, error)
 
 
 def run_on_this_machine(
@@ -259,18 +257,19 @@ def run_in_dask(
             # workers.
             for future in distributed.as_completed(futures):
                 task = task_of[future.key]
-                yield task, _outcome(task, future.result)
+                try:
+                    outcome = future.result()
+                except Exception as error:
+                    outcome = _failure(task, error)
+                yield task, outcome
                 future.release()
         finally:
             client.cancel(futures)
             client.run(end_blenders)
 
 
-def _outcome(task: dict, result: Callable[[], _Outcome]) -> _Outcome | dict:
-    try:
-        return result()
-    except Exception as error:
-        return {"error": f"{task['source']}: {_sentence(error)}"}
+def _failure(task: dict, error: Exception) -> dict:
+    return {"error": f"{task['source']}: {_sentence(error)}"}
 
 
 def _warn_where_open(address: str, warn: Callable[[str], None]) -> None:
