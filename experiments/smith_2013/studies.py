@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import sinew
 
+from .fits import kabsch, walker
 from .tables import LAYOUTS
 
 CHAINS = 2000
 LENGTHS = (4, 16, 64, 256)
-# By representation: the method that solves for a change of coordinates.
-SOLVERS: dict[str, sinew.fit.Method] = {"affine": "kabsch", "quat_vec": "horn", "dual_quat": "walker"}
 # Where nlerp and slerp differ most, and near it; the second half of the interval is symmetric.
 TIMES = (0.1, 0.2, 0.3)
 
@@ -79,9 +78,15 @@ def fits(sets: int = CHAINS) -> dict[str, Spread]:
     source = random.normal(size=(sets, 12, 3))
     true = sinew.affine.from_axis_angle(random.normal(size=(sets, 3)), random.uniform(-np.pi, np.pi, sets))
     target = sinew.affine.transform_point(true[:, None], source) + 0.01 * random.normal(size=source.shape)
+    single = source.astype(np.float32), target.astype(np.float32)
+    double = [points.astype(np.float64) for points in single]
+    solved = {
+        "affine": kabsch(*double).astype(np.float32),
+        "quat_vec": sinew.fit.rigid(*single).transforms,
+        "dual_quat": walker(*double).astype(np.float32),
+    }
     found = {}
-    for name, solver in SOLVERS.items():
-        fit = sinew.fit.rigid(source.astype(np.float32), target.astype(np.float32), method=solver).transforms
+    for name, fit in solved.items():
         exact = fit.astype(np.float64)
         matrices = exact if name == "affine" else LAYOUTS[name].to_affine(exact)
         matrices = sinew.affine.normalized(matrices)

@@ -62,9 +62,8 @@ Rows<T, T> checked_weights(const py::object& value, const char* argument, py::ss
     return rows;
 }
 
-template <class Method, class T>
+template <class T>
 py::object fit_items(const std::array<py::object, 6>& values) {
-    using Transform = typename Method::template Transform<T>;
     const auto source = checked_rows<T, Vec3<T>>(values[0], "source");
     const auto target = checked_rows<T, Vec3<T>>(values[1], "target", source.count);
     const auto weights = checked_weights<T>(values[2], "weights", source.count);
@@ -81,7 +80,7 @@ py::object fit_items(const std::array<py::object, 6>& values) {
         source.input,           target.input, weights.input, source_directions.input, target_directions.input,
         direction_weights.input};
     const Shape common = broadcast(std::span<Input<T>>(inputs));
-    Output<Named<"RigidFit", Transform, T, bool, bool>> output(common);
+    Output<Named<"RigidFit", QuatVec<T>, T, bool, bool>> output(common);
     const py::ssize_t count = count_of(common);
     without_gil([&] {
         const auto rows = [&]<class Value>(const Rows<T, Value>& of, std::size_t index, py::ssize_t item) {
@@ -94,7 +93,7 @@ py::object fit_items(const std::array<py::object, 6>& values) {
             const auto c = rows(source_directions, 3, i);
             const auto d = rows(target_directions, 4, i);
             const auto v = rows(direction_weights, 5, i);
-            const auto fit = Method::fit(Pairs<T>{a, b, w, c, d, v});
+            const auto fit = fit_rigid(Pairs<T>{a, b, w, c, d, v});
             output.write(i, {fit.transform, fit.error, fit.is_defined, fit.is_mirrored});
         }
     });
@@ -104,15 +103,12 @@ py::object fit_items(const std::array<py::object, 6>& values) {
 NamedTuple<"RigidFit"> rigid(const ArrayLike& source, const ArrayLike& target,
                              const OptionalArrayLike& weights, const OptionalArrayLike& source_directions,
                              const OptionalArrayLike& target_directions,
-                             const OptionalArrayLike& direction_weights,
-                             const Typed<"sinew.fit.Method">& method) {
+                             const OptionalArrayLike& direction_weights) {
     const auto values = promoted<6>(
         {"source", "target", "weights", "source_directions", "target_directions", "direction_weights"},
         {source, target, weights, source_directions, target_directions, direction_weights});
-    return with_row<RigidFits>(method, "method", [&]<class Method>(Method) {
-        return with_element(values[0], "source", Item<Vec3<double>>::kShape,
-                            [&]<class T>(T) { return fit_items<Method, T>(values); });
-    });
+    return with_element(values[0], "source", Item<Vec3<double>>::kShape,
+                        [&]<class T>(T) { return fit_items<T>(values); });
 }
 
 template <class Transform, class T>
@@ -207,10 +203,9 @@ NamedTuple<"Averaged"> average_poses(const ArrayLike& any_poses, const OptionalA
 
 void bind_fit(py::module_& m) {
     auto fit = m.def_submodule("fit");
-    fit.attr("METHODS") = names_in_python(names_of(RigidFits{}));
     fit.def("rigid", &rigid, "source"_a, "target"_a, "weights"_a = py::none(), py::kw_only(),
             "source_directions"_a = py::none(), "target_directions"_a = py::none(),
-            "direction_weights"_a = py::none(), "method"_a = "horn",
+            "direction_weights"_a = py::none(),
             R"(The rigid transform that maps `source` to `target` with the smallest weighted sum of squared
 distances.
 
@@ -220,11 +215,8 @@ source_directions, target_directions: [.., m, 3], or None. Any length, which is 
     either has length 0 does not count.
 direction_weights: [.., m], not negative; None: 1 each. A direction counts as a point at distance 1 from the
     middle, so its weight is in squares of lengths.
-method: one of METHODS. All minimise the same squares and differ only by rounding.
 
-kabsch  layout affine     singular value decomposition of the covariance (Kabsch 1976; Umeyama 1991)
-horn    layout quat_vec   eigenvector of a 4x4 matrix (Horn 1987)
-walker  layout dual_quat  rotation and translation at once (Walker, Shao, Volz 1991)
+The result is in the layout of sinew.quat_vec. Its rotation is an eigenvector of a 4x4 matrix (Horn 1987).
 
 Not defined: points on one line or all in one position, a mirror image with a symmetry, no positive weight
 (the identity). For points in a plane the fit is defined. is_mirrored: a mirror image would fit better; the

@@ -12,24 +12,18 @@ constexpr std::array<std::string_view, sizeof...(Rows)> names_of(const std::tupl
     return {Rows::name...};
 }
 
-/// Calls f(Row{}) for the row of the list that is called `name`. ValueError for another name, TypeError if it is no
+/// Calls f(Method{}) for the interpolation that is called `method`. ValueError for another name, TypeError if it is no
 /// str.
-template <class Rows, class F>
-py::object with_row(const py::object& name, const char* argument, F f) {
-    const std::size_t found = checked_choice(name, argument, names_of(Rows{}));
+template <class F>
+py::object with_method(const py::object& method, F f) {
+    const std::size_t found = checked_choice(method, "method", names_of(Interpolations{}));
     py::object result;
     std::size_t index = 0;
     const auto try_row = [&](auto row) {
         if (index++ == found) result = f(row);
     };
-    std::apply([&](auto... row) { (try_row(row), ...); }, Rows{});
+    std::apply([&](auto... row) { (try_row(row), ...); }, Interpolations{});
     return result;
-}
-
-/// The same for methods of interpolation.
-template <class F>
-py::object with_method(const py::object& method, F f) {
-    return with_row<Interpolations>(method, "method", f);
 }
 
 template <template <class> class X>

@@ -22,7 +22,6 @@ METHODS = {
     "interpolate.between": sinew.interpolate.METHODS,
     "interpolate.blend": sinew.interpolate.METHODS,
     "spline.catmull_rom": sinew.interpolate.METHODS,
-    "fit.rigid": sinew.fit.METHODS,
 }
 CHECKS = {**exact_transforms.CHECKS, **exact_interpolation.CHECKS, **exact_fits.CHECKS}
 

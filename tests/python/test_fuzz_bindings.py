@@ -330,13 +330,12 @@ def fit_calls(draw):
     d = Draw(draw, 8)
     weights = d.array(count, optional=True)
     if draw(st.booleans()):
-        solver = d.one(st.sampled_from(sinew.fit.METHODS)), None
         directions = [(None, None)] * 3
         if draw(st.booleans()):
             directions = [d.array(count, 3), d.array(count, 3), (None, None)]
-        keywords = ("source_directions", "target_directions", "direction_weights", "method")
+        keywords = ("source_directions", "target_directions", "direction_weights")
         rigid = by_position(sinew.fit.rigid, *keywords)
-        return rigid, [d.array(count, 3), d.array(count, 3), weights, *directions, solver]
+        return rigid, [d.array(count, 3), d.array(count, 3), weights, *directions]
     poses = d.array(count, *KINDS[layout])
     if draw(st.booleans()):
         return sinew.fit.hand_eye, [poses, d.array(count, *KINDS[layout]), weights]

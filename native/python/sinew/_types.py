@@ -43,7 +43,7 @@ class Blended(NamedTuple, Generic[Float]):
 
 
 class RigidFit(NamedTuple, Generic[Float]):
-    """transforms: target_from_source, in the layout of the method; error [..]: the root of the weighted
+    """transforms: target_from_source, in the layout of sinew.quat_vec; error [..]: the root of the weighted
     mean of the remaining squared distances; is_defined, is_mirrored: bool [..]."""
 
     transforms: NDArray[Float]

@@ -6,14 +6,7 @@ numpy. All computation is in float64. `is_defined` says whether the result is th
 one of the best, finite. Negative weights are refused.
 """
 
-from typing import Final, Literal
-
-from ._native import fit as _native
 from ._native.fit import average, hand_eye, rigid
 from ._types import Averaged, HandEye, RigidFit
 
-__all__ = ["METHODS", "Averaged", "HandEye", "Method", "RigidFit", "average", "hand_eye", "rigid"]
-
-Method = Literal["kabsch", "horn", "walker"]
-
-METHODS: Final[tuple[Method, ...]] = _native.METHODS
+__all__ = ["Averaged", "HandEye", "RigidFit", "average", "hand_eye", "rigid"]

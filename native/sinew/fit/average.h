@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "sinew/fit/rigid.h"
 #include "sinew/interpolate/dual.h"
-#include "sinew/transform/nearest_rotation.h"
 #include "sinew/transform/rigid_distance.h"
 
 namespace sinew {
@@ -40,12 +40,10 @@ template <class T>
 [[nodiscard]] Poses poses_of(std::span<const DualQuat<T>> poses, std::span<const T> weights) {
     Poses result;
     double largest = 0.0;
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-        largest = std::max(largest, weights.empty() ? 1.0 : static_cast<double>(weights[i]));
-    }
+    for (std::size_t i = 0; i < poses.size(); ++i) largest = std::max(largest, weight_at(weights, i));
     double sum = 0.0;
     for (std::size_t i = 0; i < poses.size(); ++i) {
-        const double weight = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+        const double weight = weight_at(weights, i);
         if (!(weight > 0.0)) continue;
         result.poses.push_back(normalized(cast<double>(poses[i])));
         result.weights.push_back(weight / largest);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <span>
 
+#include "sinew/fit/rigid.h"
 #include "sinew/fit/singular_values.h"
 #include "sinew/interpolate/blended.h"
 #include "sinew/transform/rigid_distance.h"
@@ -117,7 +118,7 @@ template <class T>
                                                 const DualQuat<double>* known) noexcept {
     Triangle rows;
     for (std::size_t i = 0; i < a.size(); ++i) {
-        const double weight = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+        const double weight = weight_at(weights, i);
         if (!(weight > 0.0)) continue;
         DualQuat<double> from = with_lengths_divided(a[i], length);
         DualQuat<double> onto = with_lengths_divided(b[i], length);
@@ -146,7 +147,7 @@ template <class T>
     Mat3<double> normal(0.0);
     Vec3<double> residual(0.0);
     for (std::size_t i = 0; i < a.size(); ++i) {
-        const double weight = (weights.empty() ? 1.0 : static_cast<double>(weights[i])) / largest_weight;
+        const double weight = weight_at(weights, i) / largest_weight;
         if (!(weight > 0.0)) continue;
         const DualQuat<double> from = with_lengths_divided(a[i], length);
         const DualQuat<double> onto = with_lengths_divided(b[i], length);
@@ -191,7 +192,7 @@ template <class T>
     double length = 0.0;
     double largest_weight = 0.0;
     for (std::size_t i = 0; i < a.size(); ++i) {
-        const double weight = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+        const double weight = detail::weight_at(weights, i);
         if (!(weight > 0.0)) continue;
         largest_weight = std::max(largest_weight, weight);
         length = std::max({length, safe_length(translation(normalized(cast<double>(a[i])))),
@@ -215,7 +216,7 @@ template <class T>
     double distances = 0.0;
     double sum = 0.0;
     for (std::size_t i = 0; i < a.size(); ++i) {
-        const double weight = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+        const double weight = detail::weight_at(weights, i);
         if (!(weight > 0.0)) continue;
         const double share = weight / largest_weight;
         const RigidDistance<double> off =

@@ -1,157 +1,206 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
-#include <string_view>
-#include <tuple>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
 
-#include "sinew/fit/pairs.h"
-#include "sinew/fit/singular_values.h"
+#include "sinew/transform/convert.h"
 #include "sinew/transform/nearest_rotation.h"
 
 namespace sinew {
 
-// Fits the rigid transform from a source to a target, with one solver for each representation: a type with a
-// name, its Transform, and fit(pairs). All minimise the same squares and differ only by rounding. Sums are in
-// double, with coordinates relative to the middle of the points; nothing is allocated.
-
-/// Rotation from the singular value decomposition of the covariance, translation between the middles (Kabsch
-/// 1976, 1978; Umeyama 1991 for mirrors).
-struct Kabsch {
-    static constexpr std::string_view name = "kabsch";
-    template <class T>
-    using Transform = Affine<T>;
-
-    template <class T>
-    [[nodiscard]] static Fitted<Affine<T>, T> fit(const Pairs<T>& pairs) noexcept {
-        const detail::PairMoments m = detail::moments_of(pairs);
-        Columns<3> covariance{};
-        for (std::size_t i = 0; i < 3; ++i) {
-            const Vec3<double>& column = m.covariance[static_cast<int>(i)];
-            covariance[i] = {column.x, column.y, column.z};
-        }
-        const SingularValues<3> s = singular_values<3>(covariance);
-        const auto vector = [](const std::array<double, 3>& a) { return Vec3<double>(a[0], a[1], a[2]); };
-        // The third axes are cross products, so both are rotations and the last value has the sign of the
-        // determinant.
-        const Mat3<double> v(vector(s.v[0]), vector(s.v[1]), glm::cross(vector(s.v[0]), vector(s.v[1])));
-        const Vec3<double> u0 = unit(vector(s.scaled[0]), v[0]);
-        const Vec3<double> across = vector(s.scaled[1]) - u0 * glm::dot(u0, vector(s.scaled[1]));
-        const bool is_line = s.values[1] <= 8.0 * std::numeric_limits<double>::epsilon() * s.values[0];
-        const Vec3<double> u1 = is_line ? beside(u0, v[0], v[1]) : unit(across, v[1]);
-        const Mat3<double> u(u0, u1, glm::cross(u0, u1));
-        const double last = glm::dot(u[2], m.covariance * v[2]);
-        const Quat<double> rotation = to_quat(u * glm::transpose(v));
-        const Vec3<double> translation = m.target_middle - rotate(rotation, m.source_middle);
-        return detail::rounded<Affine<T>, T>(
-            detail::judged(pairs, m, {rotation, translation}, s.values[1] + last));
-    }
-
-private:
-    /// A direction perpendicular to `u0`: the image of `v1` under the shortest rotation from `v0` to `u0`.
-    [[nodiscard]] static Vec3<double> beside(const Vec3<double>& u0, const Vec3<double>& v0,
-                                             const Vec3<double>& v1) noexcept {
-        const Vec3<double> sum = u0 + v0;
-        const double square = glm::dot(sum, sum);
-        // Opposite: rotates by 180 degrees about v1.
-        if (square < 1e-12) return v1;
-        return unit(v1 - (2.0 * glm::dot(sum, v1) / square) * sum, v1);
-    }
+/// Points and directions of a source, and the points and directions of a target that a rigid transform should map
+/// them to.
+///
+/// source, target                        [n] points, finite
+/// weights                               [n] of points, not negative; empty: 1 each
+/// source_directions, target_directions  [m] of any length, which is ignored; a pair in which either has length 0
+///                                       does not count
+/// direction_weights                     [m] not negative; empty: 1 each. A direction counts as a point at
+///                                       distance 1 from the middle, so its weight is in squares of lengths
+template <class T>
+struct Pairs {
+    std::span<const Vec3<T>> source{};
+    std::span<const Vec3<T>> target{};
+    std::span<const T> weights{};
+    std::span<const Vec3<T>> source_directions{};
+    std::span<const Vec3<T>> target_directions{};
+    std::span<const T> direction_weights{};
 };
 
-/// Rotation as an eigenvector of a symmetric 4x4 matrix, translation between the middles (Horn 1987).
-struct Horn {
-    static constexpr std::string_view name = "horn";
-    template <class T>
-    using Transform = QuatVec<T>;
-
-    template <class T>
-    [[nodiscard]] static Fitted<QuatVec<T>, T> fit(const Pairs<T>& pairs) noexcept {
-        const detail::PairMoments m = detail::moments_of(pairs);
-        const NearestRotation<double> nearest = nearest_rotation(m.covariance);
-        const Vec3<double> translation = m.target_middle - rotate(nearest.rotation, m.source_middle);
-        return detail::rounded<QuatVec<T>, T>(
-            detail::judged(pairs, m, {nearest.rotation, translation}, 0.5 * nearest.gap));
-    }
+/// The result of fit_rigid().
+///
+/// transform    target_from_source: minimises the weighted sum of squared distances
+/// error        the root of the weighted mean of the remaining squared distances, of points and directions
+/// is_defined   false if other rotations are equally good to within rounding of T: points on one line or all in
+///              one position, a mirror image with a symmetry, no positive weight. The transform is then one of
+///              the best, finite; without positive weights the identity
+/// is_mirrored  a mirror image would fit better, by more than rounding
+template <class T>
+struct RigidFit {
+    QuatVec<T> transform;
+    T error = T(0);
+    bool is_defined = true;
+    bool is_mirrored = false;
 };
 
-/// Rotation and translation at once, as a dual quaternion r + e s (Walker, Shao, Volz 1991). The squared distance
-/// of a pair is |q r - r p - 2 s|^2, whose argument is linear in r and s. The best s is linear in r, and r is an
-/// eigenvector.
-struct Walker {
-    static constexpr std::string_view name = "walker";
-    template <class T>
-    using Transform = DualQuat<T>;
+namespace detail {
 
-    template <class T>
-    [[nodiscard]] static Fitted<DualQuat<T>, T> fit(const Pairs<T>& pairs) noexcept {
-        using glm::transpose;
-        const detail::PairMoments m = detail::moments_of(pairs);
-        // Relative to the first pair: sums of coordinates far from the origin would cancel.
-        bool has_origin = false;
-        Vec3<double> source_origin(0.0);
-        Vec3<double> target_origin(0.0);
-        Mat4 squares(0.0);
-        Mat4 sum(0.0);
-        detail::for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
-            if (!has_origin) {
-                has_origin = true;
-                source_origin = source;
-                target_origin = target;
-            }
-            const Mat4 row =
-                difference((target - target_origin) / m.scale, (source - source_origin) / m.scale);
-            sum += weight / m.largest_weight * row;
-            squares += weight / m.largest_weight * (transpose(row) * row);
-        });
-        detail::for_directions(
-            pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
-                const Mat4 row = difference(target, source);
-                squares += weight / m.largest_weight / m.scale / m.scale * (transpose(row) * row);
-            });
-        if (m.weight > 0.0) squares -= transpose(sum) * sum / m.weight;
-
-        detail::Mat4Rows<double> k{};
-        detail::Mat4Rows<double> vectors{};
-        for (std::size_t i = 0; i < 4; ++i) {
-            vectors[i][i] = 1.0;
-            for (std::size_t j = 0; j < 4; ++j) k[i][j] = squares[static_cast<int>(j)][static_cast<int>(i)];
-        }
-        detail::jacobi(k, vectors);
-        std::size_t best = 0;
-        for (std::size_t i = 1; i < 4; ++i) {
-            if (k[i][i] < k[best][best]) best = i;
-        }
-        double second = std::numeric_limits<double>::infinity();
-        for (std::size_t i = 0; i < 4; ++i) {
-            if (i != best) second = std::min(second, k[i][i]);
-        }
-        const glm::dvec4 r(vectors[0][best], vectors[1][best], vectors[2][best], vectors[3][best]);
-        const glm::dvec4 s = m.weight > 0.0 ? sum * r * (0.5 * m.scale / m.weight) : glm::dvec4(0.0);
-        const DualQuat<double> about_origins = normalized(
-            DualQuat<double>{Quat<double>(r[0], r[1], r[2], r[3]), Quat<double>(s[0], s[1], s[2], s[3])});
-        const QuatVec<double> local = to_quat_vec(r[0] < 0.0 ? -about_origins : about_origins);
-        const QuatVec<double> fit{local.rotation,
-                                  local.translation + target_origin - rotate(local.rotation, source_origin)};
-        return detail::rounded<DualQuat<T>, T>(
-            detail::judged(pairs, m, fit, 0.25 * (second - k[best][best])));
-    }
-
-private:
-    using Mat4 = glm::dmat4;
-
-    /// The antisymmetric matrix that maps a quaternion r to q r - r p.
-    [[nodiscard]] static Mat4 difference(const Vec3<double>& q, const Vec3<double>& p) noexcept {
-        const Vec3<double> d = q - p;
-        const Vec3<double> c = q + p;
-        return Mat4(0.0, d.x, d.y, d.z,     //
-                    -d.x, 0.0, c.z, -c.y,   //
-                    -d.y, -c.z, 0.0, c.x,   //
-                    -d.z, c.y, -c.x, 0.0);  //
-    }
+/// Sums over pairs, in double. Coordinates are relative to the two middles and divided by `scale`; weights are
+/// divided by the largest.
+struct PairMoments {
+    Vec3<double> source_middle{0.0};
+    Vec3<double> target_middle{0.0};
+    double scale = 1.0;
+    double weight = 0.0;            ///< of all points
+    double direction_weight = 0.0;  ///< of all directions that count
+    Mat3<double> covariance{0.0};   ///< the weighted sum of target source^T
+    double size = 0.0;              ///< upper bound of the singular values of `covariance`
+    /// contribution of the input's rounding errors to a direction without extent
+    double noise = 0.0;
+    double largest_weight = 1.0;
 };
 
-/// All solvers. The Python package and the tests read this list.
-using RigidFits = std::tuple<Kabsch, Horn, Walker>;
+template <class T>
+[[nodiscard]] double weight_at(std::span<const T> weights, std::size_t i) noexcept {
+    return weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+}
+
+inline double largest_component(const Vec3<double>& v) noexcept {
+    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// Calls f(source, target, weight) for each pair of points with positive weight.
+template <class T, class F>
+void for_points(const Pairs<T>& pairs, F f) noexcept {
+    assert(pairs.source.size() == pairs.target.size());
+    for (std::size_t i = 0; i < pairs.source.size(); ++i) {
+        const double weight = weight_at(pairs.weights, i);
+        if (weight > 0.0) f(Vec3<double>(pairs.source[i]), Vec3<double>(pairs.target[i]), weight);
+    }
+}
+
+/// Calls f(source, target, weight) for each pair of directions that counts, normalised.
+template <class T, class F>
+void for_directions(const Pairs<T>& pairs, F f) noexcept {
+    assert(pairs.source_directions.size() == pairs.target_directions.size());
+    const Vec3<double> none(0.0);
+    for (std::size_t i = 0; i < pairs.source_directions.size(); ++i) {
+        const double weight = weight_at(pairs.direction_weights, i);
+        const Vec3<double> source = unit(Vec3<double>(pairs.source_directions[i]), none);
+        const Vec3<double> target = unit(Vec3<double>(pairs.target_directions[i]), none);
+        if (weight > 0.0 && source != none && target != none) f(source, target, weight);
+    }
+}
+
+template <class T>
+[[nodiscard]] PairMoments moments_of(const Pairs<T>& pairs) noexcept {
+    PairMoments m;
+    double largest = 0.0;
+    const auto note_weight = [&](const auto&, const auto&, double weight) {
+        largest = std::max(largest, weight);
+    };
+    for_points(pairs, note_weight);
+    for_directions(pairs, note_weight);
+    if (!(largest > 0.0)) return m;
+    m.largest_weight = largest;
+
+    for_points(pairs, [&](const auto&, const auto&, double weight) { m.weight += weight / largest; });
+    double reach = 0.0;
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        const double share = weight / largest / m.weight;
+        m.source_middle += share * source;
+        m.target_middle += share * target;
+        reach = std::max({reach, largest_component(source), largest_component(target)});
+    });
+    double extent = 0.0;
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double) {
+        extent = std::max({extent, largest_component(source - m.source_middle),
+                           largest_component(target - m.target_middle)});
+    });
+    bool has_directions = false;
+    for_directions(pairs, [&](const auto&, const auto&, double) { has_directions = true; });
+    if (has_directions) extent = std::max(extent, 1.0);
+    if (extent > 0.0) m.scale = extent;
+
+    double source_square = 0.0;
+    double target_square = 0.0;
+    const auto add = [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        m.covariance += weight * glm::outerProduct(target, source);
+        source_square += weight * glm::dot(source, source);
+        target_square += weight * glm::dot(target, target);
+    };
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        add((source - m.source_middle) / m.scale, (target - m.target_middle) / m.scale, weight / largest);
+    });
+    for_directions(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        m.direction_weight += weight / largest;
+        add(source, target, weight / largest / m.scale / m.scale);
+    });
+    m.size = std::sqrt(source_square) * std::sqrt(target_square);
+    // Coordinates are precise to half a unit in their last digit; a factor of eight leaves room for earlier
+    // errors.
+    const double rounding = 8.0 * std::numeric_limits<T>::epsilon();
+    m.noise = m.weight * std::pow(rounding * reach / m.scale, 2) +
+              m.direction_weight * std::pow(rounding / m.scale, 2);
+    return m;
+}
+
+/// The fit with this transform. `gap` is the sum of the two smaller singular values of the covariance, the last of
+/// them negative if the covariance mirrors.
+template <class T>
+[[nodiscard]] RigidFit<T> judged(const Pairs<T>& pairs, const PairMoments& m, const QuatVec<double>& fit,
+                                 double gap) noexcept {
+    double square = 0.0;
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        const Vec3<double> off = (transform_point(fit, source) - target) / m.scale;
+        square += weight / m.largest_weight * glm::dot(off, off);
+    });
+    for_directions(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        const Vec3<double> off = (rotate(fit.rotation, source) - target) / m.scale;
+        square += weight / m.largest_weight * glm::dot(off, off);
+    });
+    const double weight = m.weight + m.direction_weight;
+    if (!(weight > 0.0) || (m.weight == 0.0 && !pairs.source.empty())) return {{}, T(0), false, false};
+    RigidFit<T> result{cast<T>(fit), static_cast<T>(m.scale * std::sqrt(square / weight))};
+    if (!std::isfinite(glm::dot(glm::abs(result.transform.translation), Vec3<T>(T(1) / T(4)))) ||
+        !std::isfinite(result.error)) {
+        return {{}, T(0), false, false};
+    }
+
+    // The smallest singular value with its sign, from its sum and its product with the second.
+    const Mat3<double> aligned = glm::transpose(to_mat3(fit.rotation)) * m.covariance;
+    const double first = aligned[0][0] + aligned[1][1] + aligned[2][2] - gap;
+    double product = first > 0.0 ? glm::determinant(m.covariance) / first : 0.0;
+    // For points on a line the determinant is only a rounding error, which the root below would make large.
+    const double rounding = 8.0 * std::numeric_limits<double>::epsilon() * std::pow(m.size, 3);
+    if (product < 0.0) product = std::min(product + rounding / first, 0.0);
+    const double root = std::sqrt(std::max(gap * gap - 4.0 * product, 0.0));
+    const double last = gap + root > 0.0 ? 2.0 * product / (gap + root) : 0.0;
+    const double first_order = 8.0 * std::numeric_limits<T>::epsilon() * m.size;
+    const double second_order = 64.0 * std::numeric_limits<double>::epsilon() * m.size + m.noise;
+    result.is_mirrored = last < -first_order - m.noise;
+    // If it mirrors, the gap is a difference, and rounding counts in full; otherwise it is a sum of squared
+    // extents.
+    result.is_defined = gap > second_order + (last < -second_order ? first_order : 0.0);
+    return result;
+}
+
+}  // namespace detail
+
+/// The rigid transform from a source to a target: the rotation as an eigenvector of a symmetric 4x4 matrix, the
+/// translation between the middles (Horn 1987). Sums are in double, with coordinates relative to the middle of the
+/// points; nothing is allocated.
+template <class T>
+[[nodiscard]] RigidFit<T> fit_rigid(const Pairs<T>& pairs) noexcept {
+    const detail::PairMoments m = detail::moments_of(pairs);
+    const NearestRotation<double> nearest = nearest_rotation(m.covariance);
+    const Vec3<double> translation = m.target_middle - rotate(nearest.rotation, m.source_middle);
+    return detail::judged(pairs, m, {nearest.rotation, translation}, 0.5 * nearest.gap);
+}
 
 }  // namespace sinew

@@ -1,9 +1,8 @@
 from __future__ import annotations
 import numpy.typing
 import sinew._types
-import sinew.fit
 import typing
-__all__: list[str] = ['METHODS', 'average', 'hand_eye', 'rigid']
+__all__: list[str] = ['average', 'hand_eye', 'rigid']
 def average(poses: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike | None = None, *, robust: bool = False) -> sinew._types.Averaged[typing.Any]:
     """
     The mean of n poses, in their layout. Signs of quaternions and the order do not matter.
@@ -39,7 +38,7 @@ def hand_eye(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, weights: nump
     Not defined: fewer than two motions, rotations only about parallel axes, only rotations by 180 degrees, no
     positive weight.
     """
-def rigid(source: numpy.typing.ArrayLike, target: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike | None = None, *, source_directions: numpy.typing.ArrayLike | None = None, target_directions: numpy.typing.ArrayLike | None = None, direction_weights: numpy.typing.ArrayLike | None = None, method: sinew.fit.Method = 'horn') -> sinew._types.RigidFit[typing.Any]:
+def rigid(source: numpy.typing.ArrayLike, target: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike | None = None, *, source_directions: numpy.typing.ArrayLike | None = None, target_directions: numpy.typing.ArrayLike | None = None, direction_weights: numpy.typing.ArrayLike | None = None) -> sinew._types.RigidFit[typing.Any]:
     """
     The rigid transform that maps `source` to `target` with the smallest weighted sum of squared
     distances.
@@ -50,14 +49,10 @@ def rigid(source: numpy.typing.ArrayLike, target: numpy.typing.ArrayLike, weight
         either has length 0 does not count.
     direction_weights: [.., m], not negative; None: 1 each. A direction counts as a point at distance 1 from the
         middle, so its weight is in squares of lengths.
-    method: one of METHODS. All minimise the same squares and differ only by rounding.
 
-    kabsch  layout affine     singular value decomposition of the covariance (Kabsch 1976; Umeyama 1991)
-    horn    layout quat_vec   eigenvector of a 4x4 matrix (Horn 1987)
-    walker  layout dual_quat  rotation and translation at once (Walker, Shao, Volz 1991)
+    The result is in the layout of sinew.quat_vec. Its rotation is an eigenvector of a 4x4 matrix (Horn 1987).
 
     Not defined: points on one line or all in one position, a mirror image with a symmetry, no positive weight
     (the identity). For points in a plane the fit is defined. is_mirrored: a mirror image would fit better; the
     result is still the best rotation.
     """
-METHODS: tuple = ('kabsch', 'horn', 'walker')
