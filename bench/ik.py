@@ -16,6 +16,7 @@ import matplotlib
 import numpy as np
 import sinew
 import sinew_addon
+from sinew import affine, quat
 from sinew_addon.core import ik as core
 from sinew_addon.io import ik_io
 
@@ -65,6 +66,14 @@ def make_chains(bones: int, kind: str, count: int) -> tuple[bpy.types.Object, li
                 setattr(bone, f"ik_min_{axis}", least)
                 setattr(bone, f"ik_max_{axis}", largest)
     return armature, targets
+
+
+def angular_acceleration(matrices: np.ndarray) -> float:
+    """Root mean square over frames and bones of the second difference of rotations, radians per frame squared;
+    matrices [frames, bones, 4, 4]."""
+    rotations = affine.to_quat_vec(affine.normalized(matrices.astype(float)))[..., :4]
+    steps = quat.to_rotation_vector(quat.compose(rotations[1:], quat.conjugate(rotations[:-1])))
+    return float(np.sqrt((np.diff(steps, axis=0) ** 2).sum(axis=-1).mean()))
 
 
 def place_targets(targets: list, bones: int, rng: np.random.Generator) -> None:
@@ -173,7 +182,7 @@ def animated(bones: int, kind: str) -> dict:
     return {
         solver: {
             "errors": core.tip_errors(tree, problem, of).tolist(),
-            "acceleration": core.angular_acceleration(of),
+            "acceleration": angular_acceleration(of),
         }
         for solver, of in matrices.items()
     }

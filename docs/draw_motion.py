@@ -19,8 +19,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from sinew import affine, quat_vec
 from sinew_addon.core.inbetween import Poses
-from sinew_addon.core.motion import measure
-from sinew_addon.core.motion.blend import ARMATURE, KEYED, Blend, Settings, blend
+from sinew_addon.core.motion.blend import KEYED, Blend, Settings, blend
 from sinew_addon.core.motion.clip import Clip, Rig
 from sinew_addon.core.plots import COLOURS
 
@@ -44,7 +43,7 @@ def arm_rig() -> Rig:
     """A chain along Y."""
     rest = np.array([[1.0, 0, 0, 0, 0, length, 0] for length in (0.0, *LENGTHS[:-1])])
     names, parents = ("upper arm", "forearm", "hand"), np.array([-1, 0, 1])
-    return Rig(names, parents, rest, np.array(LENGTHS), parents >= 0)
+    return Rig(names, parents, rest, np.array(LENGTHS))
 
 
 def arm_poses(rig: Rig) -> tuple[Clip, Clip]:
@@ -138,11 +137,11 @@ def draw_arms(path: Path) -> None:
                     corners[order][:, :, 1:], facecolors=colours, edgecolors=colours, linewidths=0.4
                 )
             )
-            least = measure.shrinking(made)
+            volume, bone, _frame = made.smallest()
             text = ("the first clip", "the second")[int(share)] if share in (0.0, 1.0) else f"{share:.0%}"
-            if least.volume < 0.99:
-                text += f"\nhand: {max(least.volume, 0.0):.0%}"
-                print(f"{method} at {share:.0%}: {least.bone} has {least.volume:.1%} of its volume")
+            if volume < 0.99:
+                text += f"\nhand: {max(volume, 0.0):.0%}"
+                print(f"{method} at {share:.0%}: {bone} has {volume:.1%} of its volume")
             axes.text(apart * number + 0.6, -2.35, text, ha="center", va="top", fontsize=9)
         axes.set(xlim=(-0.6, apart * len(shares)), ylim=(-2.75, 2.0), aspect="equal")
         axes.set_title(method, loc="left", fontsize=12, fontweight="bold")
@@ -160,8 +159,6 @@ def pair() -> tuple[Clip, Clip]:
 
 def draw_sliding(path: Path) -> None:
     walk, run = pair()
-    up = walks.UP
-    feet = measure.bones_named(walk, ["foot.L", "foot.R"])
     made = {
         "aligned": blend([walk, run], (1, 1), Settings(cycles=2)),
         "not aligned": blend([walk, run], (1, 1), Settings(cycles=2, align=False)),
@@ -169,15 +166,15 @@ def draw_sliding(path: Path) -> None:
     figure, (first, second, third) = plt.subplots(1, 3, figsize=(12.6, 3.5), layout="constrained")
     for number, (name, each) in enumerate(made.items()):
         clip = each.clip(name)
-        height = clip.rig.points(clip.rig.to_armature(clip.poses.rigid))[:, feet[0], 0, 2]
-        steps, on_ground = measure.sliding(clip, feet, up)
+        height = clip.rig.points(clip.rig.to_armature(clip.poses.rigid))[:, clip.rig.index("foot.L"), 0, 2]
+        steps, on_ground = walks.sliding(clip)
         frames = np.arange(len(height))
         first.plot(frames, height - walks.ANKLE, color=COLOURS[number], label=name)
         slide = np.where(on_ground[:, 0] > 0.05, steps[:, 0], np.nan)
         second.plot(frames[1:] - 0.5, slide, color=COLOURS[number], marker=".", label=name)
-        print(f"{name:12} {measure.measure(clip, feet, 0, up, 24.0)}")
+        print(f"{name:12} {walks.mean_sliding(clip):.4f}")
     for clip in (walk, run):
-        print(f"{clip.name:12} {measure.measure(clip, feet, 0, up, 24.0)}")
+        print(f"{clip.name:12} {walks.mean_sliding(clip):.4f}")
     first.set(xlabel="frame", title="Height of the left ankle above its stand")
     second.set(xlabel="frame", title="How far that foot slides a frame, on the ground", ylim=(0.0, None))
     warp = made["aligned"].warps[1]
@@ -195,7 +192,7 @@ def draw_sliding(path: Path) -> None:
 
 
 def draw_strips(path: Path) -> None:
-    """Legs from the side: the clips, their blend, aligned or not, and relative to the armature."""
+    """Legs from the side: the clips, and their blend, aligned or not."""
     walk, run = pair()
     still = Settings(root_motion="in_place")
     rows = {
@@ -203,15 +200,12 @@ def draw_strips(path: Path) -> None:
         "run": blend([run, walk], (1, 0), still),
         "blend, aligned": blend([walk, run], (1, 1), still),
         "blend, not aligned": blend([walk, run], (1, 1), Settings(root_motion="in_place", align=False)),
-        "not aligned, relative to the armature": blend(
-            [walk, run], (1, 1), Settings(root_motion="in_place", align=False, space=ARMATURE)
-        ),
     }
-    figure, grid = plt.subplots(len(rows), 1, figsize=(12.6, 9.0), layout="constrained")
+    figure, grid = plt.subplots(len(rows), 1, figsize=(12.6, 7.2), layout="constrained")
     for axes, (title, made) in zip(grid, rows.items(), strict=True):
         for number in range(10):
             frame = round(number * (len(made.poses.rigid) - 1) / 10)
-            _draw_legs(axes, made, frame, 1.2 * number, "armature" in title)
+            _draw_legs(axes, made, frame, 1.2 * number)
         axes.set_aspect("equal")
         axes.set_title(title, loc="left", fontsize=10)
         axes.axhline(0.0, color="0.75", linewidth=0.8, zorder=0)
@@ -219,29 +213,16 @@ def draw_strips(path: Path) -> None:
         axes.axis("off")
     figure.savefig(path, metadata={"Date": None})
     plt.close(figure)
-    torn = rows["not aligned, relative to the armature"]
-    print(f"bones leave their parents by up to {torn.apart.max():.3f}, of legs of {walks.LEG:.2f}")
 
 
-def _draw_legs(axes, made: Blend, frame: int, x: float, is_torn: bool) -> None:
+def _draw_legs(axes, made: Blend, frame: int, x: float) -> None:
     rig = made.rig
     ends = rig.points(rig.to_armature(made.poses.rigid[frame]))
-    if is_torn:
-        # As the blend has them, before Blender holds connected bones.
-        ends = _torn(made, frame)
     for side, colour in (("R", "0.65"), ("L", COLOURS[1])):
         for name in ("thigh", "shin", "foot"):
             head, tail = ends[rig.index(f"{name}.{side}")]
             axes.plot([x - head[1], x - tail[1]], [head[2], tail[2]], color=colour, linewidth=4,
                       solid_capstyle="round")  # fmt: skip
-
-
-def _torn(made: Blend, frame: int) -> np.ndarray:
-    rig, walk_and_run = made.rig, pair()
-    free = Rig(rig.names, rig.parents, rig.rest, rig.lengths, np.zeros(len(rig.names), dtype=bool))
-    loose = [Clip(clip.name, free, clip.poses, clip.length) for clip in walk_and_run]
-    whole = blend(loose, (1, 1), Settings(root_motion="in_place", align=False, space=ARMATURE))
-    return free.points(free.to_armature(whole.poses.rigid[frame]))
 
 
 def main() -> None:

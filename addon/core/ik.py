@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inverse kinematics over frames: the problem of Blender's constraints, solved by `sinew.ik`, and
-measured."""
+"""Inverse kinematics over frames: the problem of Blender's constraints, solved by `sinew.ik`."""
 
 from __future__ import annotations
 
@@ -174,16 +173,6 @@ def tip_errors(tree: Tree, problem: Problem, matrices: np.ndarray) -> np.ndarray
     counted = np.array([effector.position_weight > 0.0 for effector in tree.effectors])
     longest = np.array([_reach(tree, problem, effector.bone) for effector in tree.effectors]).max(axis=0)
     return distances[:, counted].max(axis=1, initial=0.0) / np.maximum(longest, 1e-30)
-
-
-def angular_acceleration(matrices: np.ndarray) -> float:
-    """The root of the mean square over frames and bones of the second difference of rotations, radians per
-    frame squared; 0 for fewer than three frames. matrices: [frames, bones, 4, 4]."""
-    if len(matrices) < 3:
-        return 0.0
-    rigid = affine.to_quat_vec(_with_axes(_axes_of(matrices)))[..., :4]
-    steps = quat.to_rotation_vector(quat.compose(rigid[1:], quat.conjugate(rigid[:-1])))
-    return float(np.sqrt((np.diff(steps, axis=0) ** 2).sum(axis=-1).mean()))
 
 
 def _reach(tree: Tree, problem: Problem, bone: int) -> np.ndarray:

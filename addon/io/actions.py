@@ -211,6 +211,25 @@ def key_value(name: str, choice: str) -> int:
     return bpy.types.Keyframe.bl_rna.properties[name].enum_items[choice].value
 
 
+def write_keys(curve: bpy.types.FCurve, times: Sequence[float], values: np.ndarray) -> None:
+    """Replaces all keys from the first to the last of `times` by keys at `times`, with linear interpolation;
+    those outside stay."""
+    points = curve.keyframe_points
+    for point in reversed([point for point in points if times[0] <= point.co.x <= times[-1]]):
+        points.remove(point, fast=True)
+    kept = len(points)
+    points.add(len(times))
+    kinds = np.empty(len(points), np.int32)
+    keys = np.empty(2 * len(points), np.float32)
+    points.foreach_get("interpolation", kinds)
+    points.foreach_get("co", keys)
+    kinds[kept:] = key_value("interpolation", "LINEAR")
+    keys[2 * kept :] = np.column_stack([times, values]).ravel()
+    points.foreach_set("interpolation", kinds)
+    points.foreach_set("co", keys)
+    curve.update()
+
+
 def reason_against(curves: Sequence[bpy.types.FCurve]) -> str | None:
     """Returns why a bone's curves cannot be keyed poses; None where they can."""
     if not all(len(curve.keyframe_points) for curve in curves):

@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator
 from pathlib import Path
 from typing import TypeVar
 
@@ -54,7 +53,6 @@ def rig_of(armature: bpy.types.Object) -> Rig:
         parents,
         quat_vec.compose(quat_vec.inverse(above), rest),
         np.array([bone.length for bone in bones]),
-        np.array([bone.use_connect and bone.parent is not None for bone in bones]),
     )
 
 
@@ -130,7 +128,7 @@ def write(
                     for index in range(values.shape[1]):
                         property_name = rotations[bone] if kind == "rotation" else kind
                         curve = actions.new_curve(curves, path + property_name, index, bone)
-                        _fill(curve, times, values[:, index])
+                        actions.write_keys(curve, times, values[:, index])
             yield 0.5 + 0.5 * (row + 1) / len(rig.names)
     except BaseException:
         # Esc closes the generator.
@@ -140,28 +138,33 @@ def write(
 
 
 def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Action]:
-    """Imports the animations of a .bvh, .glb, .gltf or .fbx file as new actions of `armature`. Blender's
-    importers read it into a separate scene, which is then removed.
+    """Imports the animations of a .bvh, .glb, .gltf or .fbx file as new actions of `armature`. What else
+    Blender's importer makes is removed. Not in a window, as importers add to its scene.
 
     Raises SinewError where the file has no animation, or its bones have another rest pose.
     """
-    importer = IMPORTERS.get(path.suffix.lower())
-    if importer is None:
-        raise SinewError(f"{path}: expected a file ending in {', '.join(IMPORTERS)}")
     files.check_readable(path, tuple(IMPORTERS))
-    rig, found = rig_of(armature), []
-    with _imported(path, importer) as objects:
-        armatures = [obj for obj in objects if obj.type == "ARMATURE"]
+    known = {block.session_uid for block in _blocks()}
+    scene, render = bpy.data.scenes.new(path.stem), bpy.context.scene.render
+    scene.render.fps, scene.render.fps_base = render.fps, render.fps_base
+    try:
+        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+            IMPORTERS[path.suffix.lower()](str(path))
+        armatures = [obj for obj in scene.objects if obj.type == "ARMATURE"]
         sources = [(obj, action) for obj in armatures for action in _actions_of(obj)]
         if not sources:
             raise SinewError(f"{path}: has no animation of an armature")
+        rig, found = rig_of(armature), []
         for source, action in sources:
-            clip = _on_rig(finished(read(source, action)), rig, path)
             # Without the number that Blender adds where an action of this name exists.
             own = re.sub(r"\.\d{3}$", "", action.name)
             name = path.stem if len(sources) == 1 else f"{path.stem} {own}"
             keyed = {each for each in keyed_properties(source, action) if each[0] in rig.names}
-            found.append((clip, name, keyed))
+            found.append((_on_rig(finished(read(source, action)), rig, path), name, keyed))
+    except RuntimeError as error:
+        raise SinewError(f"{path}: Blender can not read it: {files.telling_line(error)}") from None
+    finally:
+        bpy.data.batch_remove([block for block in _blocks() if block.session_uid not in known])
     made = [finished(write(armature, clip, name, 1.0, keyed)) for clip, name, keyed in found]
     for action in made:
         action.use_fake_user = True
@@ -215,15 +218,6 @@ def _kinds(mode: str) -> list[tuple[str, slice, np.ndarray]]:
     return [(kind, where, rest[where]) for kind, where in columns.items()]
 
 
-def _fill(curve: bpy.types.FCurve, times: np.ndarray, values: np.ndarray) -> None:
-    points = curve.keyframe_points
-    points.add(len(times))
-    points.foreach_set("co", np.column_stack([times, values]).astype(np.float32).ravel())
-    linear = actions.key_value("interpolation", "LINEAR")
-    points.foreach_set("interpolation", np.full(len(times), linear, np.int32))
-    curve.update()
-
-
 def _on_rig(clip: Clip, rig: Rig, path: Path) -> Clip:
     """Returns the clip of a similar armature for the bones of `rig`; bones that it lacks are at rest."""
     rows = [(row, clip.rig.names.index(name)) for row, name in enumerate(rig.names) if name in clip.rig.names]
@@ -261,42 +255,6 @@ def finished(steps: Generator[float, None, Result]) -> Result:
             next(steps)
         except StopIteration as end:
             return end.value
-
-
-@contextmanager
-def _imported(path: Path, importer: Callable[[str], object]) -> Iterator[list[bpy.types.Object]]:
-    """Context with the objects of a file, imported into a separate scene at the open scene's frame rate;
-    afterwards everything that the importer made is removed."""
-    before = bpy.context.scene
-    known = {block.session_uid for block in _blocks()}
-    scene = bpy.data.scenes.new(path.stem)
-    scene.render.fps, scene.render.fps_base = before.render.fps, before.render.fps_base
-    try:
-        with _shown(scene):
-            try:
-                importer(str(path))
-            except RuntimeError as error:
-                raise SinewError(f"{path}: Blender can not read it: {files.telling_line(error)}") from None
-            yield list(scene.objects)
-    finally:
-        bpy.data.batch_remove([block for block in _blocks() if block.session_uid not in known])
-
-
-@contextmanager
-def _shown(scene: bpy.types.Scene) -> Iterator[None]:
-    """Makes the scene the one of the context, to which importers add."""
-    window = bpy.context.window
-    if window is None:
-        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-            yield
-        return
-    before, layer = window.scene, window.view_layer
-    window.scene = scene
-    try:
-        yield
-    finally:
-        window.scene = before
-        window.view_layer = layer
 
 
 def _blocks() -> list[bpy.types.ID]:

@@ -186,14 +186,7 @@ def _write_curves(rig: bpy.types.Object, name: str, channels: np.ndarray, times:
         bone.keyframe_insert(path, frame=times[0], group=name)
     animation = rig.animation_data
     for curve, channel in actions.bone_curves(animation.action, actions.slot_of(animation))[name]:
-        points = curve.keyframe_points
-        points.clear()
-        points.add(len(times))
-        keys = np.column_stack([times, channels[:, channel.column]])
-        points.foreach_set("co", keys.astype(np.float32).ravel())
-        linear = actions.key_value("interpolation", "LINEAR")
-        points.foreach_set("interpolation", np.full(len(times), linear, np.int32))
-        curve.update()
+        actions.write_keys(curve, times, channels[:, channel.column])
 
 
 def write_weights(

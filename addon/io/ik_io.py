@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 
 import bpy
 import numpy as np
@@ -44,17 +43,6 @@ def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) 
 
 def constraints_of(armature: bpy.types.Object, tree: Tree) -> list[bpy.types.Constraint]:
     return [armature.pose.bones[bone].constraints[name] for bone, name in tree.constraints]
-
-
-@contextmanager
-def muted(armature: bpy.types.Object, tree: Tree) -> Iterator[None]:
-    """Context in which a tree's constraints are muted."""
-    names = list(tree.constraints)
-    set_muted(armature, names, True)
-    try:
-        yield
-    finally:
-        set_muted(armature, names, False)
 
 
 def set_muted(armature: bpy.types.Object, names: Collection[tuple[str, str]], mute: bool) -> None:

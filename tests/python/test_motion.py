@@ -12,12 +12,10 @@ import walks
 from sinew import affine, dual_quat, quat_vec
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.inbetween import Poses
-from sinew_addon.core.motion import measure
 from sinew_addon.core.motion.align import PHASES, align
-from sinew_addon.core.motion.blend import ARMATURE, IN_PLACE, KEYED, METHODS, TRAVEL, Settings, blend
+from sinew_addon.core.motion.blend import IN_PLACE, KEYED, METHODS, TRAVEL, Settings, blend
 from sinew_addon.core.motion.clip import Clip
 from sinew_addon.core.motion.root import grounded, main_root
-from sinew_addon.core.motion.timing import Weights
 
 UP = walks.UP
 
@@ -50,12 +48,11 @@ def test_methods_are_the_librarys():
 
 
 @pytest.mark.parametrize("root_motion", [TRAVEL, KEYED])
-@pytest.mark.parametrize("space", ["relative", ARMATURE])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_clip_of_weight_one_is_that_clip(method, space, root_motion):
+def test_a_clip_of_weight_one_is_that_clip(method, root_motion):
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
     for is_aligned in (True, False):
-        settings = Settings(method=method, space=space, root_motion=root_motion, align=is_aligned)
+        settings = Settings(method=method, root_motion=root_motion, align=is_aligned)
         for number, clip in enumerate((walk, run)):
             made = blend([walk, run], np.eye(2)[number], settings).clip("one")
             assert made.length == clip.length
@@ -115,34 +112,12 @@ def test_linear_matrices_shrink_and_no_other_method_does():
             # What Blender receives of it: the lengths of the axes.
             axes = np.linalg.norm(0.5 * (left + right)[..., :3, :3], axis=-2)
             assert np.abs(made.poses.scale - scale * axes).max() < 1e-12
-            shrunk = measure.shrinking(made)
-            assert shrunk.volume == made.volume.min()
-            assert made.volume[shrunk.frame, a.rig.index(shrunk.bone)] == shrunk.volume
+            volume, bone, frame = made.smallest()
+            assert volume == made.volume.min() == made.volume[frame, a.rig.index(bone)]
         else:
             assert (made.volume == 1.0).all()
             assert np.abs(made.poses.scale - scale).max() < 1e-12
         assert np.abs(np.linalg.norm(made.poses.rigid[..., :4], axis=-1) - 1.0).max() < 1e-9
-
-
-def test_armature_space_is_the_blend_of_what_algorithm_1_gives():
-    a, b = pair(13)
-    rig = a.rig
-    made = blend([a, b], (0.5, 0.5), plain("dlb", space=ARMATURE))
-    skeleton = sinew.Skeleton(rig.parents)
-    for frame in (0, 6, 12):
-        ends = [
-            skeleton.root_relative(quat_vec.compose(rig.rest, clip.poses.rigid[frame])) for clip in (a, b)
-        ]
-        wanted = sinew.interpolate.blend(
-            np.stack([quat_vec.to_dual_quat(end) for end in ends], axis=1), np.full((8, 2), 0.5), "dlb"
-        ).transforms
-        posed = rig.to_armature(made.poses.rigid)[frame]
-        # Rotations do not depend on how heads are constrained.
-        assert np.abs(matrices(posed)[:, :3, :3] - dual_quat.to_affine(wanted)[:, :3, :3]).max() < 1e-9
-    # Connected bones stay on their parents' tails; the distance by which they would leave them is reported.
-    assert np.abs(made.poses.rigid[:, rig.connected, 4:]).max() == 0.0
-    assert made.apart[:, rig.connected].max() > 0.05
-    assert blend([a, b], (0.5, 0.5), plain("dlb")).apart.max() == 0.0
 
 
 # --- Timing
@@ -160,7 +135,7 @@ def test_a_blend_of_periods_20_and_30_has_period_25_and_keeps_the_contacts():
     # For the reference, which is the first clip: it starts at phase 0.1, and its left foot lifts at 0.6.
     phases = 0.1 + np.arange(26) / 25.0
     sides = [walks.foot(phases + ahead, 1.0, 0.1)[1] == 0.0 for ahead in (0.0, 0.5)]
-    feet = measure.bones_named(clip, ["foot.L", "foot.R"])
+    feet = [clip.rig.index(name) for name in ("foot.L", "foot.R")]
     heights = clip.rig.points(clip.rig.to_armature(clip.poses.rigid))[:, feet, 0, 2]
     for height, on_ground in zip(heights.T, sides, strict=True):
         sure = on_ground & np.roll(on_ground, 1) & np.roll(on_ground, -1)
@@ -175,12 +150,11 @@ def test_a_blend_of_periods_20_and_30_has_period_25_and_keeps_the_contacts():
 def test_without_alignment_feet_meet_the_ground_at_other_times_and_slide():
     walk = walks.walk(period=20)
     run = walks.walk("run", 30, 1.1, 0.2, start=0.65)
-    feet = measure.bones_named(walk, ["foot.L", "foot.R"])
     slides = {}
     for is_aligned in (True, False):
         made = blend([walk, run], (0.5, 0.5), Settings(align=is_aligned)).clip("blend")
-        slides[is_aligned] = measure.measure(made, feet, 0, UP, 24.0).sliding
-    own = max(measure.measure(clip, feet, 0, UP, 24.0).sliding for clip in (walk, run))
+        slides[is_aligned] = walks.mean_sliding(made)
+    own = max(map(walks.mean_sliding, (walk, run)))
     assert slides[True] < 1.5 * own
     assert slides[False] > 2.0 * slides[True]
 
@@ -201,11 +175,6 @@ def test_one_foot_says_the_phase():
     bones = np.array([name == "foot.L" for name in reference.rig.names])
     off = align(reference, late, bones).own - np.arange(PHASES + 1) / PHASES + 0.25
     assert np.abs(off).max() < 1.5 / PHASES
-    made = [
-        blend([walks.walk(), walks.walk("late", start=0.25)], (1, 1), Settings(align_bones=names))
-        for names in ((), ("foot.L",))
-    ]
-    assert np.abs(made[0].timing.times - made[1].timing.times).max() < 1.0
 
 
 def test_another_pace_within_the_cycle_is_found():
@@ -310,43 +279,6 @@ def test_a_change_of_weights_has_no_jumps(method):
     assert steps["blend"] < 1.1 * max(steps["walk"], steps["run"])
 
 
-@pytest.mark.parametrize("smooth", [False, True])
-def test_weights_have_keys_over_the_motion(smooth):
-    """A run in the middle of a walk, which is alone before and after it."""
-    walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
-    weights = Weights.of(((1, 0), (0, 2), (3, 0)), 2, (0.25, 0.5, 0.75), smooth)
-    made = blend([walk, run], weights, Settings(cycles=8))
-    shares = np.array([0.0, 0.25, 0.3125, 0.375, 0.4375, 0.5, 0.625, 0.75, 1.0])
-    quarter = 0.15625 if smooth else 0.25
-    values = [0, 0, quarter, 0.5, 1 - quarter, 1, 0.5, 0, 0]
-    assert np.abs(weights.over(shares)[:, 1] - values).max() < 1e-12
-    assert np.abs(weights.over(shares).sum(axis=1) - 1.0).max() < 1e-12
-    ran = made.timing.weights[:, 1]
-    assert ran.max() > 0.95
-    # Two of eight cycles at each end are the walk's own, with its timing.
-    assert (ran[:40] == 0.0).all()
-    assert (ran[-40:] == 0.0).all()
-    paces = np.diff(made.timing.times[:, 0])
-    assert np.abs(paces[:39] - 1.0).max() < 0.01
-    assert not made.is_cyclic
-
-
-@pytest.mark.parametrize(
-    ("given", "at"),
-    [
-        (((1, 0), (0, 1)), (0.5,)),
-        (((1, 0), (0, 1)), (0.5, 0.5)),
-        (((1, 0), (0, 1)), (0.6, 0.5)),
-        (((1, 0), (0, 1)), (-0.1, 0.5)),
-        (((1, 0), (0, 1)), (0.1, 1.5)),
-        (((1, 0), (0, 1)), (0.1, float("nan"))),
-    ],
-)
-def test_keys_of_weights_that_are_none(given, at):
-    with pytest.raises(SinewError, match="shares of the motion from 0 to 1"):
-        Weights.of(given, 2, at)
-
-
 @pytest.mark.parametrize("method", ["dlb", "sclerp", "qv_slerp", "matrix_polar"])
 def test_turns_add_up_to_the_blended_turn(method):
     left, right = walks.walk(turn=0.9), walks.walk("right", turn=-0.3)
@@ -396,7 +328,6 @@ def test_the_root_is_the_uppermost_bone_that_moves():
         parents=parents,
         rest=np.vstack([quat_vec.identity(), rig.rest]),
         lengths=np.concatenate([[1.0], rig.lengths]),
-        connected=np.concatenate([[False], rig.connected]),
     )
     still = np.broadcast_to(quat_vec.identity(), (21, 1, 7))
     poses = Poses(np.concatenate([still, walk.poses.rigid], axis=1), np.ones((21, 9, 3)))
@@ -427,45 +358,6 @@ def test_a_root_that_tilts_on_a_turned_armature_travels_on_its_own_ground():
     assert np.abs(place[-1] - place[0] - quat_vec.transform_vector(x, [0.0, -2.4, 0.0])).max() < 1e-9
 
 
-# --- Measures
-
-
-def test_sliding_is_what_a_dragged_foot_slides():
-    walk = walks.walk(sway=0.0)
-    rigid = np.repeat(walk.poses.rigid[:1], 21, axis=0)
-    # Straight ahead, without a step.
-    rigid[:, 0, 6] = 0.03 * np.arange(21)
-    dragged = Clip("dragged", walk.rig, Poses(rigid, walk.poses.scale), 20.0)
-    feet = measure.bones_named(dragged, ["foot.L"])
-    found = measure.measure(dragged, feet, 0, UP, 24.0)
-    assert found.sliding == pytest.approx(0.03)
-    assert found.travel == pytest.approx(0.03)
-    assert found.angular_acceleration == found.worst_acceleration == 0.0
-    # A planted foot does not slide.
-    standing = np.arange(21) / 20 < 0.55
-    steps, on_ground = measure.sliding(walk, feet, UP)
-    assert steps[standing[1:], 0].max() < 1e-9
-    assert on_ground[standing[1:], 0].min() > 0.99
-    assert on_ground[:, 0].min() == 0.0
-
-
-def test_angular_acceleration_is_that_of_a_growing_spin():
-    rig = walks.rig()
-    frames = np.arange(25)
-    rigid = np.broadcast_to(quat_vec.identity(), (25, 8, 7)).copy()
-    # angle = a t^2 / 2: at 24 frames per second every second difference is a / 24^2.
-    rigid[:, 4] = quat_vec.from_axis_angle([1.0, 2.0, 2.0], 0.5 * 3.0 * (frames / 24.0) ** 2)
-    clip = Clip("spin", rig, Poses(rigid, np.ones((25, 8, 3))), 24.0)
-    found = measure.measure(clip, [], 0, UP, 24.0)
-    assert found.worst_acceleration == pytest.approx(np.degrees(3.0))
-    assert found.angular_acceleration == pytest.approx(np.degrees(3.0) / np.sqrt(8.0))
-
-
-def test_feet_are_found():
-    walk = walks.walk()
-    assert [walk.rig.names[bone] for bone in measure.feet_of(walk, UP)] == ["foot.L", "foot.R"]
-
-
 # --- Errors
 
 
@@ -473,16 +365,15 @@ def test_feet_are_found():
     ("weights", "settings", "sentence"),
     [
         ((1,), {}, "expected one for each of 2 clips, got 1"),
+        (((1, 0), (1,)), {}, "expected one for each of 2 clips, got 1"),
         ((0, 0), {}, "not all of them 0"),
         ((1, -1), {}, "0 or more"),
         ((1, float("nan")), {}, "0 or more"),
         ((1, 1), {"method": "slerp"}, "method: expected one of dlb"),
-        ((1, 1), {"space": "world"}, "space: expected one of relative, armature"),
         ((1, 1), {"root_motion": "yes"}, "root motion: expected one of travel"),
         ((1, 1), {"cycles": 0}, "cycles: expected 1 or more"),
         ((1, 1), {"cycles": 10_000}, "choose fewer cycles"),
         ((1, 1), {"root": "tail"}, "There is no bone 'tail'"),
-        ((1, 1), {"align_bones": ("paw",)}, "There is no bone 'paw'"),
     ],
 )
 def test_errors_are_one_sentence(weights, settings, sentence):

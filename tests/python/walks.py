@@ -47,8 +47,30 @@ def rig() -> Rig:
     for bone, parent in enumerate(parents):
         if parent >= 0:
             rest[bone] = quat_vec.compose(quat_vec.inverse(armature[parent]), armature[bone])
-    connected = np.array([name.startswith(("spine", "shin", "foot")) for name in names])
-    return Rig(names, parents, rest, np.array(lengths), connected)
+    return Rig(names, parents, rest, np.array(lengths))
+
+
+def is_connected(name: str) -> bool:
+    """Whether Blender keeps the bone's head on its parent's tail."""
+    return name.startswith(("spine", "shin", "foot"))
+
+
+def sliding(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+    """[samples - 1, 2]: how far each foot moves along the ground to the next sample, and how much it is on
+    the ground then: 2 - 2^(h / H), where h is its height above its lowest position and H 1.5 % of the rig's size
+    (Zhang, Starke, Komura, Saito 2018, section 8)."""
+    own = clip.rig
+    places = own.points(own.to_armature(clip.poses.rigid))[:, [own.index("foot.L"), own.index("foot.R")], 1]
+    heights = places[..., 2] - places[..., 2].min(axis=0)
+    height = 0.5 * (heights[1:] + heights[:-1])
+    steps = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1)
+    return steps, np.clip(2.0 - 2.0 ** (height / (0.015 * own.size)), 0.0, 1.0)
+
+
+def mean_sliding(clip: Clip) -> float:
+    """A frame, of feet on the ground."""
+    steps, on_ground = sliding(clip)
+    return float((steps * on_ground).sum() / max(on_ground.sum(), 1e-9))
 
 
 def foot(phase: np.ndarray, stride: float, lift: float) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,6 @@ from .align import Warp, align, same_pace
 from .clip import Clip, Rig, common_rig
 from .root import Grounded, accumulated, as_keyed, carried, grounded, main_root
 
-RELATIVE, ARMATURE = "relative", "armature"
 TRAVEL, IN_PLACE, KEYED = "travel", "in_place", "keyed"
 
 
@@ -47,18 +46,14 @@ class Settings:
     """How clips are blended.
 
     method       of METHODS
-    space        RELATIVE, each bone relative to its parent; or ARMATURE, where bones can leave their parents
     align        whether clips are brought to the same moment; otherwise each plays from its first frame
-    align_bones  the bones by which moments are compared; none: all below the root
     root         the bone that carries the others; None: found by main_root()
     root_motion  TRAVEL: blended and accumulated; IN_PLACE: removed; KEYED: blended like any bone's pose
     cycles       how often the blend repeats; clips that are no cycles repeat once
     """
 
     method: interpolate.Method = "dlb"
-    space: str = RELATIVE
     align: bool = True
-    align_bones: tuple[str, ...] = ()
     root: str | None = None
     root_motion: str = TRAVEL
     cycles: int = 1
@@ -70,7 +65,6 @@ class Blend:
 
     poses      [frames, bones, ..], each bone relative to its parent and rest
     volume     [frames, bones]: determinant of the method's result; below 1 a bone shrinks
-    apart      [frames, bones]: how far heads would be from where their parents keep them
     undefined  bool [frames, bones]: where sinew.interpolate.blend says that its result is not defined
     timing     of each clip in each frame
     warps      of the clips
@@ -81,7 +75,6 @@ class Blend:
     rig: Rig
     poses: Poses
     volume: np.ndarray
-    apart: np.ndarray
     undefined: np.ndarray
     timing: timing.Timing
     warps: list[Warp]
@@ -91,29 +84,34 @@ class Blend:
     def clip(self, name: str) -> Clip:
         return Clip(name, self.rig, self.poses, float(len(self.poses.rigid) - 1), self.is_cyclic)
 
+    def smallest(self) -> tuple[float, str, int]:
+        """Returns the least volume, with its bone and frame."""
+        frame, bone = np.unravel_index(np.argmin(self.volume), self.volume.shape)
+        return float(self.volume[frame, bone]), self.rig.names[bone], int(frame)
+
 
 def blend(
     clips: Sequence[Clip],
-    weights: Sequence[float] | timing.Weights,
+    weights: Sequence,
     settings: Settings | None = None,
     up: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Blend:
-    """Blends clips by weights, scaled to sum 1, or by weights that change.
+    """Blends clips by weights, scaled to sum 1.
 
     Whether a clip is a cycle is found from its poses, or given by `Clip.is_cyclic`. Where some are none, all
     are aligned from their first pose to their last. The clip with the largest weight at the beginning is the
     reference: the blend begins where it does.
 
-    up  [3], the vertical in armature space, of length 1
+    weights  of the clips; or those at the beginning, and those at the end
+    up       [3], the vertical in armature space, of length 1
 
     Raises SinewError for impossible settings, weights or bones.
     """
     settings = Settings() if settings is None else settings
     rig = common_rig(clips)
-    if not isinstance(weights, timing.Weights):
-        weights = timing.Weights.of(weights, len(clips))
+    weights = timing.Weights.of(weights, len(clips))
     _check(settings)
-    reference = int(np.argmax(weights.values[0]))
+    reference = int(np.argmax(weights.first))
     root = rig.index(settings.root) if settings.root is not None else main_root(rig, list(clips))
     travels = _in_place(clips, root, np.asarray(up), settings)
     placed = [travel.clip for travel in travels]
@@ -125,7 +123,7 @@ def blend(
         else timing.own_pace(placed, weights, cycles)
     )
     sampled = [clip.at(times) for clip, times in zip(placed, schedule.times.T, strict=True)]
-    result = _blended(rig, sampled, schedule.weights, settings)
+    result = _blended(sampled, schedule.weights, settings.method)
     rigid = result.poses.rigid
     if settings.root_motion != KEYED:
         ground = _ground(travels, schedule, reference, settings)
@@ -134,7 +132,6 @@ def blend(
         rig,
         Poses(rigid, result.poses.scale),
         result.volume,
-        result.apart,
         result.undefined,
         schedule,
         warps,
@@ -146,7 +143,6 @@ def blend(
 def _check(settings: Settings) -> None:
     for what, value, known in (
         ("method", settings.method, tuple(METHODS)),
-        ("space", settings.space, (RELATIVE, ARMATURE)),
         ("root motion", settings.root_motion, (TRAVEL, IN_PLACE, KEYED)),
     ):
         if value not in known:
@@ -167,11 +163,8 @@ def _in_place(clips: Sequence[Clip], root: int, up: np.ndarray, settings: Settin
 def _warps(clips: Sequence[Clip], reference: int, rig: Rig, root: int, settings: Settings) -> list[Warp]:
     if not settings.align:
         return [same_pace() for _clip in clips]
-    bones = rig.below(root)
-    if settings.align_bones:
-        bones = np.isin(np.arange(len(rig.names)), [rig.index(name) for name in settings.align_bones])
     return [
-        same_pace() if number == reference else align(clips[reference], clip, bones)
+        same_pace() if number == reference else align(clips[reference], clip, rig.below(root))
         for number, clip in enumerate(clips)
     ]
 
@@ -207,38 +200,17 @@ def _of_all(
 class _Result(NamedTuple):
     poses: Poses
     volume: np.ndarray
-    apart: np.ndarray
     undefined: np.ndarray
 
 
-def _blended(rig: Rig, sampled: Sequence[Poses], weights: np.ndarray, settings: Settings) -> _Result:
+def _blended(sampled: Sequence[Poses], weights: np.ndarray, method: interpolate.Method) -> _Result:
     """Blends poses [frames, bones, ..] of clips by weights [frames, clips]."""
-    rigid = [poses.rigid for poses in sampled]
     scale = np.einsum("fc,fcbk->fbk", weights, np.stack([poses.scale for poses in sampled], axis=1))
-    if settings.space == ARMATURE:
-        rigid = [rig.to_armature(each) for each in rigid]
-    blended = _of_all(rigid, weights[:, None], settings.method)
-    volume = np.ones(rigid[0].shape[:2])
-    if settings.method == "matrix_linear":
+    blended = _of_all([poses.rigid for poses in sampled], weights[:, None], method)
+    volume = np.ones(scale.shape[:2])
+    if method == "matrix_linear":
         volume = np.linalg.det(blended.transforms[..., :3, :3])
-    found = rigid_of(settings.method, blended.transforms)
-    apart = np.zeros(volume.shape)
-    if settings.space == ARMATURE:
-        found = rig.to_relative(found)
-        heads = np.stack([poses.rigid[..., 4:] for poses in sampled], axis=1)
-        apart = np.linalg.norm(found[..., 4:] - np.einsum("fc,fcbk->fbk", weights, heads), axis=-1)
-        # Such a bone has no location in Blender.
-        found[:, rig.connected, 4:] = 0.0
-    if settings.method == "matrix_linear":
-        scale = scale * _stretch(rig, blended.transforms, volume, settings.space)
-    return _Result(Poses(found, scale), volume, apart, ~np.asarray(blended.is_defined))
-
-
-def _stretch(rig: Rig, matrices: np.ndarray, volume: np.ndarray, space: str) -> np.ndarray:
-    """[frames, bones, 3]: the scale that a bone can take from matrices that are not rigid: the lengths of
-    their axes. In armature space, where bones already have their parents' scale, only the overall size."""
-    if space == RELATIVE:
-        return axes_of(matrices)
-    size = np.cbrt(np.maximum(volume, 0.0))
-    above = np.where(rig.parents >= 0, size[:, np.maximum(rig.parents, 0)], 1.0)
-    return np.repeat((size / np.maximum(above, 1e-6))[..., None], 3, axis=-1)
+        # The scale that a bone can take from matrices that are not rigid.
+        scale = scale * axes_of(blended.transforms)
+    found = rigid_of(method, blended.transforms)
+    return _Result(Poses(found, scale), volume, ~np.asarray(blended.is_defined))

@@ -20,19 +20,17 @@ SAME_ANGLE, SAME_PLACE = 0.06, 0.02
 class Rig:
     """The bones of an armature at rest; parents come before their children.
 
-    names      [bones]
-    parents    int [bones], -1 for a bone without one
-    rest       float64 [bones, 7]: parent_from_bone in the layout of sinew.quat_vec, armature_from_bone where
-               there is no parent; Y along the bone
-    lengths    float64 [bones]
-    connected  bool [bones]: Blender keeps the head of such a bone on its parent's tail
+    names    [bones]
+    parents  int [bones], -1 for a bone without one
+    rest     float64 [bones, 7]: parent_from_bone in the layout of sinew.quat_vec, armature_from_bone where
+             there is no parent; Y along the bone
+    lengths  float64 [bones]
     """
 
     names: tuple[str, ...]
     parents: np.ndarray
     rest: np.ndarray
     lengths: np.ndarray
-    connected: np.ndarray
 
     def to_armature(self, relative: np.ndarray) -> np.ndarray:
         """[.., bones, 7] armature_from_bone, from bones relative to their parents and rests; rigid parts

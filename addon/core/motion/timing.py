@@ -32,51 +32,33 @@ class Timing:
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of a blend's clips over its motion, interpolated linearly between keys, or smoothly.
+    """Weights of a blend's clips, of sum 1, [clips]: they go evenly from the first to the last."""
 
-    at      [keys], ascending: shares of the motion, from 0 to 1; constant before the first key and after the
-            last
-    values  [keys, clips], of sum 1
-    """
-
-    at: np.ndarray
-    values: np.ndarray
-    smooth: bool = False
+    first: np.ndarray
+    last: np.ndarray
 
     @classmethod
-    def of(
-        cls, given: Sequence, count: int, at: Sequence[float] | None = None, smooth: bool = False
-    ) -> Weights:
-        """given: the weights of `count` clips, or these at each key; without `at`, keys are even.
+    def of(cls, given: Sequence, count: int) -> Weights:
+        """given: the weights of `count` clips; or those at the beginning, and those at the end.
 
-        Raises SinewError where they are invalid.
+        Raises WrongUse where they are invalid.
         """
-        are_keys = len(given) > 0 and np.ndim(given[0]) > 0
-        values = [np.array(each, dtype=np.float64) for each in (given if are_keys else [given])]
+        both = given if np.ndim(given[0]) > 0 else (given, given)
+        values = [np.array(each, dtype=np.float64) for each in both]
         for each in values:
             if each.shape != (count,):
                 raise WrongUse(f"Weights: expected one for each of {count} clips, got {each.size}")
             if not np.isfinite(each).all() or (each < 0.0).any() or each.sum() <= 0.0:
                 raise WrongUse("Weights: expected numbers of 0 or more, and not all of them 0")
-        keys = np.linspace(0.0, 1.0, len(values)) if at is None else np.array(at, dtype=np.float64)
-        is_within = keys.shape == (len(values),) and ((keys >= 0.0) & (keys <= 1.0)).all()
-        if not is_within or not (np.diff(keys) > 0.0).all():
-            raise WrongUse("Weights: expected them at shares of the motion from 0 to 1, one after the other")
-        return cls(keys, np.array([each / each.sum() for each in values]), smooth)
+        return cls(*(each / each.sum() for each in values))
 
     @property
     def change(self) -> bool:
-        return bool((self.values != self.values[0]).any())
+        return bool((self.first != self.last).any())
 
     def over(self, shares: np.ndarray) -> np.ndarray:
-        """[n, clips] at n shares of the motion."""
-        last = len(self.at) - 1
-        place = np.interp(shares, self.at, np.arange(last + 1.0))
-        key = np.minimum(place.astype(int), max(last - 1, 0))
-        behind = (place - key)[:, None]
-        if self.smooth:
-            behind = behind * behind * (3.0 - 2.0 * behind)
-        return (1.0 - behind) * self.values[key] + behind * self.values[np.minimum(key + 1, last)]
+        """[n, clips] at n shares of the motion, from 0 to 1."""
+        return self.first + shares[:, None] * (self.last - self.first)
 
 
 def lengths_of(clips: Sequence[Clip]) -> np.ndarray:
@@ -89,7 +71,7 @@ def lengths_of(clips: Sequence[Clip]) -> np.ndarray:
 def own_pace(clips: Sequence[Clip], weights: Weights, cycles: int) -> Timing:
     """Returns the timing where every clip plays from its first frame at its own speed, for the longest that
     has a weight."""
-    used = (weights.values > 0.0).any(axis=0)
+    used = (weights.first > 0.0) | (weights.last > 0.0)
     lengths = lengths_of(clips)
     frames = _whole(cycles * lengths[used].max())
     times = np.repeat(np.arange(frames + 1.0)[:, None], len(clips), axis=1)
@@ -101,7 +83,7 @@ def aligned(clips: Sequence[Clip], warps: Sequence[Warp], weights: Weights, cycl
     of its times in each clip: so a blend is as long as the weighted mean of its clips, in whole frames, and a
     blend of one clip plays it unchanged. Weights change in step with the motion."""
     lengths = lengths_of(clips)
-    _whole(cycles * float((weights.values @ lengths).min()))
+    _whole(cycles * min(float(weights.first @ lengths), float(weights.last @ lengths)))
     phases = np.linspace(0.0, cycles, STEPS * cycles + 1)
     own = np.column_stack([warp.at(phases) * length for warp, length in zip(warps, lengths, strict=True)])
     in_steps = weights.over(phases / cycles)

@@ -11,9 +11,6 @@ import bpy
 
 from ...core.errors import SinewError
 from ...core.motion import blend as core
-from ...core.motion import measure
-from ...core.motion.clip import Clip
-from ...core.motion.timing import Weights
 from ...io import actions, clips
 
 Result = TypeVar("Result")
@@ -24,20 +21,14 @@ READING = 0.5
 
 @dataclass(frozen=True)
 class Made:
-    """The new action, which nothing plays yet, what it was made from, and the vertical in armature space."""
+    """The new action, which nothing plays yet, and the blend."""
 
     action: bpy.types.Action
-    sources: list[Clip]
     blend: core.Blend
-    up: list[float]
 
     @property
     def frames(self) -> int:
         return len(self.blend.poses.rigid)
-
-    @property
-    def clip(self) -> Clip:
-        return self.blend.clip(self.action.name)
 
     def notes(self) -> list[str]:
         """What a user should know about it, each a sentence."""
@@ -48,15 +39,11 @@ class Made:
                 f"{', '.join(unsure[:3])}{' and others' if len(unsure) > 3 else ''}: the actions are half a "
                 "turn apart in some frames, where a blend may jump"
             )
-        least = measure.shrinking(blend)
-        if least.volume < 0.99:
+        volume, bone, frame = blend.smallest()
+        if volume < 0.99:
             found.append(
-                f"{least.bone} shrinks to {max(least.volume, 0.0):.0%} of its volume in frame "
-                f"{least.frame + 1} of the blend: another method keeps it"
-            )
-        if least.apart > 0.001 * blend.rig.size:
-            found.append(
-                f"Bones would leave their parents by up to {least.apart:.3g}: connected ones are kept on them"
+                f"{bone} shrinks to {max(volume, 0.0):.0%} of its volume in frame {frame + 1} of the blend: "
+                "another method keeps it"
             )
         return found
 
@@ -64,28 +51,31 @@ class Made:
 def make(
     armature: bpy.types.Object,
     chosen: Sequence[bpy.types.Action],
-    weights: Sequence[float] | Weights,
+    weights: Sequence,
     settings: core.Settings,
     name: str = "",
 ) -> Generator[float, None, Made]:
     """Yields the progress. The new action begins at the scene's first frame; if closed before the end,
-    nothing has changed. Raises SinewError for what cannot be blended."""
+    nothing has changed. Raises SinewError for what cannot be blended.
+
+    weights  as core.blend() takes them
+    """
     if not armature.is_editable:
         raise SinewError(f"{armature.name} is linked: make a library override of it first")
     if len(chosen) < 2:
         raise SinewError(f"{armature.name}: choose two actions or more to blend")
-    rig, up, sources = clips.rig_of(armature), clips.up_of(armature), []
+    rig, sources = clips.rig_of(armature), []
     for number, action in enumerate(chosen):
         steps = clips.read(armature, action, rig)
         clip = yield from _part(steps, READING * number / len(chosen), READING / len(chosen))
         sources.append(clip)
-    blend = core.blend(sources, weights, settings, up)
+    blend = core.blend(sources, weights, settings, clips.up_of(armature))
     keyed = set().union(*(clips.keyed_properties(armature, action) for action in chosen))
     name = name or f"Blend {' '.join(action.name for action in chosen)}"
     first = float(bpy.context.scene.frame_start)
     steps = clips.write(armature, blend.clip(name), name, first, keyed)
     made = yield from _part(steps, READING, 1.0 - READING)
-    return Made(made, sources, blend, list(up))
+    return Made(made, blend)
 
 
 def play(armature: bpy.types.Object, action: bpy.types.Action) -> None:

@@ -10,7 +10,6 @@ import bpy
 from ...attach.feature import Feature
 from ...core.errors import SinewError
 from ...core.motion import blend as core
-from ...core.motion.timing import Weights
 from ...io import clips
 from ...ui import operators, stepped
 from ...ui.sidebar import draw_text
@@ -56,57 +55,15 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
         items=[(m.name, m.label, m.description, m.number) for m in core.METHODS.values()],
         default="dlb",
     )
-    space: bpy.props.EnumProperty(
-        name="Space",
-        description="Relative to what bones are blended",
-        items=[
-            (core.RELATIVE, "Parents", "Each bone relative to its parent: chains stay whole", 0),
-            (
-                core.ARMATURE,
-                "Armature",
-                "Each bone by itself: it keeps its direction, and bones that are not connected leave their "
-                "parents",
-                1,
-            ),
-        ],
-        default=core.RELATIVE,
-    )
     align: bpy.props.BoolProperty(
         name="Align",
         description="Bring the actions to the same moment of their motion, and cycles to a common length; "
         "else each plays from its first frame",
         default=True,
     )
-    align_bone: bpy.props.StringProperty(
-        name="Aligned by",
-        description="The bone that says which moment it is, such as a foot; empty: all bones",
-    )
     changes: bpy.props.BoolProperty(
         name="Change Weights",
-        description="Let the weights change in the course of the blend",
-        default=False,
-    )
-    change_start: bpy.props.FloatProperty(
-        name="Begins At",
-        description="The share of the motion after which weights change",
-        subtype="PERCENTAGE",
-        default=0.0,
-        min=0.0,
-        max=100.0,
-        precision=0,
-    )
-    change_end: bpy.props.FloatProperty(
-        name="Ends At",
-        description="The share of the motion after which they have changed",
-        subtype="PERCENTAGE",
-        default=100.0,
-        min=0.0,
-        max=100.0,
-        precision=0,
-    )
-    smooth: bpy.props.BoolProperty(
-        name="Slow In and Out",
-        description="Let the change of weights begin and end slowly; else it is even",
+        description="Let the weights change evenly from the first frame to the last",
         default=False,
     )
     cycles: bpy.props.IntProperty(
@@ -161,18 +118,8 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
             column.prop(each, "weight", text=each.name, translate=False)
         if len(self.actions) < 2:
             draw_text(layout, context, "Blender has no two actions of this armature", icon="INFO")
-        for name in ("method", "space", "changes"):
+        for name in ("changes", "method", "align", "cycles", "root_motion"):
             layout.prop(self, name)
-        if self.changes:
-            times = layout.column(align=True)
-            times.prop(self, "change_start")
-            times.prop(self, "change_end")
-            layout.prop(self, "smooth")
-        layout.prop(self, "align")
-        if self.align:
-            layout.prop_search(self, "align_bone", armature.data, "bones")
-        layout.prop(self, "cycles")
-        layout.prop(self, "root_motion")
         if self.root_motion == core.TRAVEL or self.align:
             layout.prop_search(self, "root", armature.data, "bones")
 
@@ -188,29 +135,14 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
         missing = [each.name for each in chosen if each.name not in bpy.data.actions]
         if missing:
             raise SinewError(f"There is no action {missing[0]!r}")
+        weights = [each.weight for each in chosen]
+        if self.changes:
+            weights = [[each.weight_from for each in chosen], weights]
         self._made = yield from blend_actions.make(
             armature,
             [bpy.data.actions[each.name] for each in chosen],
-            self._weights(chosen),
-            self._settings(),
-        )
-
-    def _weights(self, chosen: list[SinewBlendAction]) -> Weights:
-        last = [each.weight for each in chosen]
-        if not self.changes:
-            return Weights.of(last, len(last))
-        at = (0.01 * self.change_start, 0.01 * self.change_end)
-        return Weights.of(([each.weight_from for each in chosen], last), len(last), at, self.smooth)
-
-    def _settings(self) -> core.Settings:
-        return core.Settings(
-            method=self.method,
-            space=self.space,
-            align=self.align,
-            align_bones=(self.align_bone,) if self.align_bone else (),
-            root=self.root or None,
-            root_motion=self.root_motion,
-            cycles=self.cycles,
+            weights,
+            core.Settings(self.method, self.align, self.root or None, self.root_motion, self.cycles),
         )
 
     def finish(self, context: bpy.types.Context) -> set[str]:

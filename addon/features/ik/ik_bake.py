@@ -115,25 +115,7 @@ def _write_keys(
     animation = armature.animation_data
     for curve, channel in actions.bone_curves(animation.action, actions.slot_of(animation))[name]:
         if channel.property == path:
-            _replace_keys(curve, frames, values[:, channel.column])
-
-
-def _replace_keys(curve: bpy.types.FCurve, frames: Sequence[int], values: np.ndarray) -> None:
-    """Replaces all keys from the first to the last of `frames` by keys at `frames`; those outside stay."""
-    points = curve.keyframe_points
-    for point in reversed([point for point in points if frames[0] <= point.co.x <= frames[-1]]):
-        points.remove(point, fast=True)
-    kept = len(points)
-    points.add(len(frames))
-    kinds = np.empty(len(points), np.int32)
-    keys = np.empty(2 * len(points), np.float32)
-    points.foreach_get("interpolation", kinds)
-    points.foreach_get("co", keys)
-    kinds[kept:] = actions.key_value("interpolation", "LINEAR")
-    keys[2 * kept :] = np.column_stack([frames, values]).ravel()
-    points.foreach_set("interpolation", kinds)
-    points.foreach_set("co", keys)
-    for modifier in curve.modifiers:
-        modifier.mute = True
-    curve.mute = False
-    curve.update()
+            actions.write_keys(curve, frames, values[:, channel.column])
+            for modifier in curve.modifiers:
+                modifier.mute = True
+            curve.mute = False
