@@ -8,7 +8,8 @@ import atexit
 import re
 import sys
 from contextlib import suppress
-from typing import TYPE_CHECKING, Protocol
+from importlib import import_module
+from typing import TYPE_CHECKING, NoReturn, Protocol, cast
 
 from . import native
 from .core import interrupt
@@ -19,6 +20,23 @@ from .prepare import leave_blender, prepare_blender
 if TYPE_CHECKING:
     from .commands.console import Console
 
+# In the order of the help: each is a module of commands/.
+COMMANDS = (
+    *(
+        "methods",
+        "info",
+        "check",
+        "points",
+        "reskin",
+        "restore",
+        "ik",
+        "inbetween",
+        "blend",
+        "bake",
+        "export",
+    ),
+    *("compare", "render"),
+)
 # Batches start Blenders of their own, or prepare this one later.
 WITHOUT_BLENDER = ("methods", "check", "reskin", "restore")
 
@@ -26,51 +44,33 @@ _commands: list[object] = []
 
 
 class Command(Protocol):
-    """The functions that a module of commands/ defines."""
+    """What a module of commands/ defines."""
 
-    def add_parser(self, subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser: ...
+    SUMMARY: str
+    HELP: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None: ...
 
     def run(self, args: argparse.Namespace, console: Console) -> int: ...
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One sentence, as of all that is wrong."""
+        raise WrongUse(message)
+
+
 def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
     """Returns the parser of the whole command line, and the module of each subcommand."""
-    from .commands import (
-        bake,
-        blend,
-        check,
-        compare,
-        export,
-        ik,
-        inbetween,
-        info,
-        methods,
-        points,
-        render,
-        reskin,
-        restore,
-    )
-
-    modules: dict[str, Command] = {
-        "methods": methods,
-        "info": info,
-        "check": check,
-        "points": points,
-        "reskin": reskin,
-        "restore": restore,
-        "ik": ik,
-        "inbetween": inbetween,
-        "blend": blend,
-        "bake": bake,
-        "export": export,
-        "compare": compare,
-        "render": render,
-    }
-    parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")
+    modules = {name: cast(Command, import_module(f"{__package__}.commands.{name}")) for name in COMMANDS}
+    parser = _Parser(prog="sinew", description="Skinning for Blender files.")
     parser.add_argument("--verbose", action="store_true", help="show what Blender prints")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in modules.values():
-        module.add_parser(subparsers)
+    for name, module in modules.items():
+        # Several lines are wrapped as they should be shown.
+        lines = argparse.RawDescriptionHelpFormatter if "\n" in module.HELP else argparse.HelpFormatter
+        own = subparsers.add_parser(name, help=module.SUMMARY, description=module.HELP, formatter_class=lines)
+        module.add_arguments(own)
     return parser, modules
 
 

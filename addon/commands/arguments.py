@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
+
+import sinew
 
 from ..core import parameters
 from ..core.errors import WrongUse
@@ -14,10 +16,10 @@ from ..core.output import folder_to_write
 FILES = ".blend, .glb, .gltf or .fbx"
 
 
-def count(text: str) -> int:
+def count(text: str, least: int = 1) -> int:
     number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"expected at least 1, got {number}")
+    if number < least:
+        raise argparse.ArgumentTypeError(f"expected {least} or more, got {number}")
     return number
 
 
@@ -28,11 +30,34 @@ def percent(text: str) -> float:
     return number
 
 
-def frame_step(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise WrongUse(f"step: expected 1 or more frames, got {number}")
+def seconds(text: str) -> float:
+    number = float(text)
+    if not 0 <= number < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected 0 or more, got {text}")
     return number
+
+
+def pixels(text: str) -> int:
+    number = int(text)
+    if not 64 <= number <= 4096:
+        raise argparse.ArgumentTypeError(f"expected 64 to 4096 pixels, got {number}")
+    return number
+
+
+def method(text: str) -> str:
+    """The type of an argument that names a method of `sinew methods`."""
+    return one_of([method.name for method in sinew.methods()])(text)
+
+
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """The type of an argument of many choices, which `choices` would repeat in each line of help."""
+
+    def read(text: str) -> str:
+        if text not in names:
+            raise argparse.ArgumentTypeError(f"expected one of {', '.join(names)}, got {text!r}")
+        return text
+
+    return read
 
 
 def add_file(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +70,10 @@ def add_files(parser: argparse.ArgumentParser) -> None:
 
 def add_object(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--object", metavar="NAME", help="only this mesh")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def add_engine(parser: argparse.ArgumentParser, default: str | None = "auto") -> None:
@@ -86,10 +115,3 @@ class _Set(argparse.Action):
             setattr(namespace, self.dest, {**known, **parameters.parse([str(value)])})
         except WrongUse as error:
             raise argparse.ArgumentError(None, str(error)) from None
-
-
-def seconds(text: str) -> float:
-    number = float(text)
-    if not 0 <= number < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected 0 or more, got {text}")
-    return number

@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 from ..core import interrupt
 from ..core.bake import EXPORTS, KINDS
-from ..core.errors import SinewError, WrongUse
+from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
 from ..jobs.inputs import Job, plan_jobs
-from .arguments import add_copies, add_set, count, frame_step, percent
+from .arguments import add_copies, add_set, count, method, percent
 from .console import Console
-from .outcome import Outcome
+from .outcome import Outcome, conclude, of_each
 
 if TYPE_CHECKING:
     from ..features.bake.bake_state import Started
 
+SUMMARY = "write what Sinew deforms as shape keys, point caches, Alembic, USD, glTF or helper bones"
 HELP = """\
 Writes Sinew's deformation of every armature-deformed mesh as data that plays without it. Inputs are never
 written to. A folder stands for all .blend files below it.
@@ -41,18 +42,12 @@ In a .blend the Armature modifiers stay, switched off (bones: on). Between frame
 shapes move in straight lines."""
 
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "bake",
-        help="write what Sinew deforms as shape keys, point caches, Alembic, USD, glTF or helper bones",
-        description=HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_copies(parser)
-    parser.add_argument("--method", required=True, help="a method of `sinew methods`")
+    parser.add_argument("--method", required=True, type=method, help="a method of `sinew methods`")
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
-    parser.add_argument("--step", type=frame_step, default=1, metavar="N", help="every Nth of the frames")
+    parser.add_argument("--step", type=count, default=1, metavar="N", help="every Nth of the frames")
     parser.add_argument(
         "--helpers",
         type=count,
@@ -77,7 +72,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     )
     parser.add_argument("--json", action="store_true", help="print JSON, with the errors of bones")
     add_set(parser)
-    return parser
 
 
 @dataclass
@@ -99,43 +93,26 @@ class Baked(Outcome):
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    import sinew
-
-    names = [method.name for method in sinew.methods()]
-    if args.method not in names:
-        raise WrongUse(f"method: expected one of {', '.join(names)}, got {args.method!r}")
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
     suffix = EXPORTS.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
-    outcomes = []
-    for number, job in enumerate(jobs):
-        what = f"Baking {job.source.name}" + (f" ({number + 1} of {len(jobs)})" if len(jobs) > 1 else "")
-        outcome = Baked(job)
-        try:
-            _bake(outcome, args, frames, console, what)
-        except SinewError as error:
-            outcome.error = str(error)
-        outcome.complain(console)
-        outcomes.append(outcome)
-    failures = sum(outcome.failed for outcome in outcomes)
+    outcomes = of_each(
+        jobs, Baked, lambda outcome: _bake(outcome, args, frames, console), args.overwrite, console
+    )
     if args.json:
         console.say(json.dumps([outcome.as_json() for outcome in outcomes], indent=2, ensure_ascii=False))
-        return 1 if failures else 0
-    console.table(
-        ("file", "meshes", "frames", "result"),
-        [(str(o.job.source), str(o.meshes), str(o.frames), o.result) for o in outcomes],
-    )
+        return 1 if any(outcome.failed for outcome in outcomes) else 0
     for outcome in outcomes:
         for report in outcome.bones:
             for sentence in report.sentences(outcome.unit):
-                console.say(f"{outcome.job.target}: {sentence}")
-    console.say(f"{len(outcomes) - failures} of {len(outcomes)} files baked with {args.method}")
-    return 1 if failures else 0
+                console.note(f"{outcome.job.target}: {sentence}")
+    columns = ("meshes", "frames")
+    return conclude(
+        console, outcomes, columns, lambda o: (str(o.meshes), str(o.frames)), f"baked with {args.method}"
+    )
 
 
-def _bake(
-    outcome: Baked, args: argparse.Namespace, frames: list[float] | None, console: Console, what: str
-) -> None:
+def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, console: Console) -> None:
     import bpy
 
     from ..attach import attach
@@ -144,9 +121,6 @@ def _bake(
     from ..io import files
 
     source, target = outcome.job.source, outcome.job.target
-    if target.exists() and not args.overwrite:
-        raise SinewError(f"{target}: is there already; use --overwrite to replace it")
-    outcome.notes += files.open_file(source)
     scene = bpy.context.scene
     meshes = attach.deformed_meshes(list(scene.objects))
     if not meshes:
@@ -174,7 +148,7 @@ def _bake(
         shares = bake_apart.sample(started) if isinstance(started, bake_apart.Export) else started.sample()
         with (
             _whole_or_nothing(started, source),
-            console.bar(what, len(chosen)) as show,
+            console.bar(f"Baking {source.name}", len(chosen)) as show,
             closing(shares),
         ):
             for share in shares:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..core import interrupt
 from ..core.errors import SinewError, WrongUse
+from ..core.motion.blend import METHODS, Settings
 from ..core.output import file_to_write
 from .arguments import count
 from .console import Console
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from ..features.blend.blend_actions import Made
 
+SUMMARY = "blend actions of an armature, such as a walk and a run, into a new action"
 HELP = """\
 Blends two or more actions of an armature, bone by bone, into a new action of plain keys, and writes a copy of
 the file in which the armature plays it. FILE is never written to; the actions stay in the copy.
@@ -33,15 +35,7 @@ the weighted mean of their lengths. The root's steps over the ground are blended
 ROOT_MOTIONS = {"travel": "travel", "in-place": "in_place", "keyed": "keyed"}
 
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    from ..core.motion.blend import METHODS
-
-    parser = subparsers.add_parser(
-        "blend",
-        help="blend actions of an armature, such as a walk and a run, into a new action",
-        description=HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf, .fbx or .bvh")
     parser.add_argument("--armature", metavar="NAME", help="which, where the file has several that are moved")
     parser.add_argument(
@@ -54,13 +48,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--clips", nargs="+", default=[], type=Path, metavar="FILE", help="more, to be imported"
     )
-    weights = {"nargs": "+", "type": float, "metavar": "W"}
-    parser.add_argument(
-        "--weights", **weights, help="one for each action, then for each clip (default: equal)"
-    )
-    parser.add_argument(
-        "--weights-from", **weights, help="those of the first frame, if --weights are of the last"
-    )
+    for name, text in (
+        ("--weights", "one for each action, then for each clip (default: equal)"),
+        ("--weights-from", "those of the first frame, if --weights are of the last"),
+    ):
+        parser.add_argument(name, nargs="+", type=float, metavar="W", help=text)
     parser.add_argument("--method", default="dlb", help=f"one of {', '.join(METHODS)} (default: dlb)")
     parser.add_argument(
         "--align",
@@ -83,7 +75,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--out", required=True, type=partial(file_to_write, endings=(".blend",)), metavar="NEW.blend"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace NEW.blend where it exists already")
-    return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -147,7 +138,6 @@ def _actions(args: argparse.Namespace, armature: bpy.types.Object) -> list[bpy.t
 def _make(
     args: argparse.Namespace, armature: bpy.types.Object, chosen: list[bpy.types.Action], console: Console
 ) -> Made:
-    from ..core.motion.blend import Settings
     from ..features.blend import blend_actions
 
     settings = Settings(args.method, args.align, args.root, ROOT_MOTIONS[args.root_motion], args.cycles)

@@ -16,9 +16,10 @@ from ..blender_process import BlenderLost, BlenderProcess, Limits
 from ..core.errors import WrongUse
 from ..jobs.inputs import blend_files_below
 from ..other_blender import BlenderStatus, blender_status
-from .arguments import seconds
+from .arguments import add_json, seconds
 from .console import Console
 
+SUMMARY = "check that files can be rendered with Sinew, before they are sent to a farm"
 HELP = """\
 Prints a line for each file: whether Sinew deforms anything in it, and what prevents that: objects that Sinew
 can not deform, data of Sinew without its settings, a Blender without Sinew. Files are only read; a file that
@@ -27,13 +28,7 @@ crashes or hangs Blender is reported as such.
 Exit status 0: all can be rendered; 1: a file has a problem; 2: wrong use."""
 
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "check",
-        help="check that files can be rendered with Sinew, before they are sent to a farm",
-        description=HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "files", nargs="+", type=Path, metavar="FILE_OR_FOLDER", help=".blend; a folder: all below it"
     )
@@ -43,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         help="the Blender that will render, if it is another: it is started in the background with its own "
         "preferences and checked for Sinew (default: the Blender that runs this)",
     )
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_json(parser)
     parser.add_argument(
         "--timeout",
         type=seconds,
@@ -51,7 +46,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         metavar="SECONDS",
         help="how long --blender, and each file, may take (default: %(default)g; 0: any time)",
     )
-    return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ from ..core.page import page
 from ..core.scratch import scratch_folder
 from ..core.sheet import require_pillow
 from . import sheet
-from .arguments import add_engine, add_files, add_object, add_set
+from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
 
 if TYPE_CHECKING:
@@ -26,15 +27,16 @@ if TYPE_CHECKING:
     from ..features.pages.render import Studio
 
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "compare",
-        help="show and measure methods beside each other",
-        description="Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
-        "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
-        "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and "
-        "the pictures. With --out SHEET.png it draws one frame of one file into one picture instead.",
-    )
+SUMMARY = "show and measure methods beside each other"
+HELP = (
+    "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
+    "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
+    "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and "
+    "the pictures. With --out SHEET.png it draws one frame of one file into one picture instead."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
     parser.add_argument(
         "--methods",
@@ -53,7 +55,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     add_object(parser)
     parser.add_argument(
         "--pictures",
-        type=int,
+        type=partial(count, least=0),
         default=4,
         metavar="N",
         help="most frames to draw, of those at which a measure is worst; 0: none (default: %(default)s)",
@@ -61,18 +63,17 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument("--video", action="store_true", help="also write an mp4 of the methods side by side")
     parser.add_argument(
         "--influences",
-        type=int,
+        type=partial(count, least=0),
         default=USUAL_INFLUENCES,
         metavar="N",
         help="how many bones a vertex may have before it is reported (default: %(default)s)",
     )
-    parser.add_argument("--size", type=int, help="pixels of each picture (default: 480; 640 in a sheet)")
+    parser.add_argument("--size", type=pixels, help="pixels of each picture (default: 480; 640 in a sheet)")
     add_engine(parser)
     parser.add_argument(
         "--out", required=True, type=_folder_or_sheet, metavar="DIR", help="a folder, or SHEET.png"
     )
     add_set(parser)
-    return parser
 
 
 def _folder_or_sheet(given: str) -> Path:
@@ -87,14 +88,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     characters.check_methods([*methods, args.reference])
     characters.set_parameters(args.set)
-    if args.size is not None:
-        render.check_size(args.size)
     if args.out.suffix.lower() in sheet.PICTURES:
         return sheet.run(args, methods, console)
     frames = parse_frames(args.frames) if args.frames is not None else None
-    for option in ("pictures", "influences"):
-        if getattr(args, option) < 0:
-            raise WrongUse(f"{option}: expected 0 or more, got {getattr(args, option)}")
     _check_names(args.files)
     if args.video:
         require_pillow()

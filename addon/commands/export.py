@@ -12,46 +12,43 @@ from functools import partial
 from pathlib import Path
 
 from ..core.bake import is_whole
-from ..core.errors import SinewError, WrongUse
+from ..core.errors import SinewError
 from ..core.output import file_to_write, write_whole
-from .arguments import add_file, add_set, count
+from .arguments import add_file, add_set, count, method
 from .console import Console
 
+SUMMARY = "write a .glb whose skins have Sinew's method and centres of rotation"
+HELP = (
+    "Writes a .glb by Blender's own exporter: bones, weights and actions as ever, and in "
+    "extras and attributes of each mesh that an armature deforms what an engine needs to skin it as "
+    "Sinew does."
+)
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "export",
-        help="write a .glb whose skins have Sinew's method and centres of rotation",
-        description="Writes a .glb by Blender's own exporter: bones, weights and actions as ever, and in "
-        "extras and attributes of each mesh that an armature deforms what an engine needs to skin it as "
-        "Sinew does.",
-    )
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--out", required=True, type=partial(file_to_write, endings=(".glb",)), metavar="OUT.glb"
     )
     parser.add_argument(
-        "--method", help="a method of `sinew methods`, for all meshes (default: each as the file has it)"
+        "--method",
+        type=method,
+        help="a method of `sinew methods`, for all meshes (default: each as the file has it)",
     )
     parser.add_argument(
         "--influences", type=count, default=4, metavar="N", help="of a vertex, at most (default: 4)"
     )
     add_set(parser)
-    return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
     import bpy
-    import sinew
 
     from ..attach import attach, properties
     from ..deform import characters
     from ..features.gltf import export
     from ..io import files
 
-    names = [method.name for method in sinew.methods()]
-    if args.method is not None and args.method not in names:
-        raise WrongUse(f"method: expected one of {', '.join(names)}, got {args.method!r}")
     console.note_on(args.file, files.open_file(args.file))
     scene = bpy.context.scene
     meshes = attach.deformed_meshes(list(scene.objects))

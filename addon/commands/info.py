@@ -8,15 +8,16 @@ import json
 from pathlib import Path
 
 from ..core.errors import SinewError
-from .arguments import add_files
+from .arguments import add_files, add_json
 from .console import Console
 
+SUMMARY = "list the armature-deformed meshes of files"
+HELP = ""
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser("info", help="list the armature-deformed meshes of files")
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    return parser
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

@@ -9,13 +9,15 @@ import math
 
 import sinew
 
+from .arguments import add_json
 from .console import Console
 
+SUMMARY = "show the skinning methods and when to use each"
+HELP = ""
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser("methods", help="show the skinning methods and when to use each")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    return parser
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

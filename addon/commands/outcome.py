@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The outcome of a command for one file."""
+"""What a command does to each of several files, each with an outcome of its own."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
+from ..core.errors import SinewError
 from ..jobs.inputs import Job
 from .console import Console
 
@@ -42,3 +45,47 @@ class Outcome:
         for reason in self.left_out:
             console.complain(f"{self.job.source}: left as it was: {reason}")
         console.note_on(self.job.source, self.notes)
+
+
+Own = TypeVar("Own", bound=Outcome)
+
+
+def of_each(
+    jobs: Iterable[Job],
+    kind: Callable[[Job], Own],
+    work: Callable[[Own], None],
+    overwrite: bool,
+    console: Console,
+) -> list[Own]:
+    """Opens the file of each job, and has `work` write its copy. An error is that of its file alone."""
+    from ..io import files
+
+    outcomes = []
+    for job in jobs:
+        outcome = kind(job)
+        try:
+            if job.target.exists() and not overwrite:
+                raise SinewError(f"{job.target}: is there already; use --overwrite to replace it")
+            outcome.notes += files.open_file(job.source)
+            work(outcome)
+        except SinewError as error:
+            outcome.error = str(error)
+        outcome.complain(console)
+        outcomes.append(outcome)
+    return outcomes
+
+
+def conclude(
+    console: Console,
+    outcomes: Sequence[Own],
+    columns: Sequence[str],
+    cells: Callable[[Own], Sequence[str]],
+    done: str,
+) -> int:
+    """Prints a row for each file, and how many were done; returns the exit status."""
+    console.table(
+        ("file", *columns, "result"), [(str(each.job.source), *cells(each), each.result) for each in outcomes]
+    )
+    good = sum(not outcome.failed for outcome in outcomes)
+    console.say(f"{good} of {len(outcomes)} files {done}")
+    return 0 if good == len(outcomes) else 1

@@ -18,15 +18,15 @@ from ..core.output import file_to_write, write_whole
 from .arguments import add_file, add_object, add_set
 from .console import Console
 
+SUMMARY = "write the deformed vertices of chosen frames"
+HELP = (
+    "Writes an .npz: for each armature-deformed mesh one float32 array [frames, vertices, "
+    "3], its key the object's name (with %2F for /): the vertices of the final evaluated mesh in object "
+    "space; and an array `frames`."
+)
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "points",
-        help="write the deformed vertices of chosen frames",
-        description="Writes an .npz: for each armature-deformed mesh one float32 array [frames, vertices, "
-        "3], its key the object's name (with %2F for /): the vertices of the final evaluated mesh in object "
-        "space; and an array `frames`.",
-    )
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument(
         "--method", required=True, help="a method of `sinew methods`, or blender for the Armature modifier"
@@ -37,7 +37,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--out", required=True, type=partial(file_to_write, endings=(".npz",)), metavar="POINTS.npz"
     )
     add_set(parser)
-    return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

@@ -19,27 +19,28 @@ from ..core.golden import (
 )
 from ..core.output import folder_to_write, remove, write_text
 from ..core.parameters import Value, as_texts, parse
-from .arguments import add_engine, add_file, add_object, add_set
+from .arguments import add_engine, add_file, add_object, add_set, pixels
 from .console import Console
 
 # In percent of the pixels; between Blender 4.2 and 5.2 on one machine, no pixel differs.
 USUAL_TOLERANCE = 0.05
 
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "render",
-        help="draw frames under one method, and compare them with golden pictures",
-        description="Draws the armature-deformed meshes of a file in clay, a picture a frame, into DIR, with "
-        "render.json that says how. With --against it does the same again (camera, engine, size and, where "
-        "not given, method, --set and frames are those of the golden pictures) and compares each frame; the "
-        "exit status is 1 where one differs by more than the tolerance.",
-    )
+SUMMARY = "draw frames under one method, and compare them with golden pictures"
+HELP = (
+    "Draws the armature-deformed meshes of a file in clay, a picture a frame, into DIR, with "
+    "render.json that says how. With --against it does the same again (camera, engine, size and, where "
+    "not given, method, --set and frames are those of the golden pictures) and compares each frame; the "
+    "exit status is 1 where one differs by more than the tolerance."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument("--method", help="a method of `sinew methods`, or blender for the Armature modifier")
     parser.add_argument("--frames", help="such as 1,12,40-48")
     add_object(parser)
-    parser.add_argument("--size", type=int, help="pixels of a picture's longer side (default: 640)")
+    parser.add_argument("--size", type=pixels, help="pixels of a picture's longer side (default: 640)")
     add_engine(parser, default=None)
     parser.add_argument(
         "--own-look",
@@ -58,7 +59,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the pictures"
     )
     add_set(parser)
-    return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -127,7 +127,6 @@ def _draw(
     from ..io import files
 
     size = args.size or (golden.size if golden else 640)
-    render.check_size(size)
     console.note_on(args.file, files.open_file(args.file))
     scene = bpy.context.scene
     characters.set_frame(scene, frames[0])

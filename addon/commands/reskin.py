@@ -7,26 +7,27 @@ import argparse
 
 import sinew
 
-from ..core.errors import WrongUse
 from ..core.frames import parse_frames
 from ..core.parameters import as_texts
 from ..jobs.job_file import Settings
 from ..jobs.job_schema import job_schema
 from ..jobs.schema import rows
 from . import batch
-from .arguments import add_set
+from .arguments import add_set, method
 from .console import Console
 
+SUMMARY = "write copies of files whose meshes are deformed by Sinew"
+HELP = (
+    "Writes a copy of each file in which every armature-deformed mesh uses Sinew with the "
+    "method chosen, and a report that compares the two. Inputs are never written to."
+)
 
-def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
-        "reskin",
-        help="write copies of files whose meshes are deformed by Sinew",
-        description="Writes a copy of each file in which every armature-deformed mesh uses Sinew with the "
-        "method chosen, and a report that compares the two. Inputs are never written to.",
-    )
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     batch.add_arguments(parser)
-    parser.add_argument("--method", help="a method of `sinew methods`; needed unless the job file has one")
+    parser.add_argument(
+        "--method", type=method, help="a method of `sinew methods`; needed unless the job file has one"
+    )
     parser.add_argument("--job", metavar="FILE.toml", help="settings for files and objects (docs/batch.md)")
     parser.add_argument("--job-help", action=_JobHelp, nargs=0, help="show the keys of a job file and exit")
     parser.add_argument(
@@ -39,7 +40,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--no-pictures", dest="pictures", action="store_false", help="a report without pictures, much faster"
     )
     add_set(parser)
-    return parser
 
 
 class _JobHelp(argparse.Action):
@@ -58,8 +58,5 @@ def _methods() -> list[str]:
 def run(args: argparse.Namespace, console: Console) -> int:
     if args.frames not in ("auto", "none"):
         parse_frames(args.frames)
-    methods = _methods()
-    if args.method is not None and args.method not in methods:
-        raise WrongUse(f"method: expected one of {', '.join(methods)}, got {args.method!r}")
     given = Settings(method=args.method, set=tuple(as_texts(args.set)))
-    return batch.run(args, console, batch.Action("reskin", "re-skinned", given, args.job, methods))
+    return batch.run(args, console, batch.Action("reskin", "re-skinned", given, args.job, _methods()))

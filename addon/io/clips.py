@@ -139,17 +139,18 @@ def write(
 
 def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Action]:
     """Imports the animations of a .bvh, .glb, .gltf or .fbx file as new actions of `armature`. What else
-    Blender's importer makes is removed. Not in a window, as importers add to its scene.
+    Blender's importer makes is removed.
 
     Raises SinewError where the file has no animation, or its bones have another rest pose.
     """
     files.check_readable(path, tuple(IMPORTERS))
     known = {block.session_uid for block in _blocks()}
-    scene, render = bpy.data.scenes.new(path.stem), bpy.context.scene.render
-    scene.render.fps, scene.render.fps_base = render.fps, render.fps_base
+    window, scene = bpy.context.window, bpy.data.scenes.new(path.stem)
+    shown = window.scene, window.view_layer
+    scene.render.fps, scene.render.fps_base = window.scene.render.fps, window.scene.render.fps_base
     try:
-        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-            IMPORTERS[path.suffix.lower()](str(path))
+        window.scene = scene
+        IMPORTERS[path.suffix.lower()](str(path))
         armatures = [obj for obj in scene.objects if obj.type == "ARMATURE"]
         sources = [(obj, action) for obj in armatures for action in _actions_of(obj)]
         if not sources:
@@ -164,6 +165,7 @@ def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Act
     except RuntimeError as error:
         raise SinewError(f"{path}: Blender can not read it: {files.telling_line(error)}") from None
     finally:
+        window.scene, window.view_layer = shown
         bpy.data.batch_remove([block for block in _blocks() if block.session_uid not in known])
     made = [finished(write(armature, clip, name, 1.0, keyed)) for clip, name, keyed in found]
     for action in made:

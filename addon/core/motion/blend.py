@@ -109,18 +109,18 @@ def blend(
     """
     settings = Settings() if settings is None else settings
     rig = common_rig(clips)
-    weights = timing.Weights.of(weights, len(clips))
+    shares = timing.Weights.of(weights, len(clips))
     _check(settings)
-    reference = int(np.argmax(weights.first))
+    reference = int(np.argmax(shares.first))
     root = rig.index(settings.root) if settings.root is not None else main_root(rig, list(clips))
     travels = _in_place(clips, root, np.asarray(up), settings)
     placed = [travel.clip for travel in travels]
     warps = _warps(placed, reference, rig, root, settings)
     cycles = settings.cycles if all(clip.is_cyclic for clip in placed) or not settings.align else 1
     schedule = (
-        timing.aligned(placed, warps, weights, cycles)
+        timing.aligned(placed, warps, shares, cycles)
         if settings.align
-        else timing.own_pace(placed, weights, cycles)
+        else timing.own_pace(placed, shares, cycles)
     )
     sampled = [clip.at(times) for clip, times in zip(placed, schedule.times.T, strict=True)]
     result = _blended(sampled, schedule.weights, settings.method)
@@ -136,7 +136,7 @@ def blend(
         schedule,
         warps,
         rig.names[root] if settings.root_motion != KEYED else None,
-        all(clip.is_cyclic for clip in placed) and not weights.change and settings.align,
+        all(clip.is_cyclic for clip in placed) and not shares.change and settings.align,
     )
 
 

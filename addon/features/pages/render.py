@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core.errors import SinewError, WrongUse
+from ...core.errors import SinewError
 from ...core.heat import linear
 from ...core.opengl import default_engine
 from ...core.output import write_whole
@@ -29,11 +29,6 @@ from ...io.files import telling_line
 CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
 PNG_END = b"IEND\xaeB`\x82"
-
-
-def check_size(size: int) -> None:
-    if not 64 <= size <= 4096:
-        raise WrongUse(f"size: expected 64 to 4096 pixels, got {size}")
 
 
 def chosen_engine(wanted: str) -> str:
