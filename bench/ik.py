@@ -69,8 +69,8 @@ def make_chains(bones: int, kind: str, count: int) -> tuple[bpy.types.Object, li
 
 
 def angular_acceleration(matrices: np.ndarray) -> float:
-    """Root mean square over frames and bones of the second difference of rotations, radians per frame squared;
-    matrices [frames, bones, 4, 4]."""
+    """Root mean square over frames and bones of the second difference of rotations, radians per frame
+    squared; matrices [frames, bones, 4, 4]."""
     rotations = affine.to_quat_vec(affine.normalized(matrices.astype(float)))[..., :4]
     steps = quat.to_rotation_vector(quat.compose(rotations[1:], quat.conjugate(rotations[:-1])))
     return float(np.sqrt((np.diff(steps, axis=0) ** 2).sum(axis=-1).mean()))

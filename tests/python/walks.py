@@ -57,8 +57,8 @@ def is_connected(name: str) -> bool:
 
 def sliding(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
     """[samples - 1, 2]: how far each foot moves along the ground to the next sample, and how much it is on
-    the ground then: 2 - 2^(h / H), where h is its height above its lowest position and H 1.5 % of the rig's size
-    (Zhang, Starke, Komura, Saito 2018, section 8)."""
+    the ground then: 2 - 2^(h / H), where h is its height above its lowest position and H 1.5 % of the rig's
+    size (Zhang, Starke, Komura, Saito 2018, section 8)."""
     own = clip.rig
     places = own.points(own.to_armature(clip.poses.rigid))[:, [own.index("foot.L"), own.index("foot.R")], 1]
     heights = places[..., 2] - places[..., 2].min(axis=0)
