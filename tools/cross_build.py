@@ -352,7 +352,8 @@ def build_package(platform: Platform, pythons: list[Python], validator: Path) ->
     build_wheels(platform, pythons, out)
     words = [sys.executable, "-I", tools / "package.py", "--platform", platform.name]
     made = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
-    subprocess.run([validator, tools / "split_package.py", made], check=True)
+    words = [validator, tools / "split_package.py", made, "--repository", Path(made).parent]
+    subprocess.run(words, check=True)
     subprocess.run([sys.executable, "-I", tools / "sbom.py", made], check=True, stdout=sys.stderr)
     print(made)
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Splits the extension's zip into one for each platform, and validates them, with Blender's own program.
+"""Splits the extension's zip into one for each platform, validates them, and makes their folder a repository
+that Blender can install from: index.json, and index.html as its page. All with Blender's own program.
 
 Without a folder for these, validates zips as they are.
 
@@ -72,17 +73,26 @@ def split(package: Path, out: Path) -> list[Path]:
     return [out / path.name for path in split_files]
 
 
+def make_repository(folder: Path) -> None:
+    """Lists the zips of a folder, which may then be served as it is. Links are relative."""
+    page = Path(__file__).with_name("repository.html")
+    run("server-generate", "--html", "--html-template", page, "--repo-dir", folder)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
         "packages", type=Path, nargs="+", metavar="package", help="a zip that ./dev package made"
     )
-    parser.add_argument("--out", type=Path, help="folder for the zips")
+    parser.add_argument("--out", type=Path, help="folder for the zips, as a repository")
+    parser.add_argument("--repository", type=Path, help="make the folder that has the packages a repository")
     options = parser.parse_args()
     for package in options.packages:
         validate(package)
         for path in split(package, options.out) if options.out else []:
             print(path)
+    if folder := options.out or options.repository:
+        make_repository(folder)
 
 
 if __name__ == "__main__":

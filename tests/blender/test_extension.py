@@ -26,7 +26,15 @@ import numpy as np
 
 addon_utils.enable("bl_pkg")
 bpy.ops.wm.open_mainfile(filepath=sys.argv[3])
-bpy.ops.extensions.package_install_files(filepath=sys.argv[2], repo="user_default", enable_on_install=True)
+if sys.argv[2].endswith(".zip"):
+    bpy.ops.extensions.package_install_files(filepath=sys.argv[2], repo="user_default", enable_on_install=True)
+else:
+    bpy.context.preferences.system.use_online_access = True
+    repositories = bpy.context.preferences.extensions.repos
+    repository = repositories.new(name="Sinew", module="sinew_repository", remote_url=sys.argv[2])
+    number = len(repositories) - 1
+    bpy.ops.extensions.repo_sync(repo_directory=repository.directory)
+    bpy.ops.extensions.package_install(repo_index=number, pkg_id="sinew", enable_on_install=True)
 obj = bpy.data.objects["Arm"]
 bpy.context.view_layer.objects.active = obj
 bpy.ops.sinew.add()
@@ -74,7 +82,14 @@ def bare_site(tmp_path) -> Path:
     return bare
 
 
-def test_installs_and_works_in_the_same_session(package, bare_site, tmp_path):
+@pytest.mark.parametrize("source", ["zip", "repository"])
+def test_installs_and_works_in_the_same_session(source, package, bare_site, tmp_path):
+    if source == "repository":
+        made = run_split(package, tmp_path / "repository")
+        assert made.returncode == 0, made.stderr
+        page = (tmp_path / "repository/index.html").read_text()
+        assert Path(made.stdout.strip()).name in page
+        package = (tmp_path / "repository/index.json").as_uri()
     obj, _armature = scenes.make_arm()
     expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)[0]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
