@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws the pictures of the extension's page on a platform: the icon, the picture at its top, five photographs
+"""Draws the pictures of the extension's page on a platform: the icon, the picture at the top, and photographs
 of Blender's window.
 
     .venv/bin/python listing/draw.py dist/sinew-VERSION.zip [--only icon.png]
@@ -68,7 +68,18 @@ def draw_top(path: Path) -> None:
     wrist = HERE.parent / "blend_files/wrist.blend"
     with tempfile.TemporaryDirectory() as folder:
         sheet = Path(folder, "sheet.png")
-        words = ["compare", wrist, "--methods", "lbs,dq,cor", "--frame", "24", "--size", "620", "--out", sheet]
+        words = [
+            "compare",
+            wrist,
+            "--methods",
+            "lbs,dq,cor",
+            "--frame",
+            "24",
+            "--size",
+            "620",
+            "--out",
+            sheet,
+        ]
         subprocess.run([SINEW, *words], check=True, stdout=subprocess.DEVNULL)
         with Image.open(sheet) as drawn:
             fitted(drawn.convert("RGB")).save(path, quality=90)
@@ -78,7 +89,9 @@ def fitted(drawn: Image.Image) -> Image.Image:
     """As large as it fits, on the colour of its own corner."""
     whole = Image.new("RGB", PICTURE, drawn.getpixel((0, 0)))
     factor = min(PICTURE[0] / drawn.width, PICTURE[1] / drawn.height)
-    drawn = drawn.resize((round(drawn.width * factor), round(drawn.height * factor)), Image.Resampling.LANCZOS)
+    drawn = drawn.resize(
+        (round(drawn.width * factor), round(drawn.height * factor)), Image.Resampling.LANCZOS
+    )
     whole.paste(drawn, ((PICTURE[0] - drawn.width) // 2, (PICTURE[1] - drawn.height) // 2))
     return whole
 
@@ -88,7 +101,9 @@ def photograph(script: str, package: Path, names: tuple[str, ...]) -> None:
     pictures = [HERE / f"{name}.webp" for name in names]
     words = ["run", "--factory-startup", human, "--python", DOCS / script, "--", package, *pictures]
     screen = os.environ | {"SCREEN": "x".join(map(str, PICTURE))}
-    subprocess.run([os.environ["SINEW_FULL_BLENDER"], *words], check=True, env=screen, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [os.environ["SINEW_FULL_BLENDER"], *words], check=True, env=screen, stdout=subprocess.DEVNULL
+    )
 
 
 def main() -> None:

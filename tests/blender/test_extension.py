@@ -26,12 +26,13 @@ import numpy as np
 
 addon_utils.enable("bl_pkg")
 bpy.ops.wm.open_mainfile(filepath=sys.argv[3])
-if sys.argv[2].endswith(".zip"):
-    bpy.ops.extensions.package_install_files(filepath=sys.argv[2], repo="user_default", enable_on_install=True)
+source = sys.argv[2]
+if source.endswith(".zip"):
+    bpy.ops.extensions.package_install_files(filepath=source, repo="user_default", enable_on_install=True)
 else:
     bpy.context.preferences.system.use_online_access = True
     repositories = bpy.context.preferences.extensions.repos
-    repository = repositories.new(name="Sinew", module="sinew_repository", remote_url=sys.argv[2])
+    repository = repositories.new(name="Sinew", module="sinew_repository", remote_url=source)
     number = len(repositories) - 1
     bpy.ops.extensions.repo_sync(repo_directory=repository.directory)
     bpy.ops.extensions.package_install(repo_index=number, pkg_id="sinew", enable_on_install=True)
