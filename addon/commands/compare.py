@@ -12,6 +12,7 @@ from ..core.comparison import USUAL_METHODS, Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
+from ..core.html import require_jinja
 from ..core.metrics import Summary
 from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
@@ -90,6 +91,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     characters.set_parameters(args.set)
     if args.out.suffix.lower() in sheet.PICTURES:
         return sheet.run(args, methods, console)
+    require_jinja()
     frames = parse_frames(args.frames) if args.frames is not None else None
     _check_names(args.files)
     if args.video:
