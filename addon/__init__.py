@@ -21,17 +21,16 @@ def unregister() -> None:
 
 def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
     """Called before an export."""
-    from .deform import lifecycle
     from .features.gltf import feature
 
-    feature.before_export(export_settings, lifecycle.before_export)
+    feature.before_export(export_settings)
 
 
-def glTF2_post_export_callback(export_settings: dict) -> None:  # noqa: N802
-    """Called after an export."""
-    from .deform import lifecycle
+def glTF2_post_export_callback(_export_settings: dict) -> None:  # noqa: N802
+    """Called after an export that did not fail."""
+    from .features.gltf import export
 
-    lifecycle.after_export(export_settings)
+    export.end()
 
 
 def glTF2ExportUserExtension() -> object:  # noqa: N802

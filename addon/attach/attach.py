@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Puts Sinew in the place of an object's Armature modifiers, and takes it off again.
 
-While Sinew deforms, the Armature modifiers stay in the stack, switched off. In a saved file they deform
-instead, and Sinew's modifier is off, so that a Blender without Sinew can play it. What the artist or a tool
-does to the modifiers' icons has the meaning that core/icons.py gives it.
+While Sinew deforms, the Armature modifiers stay in the stack, switched on, where other tools look for them;
+in_depsgraph.py has Blender leave them out. In a saved file they deform, and Sinew's modifier is off, so that
+a Blender without Sinew can play it. What the artist or a tool does to the modifiers' icons has the meaning
+that core/icons.py gives it.
 """
 
 from __future__ import annotations
@@ -262,7 +263,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         restore_volume(obj)
         adopt_pointers(obj)
         _note_keyed_visibility(obj)
-        _set_icons(obj, Situation.PAINT if keeps_modifiers_on(obj) else Situation.SINEW)
+        _set_icons(obj, Situation.ALONE if _is_alone(obj) else Situation.SINEW)
         return
     if settings.replaces_modifiers:
         restore_builtin(obj)
@@ -284,7 +285,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
     situation = Situation(settings.situation)
     for name in VIEWS:
         view = _view(obj, name)
-        before = icons.icons(view, situation, name)
+        before = icons.icons(view, situation)
         modifiers = tuple(
             was_on if _is_keyed(obj, modifier, replaced) else getattr(modifier, f"show_{name}")
             for (modifier, replaced), was_on in zip(pairs, before.modifiers, strict=True)
@@ -297,7 +298,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
         if is_left and now.sinew and obj.mode not in ("EDIT", "SCULPT"):
             # The artist wants Sinew to deform it, though it is small.
             properties.store(settings, "leave_small", False)
-        _store(obj, name, icons.follow(view, situation, name, now))
+        _store(obj, name, icons.follow(view, situation, now))
     # So that what was taken over is not taken for another click.
     _set_icons(obj, situation)
 
@@ -339,34 +340,34 @@ def deforms(obj: bpy.types.Object) -> bool:
 
 def do_views_differ(obj: bpy.types.Object) -> bool:
     """Whether Sinew deforms by other Armature modifiers in the viewport than in renders."""
-    viewport, render = (_view(obj, name).shown for name in VIEWS)
+    viewport, render = (_view(obj, name).taking_part for name in VIEWS)
     return any(viewport) and any(render) and viewport != render
 
 
 def _view(obj: bpy.types.Object, name: str) -> icons.View:
     settings = properties.of(obj)
     pairs = replaced_modifiers(obj)
-    shown, forced, own = (
+    shown, forced, switched = (
         tuple(getattr(replaced, f"{kind}_{name}") for _modifier, replaced in pairs)
-        for kind in ("show", "was_off", "on")
+        for kind in ("show", "was_off", "switched")
     )
     # One that an animation switches may be on in any frame.
     shown = tuple(is_shown or _is_keyed(obj, *pair) for is_shown, pair in zip(shown, pairs, strict=True))
-    return icons.View(shown, forced, getattr(settings, f"hidden_{name}"), own)
+    return icons.View(shown, forced, getattr(settings, f"hidden_{name}"), switched)
 
 
 def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
     properties.store(properties.of(obj), f"hidden_{name}", view.hidden)
     pairs = replaced_modifiers(obj)
     none = (False,) * len(pairs)
-    for pair, shown, forced, own in zip(
-        pairs, view.shown, view.forced or none, view.own or none, strict=True
+    for pair, shown, forced, switched in zip(
+        pairs, view.shown, view.forced or none, view.switched or none, strict=True
     ):
         _modifier, replaced = pair
         if not _is_keyed(obj, *pair):
             properties.store(replaced, f"show_{name}", shown)
         properties.store(replaced, f"was_off_{name}", forced)
-        properties.store(replaced, f"on_{name}", own)
+        properties.store(replaced, f"switched_{name}", switched)
 
 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
@@ -374,7 +375,7 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     neutral, smooth = stack.neutral_modifier(obj), {}
     for name in VIEWS:
         view = _view(obj, name)
-        wanted = icons.icons(view, situation, name)
+        wanted = icons.icons(view, situation)
         for (modifier, replaced), is_on in zip(pairs, wanted.modifiers, strict=True):
             is_keyed = is_visibility_animated(obj, modifier)
             if not (is_keyed if situation.is_by_sinew else replaced.visibility_is_keyed):
@@ -504,8 +505,9 @@ def _replaced_modifier(
     if found is None:
         found = replaced_modifiers.add()
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
-        if properties.of(obj).replaces_modifiers and not is_visibility_animated(obj, modifier):
-            _show(modifier, False, False)
+        for name in VIEWS:
+            if getattr(properties.of(obj), f"hidden_{name}"):
+                _show_in(modifier, name, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
     properties.store(found, "name", modifier.name)
     properties.store(found, "uid", modifier.persistent_uid)
@@ -565,10 +567,11 @@ def position_modifier(obj: bpy.types.Object) -> None:
     undeformed.position(obj)
 
 
-def keeps_modifiers_on(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifiers stay on in the viewport, before Sinew's: tools for weights find the
-    deforming bones through them."""
-    return obj.mode == "WEIGHT_PAINT" and not stack.visibility_is_animated(obj)
+def _is_alone(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifiers are off while Sinew deforms: in a comparison's copies, to save time, and
+    where an animation sets the icon of Sinew's modifier, as they would deform where it is off."""
+    nodes = sinew_modifier(obj)
+    return properties.is_copy(obj) or (nodes is not None and is_visibility_animated(obj, nodes))
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:

@@ -134,9 +134,9 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
     # Its icons were off before Sinew, which deforms by it nevertheless; removal switches them off again.
     was_off_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     was_off_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    # The artist switched its icon on while Sinew is on, so that it deforms in Sinew's place.
-    on_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    on_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    # The artist switched its icon while Sinew is on, or after Sinew's icon was switched off.
+    switched_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    switched_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
     visibility_is_keyed: bpy.props.BoolProperty(
         description="An animation has set the Armature modifier's flags, and not Sinew",
         options={"HIDDEN"},

@@ -23,7 +23,7 @@ class Subscribers:
     objects_changed           these are the objects that have Sinew now
     deformed                  all objects have the shape of this evaluation, as far as handlers are concerned
     frame_shown               what the panel shows of a frame may differ
-    exported                  an export has ended, or failed
+    saving                    the file is about to be saved
     safe_mode_changed         safe mode was switched on or off
     precomputation_requested  something is computed on a thread, or will be
     precomputation_shown      the progress of that may differ
@@ -41,7 +41,7 @@ class Subscribers:
         default_factory=list
     )
     frame_shown: list[Callable[[], None]] = field(default_factory=list)
-    exported: list[Callable[[], None]] = field(default_factory=list)
+    saving: list[Callable[[], None]] = field(default_factory=list)
     safe_mode_changed: list[Callable[[], None]] = field(default_factory=list)
     precomputation_requested: list[Callable[[], None]] = field(default_factory=list)
     precomputation_shown: list[Callable[[], None]] = field(default_factory=list)

@@ -33,7 +33,7 @@ def updates_suspended() -> Iterator[None]:
 class Phase:
     """What Blender does with the file as a whole (deform/lifecycle.py).
 
-    is_saving     it is written or exported
+    is_saving     it is written
     is_rendering  between the events of a render's start and end
     must_refresh  something waits for the end of a render
     """

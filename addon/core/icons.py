@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the icons of Sinew's modifier and of the Armature modifiers that it replaces mean.
 
-The viewport and renders each have icons of their own, and exactly one of three things deforms there: Sinew;
-an Armature modifier whose icon was switched on; or nothing, where Sinew's icon was switched off.
+The viewport and renders each have icons of their own, and exactly one of three things deforms there. Sinew,
+as long as its icon and an Armature modifier's are on: so tools of others find that modifier, and get the mesh
+at rest where they hide it. Nothing, once one of the two is switched off. The Armature modifier, where its
+icon is switched on again after Sinew's was switched off.
 """
 
 from __future__ import annotations
@@ -28,11 +30,11 @@ class Situation(Enum):
     OFF = ""  # the Armature modifiers, as Sinew is off
     BUILT_IN = "built-in"  # the Armature modifiers, in Sinew's place
     SINEW = "Sinew"
-    PAINT = "paint"  # Sinew, with the Armature modifiers on in the viewport
+    ALONE = "alone"  # Sinew, with the Armature modifiers off
 
     @property
     def is_by_sinew(self) -> bool:
-        return self in (Situation.SINEW, Situation.PAINT)
+        return self in (Situation.SINEW, Situation.ALONE)
 
 
 @dataclass(frozen=True)
@@ -47,22 +49,33 @@ class Icons:
 class View:
     """What is known of one view.
 
-    shown   for each Armature modifier, whether it deforms by Sinew, or without it
-    forced  for each Armature modifier, whether it is shown because of Sinew alone
-    hidden  Sinew's icon was switched off
-    own     for each Armature modifier, whether it was switched on while Sinew is on
+    shown     for each Armature modifier, whether it was on before Sinew, or is because of Sinew
+    forced    for each Armature modifier, whether it is shown because of Sinew alone
+    hidden    Sinew's icon was switched off, and the Armature modifiers' with it
+    switched  for each Armature modifier, whether its icon was switched since then, or since Sinew is on
     """
 
     shown: tuple[bool, ...]
     forced: tuple[bool, ...] = ()
     hidden: bool = False
-    own: tuple[bool, ...] = ()
+    switched: tuple[bool, ...] = ()
+
+    @property
+    def on(self) -> tuple[bool, ...]:
+        """The Armature modifiers' icons while Sinew is on."""
+        switched = self.switched or (False,) * len(self.shown)
+        return _each(lambda shown, other: (shown and not self.hidden) != other, self.shown, switched)
+
+    @property
+    def taking_part(self) -> tuple[bool, ...]:
+        """For each Armature modifier, whether Sinew deforms by it where Sinew deforms."""
+        return self.shown if self.hidden else self.on
 
     @property
     def deformer(self) -> Deformer:
-        if any(self.own):
-            return Deformer.ARMATURE
-        return Deformer.NOTHING if self.hidden or not any(self.shown) else Deformer.SINEW
+        if not any(self.on):
+            return Deformer.NOTHING
+        return Deformer.ARMATURE if self.hidden else Deformer.SINEW
 
     def switched_on(self, wanted: tuple[bool, ...] = ()) -> View:
         """Returns the view with Sinew in it.
@@ -81,47 +94,35 @@ def taking_part(shown: Sequence[bool], in_other_view: Sequence[bool]) -> Sequenc
     return shown if any(shown) else in_other_view
 
 
-def icons(view: View, situation: Situation, name: str) -> Icons:
-    """Returns the icons that Sinew sets.
-
-    name  of the view
-    """
-    deformer, none = view.deformer, (False,) * len(view.shown)
+def icons(view: View, situation: Situation) -> Icons:
+    """Returns the icons that Sinew sets."""
     if situation is Situation.OFF:
         return Icons(False, view.shown)
-    if deformer is Deformer.ARMATURE:
-        return Icons(False, view.own)
-    if deformer is Deformer.NOTHING:
-        return Icons(False, none)
-    is_kept_on = situation is Situation.PAINT and name == VIEWPORT
-    is_on = situation is Situation.BUILT_IN or is_kept_on
-    return Icons(situation.is_by_sinew, view.shown if is_on else none)
+    is_sinews = view.deformer is Deformer.SINEW
+    are_off = is_sinews and situation is Situation.ALONE
+    return Icons(is_sinews and situation.is_by_sinew, (False,) * len(view.shown) if are_off else view.on)
 
 
-def follow(view: View, situation: Situation, name: str, now: Icons) -> View:
+def follow(view: View, situation: Situation, now: Icons) -> View:
     """Returns what is known of a view after the artist, or a tool, has switched its icons.
 
     now  the icons as they are; before, they were as from icons()
     """
-    before = icons(view, situation, name)
+    before = icons(view, situation)
     if now == before:
         return view
     if situation is Situation.OFF:
         return _followed_off(view, now)
     if now.sinew and not before.sinew:
         return view.switched_on()
-    if situation is Situation.BUILT_IN:
-        if any(now.modifiers) and view.deformer is Deformer.NOTHING:
-            return view.switched_on(now.modifiers)
-        if not any(now.modifiers) and view.deformer is Deformer.SINEW:
-            return replace(view, hidden=True)
-        return replace(view, own=now.modifiers)
-    own = now.modifiers
-    if view.deformer is Deformer.SINEW:
-        # Those that are kept on say nothing.
-        own = _each(lambda is_on, was_on: is_on and not was_on, own, before.modifiers)
-    hidden = view.hidden or (before.sinew and not now.sinew)
-    return replace(view, own=own if any(own) else (), hidden=hidden)
+    if before.sinew and not now.sinew:
+        return replace(view, hidden=True, switched=())
+    if not any(view.shown) and any(now.modifiers):
+        return view.switched_on(now.modifiers)
+    if situation is Situation.ALONE:
+        return replace(view, hidden=any(now.modifiers), switched=now.modifiers)
+    was_on = replace(view, switched=()).on
+    return replace(view, switched=_each(lambda is_on, was: is_on != was, now.modifiers, was_on))
 
 
 def _followed_off(view: View, now: Icons) -> View:
@@ -132,7 +133,7 @@ def _followed_off(view: View, now: Icons) -> View:
         now.modifiers,
         forced if view.forced else (),
         view.hidden and not now.sinew,
-        view.own if all(is_same) else (),
+        view.switched if all(is_same) else (),
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import sinew
 
 from ..attach import point_store, properties
+from ..core.icons import VIEWS
 from ..io import mesh_io
 from . import pose, source
 from .plan import State
@@ -94,6 +95,8 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     memory = _memory_to_write(settings, mesh, skinned)
     if memory is None:
         return "its mesh changed"
+    if skinned.evaluation.is_shown(mesh):
+        _leave_out(evaluated, modifiers)
     out, normals = memory
     _note_unannounced_change(out, skinned)
     frames = pose.read(evaluated, settings, modifiers, skinned, "VIEWPORT")
@@ -112,6 +115,20 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     # An animation can choose a method whose data has not been requested yet.
     is_new_need = skinned.plan.state is not State.WAITING and pose.lacks_data(bound, frames)
     return "what its method needs is not computed" if is_new_need else ""
+
+
+def _leave_out(evaluated: bpy.types.Object, modifiers: pose.Modifiers) -> None:
+    """Switches the Armature modifiers off in evaluated data, where Sinew's modifier comes after them and sets
+    each vertex: on a large mesh they take as long as Sinew. Blender copies their icons from the original
+    again before it requests points again. foreach_set() tags nothing, which is not allowed here.
+
+    Exporters evaluate for themselves, and find them as they are: USD writes a skin where one is on.
+    """
+    names = {replaced.name for replaced, _armature in modifiers}
+    for view in VIEWS:
+        if not getattr(evaluated.sinew, f"hidden_{view}"):
+            shown = [getattr(m, f"show_{view}") and m.name not in names for m in evaluated.modifiers]
+            evaluated.modifiers.foreach_set(f"show_{view}", shown)
 
 
 def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:

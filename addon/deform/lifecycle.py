@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What happens to the open file as a whole: undo, redo, loading, saving, exporting, rendering, and the end of
-Sinew. Each of Blender's events has one handler, which calls the subscribers in order."""
+"""What happens to the open file as a whole: undo, redo, loading, saving, rendering, and the end of Sinew.
+Each of Blender's events has one handler, which calls the subscribers in order."""
 
 from __future__ import annotations
 
@@ -15,15 +15,13 @@ from bpy.app.handlers import persistent
 
 from ..attach import note, overrides, point_store, properties, references
 from ..attach.subscribers import notify, subscribers
-from ..attach.updates import is_rendering_in_window, may_change_file, phase, reaction, updates_suspended
+from ..attach.updates import is_rendering_in_window, phase, reaction, updates_suspended
 from ..core.precompute import precomputations
 from ..io.animation_paths import animated_paths
 from . import apply_plan, events, handlers, precompute_watch, precomputing, session
 from .changes import Changes
 
 log = logging.getLogger("sinew")
-
-_FBX, _GLTF = "EXPORT_SCENE_OT_fbx", "EXPORT_SCENE_OT_gltf"
 
 
 def _handler(function: Callable[[bool], None]) -> Callable[..., None]:
@@ -84,7 +82,7 @@ def on_loaded(_may_react: bool) -> None:
     session.refresh(bpy.context)
 
 
-# --- Saving and exporting
+# --- Saving
 
 
 @dataclass
@@ -110,10 +108,6 @@ def on_save(may_react: bool) -> None:
         # A thread reads the file meanwhile. With Sinew, the saved file is complete, as an autosave is.
         log.warning("Saved during a render: save again after it, for Blenders without Sinew")
         return
-    _begin_saving()
-
-
-def _begin_saving() -> None:
     # So that the artist's last changes are seen separately from those made for saving.
     bpy.context.evaluated_depsgraph_get()
     # First, so that whatever happens, on_saved() reverses it.
@@ -129,61 +123,11 @@ def on_saved(may_react: bool) -> None:
             resume_after_save(bpy.context)
 
 
-@_handler
-def before_export(may_react: bool) -> None:
-    """From here to after_export() the file is as in a saved state, and frames do without Sinew."""
-    if may_react and may_change_file() and not session.current.is_idle:
-        _begin_saving()
-        note.remove()
-        if not bpy.app.background:
-            # An exporter that fails does not announce its end.
-            bpy.app.timers.register(on_saved, first_interval=0.0)
-
-
-def after_export(*_settings: object) -> None:
-    notify(subscribers.exported)
-    on_saved()
-
-
-def _wrap_exporters() -> None:
-    """Wraps those of Blender's exporters of skins that are registered and not wrapped yet: they need Armature
-    modifiers that deform, and use them to bring the mesh to rest.
-
-    The glTF exporter calls extensions before an export, but afterwards only if it did not fail. The FBX
-    exporter, also written in Python, calls nobody (seen on 4.2 to 5.2). So both operators are wrapped.
-    """
-    for name in (_FBX, _GLTF):
-        operator = getattr(bpy.types, name, None)
-        if operator is not None and not hasattr(operator.execute, "__wrapped__"):
-            operator.execute = _without_sinew(operator.execute, is_announced=name == _GLTF)
-
-
-def _without_sinew(execute: Callable, is_announced: bool) -> Callable:
-    """is_announced: the exporter itself calls before_export()."""
-
-    @functools.wraps(execute)
-    def execute_without_sinew(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
-        if not is_announced:
-            before_export()
-        try:
-            return execute(self, context)
-        finally:
-            after_export()
-
-    return execute_without_sinew
-
-
-def _unwrap_exporters() -> None:
-    for name in (_FBX, _GLTF):
-        operator = getattr(bpy.types, name, None)
-        if operator is not None and hasattr(operator.execute, "__wrapped__"):
-            operator.execute = operator.execute.__wrapped__
-
-
 def prepare_for_save() -> None:
     """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has.
     Raises nothing: what fails is reported, and the rest of the file is prepared."""
     session.current.gate.restore()
+    notify(subscribers.saving)
     objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
     # Known before anything can fail, so that resume_after_save() reverses all of it.
     _saving.on_before = {obj.session_uid for obj in objects if properties.of(obj).replaces_modifiers}
@@ -305,7 +249,6 @@ _HANDLERS = {
 _SUBSCRIPTIONS = (
     (subscribers.precomputation_requested, precompute_watch.begin),
     (subscribers.before_removal, session.forget_object),
-    (subscribers.loaded, _wrap_exporters),
 )
 
 
@@ -315,7 +258,6 @@ def register() -> None:
         functions.append(function)
     handlers.register()
     events.subscribe_all(_HANDLERS)
-    _wrap_exporters()
 
 
 def adopt_open_file() -> None:
@@ -337,7 +279,6 @@ def leave_open_file() -> None:
 
 
 def unregister() -> None:
-    _unwrap_exporters()
     precomputing.end()
     for functions, function in _SUBSCRIPTIONS:
         functions.remove(function)

@@ -144,7 +144,10 @@ def _taking_part(
     """Returns which of the modifiers deform in a view; where an animation sets their icons, it decides."""
     viewport, render = (
         [
-            getattr(evaluated.modifiers[replaced.name] if is_keyed else replaced, f"show_{name}")
+            getattr(evaluated.modifiers[replaced.name], f"show_{name}")
+            if is_keyed
+            else getattr(replaced, f"show_{name}")
+            != (getattr(replaced, f"switched_{name}") and not getattr(evaluated.sinew, f"hidden_{name}"))
             for (replaced, _armature), is_keyed in zip(modifiers, are_keyed, strict=False)
         ]
         for name in icons.VIEWS

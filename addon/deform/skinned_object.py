@@ -49,6 +49,7 @@ class Evaluation:
     is_only_user         the mesh has as many users as when the plan was applied
     mesh                 the address of the evaluated mesh that was given points, or 0; compared only within
                          the same event, while Blender keeps the mesh
+    mesh_shown           the address of the evaluated mesh that viewports showed last, or 0
     is_event_known       Blender called handlers before the evaluation, or Sinew caused it
     was_tagged           Sinew has tagged the object for another evaluation since
     changed_unannounced  the mesh was replaced without any event before the evaluation
@@ -60,6 +61,7 @@ class Evaluation:
 
     is_only_user: bool = True
     mesh: int = 0
+    mesh_shown: int = 0
     is_event_known: bool = True
     was_tagged: bool = False
     changed_unannounced: bool = False
@@ -83,6 +85,10 @@ class Evaluation:
     def note_failure(self, failure: str) -> None:
         self.skip_reason = self.failure = failure
         self.failures += 1
+
+    def is_shown(self, mesh: bpy.types.Mesh) -> bool:
+        """Whether it is the evaluated mesh of a viewport, not of a render or an exporter."""
+        return self.mesh_shown == mesh.as_pointer()
 
     def succeed(self, mesh: bpy.types.Mesh) -> None:
         self.mesh, self.skip_reason, self.failures_in_a_row = mesh.as_pointer(), "", 0
@@ -231,7 +237,11 @@ class SkinnedObject:
         if self.plan.uses_builtin:
             return self.noted.builtin_fingerprint == small_meshes.fingerprint(obj)
         given = self.evaluation.mesh
-        return given != 0 and given == obj.data.evaluated_get(depsgraph).as_pointer()
+        if given == 0 or given != obj.data.evaluated_get(depsgraph).as_pointer():
+            return False
+        if depsgraph.mode == "VIEWPORT":
+            self.evaluation.mesh_shown = given
+        return True
 
     def is_attached(self, obj: bpy.types.Object) -> bool:
         """Whether Sinew's modifier is there, with its node group where that is needed. Another add-on's

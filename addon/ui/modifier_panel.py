@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import properties
+from ..attach import other_tools, properties
 from ..attach.feature import Feature
 from ..deform import session
 from ..deform.plan import State
@@ -28,6 +28,8 @@ def _draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
     row.operator("sinew.open_tab", text="", icon="MENU_PANEL")
     is_refused = session.plan_of(obj).state is State.REFUSED
     draw_text(box, context, state_text.sentence_of(obj), alert=is_refused)
+    if settings.replaces_modifiers:
+        draw_text(box, context, other_tools.APPLYING, icon="INFO")
 
 
 def _begin() -> None:

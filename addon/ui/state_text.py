@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import bpy
 
-from ..attach import attach, behind_nodes, properties
+from ..attach import attach, behind_nodes, other_tools, properties
 from ..core.icons import Deformer
 from ..deform import lifecycle, session, small_meshes
 from ..deform.plan import ARMATURE_MODIFIER_MODES, State
@@ -137,7 +137,7 @@ def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
     plan = session.plan_of(obj)
     if plan.state is State.REFUSED:
         draw_text(layout, context, plan.reason, icon="ERROR", alert=True)
-    for sentence in (*reasons_of(obj), *attach.notes(obj)):
+    for sentence in (*reasons_of(obj), *attach.notes(obj), *other_tools.notes(obj)):
         draw_text(layout, context, sentence, icon="INFO")
     draw_in_mode(layout, context, obj)
     if plan.normals_reason:
@@ -163,7 +163,7 @@ def draw_character(
     for obj, plan in plans.items():
         is_off = plan.state in (State.OFF, State.REFUSED)
         views = reasons_of(obj) if plan.uses_builtin else plan.view_reasons
-        for reason in (*(() if is_off else views), *attach.notes(obj)):
+        for reason in (*(() if is_off else views), *attach.notes(obj), *other_tools.notes(obj)):
             by_reason.setdefault(reason, []).append(obj.name)
     for reason, names in by_reason.items():
         who = names_text(names, most=2)

@@ -615,7 +615,7 @@ def test_visibility_that_is_keyed_while_sinew_is_on():
             modifier.keyframe_insert(path, frame=frame)
     for curve in animation_paths.curves_of(obj):
         if ".show_" in curve.data_path:
-            curve.keyframe_points[1].co.y = 1.0
+            curve.keyframe_points[0].co.y = 0.0
     bpy.context.scene.frame_set(1)
     scenes.bend(armature, 90.0)
     bpy.context.view_layer.update()

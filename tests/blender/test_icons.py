@@ -26,26 +26,27 @@ SINEW, ARMATURE, NOTHING = Deformer.SINEW, Deformer.ARMATURE, Deformer.NOTHING
 @dataclass
 class Rule:
     """What the icons should mean, apart from Sinew's own code: for each view, whether Sinew's was switched
-    off, and whether the Armature modifier's is on."""
+    off, and whether the Armature modifier's is on, which goes off with it."""
 
     hidden: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, False))
-    aside: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, False))
+    armature: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, True))
 
     def click(self, modifier: str, view: str) -> None:
         if modifier == "Armature":
-            self.aside[view] = not self.aside[view]
-        elif self.deformer(view) is SINEW:
-            self.hidden[view] = True
+            self.armature[view] = not self.armature[view]
         else:
-            self.hidden[view] = self.aside[view] = False
+            self.hidden[view] = self.deformer(view) is SINEW
+            self.armature[view] = not self.hidden[view]
 
     def deformer(self, view: str) -> Deformer:
-        return ARMATURE if self.aside[view] else NOTHING if self.hidden[view] else SINEW
+        if not self.armature[view]:
+            return NOTHING
+        return ARMATURE if self.hidden[view] else SINEW
 
     def icons(self) -> dict[str, tuple[bool, bool]]:
         views = [self.deformer(view) for view in VIEWS]
-        of = {"Sinew": SINEW, "Armature": ARMATURE}
-        return {name: tuple(view is meant for view in views) for name, meant in of.items()}
+        of = {"Sinew": (SINEW,), "Armature": (SINEW, ARMATURE)}
+        return {name: tuple(view in meant for view in views) for name, meant in of.items()}
 
 
 class Character:
@@ -105,7 +106,7 @@ def test_every_order_of_three_clicks(rendered_points):
             if clicks[: number + 1] not in seen:
                 seen.add(clicks[: number + 1])
                 # Each state after each click is drawn once.
-                state = (*rule.hidden.values(), *rule.aside.values(), click)
+                state = (*rule.hidden.values(), *rule.armature.values(), click)
                 character.check(rule, None if state in drawn else rendered_points)
                 drawn.add(state)
         attach.remove(character.obj)
@@ -162,14 +163,12 @@ def _duplicate(character: Character, _rule: Rule, _chosen: tuple[str, str], _pat
 
 
 def _paint(character: Character, rule: Rule, chosen: tuple[str, str], _path: str) -> None:
-    """In this mode the Armature modifier is on while Sinew deforms, which its own icon does not change."""
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     bpy.context.view_layer.update()
     assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
-    if chosen != ("Armature", "viewport"):
-        character.click(*chosen)
-        rule.click(*chosen)
-        assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
+    character.click(*chosen)
+    rule.click(*chosen)
+    assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
 

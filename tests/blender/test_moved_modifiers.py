@@ -97,7 +97,7 @@ def test_a_third_added():
     third.object = properties.of(obj).armatures[1]
     bpy.context.view_layer.update()
     got = scenes.shapes(obj, FRAMES)
-    assert not third.show_viewport
+    assert third.show_viewport
     attach.remove(obj)
     session.refresh(bpy.context)
     assert third.show_viewport

@@ -15,7 +15,7 @@ import pytest
 import scenes
 from program import checked, without_sinew
 from sinew_addon.attach import attach, node_group, note, properties, stack, updates
-from sinew_addon.deform import apply_plan, lifecycle, safe_mode, session, small_meshes
+from sinew_addon.deform import apply_plan, safe_mode, session, small_meshes
 from sinew_addon.io import armature_io
 from sinew_addon.ui import state_text
 
@@ -125,7 +125,7 @@ def test_a_group_that_was_taken_apart_is_saved(tmp_path):
     group.links.remove(output.inputs["Geometry"].links[0])
     save(tmp_path / "saved.blend")
     # Sinew goes on.
-    assert not obj.modifiers["Armature"].show_viewport
+    assert stack.sinew_modifier(obj).show_viewport
 
 
 def _unknown_method(obj):
@@ -152,13 +152,13 @@ def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
     session.refresh(bpy.context)
     path = tmp_path / "saved.blend"
     save(path)
-    assert not obj.modifiers["Armature"].show_viewport
+    assert stack.sinew_modifier(obj).show_viewport
     assert "newer Sinew" in properties.of(newer).error
     assert np.array_equal(scenes.shapes(newer, FRAMES), expected)
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert properties.of(bpy.data.objects["Newer"]).enabled
     assert properties.of(bpy.data.objects["Newer"]).method == ""
-    assert not bpy.data.objects["Arm"].modifiers["Armature"].show_viewport
+    assert stack.sinew_modifier(bpy.data.objects["Arm"]).show_viewport
     # A script that ends with this file.
     script = (
         f"import bpy, sinew_addon; sinew_addon.register(); bpy.ops.wm.open_mainfile(filepath={str(path)!r})"
@@ -166,7 +166,7 @@ def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
     properties.of(bpy.data.objects["Newer"]).method = "lbs"
     assert properties.of(bpy.data.objects["Newer"]).error == ""
-    assert not bpy.data.objects["Newer"].modifiers["Armature"].show_viewport
+    assert stack.sinew_modifier(bpy.data.objects["Newer"]).show_viewport
 
 
 def test_evaluations_while_saving_change_nothing(tmp_path):
@@ -196,7 +196,7 @@ def test_evaluations_while_saving_change_nothing(tmp_path):
         bpy.app.handlers.save_pre.remove(neighbour)
     blenders_own = (armature, True, True, False, False)
     assert seen == [(blenders_own, blenders_own)]
-    assert not state()[1]
+    assert state() == (armature, True, True, True, True)
     expected = scenes.final_points(obj)
     scenes.shapes(obj, FRAMES)
     assert np.array_equal(scenes.shapes(obj, [11])[0], expected)
@@ -373,19 +373,6 @@ def test_the_menu_of_modifiers_offers_nothing_of_sinews():
     groups = [group for group in bpy.data.node_groups if group.get(node_group.MARK)]
     assert groups
     assert not any(group.is_modifier for group in groups)
-
-
-def test_an_export_has_blenders_own_modifiers_and_frames(tmp_path):
-    """As exporters read them, frame by frame; afterwards Sinew continues."""
-    obj, armature = scenes.make_arm()
-    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
-    scenes.add_sinew(obj, "dq")
-    ours = scenes.shapes(obj, FRAMES)
-    lifecycle.before_export()
-    assert obj.find_armature() == armature
-    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-    lifecycle.after_export()
-    assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
 
 
 def test_fbx_has_the_skin(tmp_path):

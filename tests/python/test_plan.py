@@ -120,7 +120,7 @@ def test_who_computes_normals(facts, domain, reason):
 CLICKS = [
     # Sinew's icon (S) and that of the Armature modifier (A) in one view, as clicked: what deforms.
     ("", Deformer.SINEW),
-    ("A", Deformer.ARMATURE),
+    ("A", Deformer.NOTHING),
     ("AA", Deformer.SINEW),
     ("AS", Deformer.SINEW),
     ("S", Deformer.NOTHING),
@@ -128,32 +128,31 @@ CLICKS = [
     ("SA", Deformer.ARMATURE),
     ("SAA", Deformer.NOTHING),
     ("SAAS", Deformer.SINEW),
-    ("SASA", Deformer.ARMATURE),
+    ("SASA", Deformer.NOTHING),
     ("SASAA", Deformer.SINEW),
 ]
 
 
-def _after(clicks: str, situation: Situation, view: View, name: str) -> View:
+def _after(clicks: str, situation: Situation, view: View) -> View:
     for click in clicks:
-        before = icons(view, situation, name)
+        before = icons(view, situation)
         sinew, (modifier,) = before.sinew ^ (click == "S"), before.modifiers
-        view = follow(view, situation, name, Icons(sinew, (modifier ^ (click == "A"),)))
+        view = follow(view, situation, Icons(sinew, (modifier ^ (click == "A"),)))
         # What Sinew sets then is not taken for a click.
-        assert follow(view, situation, name, icons(view, situation, name)) == view
+        assert follow(view, situation, icons(view, situation)) == view
     return view
 
 
-@pytest.mark.parametrize("name", ["viewport", "render"])
 @pytest.mark.parametrize(("clicks", "deformer"), CLICKS)
-def test_the_order_of_clicks(clicks, deformer, name):
-    view = _after(clicks, Situation.SINEW, View((True,)), name)
+def test_the_order_of_clicks(clicks, deformer):
+    view = _after(clicks, Situation.SINEW, View((True,)))
     assert view.deformer is deformer
-    is_on = (deformer is Deformer.SINEW, deformer is Deformer.ARMATURE)
-    set_now = icons(view, Situation.SINEW, name)
-    assert (set_now.sinew, *set_now.modifiers) == is_on
+    assert icons(view, Situation.SINEW) == Icons(
+        deformer is Deformer.SINEW, (deformer is not Deformer.NOTHING,)
+    )
     assert view.shown == (True,)
     # While Sinew is off, the Armature modifier is as before.
-    assert icons(view, Situation.OFF, name) == Icons(False, (True,))
+    assert icons(view, Situation.OFF) == Icons(False, (True,))
 
 
 @pytest.mark.parametrize(
@@ -164,40 +163,44 @@ def test_the_order_of_clicks(clicks, deformer, name):
         (Situation.BUILT_IN, "AS", Deformer.SINEW),
         (Situation.OFF, "A", Deformer.NOTHING),
         (Situation.OFF, "AA", Deformer.SINEW),
-        (Situation.PAINT, "A", Deformer.SINEW),
-        (Situation.PAINT, "S", Deformer.NOTHING),
-        (Situation.PAINT, "SA", Deformer.ARMATURE),
+        (Situation.ALONE, "A", Deformer.ARMATURE),
+        (Situation.ALONE, "AA", Deformer.SINEW),
+        (Situation.ALONE, "S", Deformer.NOTHING),
+        (Situation.ALONE, "SA", Deformer.ARMATURE),
     ],
 )
-def test_clicks_while_the_armature_modifier_is_on_for_sinew(situation, clicks, deformer):
-    assert _after(clicks, situation, View((True,)), "viewport").deformer is deformer
+def test_clicks_while_the_icons_are_otherwise(situation, clicks, deformer):
+    assert _after(clicks, situation, View((True,))).deformer is deformer
 
 
 def test_several_armature_modifiers():
-    """Each icon is for its own modifier; by Sinew, those deform that were on."""
+    """Each icon is for its own modifier; by Sinew, those deform that are on."""
     view = View((True, False))
-    assert icons(view, Situation.BUILT_IN, "render").modifiers == (True, False)
-    aside = follow(view, Situation.SINEW, "render", Icons(True, (False, True)))
-    assert icons(aside, Situation.SINEW, "render") == Icons(False, (False, True))
-    more = follow(aside, Situation.SINEW, "render", Icons(False, (True, True)))
-    assert icons(more, Situation.SINEW, "render") == Icons(False, (True, True))
-    assert follow(more, Situation.SINEW, "render", Icons(False, (False, False))).deformer is Deformer.SINEW
+    assert icons(view, Situation.BUILT_IN).modifiers == (True, False)
+    both = follow(view, Situation.SINEW, Icons(True, (True, True)))
+    assert (both.deformer, both.taking_part) == (Deformer.SINEW, (True, True))
+    second = follow(both, Situation.SINEW, Icons(True, (False, True)))
+    assert (second.deformer, second.taking_part) == (Deformer.SINEW, (False, True))
+    assert follow(second, Situation.SINEW, Icons(True, (False, False))).deformer is Deformer.NOTHING
+    aside = replace(view, hidden=True, switched=(False, True))
+    assert icons(aside, Situation.SINEW) == Icons(False, (False, True))
+    assert aside.taking_part == (True, False)
 
 
 def test_modifiers_that_were_off():
     """Where none was on, Sinew's icon has it deform by all of them, which Remove takes back."""
     off = View((False, False))
     assert off.deformer is Deformer.NOTHING
-    assert icons(off, Situation.SINEW, "render") == Icons(False, (False, False))
-    on = follow(off, Situation.SINEW, "render", Icons(True, (False, False)))
+    assert icons(off, Situation.SINEW) == Icons(False, (False, False))
+    on = follow(off, Situation.SINEW, Icons(True, (False, False)))
     assert on == View((True, True), forced=(True, True))
-    hidden = follow(on, Situation.SINEW, "render", Icons(False, (False, False)))
+    hidden = follow(on, Situation.SINEW, Icons(False, (False, False)))
     assert hidden == replace(on, hidden=True)
     # What the artist switches while Sinew is off is not taken back.
-    kept = follow(on, Situation.OFF, "render", Icons(False, (True, False)))
+    kept = follow(on, Situation.OFF, Icons(False, (True, False)))
     assert kept == View((True, False), forced=(True, False))
-    none = follow(on, Situation.OFF, "render", Icons(False, (False, False)))
-    again = follow(none, Situation.OFF, "render", Icons(False, (True, False)))
+    none = follow(on, Situation.OFF, Icons(False, (False, False)))
+    again = follow(none, Situation.OFF, Icons(False, (True, False)))
     assert again == View((True, False), forced=(False, False))
 
 

@@ -131,7 +131,7 @@ def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str
     for sentence in _current.left_out:
         settings["log"].warning(sentence)
     if not bpy.app.background:
-        # An exporter that fails does not announce its end.
+        # An exporter that fails does not announce its end. Without a window, the next export and saving do.
         bpy.app.timers.register(end, first_interval=0.0)
 
 

@@ -37,11 +37,10 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         body.prop(context.scene.sinew_gltf, "skinning")
 
 
-def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) -> None:
-    """settings: the exporter's own. begin_export: from then on Sinew deforms nothing."""
+def before_export(settings: dict[str, Any]) -> None:
+    """settings: the exporter's own."""
     context = bpy.context
     found, left_out = export.collect(context) if context.scene.sinew_gltf.skinning else ([], [])
-    begin_export()
     export.begin(found, left_out, settings)
 
 
@@ -68,7 +67,7 @@ def _end() -> None:
 FEATURE = Feature(
     (SinewGltf,),
     {"Scene.sinew_gltf": bpy.props.PointerProperty(type=SinewGltf)},
-    subscriptions=((subscribers.exported, export.end),),
+    subscriptions=((subscribers.saving, export.end),),
     begin=_begin,
     end=_end,
 )

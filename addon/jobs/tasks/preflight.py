@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...attach import attach, properties, stack, upstream_proxy
+from ...attach import attach, other_tools, properties, stack, upstream_proxy
 from ...attach.updates import updates_suspended
 from ...core.errors import SinewError
 from ...deform import characters, session
@@ -50,6 +50,10 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     ]
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
     problems += _not_deformable(skinned)
+    by_sinew = [obj for obj in skinned if properties.of(obj).replaces_modifiers]
+    told += [f"{obj.name}: {sentence}" for obj in by_sinew for sentence in other_tools.notes(obj)]
+    if by_sinew:
+        told.append(other_tools.APPLYING)
     notes += [f"{name} is switched off: its Armature modifier deforms it" for name in off]
     notes += told
     notes += [

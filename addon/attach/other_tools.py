@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exporters and tools of others that do with Sinew what they do not do without it (docs/parity.md)."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.phrases import phrase
+from . import properties, stack
+
+# Such a tool also applies Sinew's modifier, and Sinew then removes the Armature modifiers.
+APPLYING = phrase(
+    "Switch Sinew off before a tool applies all modifiers but the Armature modifier: it would apply Sinew's"
+)
+
+
+def notes(obj: bpy.types.Object) -> list[str]:
+    """Returns a sentence for what an exporter would leave out while Sinew deforms the mesh."""
+    keys, own = obj.data.shape_keys, stack.own_modifiers(obj)
+    if not properties.of(obj).replaces_modifiers or keys is None:
+        return []
+    # FBX files have no shape keys where any modifier but the Armature modifier is on.
+    others = [m for m in obj.modifiers if m.type != "ARMATURE" and m not in own and stack.is_on(m)]
+    text = "Switch Sinew off before an export to FBX, or the file has no shape keys"
+    return [] if others else [phrase(text)]

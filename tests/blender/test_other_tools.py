@@ -1,0 +1,417 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exporters and tools of others give the same with Sinew as without it (the table of docs/parity.md): each
+row calls what the tool calls, or the tool itself where Blender has it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.attach import other_tools, properties, stack
+from sinew_addon.jobs.tasks import preflight
+
+FBX = "Switch Sinew off before an export to FBX, or the file has no shape keys"
+Seen = dict[str, object]
+"""What a tool has made: points, weights, shape keys, modifiers, files."""
+
+
+# --- Meshes
+
+
+def plain(obj: bpy.types.Object) -> None:
+    pass
+
+
+def with_keys(obj: bpy.types.Object) -> None:
+    scenes.key_shape(obj)
+    obj.data.shape_keys.animation_data_clear()
+    obj.data.shape_keys.key_blocks["Key"].value = 0.5
+
+
+def with_front(obj: bpy.types.Object) -> None:
+    scenes.put_in_front(obj, "MIRROR").use_axis = (False, True, False)
+
+
+def with_behind(obj: bpy.types.Object) -> None:
+    obj.modifiers.new("Behind", "SUBSURF").levels = 1
+
+
+MESHES = (plain, with_keys, with_front, with_behind)
+
+
+def make(prepare: Callable, has_sinew: bool) -> bpy.types.Object:
+    """A posed arm under linear blending, which Sinew computes as Blender does."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj, armature = scenes.make_arm(bones=3, sides=8, rings=13)
+    obj.parent = armature
+    prepare(obj)
+    if has_sinew:
+        scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(9)
+    for each in bpy.data.objects:
+        each.select_set(each == obj)
+    return obj
+
+
+# --- What is seen of a mesh
+
+
+def points_of(vertices: bpy.types.bpy_prop_collection) -> np.ndarray:
+    points = np.empty((len(vertices), 3), dtype=np.float32)
+    vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def seen_of(obj: bpy.types.Object, name: str = "") -> Seen:
+    """The mesh itself, its shape in this pose, weights, shape keys and modifiers but for Sinew's."""
+    bpy.context.view_layer.update()
+    keys = obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
+    own = stack.own_modifiers(obj) if properties.has_sinew(obj) else []
+    left = [m for m in obj.modifiers if m not in own]
+    weights = [[round(group.weight, 4) for group in vertex.groups] for vertex in obj.data.vertices]
+    return {
+        f"{name} rest": points_of(obj.data.vertices),
+        f"{name} posed": scenes.final_points(obj),
+        f"{name} weights": weights,
+        **{f"{name} key {key.name}": points_of(key.data) for key in keys},
+        f"{name} keys": [key.name for key in keys],
+        f"{name} modifiers": [(m.type, m.name, m.show_viewport, m.show_render) for m in left],
+        f"{name} armatures": [m.object.name for m in left if m.type == "ARMATURE"],
+    }
+
+
+def evaluated(obj: bpy.types.Object) -> np.ndarray:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    shown = obj.evaluated_get(depsgraph)
+    points = points_of(shown.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph).vertices)
+    shown.to_mesh_clear()
+    return points
+
+
+def skins_of(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
+    return [m for m in obj.modifiers if m.type == "ARMATURE" and m.show_viewport]
+
+
+@contextmanager
+def hidden(modifiers: list[bpy.types.Modifier]) -> Iterator[None]:
+    for modifier in modifiers:
+        modifier.show_viewport = False
+    yield
+    for modifier in modifiers:
+        modifier.show_viewport = True
+
+
+def make_active(obj: bpy.types.Object) -> None:
+    for each in bpy.context.scene.objects:
+        each.select_set(each == obj)
+    bpy.context.view_layer.objects.active = obj
+
+
+def copy_of(obj: bpy.types.Object) -> bpy.types.Object:
+    new = obj.copy()
+    new.data = obj.data.copy()
+    bpy.context.scene.collection.objects.link(new)
+    return new
+
+
+# --- Exporters: the file, read again, and what they leave
+
+
+def read_again(operator: Callable, path: Path, **options: object) -> Seen:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    operator(filepath=str(path), **options)
+    bpy.context.scene.frame_set(9)
+    found: Seen = {"objects": sorted(f"{each.type} {each.name}" for each in bpy.data.objects)}
+    for each in [obj for obj in bpy.data.objects if obj.type == "MESH"]:
+        found |= seen_of(each, f"read {each.name}")
+    return found
+
+
+def exported(export: Callable, read: Callable, kind: str, **options: object) -> Callable:
+    def tool(obj: bpy.types.Object, folder: Path) -> Seen:
+        path = folder / f"arm.{kind}"
+        export(filepath=str(path), **options)
+        left = seen_of(obj, "left")
+        return left | read_again(read, path)
+
+    return tool
+
+
+def alembic(obj: bpy.types.Object, folder: Path) -> Seen:
+    path = folder / "arm.abc"
+    bpy.ops.wm.alembic_export(filepath=str(path), as_background_job=False)
+    left = seen_of(obj, "left")
+    return left | read_again(bpy.ops.wm.alembic_import, path, as_background_job=False)
+
+
+def collada(obj: bpy.types.Object, folder: Path) -> Seen:
+    path = folder / "arm.dae"
+    bpy.ops.wm.collada_export(filepath=str(path), apply_modifiers=True)
+    left = seen_of(obj, "left")
+    return left | read_again(bpy.ops.wm.collada_import, path)
+
+
+# --- Tools that hide, apply, copy and join
+
+
+def vrm_0(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """Skins are modifiers that are on; the mesh at rest is what is shown where these are hidden."""
+    found = skins_of(obj)
+    with hidden(found):
+        bpy.context.view_layer.update()
+        rest = evaluated(obj)
+    return {"skins": [m.object.name for m in found], "rest": rest, **seen_of(obj)}
+
+
+def vrm_1(obj: bpy.types.Object, folder: Path) -> Seen:
+    """The same on a copy, which Blender's glTF exporter then writes."""
+    new = copy_of(obj)
+    found: Seen = {"skins": [m.object.name for m in skins_of(new)]}
+    make_active(new)
+    path = folder / "arm.glb"
+    bpy.ops.export_scene.gltf(filepath=str(path), use_selection=True, export_apply=True)
+    bpy.data.objects.remove(new)
+    return found | seen_of(obj, "left") | read_again(bpy.ops.import_scene.gltf, path)
+
+
+def cgcookie(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """Apply Modifiers with Shape Keys: each key on a copy, with the chosen modifiers applied."""
+    chosen = [m.name for m in obj.modifiers if m.type in ("MIRROR", "SUBSURF")]
+    names = [key.name for key in obj.data.shape_keys.key_blocks] if obj.data.shape_keys else []
+    with hidden(skins_of(obj)):
+        copies = [copy_of(obj) for _name in names[1:]]
+        for number, each in enumerate((obj, *copies)):
+            make_active(each)
+            _keep_key(each, number)
+            for name in chosen:
+                bpy.ops.object.modifier_apply(modifier=name)
+        _join_as_keys(obj, copies, names)
+    return seen_of(obj)
+
+
+def _keep_key(obj: bpy.types.Object, number: int) -> None:
+    """Makes a key the mesh's shape."""
+    if obj.data.shape_keys is None:
+        return
+    points = points_of(obj.data.shape_keys.key_blocks[number].data)
+    obj.shape_key_clear()
+    obj.data.vertices.foreach_set("co", points.ravel())
+    obj.data.update()
+
+
+def _join_as_keys(obj: bpy.types.Object, copies: list[bpy.types.Object], names: list[str]) -> None:
+    for each in bpy.context.scene.objects:
+        each.select_set(each in copies)
+    bpy.context.view_layer.objects.active = obj
+    if copies:
+        bpy.ops.object.join_shapes()
+    for name, each in zip(names[1:], copies, strict=True):
+        obj.data.shape_keys.key_blocks[-1].name = name
+        mesh = each.data
+        bpy.data.objects.remove(each)
+        bpy.data.meshes.remove(mesh)
+
+
+def gret(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """Apply Modifiers with Shape Keys: those that are on are applied, others removed, on copies in no
+    scene."""
+    if obj.data.users > 1:
+        obj.data = obj.data.copy()
+    keys = obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
+    shapes = [(key.name, points_of(key.data)) for key in keys]
+    copies = []
+    for _name, points in shapes:
+        new = obj.copy()
+        new.data = obj.data.copy()
+        new.shape_key_clear()
+        new.data.vertices.foreach_set("co", points.ravel())
+        copies.append(new)
+    obj.shape_key_clear()
+    for name in [m.name for m in obj.modifiers]:
+        for each in (obj, *copies):
+            if name not in each.modifiers:
+                continue
+            with bpy.context.temp_override(object=each, active_object=each):
+                if each.modifiers[name].show_viewport:
+                    bpy.ops.object.modifier_apply(modifier=name)
+                else:
+                    bpy.ops.object.modifier_remove(modifier=name)
+    for (name, _points), each in zip(shapes, copies, strict=True):
+        obj.shape_key_add(name=name).data.foreach_set("co", points_of(each.data.vertices).ravel())
+        bpy.data.objects.remove(each)
+    return seen_of(obj)
+
+
+def skkeeper(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """Apply All Modifiers (Keep Shapekeys): each key on a copy, which is converted."""
+    names = [key.name for key in obj.data.shape_keys.key_blocks] if obj.data.shape_keys else ["Basis"]
+    copies = [copy_of(obj) for _name in names]
+    for number, each in enumerate(copies):
+        _keep_key(each, number)
+        make_active(each)
+        bpy.ops.object.convert(target="MESH")
+    _join_as_keys(copies[0], copies[1:], names)
+    return seen_of(copies[0])
+
+
+def convert(obj: bpy.types.Object, _folder: Path) -> Seen:
+    make_active(obj)
+    bpy.ops.object.convert(target="MESH")
+    return seen_of(obj)
+
+
+def convert_hidden(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """A copy at rest: its Armature modifiers are hidden, and it is converted."""
+    new = copy_of(obj)
+    for modifier in skins_of(new):
+        modifier.show_viewport = False
+    make_active(new)
+    bpy.ops.object.convert(target="MESH")
+    return seen_of(new, "copy") | seen_of(obj, "left")
+
+
+def apply_armature(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """Pose as rest pose: the modifier is applied, the pose too, and the modifier made again."""
+    armature, keys = obj.parent, obj.data.shape_keys
+    if keys is None:
+        make_active(obj)
+        for name in [m.name for m in skins_of(obj)]:
+            bpy.ops.object.modifier_apply(modifier=name, single_user=True)
+        make_active(armature)
+        bpy.ops.object.mode_set(mode="POSE")
+        bpy.ops.pose.armature_apply()
+        bpy.ops.object.mode_set(mode="OBJECT")
+        obj.modifiers.new("Armature", "ARMATURE").object = armature
+    return seen_of(obj)
+
+
+def join(obj: bpy.types.Object, _folder: Path) -> Seen:
+    other = bpy.data.objects.new("Other", obj.data.copy())
+    bpy.context.scene.collection.objects.link(other)
+    other.location.y = 3.0
+    make_active(obj)
+    other.select_set(True)
+    bpy.ops.object.join()
+    return seen_of(obj)
+
+
+def data_transfer(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """Weights from the shown mesh to a plane of points in it."""
+    bpy.ops.mesh.primitive_grid_add(size=3.0)
+    other = bpy.context.object
+    make_active(obj)
+    other.select_set(True)
+    bpy.ops.object.data_transfer(
+        data_type="VGROUP_WEIGHTS",
+        vert_mapping="NEAREST",
+        layers_select_src="ALL",
+        layers_select_dst="NAME",
+    )
+    return seen_of(other, "other") | seen_of(obj)
+
+
+def rigify(obj: bpy.types.Object, folder: Path) -> Seen:
+    """Game rigs: the mesh gets another armature, and is exported."""
+    armature = obj.parent
+    other = armature.copy()
+    other.data, other.name = armature.data.copy(), "Game Rig"
+    bpy.context.scene.collection.objects.link(other)
+    for modifier in skins_of(obj):
+        modifier.object = other
+    obj.parent = other
+    return exported(bpy.ops.export_scene.gltf, bpy.ops.import_scene.gltf, "glb")(obj, folder)
+
+
+def auto_rig_pro(obj: bpy.types.Object, folder: Path) -> Seen:
+    """Exports a copy: all modifiers but the Armature modifier are applied, where there are no shape keys."""
+    new = copy_of(obj)
+    make_active(new)
+    if new.data.shape_keys is None:
+        for modifier in list(new.modifiers):
+            if modifier.type != "ARMATURE" and modifier.show_viewport:
+                bpy.ops.object.modifier_apply(modifier=modifier.name)
+    bpy.ops.export_scene.fbx(filepath=str(folder / "arm.fbx"), use_selection=True)
+    bpy.data.objects.remove(new)
+    return seen_of(obj, "left") | read_again(bpy.ops.import_scene.fbx, folder / "arm.fbx")
+
+
+GLTF = (bpy.ops.export_scene.gltf, bpy.ops.import_scene.gltf, "glb")
+TOOLS = {
+    "glTF": exported(*GLTF),
+    "glTF, modifiers applied": exported(*GLTF, export_apply=True),
+    "FBX": exported(bpy.ops.export_scene.fbx, bpy.ops.import_scene.fbx, "fbx"),
+    "USD": exported(bpy.ops.wm.usd_export, bpy.ops.wm.usd_import, "usda"),
+    "Alembic": alembic,
+    "OBJ": exported(bpy.ops.wm.obj_export, bpy.ops.wm.obj_import, "obj"),
+    "VRM 0": vrm_0,
+    "VRM 1": vrm_1,
+    "CGCookie": cgcookie,
+    "gret": gret,
+    "SKkeeper": skkeeper,
+    "Convert": convert,
+    "Convert, hidden": convert_hidden,
+    "Apply the Armature modifier": apply_armature,
+    "Join": join,
+    "Data Transfer": data_transfer,
+    "Rigify": rigify,
+    "Auto-Rig Pro": auto_rig_pro,
+}
+if bpy.app.version < (5, 0):
+    TOOLS["Collada"] = collada
+
+
+def differences(got: Seen, expected: Seen) -> list[str]:
+    found = sorted(got.keys() ^ expected.keys())
+    for name in got.keys() & expected.keys():
+        mine, its = got[name], expected[name]
+        if isinstance(mine, np.ndarray):
+            if mine.shape != its.shape or (len(mine) and scenes.worst(mine, its) > 1e-4):
+                found.append(name)
+        elif mine != its:
+            found.append(f"{name}: {mine} not {its}"[:200])
+    return found
+
+
+SAID = {("FBX", with_keys): FBX, ("Auto-Rig Pro", with_keys): FBX} | {
+    ("Auto-Rig Pro", prepare): other_tools.APPLYING for prepare in (plain, with_front, with_behind)
+}
+"""What differs, with the sentence that says so before."""
+
+
+@pytest.mark.parametrize("prepare", MESHES)
+@pytest.mark.parametrize("tool", TOOLS)
+def test_a_tool(tool, prepare, tmp_path):
+    expected = TOOLS[tool](make(prepare, has_sinew=False), tmp_path)
+    obj = make(prepare, has_sinew=True)
+    if prepare is with_front and tool in ("CGCookie", "gret", "Auto-Rig Pro"):
+        with pytest.raises(RuntimeError, match="multi-user"):
+            TOOLS[tool](obj, tmp_path)
+        return
+    said = [*other_tools.notes(obj), other_tools.APPLYING]
+    got = TOOLS[tool](obj, tmp_path)
+    if (tool, prepare) in SAID:
+        assert SAID[tool, prepare] in said
+        assert differences(got, expected) != []
+    else:
+        assert differences(got, expected) == []
+
+
+def test_it_is_said_before(tmp_path):
+    """In the list of meshes and by `sinew check`; where Blender deforms a small mesh, nothing differs."""
+    obj = make(with_keys, has_sinew=True)
+    assert other_tools.notes(obj) == [FBX]
+    obj.modifiers.new("Behind", "SUBSURF")
+    assert other_tools.notes(obj) == []
+    obj.modifiers.remove(obj.modifiers["Behind"])
+    path = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    notes = preflight.check({"source": str(path)}, lambda *_stage: None)["notes"]
+    assert notes == [f"Arm: {FBX}", other_tools.APPLYING]
+    obj = make(with_keys, has_sinew=True)
+    obj.sinew.enabled = False
+    assert other_tools.notes(obj) == []
