@@ -6,8 +6,6 @@ which replaces the last one. A process that crashes, hangs or grows too large is
 a new one.
 """
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import json

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds out whether the native library loads in this Blender and fits this extension, and if not, why."""
 
-from __future__ import annotations
-
 import platform
 import sys
 import tomllib

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds out whether another Blender, with its user's preferences, has Sinew."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Prepares a plain Python with bpy for the commands, and ends its process."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from typing import NoReturn

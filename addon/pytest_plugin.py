@@ -7,8 +7,6 @@
 `pytest --sinew-update` makes or renews the golden pictures.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs in the Blender of blender_process.py: reads tasks as lines of JSON, writes outcomes."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The common part of `sinew reskin` and `sinew restore`: inputs, workers, journal, progress, report."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew check`: checks whether files can be rendered, before they are sent to a render farm."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Generator

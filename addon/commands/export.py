@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew export`: writes a .glb with Blender's own exporter, with what engines need to skin as Sinew does."""
 
-from __future__ import annotations
-
 import argparse
 import errno
 import io

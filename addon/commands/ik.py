@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew ik`: writes copies of files whose IK chains Sinew solves."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import dataclass
 

@@ -2,8 +2,6 @@
 """`sinew inbetween`: writes copies of files whose bones move between their keyed poses by a method of
 Sinew."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew info`: facts and warnings of each armature-deformed mesh."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew methods`: lists the methods, and the stages that may follow them."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

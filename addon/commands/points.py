@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew points`: writes the deformed vertices of chosen frames, as numpy arrays."""
 
-from __future__ import annotations
-
 import argparse
 import zipfile
 from collections import Counter

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew reskin`: writes copies of files in which every armature-deformed mesh uses Sinew."""
 
-from __future__ import annotations
-
 import argparse
 
 import sinew

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew restore`: writes copies of re-skinned files with their original Armature modifiers."""
 
-from __future__ import annotations
-
 import argparse
 
 from . import batch

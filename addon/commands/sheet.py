@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sinew compare --out SHEET.png`: draws one picture of a frame under several methods."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

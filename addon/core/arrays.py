@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Comparison of arrays that may be None."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

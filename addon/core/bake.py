@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Point caches of baked frames (MDD and PC2), and checks of the frames and the disk space of a bake."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import struct

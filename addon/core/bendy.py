@@ -8,8 +8,6 @@ Based on what Blender's Armature modifier does. For the curved mapping, on the d
 vertex mapping" in Blender's developer documentation and its change 110758, whose constants are used here.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .influences import Influences

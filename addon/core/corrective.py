@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Corrective shapes: offsets of rest points with which skinning gives another shape in one pose."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -2,8 +2,6 @@
 """Finds what is wrong, or fragile, in the weights of a mesh: where, what it means, and what to do about
 it."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import permutations

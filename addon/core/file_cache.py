@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A folder of arrays, by the hash of what they were made from. Any number of processes may share it."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

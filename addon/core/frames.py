@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parses lists of frames."""
 
-from __future__ import annotations
-
 from .errors import WrongUse
 
 # Blender's limits; it clamps frames beyond them without a message.

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pages from templates, by Jinja2, which Blender's own Python does not have."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .errors import SinewError

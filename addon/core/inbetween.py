@@ -6,8 +6,6 @@ their parents' tails (Smith 2013, figure 3.3). The method gives the rigid part; 
 keyed scales, with the same weights.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

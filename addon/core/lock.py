@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """File locks that the system releases when a process ends, even if it is killed."""
 
-from __future__ import annotations
-
 import os
 import sys
 

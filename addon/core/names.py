@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Patterns of names, and names as file names."""
 
-from __future__ import annotations
-
 import re
 from fnmatch import fnmatchcase
 

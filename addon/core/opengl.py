@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds out whether Blender can draw on this machine."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -2,8 +2,6 @@
 """Writes whole files, so that readers never find a half-written one. Failures are reported in one
 sentence."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Callable, Iterator

@@ -2,8 +2,6 @@
 """The page of a comparison: one HTML file that contains its pictures and needs no other file
 (templates/page.html)."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

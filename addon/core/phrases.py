@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sentences with values, which the panel can translate."""
 
-from __future__ import annotations
-
 
 class Phrase(str):
     """A sentence in English that keeps its template and values; used as plain text outside the panel.

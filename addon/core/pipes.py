@@ -2,8 +2,6 @@
 """Waits for pipes of child processes without threads; a pipe is a file descriptor. select() takes none on
 Windows."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ Such motions replace those that are independent in each frame (helper_bones.py):
 a centre, are found by damped Gauss-Newton (Levenberg, Marquardt), while everything else is fixed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 

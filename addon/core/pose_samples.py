@@ -2,8 +2,6 @@
 """Random poses that a rig can take: joints rotate within their limits, or slightly more than in given
 poses."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

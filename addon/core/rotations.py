@@ -2,8 +2,6 @@
 """Rotations as quaternions (w, x, y, z), stored component by component: [4, n]. `sinew` does the
 arithmetic."""
 
-from __future__ import annotations
-
 import numpy as np
 import sinew
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rules for the scale of bones: all methods except linear blend move vertices by rigid motions only."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

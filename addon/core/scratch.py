@@ -5,8 +5,6 @@ A killed run cannot remove its folder, so the next run does. A file lock shows w
 a process id, it works across containers that share the temporary folder.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import tempfile

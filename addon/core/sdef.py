@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Vertex data of the method sdef, from the shape keys that mmd_tools stores."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .influences import Influences

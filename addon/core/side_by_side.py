@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The positions of copies of a character beside it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 # The space between two characters, as a share of a character's width.

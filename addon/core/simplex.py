@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sparse weights of many vertices at once: non-negative, of sum 1, few of them above 0."""
 
-from __future__ import annotations
-
 import numpy as np
 
 # Added to the diagonal, as a share of its mean: the Gram matrix of equal candidates is singular.

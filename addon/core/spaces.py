@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Transforms points to other spaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import sinew
 

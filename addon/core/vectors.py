@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arithmetic on arrays of vectors stored component by component, [k, n]."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -11,8 +11,6 @@ in the job from the beginning. So a batch puts itself into its job. A Blender wi
 user opens from it, such as a web browser, must stay.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

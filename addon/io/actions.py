@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The F-curves of an action that move bones: finding them, and reading their keys."""
 
-from __future__ import annotations
-
 import functools
 import re
 from collections.abc import Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads the extension's preferences, for all folders."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy

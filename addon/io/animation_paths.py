@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds which properties of an object its animation sets. Changes nothing."""
 
-from __future__ import annotations
-
 import bpy
 
 from . import actions

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads bones and poses from Blender, in Sinew's conventions: row-major matrices, armature space."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

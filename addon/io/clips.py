@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads actions of an armature as clips, writes clips as actions, and imports actions from other formats."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Generator
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Opens files, and saves copies so that an existing file is never left half-written."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads Blender's inverse kinematics constraints: their settings and bones, and their targets at a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import bpy

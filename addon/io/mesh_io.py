@@ -2,8 +2,6 @@
 """Reads rest points, surface, shape keys and weights from a mesh; writes deformed points into an
 attribute."""
 
-from __future__ import annotations
-
 import ctypes
 import functools
 from collections.abc import Iterator, Mapping

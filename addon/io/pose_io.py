@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads and writes pose bones' location, rotation and scale, in any rotation mode."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import sinew

@@ -6,8 +6,6 @@ each picture. Text blocks and handlers of the file do not run. Anything else tha
 takes an operator that no command calls.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path

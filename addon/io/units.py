@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Formats measured values for display, in the units that the preferences choose."""
 
-from __future__ import annotations
-
 import bpy
 
 from . import addon_preferences

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The keys of a job file. Its reader, `sinew reskin --job-help` and docs/batch.md are made from this list."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any

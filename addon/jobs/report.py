@@ -2,8 +2,6 @@
 """Writes report.json and report.html: the result of each file of a batch, with pictures of its worst
 frame."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ one change of a slider or menu changes all of them, in one undo step. Keys and d
 settings.
 """
 
-from __future__ import annotations
-
 import inspect
 from typing import Any
 

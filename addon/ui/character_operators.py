@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that act on a character's settings."""
 
-from __future__ import annotations
-
 import contextlib
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The lesson: a file with an arm, a hand and a page of text (blend_files/make_lesson.py), for new users."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar tab "Sinew" of the 3D view: one set of controls for a character, however many meshes it has."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

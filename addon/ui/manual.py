@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes Blender's "Online Manual", on Sinew's buttons and properties, open the page in the extension."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The list of a character's meshes, where each can have its own settings."""
 
-from __future__ import annotations
-
 import bpy
 
 from ..attach import properties

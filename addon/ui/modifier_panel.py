@@ -2,8 +2,6 @@
 """Shows who deforms a mesh, above its stack of modifiers. Blender itself draws the panel of a modifier, and
 all meshes share the node group, so these cannot show it."""
 
-from __future__ import annotations
-
 import bpy
 
 from ..attach import other_tools, properties

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel's operators: poll, gather, one call, report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator
 
 import bpy

@@ -2,8 +2,6 @@
 """The progress of precomputations, in the panel and the status bar; Esc and buttons that stop and continue
 them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

@@ -2,8 +2,6 @@
 """Presets of a method with its parameters and stages, by Blender's own mechanism: each is a Python file in
 the user's folder of presets."""
 
-from __future__ import annotations
-
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws settings: a character's (character.py) or those of one mesh, which have the same names."""
 
-from __future__ import annotations
-
 import bpy
 import sinew
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar tab, and its content where the native library does not load."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 

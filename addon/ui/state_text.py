@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sentences for the panel about who deforms a mesh, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

@@ -5,8 +5,6 @@ Blender itself translates every label, tooltip and choice, and text given to a l
 through tr() and counted().
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable

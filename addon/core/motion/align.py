@@ -7,8 +7,6 @@ the ends of the path are the same moment. With a blended timing, clips warped in
 curves of Kovar and Gleicher 2003.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

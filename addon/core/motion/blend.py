@@ -5,8 +5,6 @@ Smith 2013, section 4.1, describes it. Rigid parts are blended by the method; th
 clips' scales, with the same weights, as Blender stores a bone's scale separately from its rotation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

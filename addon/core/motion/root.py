@@ -7,8 +7,6 @@ For another clip it is under the root at every sample. Without their ground fram
 be compared and blended; of the ground frames, the changes from frame to frame are blended and accumulated.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

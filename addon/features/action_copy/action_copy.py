@@ -2,8 +2,6 @@
 """Has an armature play a copy of its action, which plays without Sinew; and restores the original, the pose
 that it did not key, and the constraints that the copy stands for."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Copies of actions that Sinew keys: their record, and the operator that plays the original again."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...attach.feature import Feature

@@ -5,8 +5,6 @@ redraws nothing and cannot be stopped. A process can be stopped.
 The second Blender opens a copy of the open file, saved beside the output, and runs bake_export there.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager

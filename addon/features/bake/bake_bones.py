@@ -2,8 +2,6 @@
 """A bake to bones: helper bones in addition to a rig's own, and weights, which Blender's Armature modifier
 and every engine can play. Helper bones have plain keys, or follow the pose by Blender's constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bakes that a batch writes beside a re-skinned copy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes by Blender's own exporters: the final meshes, with UVs and materials."""
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager

@@ -4,8 +4,6 @@
 A bake runs in steps, so that a window stays responsive and it can be stopped at any time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes: an operator."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shapes of frames as shape keys with keyed values and linear interpolation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

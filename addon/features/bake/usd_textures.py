@@ -6,8 +6,6 @@ name, and the first one stays. So files on disk are referred to where they are, 
 the .blend go into a separate folder for the export.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blends of actions: an operator; its dialog lists those of the armature."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

@@ -6,8 +6,6 @@ displays it at another position. Everything a copy needs is in separate objects 
 of the original changes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

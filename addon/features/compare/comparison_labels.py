@@ -2,8 +2,6 @@
 """The methods' names above a comparison's characters, drawn in the 3D views; nothing of this is in the
 file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import blf

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Comparisons: a panel and its buttons, what a scene stores, labels in the 3D views."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Brings a character and its copies into a 3D view that does not show all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

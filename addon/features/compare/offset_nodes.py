@@ -2,8 +2,6 @@
 """The Geometry Nodes group "Sinew Offset": moves an object's evaluated geometry, in world axes, and does not
 move the object, as the bones' motions are relative to it."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

@@ -2,8 +2,6 @@
 """A shape key with which the Armature modifiers alone show Sinew's shape in this pose, for files without
 Sinew, or for an engine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Corrective shape keys: an operator."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...attach import properties

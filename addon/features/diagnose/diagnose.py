@@ -2,8 +2,6 @@
 """Checks a mesh's weights and poses, on the mesh as it is edited, and remembers the findings until the
 weights change."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

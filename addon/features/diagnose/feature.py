@@ -2,8 +2,6 @@
 """Diagnostics: a panel with faults of weights and poses, what to do about them, and where they are;
 handlers that forget findings when weights change."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

@@ -7,8 +7,6 @@ Meshes have these attributes only during an export, as the exporter splits verti
 attributes to the right ones. They are made when it calls before an export, and removed at its end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The glTF export: a check box in the exporter, stored in the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 Sinew is off such a mesh, so its colours are an attribute of the mesh itself while they are shown, and only
 then, as exporters would write them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

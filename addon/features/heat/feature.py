@@ -2,8 +2,6 @@
 """Heat maps: panels and their buttons, what a scene stores, a legend in the 3D views, and colours of each
 frame."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...attach import properties

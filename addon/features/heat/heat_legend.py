@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The legend of the heat map, drawn over the 3D views: what is shown, and the values of the colours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The heat map: in each frame, the chosen measure as vertex colours of the objects that show it."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

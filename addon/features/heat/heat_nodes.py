@@ -6,8 +6,6 @@ The colours are an attribute of the evaluated mesh only, with the same name for 
 share a mesh have separate colours, and one material shows them all.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's heat map, measures of the current frame, and worst frames, with their buttons."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import bpy

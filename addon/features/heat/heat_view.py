@@ -6,8 +6,6 @@ Meshes and screens have properties that keep what was there before, so saved fil
 meshes, but no screens: sync() follows it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Iterator
 

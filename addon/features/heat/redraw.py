@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps numbers in the sidebar up to date where Blender would not redraw it, as in playback."""
 
-from __future__ import annotations
-
 from ...attach.updates import is_rendering_in_window
 from ...ui import sidebar
 

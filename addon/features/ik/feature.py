@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Inverse kinematics: an operator that keys it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

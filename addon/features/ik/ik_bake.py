@@ -2,8 +2,6 @@
 """Bakes Sinew's inverse kinematics to plain keys in a copy of the action, in place of Blender's
 constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

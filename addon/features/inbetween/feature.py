@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """In-betweens: an operator that keys them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

@@ -6,8 +6,6 @@ same vertices. The open file's frame and methods are changed: use it only for fi
 afterwards.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

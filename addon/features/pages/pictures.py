@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads and writes PNG files with Blender itself, so that nothing has to be installed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -6,8 +6,6 @@ The open file's render settings, visibility and camera are changed: use it only 
 afterwards.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager

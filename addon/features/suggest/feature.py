@@ -2,8 +2,6 @@
 """Suggestions: a panel with the best methods at each measure, or all in order, and a click to use one.
 Nothing is stored in files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Goes through frames, and measures the shapes that each method would give."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import bpy

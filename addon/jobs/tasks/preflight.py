@@ -2,8 +2,6 @@
 """Finds out whether a file needs Sinew, and what in it Sinew cannot deform: for `sinew check`, before
 rendering on a farm."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 """A batch's task for one file: puts Sinew on its meshes, or takes it off, saves a copy, and returns the
 outcome."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
