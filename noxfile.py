@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import functools
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -21,6 +20,8 @@ import nox
 from filelock import FileLock
 
 sys.path.append(str(Path(__file__).parent / "tools"))
+from blenders import BLENDERS, NEWEST, OLDEST, SHORT_TERM
+from lock import tell_uv_of_the_registry
 from platforms import PLATFORMS
 
 ROOT = Path(__file__).resolve().parent
@@ -28,11 +29,6 @@ os.chdir(ROOT)
 VERSION = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 PACKAGE = ROOT / f"dist/sinew-{VERSION}.zip"
 
-# The Blenders that are tested, as bpy, and the Python that each is built for.
-BLENDERS = {"4.2": "3.11", "4.5": "3.11", "5.0": "3.11", "5.1": "3.13", "5.2": "3.13"}
-OLDEST, NEWEST = "4.2", "5.2"
-# Supported for months: what does not differ between versions is left to the others (conftest.py).
-SHORT_TERM = ("5.0", "5.1")
 WHEEL_PYTHONS = ("3.11", "3.13", "3.14")
 WHEEL_SOURCES = ("CMakeLists.txt", "pyproject.toml", "requirements/build.txt", "cmake", "native")
 # Packages that Sinew is compared with, not locked; one that does not install is left out. Of libigl the last
@@ -306,25 +302,9 @@ for _bpy in BLENDERS:
 @job("installed")
 def installed(session: nox.Session) -> None:
     """Both wheels in an environment of their own, away from the checkout, and what README says of them."""
-    python = ROOT / python_in("installed")
-    words = f"uv venv --quiet --clear {environment_of('installed')} --python".split()
-    session.run(*words, python_of(EVERYDAY_PYTHON))
-    with tempfile.TemporaryDirectory() as place:
-        # A copy: setuptools writes beside the sources, and would have it in the next wheel.
-        unwanted = shutil.ignore_patterns("__pycache__", "build", "*.egg-info")
-        sources = shutil.copytree("addon", f"{place}/addon", ignore=unwanted)
-        words = "uv build --quiet --wheel --require-hashes --build-constraints requirements/wheels.txt"
-        session.run(*words.split(), "--out-dir", place, sources)
-        # Given as files: packages with our names in the registry may not be ours.
-        (addon,) = Path(place).glob("*.whl")
-        wanted = f"./{wheel_of(EVERYDAY_PYTHON)}", f"sinew-blender[cluster] @ {addon.as_uri()}"
-        install = "uv", "pip", "install", "--quiet", "--python", str(python)
-        session.run(*install, *wanted, f"bpy=={EVERYDAY}.*", "pytest")
-        for name in ("tests/installed/test_installed.py", "blend_files/wrist.blend"):
-            shutil.copy(name, place)
-        with session.chdir(place):
-            words = f"{LIMIT}{python} -m pytest -p no:cacheprovider -ra test_installed.py"
-            session.run(*words.split(), env={"PYTHONPATH": None})
+    line = f"{sys.executable} tests/installed/make.py {environment_of('installed')}"
+    words = python_of(EVERYDAY_PYTHON), wheel_of(EVERYDAY_PYTHON), f"bpy=={EVERYDAY}.*"
+    session.run(*line.split(), *map(str, words), *LIMIT.split())
 
 
 @job("commands")
@@ -348,23 +328,6 @@ def set_up(*sessions: str, options: str = "") -> None:
         done = subprocess.run([sys.executable, *words, *sessions], stdout=sys.stderr, check=False)
     if done.returncode:
         sys.exit(done.returncode)
-
-
-def tell_uv_of_the_registry() -> None:
-    """Has uv take packages from where pip takes them."""
-    names = {"index-url": "UV_DEFAULT_INDEX", "extra-index-url": "UV_INDEX"}
-    names |= {"trusted-host": "UV_INSECURE_HOST", "cert": "SSL_CERT_FILE"}
-    listed = output_of(f"{sys.executable} -m pip config list")
-    for name, value in re.findall(r"^[\w:]+\.([\w-]+)='(.*)'$", listed, re.MULTILINE):
-        words = value.replace("\\n", " ").split()
-        if name in names:
-            os.environ.setdefault(names[name], " ".join(words))
-        if name == "find-links":
-            # As pip, without folders that are not here, such as in a whole Blender's system.
-            found = [word for word in words if "://" in word or Path(word).exists()]
-            os.environ["UV_FIND_LINKS"] = ",".join(found)
-    # As pip: the best of all, whichever registry has it.
-    os.environ.setdefault("UV_INDEX_STRATEGY", "unsafe-best-match")
 
 
 def in_blender(words: list[str], program: str) -> int:
@@ -478,24 +441,7 @@ def stub(words: list[str]) -> int:
 
 def lint(words: list[str]) -> int:
     set_up("lint")
-    programs, folders = environment_of("lint") / "bin", ("native", "tests/native", "bench", "experiments")
-    cpp = [path for folder in folders for path in Path(folder).rglob("*") if path.suffix in (".h", ".cpp")]
-    lines = ["ruff check .", "ruff format --check .", "mypy --no-error-summary", "reuse lint --lines"]
-    lines += ["check-jsonschema --quiet --builtin-schema vendor.dependabot .github/dependabot.yml"]
-    lines += ["zizmor --quiet --offline --no-progress --min-severity medium .github"]
-    statuses = [call(f"{programs}/{line}") for line in lines]
-    workflows = f"{programs}/check-jsonschema --quiet --builtin-schema vendor.github-workflows"
-    statuses.append(call(workflows, *Path(".github/workflows").glob("*.yml")))
-    statuses.append(call(f"{programs}/clang-format --dry-run -Werror", *cpp))
-    if "--fast" not in words:
-        # The library as it is compiled; native/.clang-tidy lists the checks.
-        output_of("cmake --preset release -B build/tidy -DSINEW_BUILD_TESTS=OFF -DSINEW_ONE_TARGET=ON")
-        line = f"{programs}/run-clang-tidy.py -quiet -hide-progress -config-file native/.clang-tidy"
-        statuses.append(call(f"{line} -p build/tidy -clang-tidy-binary {programs}/clang-tidy native/sinew"))
-    # No registry that ./dev installs from has actionlint.
-    if shutil.which("actionlint"):
-        statuses.append(call("actionlint"))
-    return int(any(statuses))
+    return call(f"{sys.executable} tools/lint.py {environment_of('lint')}/bin", *words)
 
 
 def package_command(words: list[str]) -> int:
@@ -532,25 +478,6 @@ def wheel(words: list[str]) -> int:
     return 0
 
 
-def lock(words: list[str]) -> int:
-    parser = argparse.ArgumentParser(prog="./dev lock")
-    parser.add_argument("--out", type=Path, default="requirements")
-    known = sorted(path.stem for path in Path("requirements").glob("*.in"))
-    parser.add_argument("names", nargs="*", metavar="name", help=", ".join(known))
-    options = parser.parse_args(words)
-    options.out.mkdir(parents=True, exist_ok=True)
-    tell_uv_of_the_registry()
-    for name in options.names or known:
-        say(f"{options.out}/{name}.txt")
-        # For all systems, and all Pythons from the oldest that takes it. Without addresses of a registry:
-        # users may have another one.
-        python = BLENDERS.get(name.removeprefix("bpy-"), "3.11")
-        line = f"uv pip compile --quiet --upgrade --universal --python-version {python} --generate-hashes"
-        line += " --no-emit-index-url --no-emit-find-links --no-header --output-file"
-        call(line, options.out / f"{name}.txt", f"requirements/{name}.in", must=True)
-    return 0
-
-
 PROGRAMS = {
     "fuzz": "tests/blender/fuzz_parity.py",
     "walk": "tests/blender/walk.py",
@@ -561,8 +488,9 @@ PROGRAMS = {
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     **{name: functools.partial(in_blender, program=program) for name, program in PROGRAMS.items()},
     **{"demo": demo, "test": test, "bench": bench, "report": report, "site": site, "stub": stub},
-    **{"lint": lint, "package": package_command, "wheel": wheel, "lock": lock},
+    **{"lint": lint, "package": package_command, "wheel": wheel},
     "release": lambda words: call(f"{sys.executable} -I tools/release.py", *words),
+    "lock": lambda words: call(f"{sys.executable} tools/lock.py", *words),
 }
 
 if __name__ == "__main__":

@@ -84,8 +84,8 @@ def test_what_it_installs_is_locked(path):
 def test_wheels_are_built_for_the_pythons_of_blender():
     jobs = load(FOLDER / "wheels.yml")["jobs"]
     built = {f"3.{minor}" for minor in re.findall(r"cp3(\d+)-", jobs["wheels"]["env"]["CIBW_BUILD"])}
-    noxfile = (ROOT / "noxfile.py").read_text(encoding="utf-8")
-    blenders = re.search(r"^BLENDERS = \{(.*)\}$", noxfile, re.MULTILINE)[1]
+    listed = (ROOT / "tools/blenders.py").read_text(encoding="utf-8")
+    blenders = re.search(r"^BLENDERS = \{(.*)\}$", listed, re.MULTILINE)[1]
     assert built == set(re.findall(r': "([\d.]+)"', blenders))
 
 
