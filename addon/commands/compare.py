@@ -17,15 +17,12 @@ from ..core.metrics import Summary
 from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import page
-from ..core.scratch import scratch_folder
-from ..core.sheet import require_pillow
 from . import sheet
 from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
 
 if TYPE_CHECKING:
     from ..features.pages.measure import Subject
-    from ..features.pages.render import Studio
 
 
 SUMMARY = "show and measure methods beside each other"
@@ -61,7 +58,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="most frames to draw, of those at which a measure is worst; 0: none (default: %(default)s)",
     )
-    parser.add_argument("--video", action="store_true", help="also write an mp4 of the methods side by side")
     parser.add_argument(
         "--influences",
         type=partial(count, least=0),
@@ -84,7 +80,7 @@ def _folder_or_sheet(given: str) -> Path:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     from ..deform import characters
-    from ..features.pages import render, video
+    from ..features.pages import render
 
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     characters.check_methods([*methods, args.reference])
@@ -94,10 +90,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     require_jinja()
     frames = parse_frames(args.frames) if args.frames is not None else None
     _check_names(args.files)
-    if args.video:
-        require_pillow()
-        video.check_can_encode()
-    engine = render.chosen_engine(args.engine) if args.pictures or args.video else None
+    engine = render.chosen_engine(args.engine) if args.pictures else None
     failed = False
     for path in args.files:
         try:
@@ -148,32 +141,16 @@ def _compare(
     sheets = []
     if engine is not None:
         studio = render.Studio(scene, subject.meshes, engine, args.size or 480)
-        if args.pictures:
-            illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
-            illustrator.plan(args.pictures)
-            count = illustrator.picture_count
-            for _ in console.progress(illustrator.draw(), count, f"Drawing {path.name}"):
-                pass
-            sheets = illustrator.sheets
-        if args.video:
-            _write_video(subject, comparison, studio, folder / "video.mp4", console)
+        illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
+        illustrator.plan(args.pictures)
+        count = illustrator.picture_count
+        for _ in console.progress(illustrator.draw(), count, f"Drawing {path.name}"):
+            pass
+        sheets = illustrator.sheets
     target = args.out / f"{path.stem}.html"
     write_text(target, page(comparison, sheets, "; ".join(f"Left out: {reason}" for reason in left_out)))
     console.say(str(target))
     return not left_out
-
-
-def _write_video(
-    subject: Subject, comparison: Comparison, studio: Studio, path: Path, console: Console
-) -> None:
-    from ..features.pages import illustrate, video
-
-    render = subject.scene.render
-    with scratch_folder() as folder:
-        pictures = illustrate.film(subject, comparison, studio, folder)
-        count = len(comparison.frames)
-        filmed = list(console.progress(pictures, count, f"Filming {comparison.file}"))
-        video.encode(filmed, render.fps, render.fps_base, path)
 
 
 def _measure(

@@ -9,15 +9,15 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 from ..core import interrupt
 from ..core.errors import SinewError
 
 if TYPE_CHECKING:
     from rich.console import Console as RichConsole
-    from rich.progress import Progress, TaskID
 
 Item = TypeVar("Item")
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
@@ -31,7 +31,6 @@ class Console:
         self.err = err
         self.verbose = verbose
         self._has_bar = False
-        self._close_bar: Callable[[], None] | None = None
         self._rich: RichConsole | None = None
         with suppress(ImportError):
             from rich.console import Console as RichConsole
@@ -94,19 +93,12 @@ class Console:
     def bar(self, what: str, total: int) -> Iterator[Callable[[float], None]]:
         """Shows the progress of a work of `total` parts: a bar on a terminal, one line elsewhere. The
         returned function is called with the progress, 0 to 1."""
-        if self._rich is None or not self._rich.is_terminal:
-            self.note(f"{what} ({total})")
-            yield lambda _share: None
-            return
-        from rich.progress import Progress
-
-        with Progress(console=self._rich) as bar:
-            task = bar.add_task(what, total=1.0)
-            self._close_bar = bar.stop
-            try:
-                yield lambda share: bar.update(task, completed=share)
-            finally:
-                self._close_bar = None
+        with self._live(what, tuple, total=1.0) as update:
+            if update is None:
+                self.note(f"{what} ({total})")
+                yield lambda _share: None
+            else:
+                yield lambda share: update(completed=share)
 
     @contextmanager
     def _writing_results(self) -> Iterator[None]:
@@ -117,36 +109,42 @@ class Console:
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
             raise SinewError(f"standard output: can not be written: {error.strerror or error}") from None
 
-    def close(self) -> None:
-        """Restores the terminal before the process ends."""
-        if self._close_bar is not None:
-            self._close_bar()
-        self.out.flush()
-        self.err.flush()
-
     @contextmanager
     def batch(self, what: str, total: int) -> Iterator[BatchProgress]:
         """Shows the progress of a batch of `total` files: a bar on a terminal, a line for each file
         elsewhere."""
-        if self._rich is None or not self._rich.is_terminal:
-            yield BatchProgress(self, total)
-            return
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        with self._live(what, _columns_of_batch, total=total, meshes=0, failed=0) as update:
+            yield BatchProgress(self, total, update)
 
-        columns = (
-            TextColumn("{task.description}"),
-            # Leaves space for a terminal's ^C in 80 columns: if that wraps, the bar is drawn twice.
-            BarColumn(bar_width=20),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[meshes]} meshes, {task.fields[failed]} failed"),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=self._rich) as bar:
+    @contextmanager
+    def _live(
+        self, what: str, columns: Callable[[], tuple], **task: Any
+    ) -> Iterator[Callable[..., None] | None]:
+        """Context with a function that updates a bar; None where there is no terminal, or no `rich`."""
+        if self._rich is None or not self._rich.is_terminal:
+            yield None
+            return
+        from rich.progress import Progress
+
+        with Progress(*columns(), console=self._rich) as bar:
             self._has_bar = True
             try:
-                yield BatchProgress(self, total, bar, bar.add_task(what, total=total, meshes=0, failed=0))
+                yield partial(bar.update, bar.add_task(what, **task))
             finally:
                 self._has_bar = False
+
+
+def _columns_of_batch() -> tuple:
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+    return (
+        TextColumn("{task.description}"),
+        # Leaves space for a terminal's ^C in 80 columns: if that wraps, the bar is drawn twice.
+        BarColumn(bar_width=20),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[meshes]} meshes, {task.fields[failed]} failed"),
+        TimeRemainingColumn(),
+    )
 
 
 def _shown(text: str) -> str:
@@ -158,23 +156,17 @@ def _shown(text: str) -> str:
 class BatchProgress:
     """Counts of a running batch."""
 
-    def __init__(
-        self,
-        console: Console,
-        total: int,
-        bar: Progress | None = None,
-        bar_task: TaskID | None = None,
-    ) -> None:
+    def __init__(self, console: Console, total: int, update: Callable[..., None] | None = None) -> None:
         self.done = self.meshes = self.failed = 0
-        self._console, self._total, self._bar, self._bar_task = console, total, bar, bar_task
+        self._console, self._total, self._update = console, total, update
 
     def step(self, line: str | None, meshes: int, failed: bool) -> None:
         """Counts one more file; `line` describes it, None if it was printed already."""
         self.done += 1
         self.meshes += meshes
         self.failed += failed
-        if self._bar is not None and self._bar_task is not None:
-            self._bar.update(self._bar_task, completed=self.done, meshes=self.meshes, failed=self.failed)
+        if self._update is not None:
+            self._update(completed=self.done, meshes=self.meshes, failed=self.failed)
         elif line is not None:
             self._console.note(f"[{self.done}/{self._total}] {line}")
 

@@ -26,7 +26,7 @@ def require_pillow() -> None:
         import PIL  # noqa: F401
     except ImportError:
         raise SinewError(
-            "sheets and videos need Pillow, which this Python does not have; "
+            "sheets need Pillow, which this Python does not have; "
             "install sinew-blender in a Python of its own and run `sinew compare` there"
         ) from None
 
@@ -52,9 +52,8 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
     cell = max(picture.width for column in pictures for picture in column)
     heights = [picture.height for picture in pictures[0]]
     head, label, row_label = 24 + 2 * MARGIN, 24 + 17 + 2 * MARGIN, 17 + MARGIN
-    # Video encoders need even numbers.
-    width = _even(len(columns) * (cell + MARGIN) + MARGIN)
-    height = _even(head + label + len(row_titles) * row_label + sum(heights) + MARGIN)
+    width = len(columns) * (cell + MARGIN) + MARGIN
+    height = head + label + len(row_titles) * row_label + sum(heights) + MARGIN
     sheet = Image.new("RGB", (width, height), BACKGROUND)
     draw = ImageDraw.Draw(sheet)
     draw.text((MARGIN, MARGIN), _fitted(draw, title, large, width - 2 * MARGIN), font=large, fill=TEXT)
@@ -69,10 +68,6 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
             draw.text((x, y), _fitted(draw, row_titles[row], small, cell), font=small, fill=FAINT)
             sheet.paste(picture, (x + (cell - picture.width) // 2, y + row_label - MARGIN // 2), picture)
     write_whole(path, lambda unfinished: sheet.save(unfinished, format="PNG"))
-
-
-def _even(size: int) -> int:
-    return size + size % 2
 
 
 def _fitted(draw: ImageDraw.ImageDraw, text: str, font: Any, width: int) -> str:

@@ -20,7 +20,6 @@ import scenes
 import trimesh
 from conftest import REPOSITORY
 from program import run_sinew
-from sinew_addon.features.pages import pictures, video
 
 # Pictures take a third of a second each, and are almost the same in all versions.
 NEWEST = bpy.app.version >= (5, 2)
@@ -148,11 +147,11 @@ def opaque_pixels(path):
 
 
 @newest_only
-def test_a_page_holds_its_pictures_and_a_video(tmp_path):
+def test_a_page_holds_its_pictures(tmp_path):
     path = REPOSITORY / "blend_files" / "wrist.blend"
     run_sinew(
         *("compare", path, "--methods", "lbs,dq", "--frames", "1,12,24", "--pictures", 2, "--size", 128),
-        *("--video", "--out", tmp_path),
+        *("--out", tmp_path),
     )
     page = (tmp_path / "wrist.html").read_text(encoding="utf-8")
     # Nothing is fetched; a plot's marks refer to shapes within the page.
@@ -172,32 +171,6 @@ def test_a_page_holds_its_pictures_and_a_video(tmp_path):
     colours = opaque_pixels(tmp_path / "wrist" / "pictures" / "dq-distance-24-close.png")
     yellow = (colours[:, 0] > 150) & (colours[:, 1] > 150) & (colours[:, 2] < 110)
     assert yellow.mean() > 0.02
-    clip = bpy.data.movieclips.load(str(tmp_path / "wrist" / "video.mp4"))
-    assert clip.frame_duration == 3
-    assert clip.size[0] > 2 * 128
-
-
-def test_a_video_shows_one_picture_after_the_other(tmp_path):
-    """Read back by Blender's own sequencer."""
-    colours = [(0.9, 0.1, 0.1), (0.1, 0.9, 0.1), (0.1, 0.1, 0.9), (0.9, 0.9, 0.1)]
-    paths = [tmp_path / f"{number:06d}.png" for number in range(len(colours))]
-    for path, colour in zip(paths, colours, strict=True):
-        pictures.write_picture(path, np.broadcast_to((*colour, 1.0), (48, 64, 4)))
-    video.encode(paths, 25, 1.0, tmp_path / "video.mp4")
-    clip = bpy.data.movieclips.load(str(tmp_path / "video.mp4"))
-    assert (tuple(clip.size), clip.frame_duration, clip.fps) == ((64, 48), 4, 25.0)
-    scene = bpy.context.scene
-    editor = scene.sequence_editor_create()
-    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
-    strips.new_movie("Movie", str(tmp_path / "video.mp4"), channel=1, frame_start=1)
-    scene.render.resolution_x, scene.render.resolution_y = 64, 48
-    scene.view_settings.view_transform = "Standard"
-    scene.render.filepath = str(tmp_path / "frame.png")
-    for frame, colour in enumerate(colours, start=1):
-        scene.frame_set(frame)
-        bpy.ops.render.render(write_still=True)
-        shown = pictures.read_picture(tmp_path / "frame.png")[24, 32, :3]
-        np.testing.assert_allclose(shown, colour, atol=0.05)
 
 
 def test_golden_pictures(tmp_path):

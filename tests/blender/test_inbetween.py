@@ -291,8 +291,6 @@ def test_half_a_turn_between_keys_is_told():
         bone.keyframe_insert("rotation_quaternion", frame=frame)
     assert bake(armature).far == {"bone.0"}
     assert np.isfinite(film(armature)).all()
-    restore(armature)
-    assert bake(armature, range=(11, 21)).far == set()
 
 
 def test_undo_and_redo():
@@ -336,22 +334,16 @@ def test_stopped_it_leaves_all_as_it_was():
     assert np.array_equal(film(armature), blender)
 
 
-def test_some_bones_in_some_frames():
+def test_some_bones():
     armature = make_rig(("QUATERNION", "XYZ"))
     key_random_poses(armature, interpolation="BEZIER")
-    for curve in curves_of(armature):
-        for point in curve.keyframe_points:
-            # Handles of Blender's own depend on the next keys.
-            point.handle_left_type = point.handle_right_type = "FREE"
     blender = film(armature, name="matrix_basis")
-    assert bake(armature, range=(11, 30), only=["bone.0"]).bones == 1
+    assert bake(armature, only=["bone.0"]).bones == 1
     shown = film(armature, name="matrix_basis")
     apart = np.abs(shown - blender).max(axis=(2, 3))
-    inside = [frame for frame in FRAMES if 11 < frame < 26]
     assert apart[:, 1].max() == 0.0
-    assert apart[[FRAMES.index(frame) for frame in inside], 0].max() > 0.01
-    outside = [number for number, frame in enumerate(FRAMES) if frame not in inside]
-    assert apart[outside, 0].max() < CLOSE
+    assert apart[:, 0].max() > 0.01
+    assert apart[[FRAMES.index(frame) for frame in KEYS], 0].max() < CLOSE
 
 
 WITHOUT_SINEW = """

@@ -350,9 +350,8 @@ def test_names_that_blender_would_fill_in(inputs, tmp_path):
     out = tmp_path / "o{scene_name}ut ##"
     run_sinew("render", file, "--method", "dq", "--frames", "6", "--size", "64", "--out", out)
     assert all_in(out) == ["0006.png", "render.json"]
-    run_sinew("compare", file, "--frames", "1,6", "--size", "64", "--pictures", "1", "--video", "--out", out)
+    run_sinew("compare", file, "--frames", "1,6", "--size", "64", "--pictures", "1", "--out", out)
     assert (out / f"{file.stem}.html").exists()
-    assert (out / file.stem / "video.mp4").stat().st_size > 1000
     assert [path for path in (out / file.stem / "pictures").iterdir() if path.suffix == ".png"]
     assert all_in(tmp_path) == sorted([name, out.name, *(f"{out.name}/{path}" for path in all_in(out))])
 

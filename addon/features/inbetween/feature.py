@@ -48,16 +48,11 @@ class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operato
     step: bpy.props.IntProperty(
         name="Step", description="Frames from one baked key to the next", default=1, min=1, soft_max=12
     )
-    over: bpy.props.EnumProperty(**{**stepped.OVER_WHICH, "default": "ACTION"})
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         self._baked: list[inbetween_bake.Baked] = []
-        armature, span = operators.armatures(context)[0], None
-        if self.over == "SCENE":
-            frames = stepped.frames_over(context.scene, [armature], self.over)
-            span = (frames[0], frames[-1])
-        only = selected_bones(armature)
-        settings = inbetween_bake.Settings(self.method, self.path, self.step, span, only)
+        armature = operators.armatures(context)[0]
+        settings = inbetween_bake.Settings(self.method, self.path, self.step, selected_bones(armature))
         yield from inbetween_bake.steps(armature, settings, self._baked)
 
     def finish(self, context: bpy.types.Context) -> set[str]:

@@ -21,14 +21,12 @@ class Settings:
     method  of core.METHODS
     path    core.STRAIGHT or core.SPLINE
     step    frames from one key to the next
-    range   keyed poses within these frames; None: all
     only    the bones that move by the method; None: all
     """
 
     method: str
     path: str = core.STRAIGHT
     step: int = 1
-    range: tuple[float, float] | None = None
     only: Collection[str] | None = None
 
 
@@ -57,7 +55,7 @@ def steps(armature: bpy.types.Object, settings: Settings, found: list[Baked]) ->
     with action_copy.playing(armature, core.METHODS[settings.method].label):
         poses = keyed_poses.read(armature, settings.only)
         baked = Baked(armature, left=poses.left)
-        wanted = [_times(group, settings) for group in poses.groups]
+        wanted = [_times(group, settings.step) for group in poses.groups]
         baked.bones = sum(
             len(group.rows) for group, times in zip(poses.groups, wanted, strict=True) if len(times)
         )
@@ -85,24 +83,15 @@ def steps(armature: bpy.types.Object, settings: Settings, found: list[Baked]) ->
     found.append(baked)
 
 
-# Of the first and the last key: what shapes the curve on the other side.
-_OUTER = (
-    ("handle_left",),
-    ("handle_right", "interpolation", "easing", "amplitude", "back", "period"),
-)
-
-
-def _times(group: keyed_poses.Group, settings: Settings) -> np.ndarray:
+def _times(group: keyed_poses.Group, step: int) -> np.ndarray:
     """Returns the times of the keys that a group's bones get, float32: the frames, and the artist's keys."""
     keys, outside = group.times, []
-    if settings.range is not None:
-        keys = keys[(keys >= settings.range[0]) & (keys <= settings.range[1])]
-    elif any(map(_extrapolates, group.curves)):
-        # A curve with linear extrapolation takes its slope from the last two keys.
-        outside = [keys[0] - 1.0, keys[-1] + 1.0]
     if len(keys) < 2:
         return np.empty(0, np.float32)
-    frames = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1, settings.step)
+    if any(map(_extrapolates, group.curves)):
+        # A curve with linear extrapolation takes its slope from the last two keys.
+        outside = [keys[0] - 1.0, keys[-1] + 1.0]
+    frames = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1, step)
     return np.unique(np.concatenate([keys, frames, outside]).astype(np.float32))
 
 
@@ -117,47 +106,19 @@ def _write_keys(
     chosen = inside | _extrapolates(curve)
     times, values = times[chosen], values[chosen]
     points = curve.keyframe_points
-    # The curve from and to keys that stay is as before.
-    outer = [
-        {name: _value(point, name) for name in names}
-        for names, time in zip(_OUTER, (times[0], times[-1]), strict=True)
-        for point in points
-        if point.co.x == time
-    ]
-    for point in reversed([point for point in points if times[0] <= point.co.x <= times[-1]]):
-        points.remove(point, fast=True)
-    kept = len(points)
+    points.clear()
     points.add(len(times))
 
-    def write(name: str, size: int, new: np.ndarray) -> None:
-        dtype = np.float32 if name == "co" else np.int32
-        every = np.empty(size * len(points), dtype)
-        points.foreach_get(name, every)
-        every[size * kept :] = new.ravel()
-        points.foreach_set(name, every)
+    def choose(name: str, where: np.ndarray | bool, choice: str, otherwise: str) -> None:
+        values = np.where(where, actions.key_value(name, choice), actions.key_value(name, otherwise))
+        points.foreach_set(name, np.broadcast_to(values, len(times)).astype(np.int32))
 
-    def choose(name: str, where: np.ndarray, choice: str, otherwise: str) -> None:
-        write(name, 1, np.where(where, actions.key_value(name, choice), actions.key_value(name, otherwise)))
-
-    write("co", 2, np.column_stack([times, values]))
+    points.foreach_set("co", np.column_stack([times, values]).astype(np.float32).ravel())
     key = np.maximum(np.searchsorted(group.times, times, side="right") - 1, 0)
     choose(
         "interpolation", group.still[key, bone] & (times >= group.times[0]), "CONSTANT", otherwise="LINEAR"
     )
     choose("type", np.isin(times, group.times), "KEYFRAME", otherwise="BREAKDOWN")
     for side in ("handle_left_type", "handle_right_type"):
-        choose(side, np.ones(len(times), dtype=bool), "AUTO_CLAMPED", otherwise="AUTO_CLAMPED")
+        choose(side, True, "AUTO_CLAMPED", otherwise="AUTO_CLAMPED")
     curve.update()
-    if kept and len(outer) == 2:
-        for at, values_of_key in zip((times[0], times[-1]), outer, strict=True):
-            point = next(point for point in points if point.co.x == at)
-            # Blender adapts a handle to its opposite unless both are free.
-            point.handle_left_type = point.handle_right_type = "FREE"
-            for name, value in values_of_key.items():
-                setattr(point, name, value)
-        curve.update()
-
-
-def _value(point: bpy.types.Keyframe, name: str) -> object:
-    value = getattr(point, name)
-    return value.copy() if name.startswith("handle_") else value

@@ -11,7 +11,6 @@ from ...core.comparison import Comparison, Worst
 from ...core.heat import HeatScale
 from ...core.metrics import METRICS, Metric
 from ...core.page import Row, Sheet
-from ...core.sheet import Column, write_sheet
 from ...core.views import View, close_view
 from ...deform import characters
 from . import measure
@@ -133,23 +132,3 @@ class Illustrator:
         path = self._folder / f"{name.replace(' ', '-')}.png"
         self._studio.picture(view, path)
         return path
-
-
-def film(subject: Subject, comparison: Comparison, studio: Studio, folder: Path) -> Iterator[Path]:
-    """Draws each frame of the comparison into one picture, the methods side by side. Requires Pillow."""
-    methods = list(comparison.methods)
-    views = characters.whole_views(subject.meshes, methods, comparison.frames)
-    # One method at a time would be faster, as it is changed less often, but would need all pictures at once.
-    for index, (frame, view) in enumerate(zip(comparison.frames, views, strict=True)):
-        columns = []
-        for method, label in comparison.methods.items():
-            characters.use_method_on(subject.meshes, method)
-            characters.set_frame(subject.scene, frame)
-            picture = folder / f"{method}.png"
-            studio.picture(view, picture)
-            change = comparison.summaries[method][index].volume_change
-            note = "" if change != change else f"volume {100 * (1 + change):.1f} % of rest"
-            columns.append(Column(f"{label} ({method})", note, [picture]))
-        path = folder / f"{index:06d}.png"
-        write_sheet(f"{comparison.file}, frame {frame}", columns, [""], path)
-        yield path
