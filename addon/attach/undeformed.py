@@ -9,6 +9,8 @@ option Add Rest Position of the object adds an attribute to the deformed mesh al
 group leaves a mesh as it is.
 
 Not in viewports: applying Sinew's modifier evaluates it there, on a mesh that has not that attribute either.
+Nodes can tell the two apart only where the mesh has a Texture Space Mesh: another mesh in the file, which
+would have to follow each edit of the first, and which neither undo nor saving could leave as it is.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from . import node_group, properties, stack
 
 def ensure(obj: bpy.types.Object) -> dict[str, object]:
     """Makes the modifier behind Sinew's, and returns inputs of Sinew's."""
-    if stack.neutral_modifier(obj) is None and obj.vertex_groups:
+    if stack.neutral_modifier(obj) is None and _can_make(obj):
         _make(obj)
     position(obj)
     can_mark = _can_mark(obj)
@@ -32,11 +34,21 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
     }
 
 
+def _can_make(obj: bpy.types.Object) -> bool:
+    if obj.vertex_groups:
+        return True
+    # With its last group a mesh would lose weights that belong to none.
+    return obj.data.is_editable and not mesh_io.read_group_weights(obj.data).counts.any()
+
+
 def _make(obj: bpy.types.Object) -> None:
     active = obj.modifiers.active
     neutral = obj.modifiers.new("Sinew Texture Coordinates", "LAPLACIANDEFORM")
-    # Blender calls one without a group disabled.
+    # Blender calls one without a group's name disabled. The group itself is not needed.
+    made = None if obj.vertex_groups else obj.vertex_groups.new(name="Sinew")
     neutral.vertex_group = obj.vertex_groups[0].name
+    if made is not None:
+        obj.vertex_groups.remove(made)
     neutral.show_expanded = neutral.show_in_editmode = False
     neutral.show_viewport = neutral.show_render = False
     properties.of(obj).neutral_uid = neutral.persistent_uid

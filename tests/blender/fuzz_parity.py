@@ -19,7 +19,8 @@ rounding moves by the tolerance, directly or by a later modifier; for stages, a 
 these are computed from the input. Behind several modifiers it also leaves out vertices where Sinew is
 within the tolerance of the float64 reference: the rest of the difference is Blender's own rounding.
 
-Sinew must refuse a rig that it cannot deform as Blender does: with a sentence, and nothing of it stays.
+Generated texture coordinates in renders must be Blender's. Sinew must refuse a rig that it cannot deform as
+Blender does: with a sentence, and nothing of it stays.
 Vertices that a seam split, as files of engines have them, must stay together.
 """
 
@@ -101,6 +102,8 @@ REFERENCE_TOLERANCE = 2 * scenes.TOLERANCE
 MIX, AFTER = "mix", "stages after"
 # The distance between vertices that a seam split.
 TORN = "seams"
+# The points that Generated texture coordinates are made from.
+COORDINATES = "coordinates"
 # Vertex groups that stages use.
 PAINTED = ("painted", "painted too")
 NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after the update"}
@@ -110,7 +113,8 @@ NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after
 class Outcome:
     """The results for one rig.
 
-    errors    the largest by (requested route, method or MIX, AFTER or TORN), relative to the diagonal
+    errors    the largest by (requested route, method or MIX, AFTER, TORN or COORDINATES), relative to the
+              diagonal
     taken     the actual route for each requested one
     refused   Sinew has to refuse it; the errors are then those of Blender's shape afterwards
     reason    why a shape was not made by Sinew, if so
@@ -559,6 +563,7 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
         bpy.context.view_layer.update()
         expected[method] = scenes.final_points(obj)
     outcome = Outcome(seed, vertices=len(expected["lbs"]), refused=must_be_refused(obj))
+    expected[COORDINATES] = coordinates_of(obj)
     is_split = has(seed, "seams", features, share=0.2)
     for route in wanted:
         routes.force(route)
@@ -572,6 +577,10 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
+        found = coordinates_of(obj)
+        is_alike = found.shape == expected[COORDINATES].shape
+        error = scenes.worst(found, expected[COORDINATES]) if is_alike else float("inf")
+        outcome.errors[route, COORDINATES] = error / scenes.diagonal(obj)
         properties.of(obj).sdef.interpolation = str(numbers(seed, "sdef").choice(["nlerp", "slerp"]))
         for method in OTHERS:
             try:
@@ -591,11 +600,19 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
     return outcome
 
 
+def coordinates_of(obj: bpy.types.Object) -> np.ndarray:
+    """float32 [vertices, 3], object space"""
+    with scenes.rendering() as render:
+        render(obj)
+    return scenes.KeepingEngine.undeformed[obj.name]
+
+
 def must_be_refused(obj: bpy.types.Object) -> bool:
     kinds = [modifier.type for modifier in obj.modifiers]
     place = kinds.index("ARMATURE")
     is_mixed = obj.parent_type == "ARMATURE" or (place and kinds[place - 1] in MIXED_BY_MULTI_MODIFIERS)
-    return not {*kinds}.isdisjoint(REFUSED_BEHIND) or bool(
+    # Blender puts a Multiresolution in front of a subdivision that is in front.
+    return not {*kinds[place:]}.isdisjoint(REFUSED_BEHIND) or bool(
         obj.modifiers[place].use_multi_modifier and is_mixed
     )
 

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import ClassVar
 
 import bpy
 import numpy as np
@@ -231,3 +234,47 @@ def triangles_of(obj: bpy.types.Object) -> np.ndarray:
     """int32 [triangles, 3]"""
     obj.data.calc_loop_triangles()
     return np.int32([triangle.vertices[:] for triangle in obj.data.loop_triangles])
+
+
+class KeepingEngine(bpy.types.RenderEngine):
+    """Draws nothing, and stores the data that it is given for each mesh."""
+
+    bl_idname = "SINEW_KEEPING"
+    bl_label = "Keeping"
+    shapes: ClassVar[dict[str, np.ndarray]] = {}
+    undeformed: ClassVar[dict[str, np.ndarray]] = {}
+    attributes: ClassVar[dict[str, list[str]]] = {}
+
+    def render(self, depsgraph):
+        for obj in depsgraph.objects:
+            if obj.type != "MESH":
+                continue
+            for name, kept in (("co", self.shapes), ("undeformed_co", self.undeformed)):
+                kept[obj.name] = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+                obj.data.vertices.foreach_get(name, kept[obj.name].ravel())
+            self.attributes[obj.name] = obj.data.attributes.keys()
+        self.end_result(self.begin_result(0, 0, 4, 4))
+
+
+@contextlib.contextmanager
+def rendering() -> Iterator[Callable[[bpy.types.Object], np.ndarray]]:
+    """Context with a function that renders, and returns float32 [vertices, 3]: what a render receives for an
+    object at this frame. KeepingEngine has the rest."""
+    bpy.utils.register_class(KeepingEngine)
+
+    def render(obj: bpy.types.Object) -> np.ndarray:
+        scene = bpy.context.scene
+        if scene.camera is None:
+            scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+            scene.collection.objects.link(scene.camera)
+        scene.render.engine = KeepingEngine.bl_idname
+        scene.render.resolution_x = scene.render.resolution_y = 4
+        KeepingEngine.shapes.clear()
+        bpy.ops.render.render()
+        return KeepingEngine.shapes[obj.name]
+
+    try:
+        yield render
+    finally:
+        bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+        bpy.utils.unregister_class(KeepingEngine)

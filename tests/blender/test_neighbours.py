@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-from conftest import KeepingEngine
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.attach.updates import reaction, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
@@ -501,7 +500,7 @@ def test_a_mesh_that_is_off_is_rendered_as_it_is(arm, rendered_points, tmp_path)
     scene.render.filepath = str(tmp_path / "frame")
     scene.frame_start, scene.frame_end = 5, 6
     bpy.ops.render.render(animation=True)
-    got = KeepingEngine.shapes[arm.name]
+    got = scenes.KeepingEngine.shapes[arm.name]
     scene.frame_set(6)
     assert scenes.worst(got, scenes.final_points(arm)) <= 1e-6
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import routes
 import scenes
-from conftest import KeepingEngine
 from sinew_addon.attach import attach, properties, stack
 
 
@@ -26,7 +25,7 @@ def rendered(rendered_points):
     def render(obj):
         bpy.context.scene.frame_set(9)
         shape = rendered_points(obj)
-        return shape, KeepingEngine.undeformed[obj.name], KeepingEngine.attributes[obj.name]
+        return shape, scenes.KeepingEngine.undeformed[obj.name], scenes.KeepingEngine.attributes[obj.name]
 
     return render
 
@@ -52,6 +51,11 @@ def _in_front(kind):
     return add
 
 
+def _by_envelopes(obj):
+    obj.vertex_groups.clear()
+    obj.modifiers["Armature"].use_bone_envelopes = True
+
+
 def _shared(obj):
     other = bpy.data.objects.new("Other", obj.data)
     bpy.context.scene.collection.objects.link(other)
@@ -66,6 +70,7 @@ CHARACTERS = {
     "Subdivision in front": _in_front("SUBSURF"),
     "Cast in front": _in_front("CAST"),
     "shared mesh": _shared,
+    "no vertex groups": _by_envelopes,
     "Add Rest Position": lambda obj: setattr(obj, "add_rest_position_attribute", True),
 }
 
