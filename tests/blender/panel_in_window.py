@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """In Blender's window, with Sinew's zip: a character of five meshes by clicks and keys. Prints "FACTS" and a
-line of JSON; pictures of each step lie in the folder.
+line of JSON with what was not as wanted; pictures of each step lie in the folder.
 
     blender --factory-startup --enable-event-simulate --python panel_in_window.py -- sinew.zip FOLDER
 
@@ -40,11 +40,20 @@ STATUS_BAR = 24
 DUAL_QUATERNION = (483, 276)
 # Positions in the dialog of a comparison, which opens here.
 DIALOG, QUATERNION_VECTOR, LOG_MATRIX = (400, 400), (171, 534), (171, 577)
-facts: dict[str, object] = {}
+faults: list[str] = []
+
+
+def check(what: str, found: object, wanted: object = True) -> None:
+    if found != wanted:
+        faults.append(f"{what}: {found}, not {wanted}")
 
 
 def main_window() -> bpy.types.Window:
     return bpy.context.window_manager.windows[0]
+
+
+def enabled() -> list[bool]:
+    return [obj.sinew.enabled for obj in meshes()]
 
 
 def meshes() -> list[bpy.types.Object]:
@@ -95,42 +104,43 @@ def start() -> Iterator[None]:
 def one_click_for_a_method() -> Iterator[None]:
     window.photograph(FOLDER / "before.png")
     yield from window.click(ADD)
-    facts["added"] = methods()
+    check("added", methods(), ["lbs"] * 5)
     window.photograph(FOLDER / "added.png")
     yield from window.click(METHOD)
     window.photograph(FOLDER / "methods.png")
     yield from window.click(DUAL_QUATERNION)
-    facts["chosen"] = methods()
+    check("chosen", methods(), ["dq"] * 5)
     yield from window.click(SWITCH)
-    facts["switched off"] = [obj.sinew.enabled for obj in meshes()]
+    check("switched off", enabled(), [False] * 5)
     yield from undo()
-    facts["on again"] = [obj.sinew.enabled for obj in meshes()]
+    check("on again", enabled(), [True] * 5)
     yield from undo()
-    facts["chosen undone"] = methods()
+    check("chosen, undone", methods(), ["lbs"] * 5)
     yield from undo()
-    facts["added undone"] = methods()
+    check("added, undone", methods(), [""] * 5)
     preferences = bpy.context.preferences.addons["bl_ext.user_default.sinew"].preferences
     preferences.first_method = "qv"
     yield from window.click(ADD)
-    facts["added as preferred"] = methods()
+    check("added as preferred", methods(), ["qv"] * 5)
     preferences.first_method = "AS_BEFORE"
     yield from undo()
 
 
 def by_search_and_keys() -> Iterator[None]:
     yield from search("add sinew")
-    facts["added by search"] = methods()
+    check("added by search", methods(), ["lbs"] * 5)
     yield from search("switch on off")
-    facts["switched by search"] = [obj.sinew.enabled for obj in meshes()]
+    check("switched by search", enabled(), [False] * 5)
     yield from search("switch on off")
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.compare("EXEC_DEFAULT", methods={"lbs", "dq"})
     yield from window.wait()
     window.press("F", VIEW, alt=True, shift=True)
     yield from window.wait()
-    facts["flipped"] = [scene().sinew_comparison.arrangement, scene().sinew_comparison.shows_second]
+    state = scene().sinew_comparison
+    check("flipped", (state.arrangement, state.shows_second), ("FLIP", False))
     yield from search("flip comparison")
-    facts["flipped by search"] = scene().sinew_comparison.shows_second
+    check("flipped by search", scene().sinew_comparison.shows_second)
     window.press("Y", VIEW, alt=True, shift=True)
     yield from window.wait()
     window.photograph(FOLDER / "pie.png")
@@ -159,6 +169,7 @@ def copies_in_view() -> bool:
 
 
 def comparison_by_clicks() -> Iterator[None]:
+    """Linear blend, dual and vector quaternions are chosen; a click removes one, another adds one."""
     with window.in_view3d("WINDOW"):
         bpy.ops.view3d.view_selected()
     window.move(DIALOG)
@@ -172,8 +183,9 @@ def comparison_by_clicks() -> Iterator[None]:
     window.press("RET", LOG_MATRIX)
     yield from window.wait(4)
     state = scene().sinew_comparison
-    facts["compared"] = sorted({obj.sinew.copied_for for obj in state.collection.objects})
-    facts["copies in view"] = copies_in_view()
+    compared = sorted({obj.sinew.copied_for for obj in state.collection.objects})
+    check("compared", compared, ["dq", "lbs", "log"])
+    check("copies in view", copies_in_view())
     window.photograph(FOLDER / "compared.png")
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
@@ -219,7 +231,8 @@ def progress_in_the_status_bar() -> Iterator[None]:
     window.press("ESC", VIEW)
     yield from window.wait()
     window.photograph(FOLDER / "stopped.png")
-    facts["progress"] = [filled("progress"), filled("stopped"), share_shown()]
+    check("a progress bar", filled("progress") > 100)
+    check("none after Esc", (filled("stopped"), share_shown()), (0, 0.0))
 
 
 def suggested_by_click() -> Iterator[None]:
@@ -234,14 +247,14 @@ def suggested_by_click() -> Iterator[None]:
     from bl_ext.user_default.sinew.core.suggestion import CRITERIA
     from bl_ext.user_default.sinew.features.suggest import suggest
 
-    facts["suggested"] = suggest.suggestions[scene().session_uid].best(CRITERIA[0])
-    facts["suggestion used"] = methods()
+    check("one for all", len(set(methods())), 1)
+    check("a suggested one", methods()[0] in suggest.suggestions[scene().session_uid].best(CRITERIA[0]))
     with window.in_view3d():
         bpy.ops.sinew.suggestions_by(measure="crossings")
     yield from window.wait(4)
     window.photograph(FOLDER / "suggest-order.png")
     yield from undo()
-    facts["suggestion undone"] = methods()
+    check("suggestion, undone", methods(), ["dq"] * 5)
     yield from window.click(SUGGEST)
     yield from window.click(HEADER)
 
@@ -254,9 +267,9 @@ def off_greys() -> Iterator[None]:
     window.photograph(FOLDER / "on.png")
     yield from window.click(SWITCH)
     window.photograph(FOLDER / "off.png")
-    facts["letters"] = [brightest(picture, METHOD) for picture in ("on", "off")]
+    check("grey where off", brightest("off", METHOD) < 0.7 * brightest("on", METHOD))
     yield from window.click(SWITCH)
-    facts["ways on"] = [obj.sinew.enabled for obj in meshes()]
+    check("on", enabled(), [True] * 5)
 
 
 def without_weights() -> int:
@@ -269,14 +282,14 @@ def mends_by_clicks() -> Iterator[None]:
     for group in bpy.data.objects["Body"].vertex_groups:
         group.remove(list(range(300, 320)))
     bpy.ops.ed.undo_push(message="removed")
-    facts["weights lost"] = without_weights()
+    check("weights lost", without_weights(), 20)
     yield from window.click(CHECK)
     window.photograph(FOLDER / "check.png")
     yield from window.click(MEND)
     window.photograph(FOLDER / "mended.png")
-    facts["weights mended"] = without_weights()
+    check("weights mended", without_weights(), 0)
     yield from undo()
-    facts["mending undone"] = without_weights()
+    check("mending, undone", without_weights(), 20)
     yield from window.click(DIAGNOSTICS)
     yield from window.click(HEADER)
 
@@ -293,9 +306,10 @@ def key_blocks() -> list[tuple[str, bool, bool]]:
 def corrective_keys() -> Iterator[None]:
     """Made with F3, and driven by a bone; with it the Armature modifier alone has Sinew's shape."""
     yield from search("corrective shape key")
-    facts["corrective"] = key_blocks()
+    ((name, *flags),) = key_blocks()
+    check("corrective key", (name.startswith("Dual Quaternion"), *flags), (True, True, False))
     yield from undo()
-    facts["corrective undone"] = key_blocks()
+    check("corrective key, undone", key_blocks(), [])
     rig, body = bpy.data.objects["Hero Rig"], bpy.data.objects["Body"]
     window.select_only(rig)
     rig.data.bones.active = rig.data.bones["bone.1"]
@@ -303,7 +317,7 @@ def corrective_keys() -> Iterator[None]:
         bpy.ops.object.mode_set(mode="POSE")
         bpy.ops.sinew.corrective_key("EXEC_DEFAULT", driven=True)
     yield
-    facts["corrective driven"] = key_blocks()
+    check("corrective key, driven", key_blocks(), [(name, True, True)])
     window.photograph(FOLDER / "corrective.png")
     shown = window.final_points(body)
     for obj in meshes():
@@ -312,8 +326,8 @@ def corrective_keys() -> Iterator[None]:
     without = window.final_points(body)
     body.data.shape_keys.key_blocks[1].mute = False
     yield
-    distances = [np.linalg.norm(points - shown, axis=1) for points in (without, window.final_points(body))]
-    facts["off by"] = [float(each.max()) for each in distances]
+    off = [np.linalg.norm(each - shown, axis=1).max() for each in (without, window.final_points(body))]
+    check("its shape is Sinew's", (bool(off[0] > 0.03), bool(off[1] <= 1e-5)), (True, True))
     with window.in_view3d("WINDOW"):
         bpy.ops.object.mode_set(mode="OBJECT")
     five_meshes.select(body)
@@ -322,7 +336,6 @@ def corrective_keys() -> Iterator[None]:
 
 def search_in_modes() -> Iterator[None]:
     """F3 searches other menus in each mode."""
-    found = {}
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Hero Rig"]
     for obj, mode in (
         *((body, mode) for mode in ("EDIT", "SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT")),
@@ -335,12 +348,11 @@ def search_in_modes() -> Iterator[None]:
         states = []
         for _time in range(2):
             yield from search("switch on off")
-            states.append([mesh.sinew.enabled for mesh in meshes()])
-        found[f"{obj.type} {mode}"] = states
+            states.append(enabled())
+        check(f"switched in {obj.type} {mode}", states, [[False] * 5, [True] * 5])
         with window.in_view3d("WINDOW"):
             bpy.ops.object.mode_set(mode="OBJECT")
         yield
-    facts["switched in modes"] = found
     five_meshes.select(body)
     yield
 
@@ -358,7 +370,7 @@ def menus() -> Iterator[None]:
         bpy.ops.wm.call_menu(name="SINEW_MT_menu")
     yield from window.wait()
     window.photograph(FOLDER / "menu.png")
-    facts["menu height"] = height_of_change("no-menu", "menu")
+    check("the menu is lower than the window", 200 < height_of_change("no-menu", "menu") < 600)
     window.press("ESC", VIEW)
     yield
     window.press("ESC", VIEW)
@@ -377,7 +389,7 @@ def modifiers() -> Iterator[None]:
         bpy.ops.sinew.open_tab("INVOKE_DEFAULT")
     yield from window.wait(4)
     region = next(region for region in view.regions if region.type == "UI")
-    facts["tab"] = [view.spaces[0].show_region_ui, region.active_panel_category]
+    check("its tab", (view.spaces[0].show_region_ui, region.active_panel_category), (True, "Sinew"))
 
 
 def bake_error() -> Iterator[None]:
@@ -386,22 +398,22 @@ def bake_error() -> Iterator[None]:
         obj.sinew.enabled = True
     five_meshes.select(bpy.data.objects["Body"])
     shading = window.area_of("VIEW_3D").spaces[0].shading
-    before = shading.color_type
+    check("colours before", shading.color_type, "MATERIAL")
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.bake("EXEC_DEFAULT", kind="bones", frames="1-20", helpers=4)
         bpy.ops.view3d.view_selected()
         bpy.ops.ed.undo_push(message="baked")
     yield from search("heat map of bake error")
     yield from undo()
-    facts["bake error undone"] = shading.color_type
+    check("bake error, undone", shading.color_type, "MATERIAL")
     yield from search("heat map of bake error")
-    shown = shading.color_type
+    check("colours of the bake error", shading.color_type, "VERTEX")
     window.photograph(FOLDER / "bake-error.png")
     yield from search("heat map of bake error")
     window.photograph(FOLDER / "bake-error-off.png")
     view = (slice(200, -200), slice(100, 700))
     vivid = [float(np.ptp(pixels_of(name)[view], axis=2).mean()) for name in ("bake-error", "bake-error-off")]
-    facts["bake error"] = [before, shown, shading.color_type, vivid]
+    check("colours afterwards", (shading.color_type, vivid[0] > 1.2 * vivid[1]), ("MATERIAL", True))
 
 
 def shortcuts() -> list[str]:
@@ -412,15 +424,15 @@ def shortcuts() -> list[str]:
 
 
 def goes_without_a_trace() -> Iterator[None]:
-    facts["shortcuts"] = shortcuts()
+    check("shortcuts", shortcuts(), ["sinew.flip_comparison ", "wm.call_menu_pie SINEW_MT_pie"])
     bpy.context.preferences.active_section = "ADDONS"
     bpy.ops.preferences.addon_show(module="bl_ext.user_default.sinew")
     yield from window.wait()
     window.photograph(FOLDER / "preferences.png")
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.sinew")
-    facts["shortcuts afterwards"] = shortcuts()
+    check("shortcuts afterwards", shortcuts(), [])
     functions = [*bpy.types.VIEW3D_MT_object.draw._draw_funcs, *bpy.types.DATA_PT_modifiers.draw._draw_funcs]
-    facts["menus afterwards"] = [each.__module__ for each in functions if "sinew" in each.__module__]
+    check("menus afterwards", [each for each in functions if "sinew" in each.__module__], [])
     yield from window.wait()
 
 
@@ -439,7 +451,7 @@ def steps() -> Iterator[None]:
     yield from modifiers()
     yield from bake_error()
     yield from goes_without_a_trace()
-    print("FACTS " + json.dumps(facts), flush=True)
+    print("FACTS " + json.dumps({"faults": faults}), flush=True)
 
 
 window.run(steps(), 0.15)

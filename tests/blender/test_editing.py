@@ -30,32 +30,6 @@ def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-def test_add_starts_with_the_method_of_the_modifier():
-    for preserve_volume, method in ((False, "lbs"), (True, "dq")):
-        obj, _armature = scenes.make_arm()
-        obj.modifiers["Armature"].use_deform_preserve_volume = preserve_volume
-        bpy.ops.sinew.add()
-        assert properties.of(obj).method == method
-
-
-@pytest.mark.parametrize("evaluated", [False, True])
-def test_an_unkeyed_move_of_a_keyed_object_stays(evaluated):
-    obj, _armature = scenes.make_arm()
-    for frame in (2, 9):
-        obj.keyframe_insert("location", frame=frame)
-    bpy.context.scene.frame_set(3)
-    obj.location.x = 5.0
-    if evaluated:
-        bpy.context.view_layer.update()
-    scenes.add_sinew(obj)
-    bpy.context.view_layer.update()
-    assert obj.location.x == 5.0
-    obj.location.x = 6.0
-    scenes.put_in_front(obj, "CAST")
-    bpy.context.view_layer.update()
-    assert obj.location.x == 6.0
-
-
 def test_add_on_the_armature_takes_all_its_meshes():
     first, armature = scenes.make_arm(name="First")
     second = first.copy()
@@ -120,39 +94,6 @@ def test_remove_deletes_keys_of_the_method_and_no_others(has_other_keys):
     whole_file.assert_same(before)
 
 
-def test_linked_duplicate_has_a_pose_of_its_own():
-    first, armature = scenes.make_arm()
-    scenes.add_sinew(first)
-    other_rig = armature.copy()
-    bpy.context.scene.collection.objects.link(other_rig)
-    other_rig.animation_data_clear()
-    scenes.bend(other_rig, 60.0)
-    second = first.copy()
-    bpy.context.scene.collection.objects.link(second)
-    second.modifiers["Armature"].object = other_rig
-    assert second.data == first.data
-    for frame in (1, 6, 11):
-        bpy.context.scene.frame_set(frame)
-        points = {obj: scenes.final_points(obj) for obj in (first, second)}
-        for obj in (first, second):
-            properties.of(obj).enabled = False
-            assert scenes.worst(scenes.final_points(obj), points[obj]) <= 1e-5
-            properties.of(obj).enabled = True
-    assert scenes.worst(points[first], points[second]) > 0.05
-
-
-def test_duplicate_rename_and_delete_the_original():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    copy = obj.copy()
-    copy.data = obj.data.copy()
-    bpy.context.scene.collection.objects.link(copy)
-    copy.name, armature.name = "Ünï 名前", "renamed rig"
-    bpy.context.scene.frame_set(4)
-    bpy.data.objects.remove(obj)
-    assert_follows(copy)
-
-
 def test_renamed_modifiers_are_still_known():
     obj, _armature = scenes.make_arm()
     before = [m.name for m in obj.modifiers]
@@ -163,43 +104,6 @@ def test_renamed_modifiers_are_still_known():
     attach.remove(obj)
     assert [m.name for m in obj.modifiers] == ["old"] != before
     assert obj.modifiers["old"].object is not None
-
-
-def test_append_from_a_saved_file(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
-    name = obj.name
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    (appended,) = scenes.link(path, name, link=False)
-    bpy.context.scene.collection.objects.link(properties.of(appended).armature)
-    bpy.context.scene.frame_set(2)
-    assert_follows(appended)
-
-
-def test_deleted_armature_is_refused_with_a_sentence():
-    obj, armature = scenes.make_arm()
-    other, _rig = scenes.make_arm(name="Other")
-    scenes.add_sinew(obj)
-    scenes.add_sinew(other)
-    bpy.data.objects.remove(armature)
-    bpy.context.scene.frame_set(6)
-    assert session.plan_of(obj).state is State.REFUSED
-    assert "armature was deleted" in properties.of(obj).error
-    assert_follows(other)
-    attach.remove(obj)
-
-
-def test_armature_deleted_as_in_the_window_is_noticed():
-    """Deleting in the window unlinks it from all scenes; only Sinew's pointer still keeps it."""
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    bpy.context.scene.collection.objects.unlink(armature)
-    bpy.context.scene.frame_set(6)
-    assert "was deleted" in properties.of(obj).error
-    bpy.context.scene.collection.objects.link(armature)
-    bpy.ops.sinew.rebind()
-    assert_follows(obj)
 
 
 def shared_mesh(obj):
@@ -231,31 +135,6 @@ def test_helpers_of_a_deleted_mesh_are_deleted(set_up, heat, by_script):
             bpy.ops.object.delete()
     bpy.context.view_layer.update()
     assert names() == before - {("objects", "Arm")}
-
-
-def test_topology_change_rebinds():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    scenes.shapes(obj, [1, 6])
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.mesh.subdivide(number_cuts=1)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert_follows(obj)
-
-
-def test_changed_weights_rebind():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    bpy.context.scene.frame_set(11)
-    before = scenes.final_points(obj)
-    obj.vertex_groups[0].add(list(range(100, 140)), 1.0, "REPLACE")
-    bpy.context.view_layer.update()
-    assert scenes.worst(scenes.final_points(obj), before) > 0.01, "the stroke does not show"
-    assert_follows(obj)
-    obj.vertex_groups[1].add(list(range(120, 160)), 0.3, "REPLACE")
-    assert_follows(obj)
 
 
 @pytest.mark.by_sinew
@@ -312,18 +191,6 @@ def test_unregister_gives_the_modifiers_their_armatures():
         sinew_addon.register()
     bpy.context.scene.frame_set(10)
     assert_follows(obj)
-
-
-@pytest.mark.by_sinew
-def test_deleted_armature_modifier_is_refused_with_a_sentence():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    obj.modifiers.remove(obj.modifiers["Armature"])
-    bpy.context.scene.frame_set(6)
-    assert "Armature modifier was deleted" in properties.of(obj).error
-    attach.remove(obj)
-    assert not properties.has_sinew(obj)
-    assert len(obj.modifiers) == 0
 
 
 def test_what_is_missing_in_the_rig_is_warned_of():

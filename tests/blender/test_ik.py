@@ -120,27 +120,6 @@ def test_a_pole_decides_two_bones_as_in_blender(method, mode):
     assert arm.animation_data is None or arm.animation_data.action is None
 
 
-def test_keys_of_the_action_come_back_and_those_of_others_stay():
-    arm = make_arm(3)
-    for frame, turn in ((1, 0.0), (24, 0.5)):
-        for name in ("base", "arm.0"):
-            arm.pose.bones[name].rotation_quaternion = Matrix.Rotation(turn, 3, "X").to_quaternion()
-            arm.pose.bones[name].keyframe_insert("rotation_quaternion", frame=frame)
-    action = arm.animation_data.action
-    target = make_empty("Target", near())
-    constraint = constrain(arm, "arm.2", target, chain_count=3)
-    names = ["base", "arm.0", "arm.1", "arm.2"]
-    before = poses(arm, names)
-    bake()
-    assert arm.animation_data.action != action
-    np.testing.assert_allclose(tails(arm, "arm.2"), places(target), atol=1e-5)
-    np.testing.assert_allclose(poses(arm, ["base"]), before[:, :1], atol=1e-6)
-    bpy.ops.sinew.original_action()
-    assert arm.animation_data.action == action
-    assert not constraint.mute
-    np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
-
-
 def test_hinges_with_limits_bend_as_in_blender():
     arm = make_arm()
     knee = arm.pose.bones["arm.1"]

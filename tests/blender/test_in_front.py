@@ -118,29 +118,6 @@ def test_a_lattice_in_front_follows_both_objects():
     assert_equal_to_modifier(obj, FRAMES)
 
 
-def test_geometry_nodes_in_front():
-    obj = arm_with("NODES")
-    group = bpy.data.node_groups.new("Front", "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    source, split, result = (
-        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSubdivideMesh", "NodeGroupOutput")
-    )
-    group.links.new(source.outputs["Geometry"], split.inputs["Mesh"])
-    group.links.new(split.outputs["Mesh"], result.inputs["Geometry"])
-    obj.modifiers["Front"].node_group = group
-    assert_equal_to_modifier(obj, FRAMES)
-
-
-def test_an_animated_modifier_in_front():
-    obj = arm_with("CAST")
-    modifier = obj.modifiers["Front"]
-    for frame, factor in ((1, 0.0), (11, 1.0)):
-        modifier.factor = factor
-        modifier.keyframe_insert("factor", frame=frame)
-    assert_equal_to_modifier(obj, FRAMES)
-
-
 def test_weights_that_change_in_front():
     obj = arm_with("VERTEX_WEIGHT_EDIT", vertex_group="bone.1")
     modifier = obj.modifiers["Front"]
@@ -159,25 +136,6 @@ def test_number_of_vertices_that_changes_in_front():
         got = scenes.shapes(obj, [frame])[0]
         assert got.shape == shape.shape
         assert scenes.worst(got, shape) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def test_shape_keys_before_a_modifier_in_front():
-    obj = arm_with("SUBSURF")
-    scenes.key_shape(obj)
-    assert_equal_to_modifier(obj, FRAMES)
-
-
-def test_absolute_shape_keys():
-    obj, _armature = scenes.make_arm()
-    obj.shape_key_add(name="Basis")
-    for point in obj.shape_key_add(name="Key").data:
-        point.co.z += 0.2
-    keys = obj.data.shape_keys
-    keys.use_relative = False
-    for frame, time in ((1, 0.0), (11, 10.0)):
-        keys.eval_time = time
-        keys.keyframe_insert("eval_time", frame=frame)
-    assert_equal_to_modifier(obj, FRAMES)
 
 
 def absolute_keys(obj):
@@ -253,100 +211,7 @@ def test_parent_that_deforms_is_a_modifier_while_sinew_is_on():
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
 
-def test_parent_that_deforms_before_the_modifier():
-    obj, armature = scenes.make_arm()
-    obj.parent, obj.parent_type = armature, "ARMATURE"
-    assert_equal_to_modifier(obj, FRAMES)
-
-
-def test_a_modifier_in_front_that_comes_changes_and_goes():
-    obj, armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj)
-
-    def check():
-        # The first update makes what the second one reads.
-        bpy.context.view_layer.update()
-        assert not properties.of(obj).error
-        bpy.context.scene.frame_set(7)
-        assert not properties.of(obj).error
-        proxy = properties.of(obj).upstream_proxy
-        assert proxy is None or proxy.animation_data is None or not proxy.animation_data.drivers
-        shown = scenes.final_points(obj)
-        properties.of(obj).enabled = False
-        expected = scenes.final_points(obj)
-        properties.of(obj).enabled = True
-        assert shown.shape == expected.shape
-        assert scenes.worst(shown, expected) <= 1e-5
-        assert not properties.of(obj).error
-
-    check()
-    scenes.put_in_front(obj)
-    check()
-    # As many vertices as without it.
-    scenes.put_in_front(obj, "CAST", "Same").factor = 0.4
-    obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = False
-    check()
-    obj.modifiers.remove(obj.modifiers["Same"])
-    obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = True
-    check()
-    obj.modifiers["Front"].levels = 2
-    check()
-    obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = False
-    check()
-    assert properties.of(obj).upstream_proxy is None
-    assert properties.of(obj).point_buffer is None
-    assert armature.name in bpy.data.objects
-
-
 MODES = ["EDIT", "SCULPT"]
-
-
-@pytest.mark.parametrize("event", [*MODES, "added", "added at a frame", "changed"])
-def test_one_update_is_enough(event):
-    """A mesh that waits for its upstream modifiers does not stay at rest until the pose changes."""
-    obj = arm_with("CAST" if event.startswith("added") else "SUBSURF")
-    scenes.add_sinew(obj)
-    bpy.context.scene.frame_set(8)
-    if event in MODES:
-        bpy.ops.object.mode_set(mode=event)
-        bpy.context.view_layer.update()
-        bpy.ops.object.mode_set(mode="OBJECT")
-    elif event.startswith("added"):
-        scenes.put_in_front(obj, "SUBSURF", "Added")
-    else:
-        obj.modifiers[0].levels = 2
-    if event.endswith("frame"):
-        bpy.context.scene.frame_set(9)
-    else:
-        bpy.context.view_layer.update()
-    shown = scenes.final_points(obj)
-    properties.of(obj).enabled = False
-    expected = scenes.final_points(obj)
-    assert shown.shape == expected.shape
-    assert scenes.worst(shown, expected) <= 1e-5
-    assert not properties.of(obj).error
-
-
-@pytest.mark.parametrize("at_a_frame", [False, True])
-def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
-    """Objects that wait for upstream modifiers are evaluated again before Blender has finished its
-    evaluation, which must not discard the results of others."""
-    obj, _armature = scenes.make_arm()
-    other, rig = scenes.make_arm(name="Other")
-    scenes.add_sinew(obj)
-    rig.hide_viewport = True
-    bpy.context.scene.frame_set(8)
-    scenes.put_in_front(obj)
-    rig.hide_viewport = other.hide_viewport = False
-    if at_a_frame:
-        bpy.context.scene.frame_set(9)
-    else:
-        bpy.context.view_layer.update()
-    shown = scenes.final_points(other)
-    other.data.update_tag()
-    bpy.context.view_layer.update()
-    assert scenes.worst(shown, scenes.final_points(other)) <= 1e-6
-    assert scenes.worst(shown, scenes.rest_points(other)) > 0.1, "nothing is tested"
 
 
 @pytest.mark.parametrize("event", ["shown", "shown and changed"])
@@ -412,23 +277,6 @@ def test_removing_leaves_the_file_as_it_was():
     whole_file.assert_same(before)
 
 
-def test_a_copy_has_points_of_its_own():
-    obj = arm_with("SUBSURF")
-    scenes.add_sinew(obj)
-    copy = obj.copy()
-    bpy.context.scene.collection.objects.link(copy)
-    bpy.context.view_layer.update()
-    bpy.context.scene.frame_set(8)
-    assert properties.of(copy).point_buffer != properties.of(obj).point_buffer
-    assert properties.of(copy).upstream_proxy != properties.of(obj).upstream_proxy
-    assert scenes.worst(scenes.final_points(copy), scenes.final_points(obj)) == 0.0
-    attach.remove(obj)
-    bpy.context.scene.frame_set(4)
-    shown = scenes.final_points(copy)
-    properties.of(copy).enabled = False
-    assert scenes.worst(scenes.final_points(copy), shown) <= 1e-5
-
-
 def test_a_simulation_in_front_is_refused_with_a_sentence():
     arm_with("CLOTH")
     bpy.context.view_layer.update()
@@ -436,23 +284,6 @@ def test_a_simulation_in_front_is_refused_with_a_sentence():
     with pytest.raises(RuntimeError, match="Front in front of Armature is a simulation"):
         bpy.ops.sinew.add()
     whole_file.assert_same(before)
-
-
-def test_an_armature_modifier_in_front_of_what_is_in_front():
-    """It is not one of the replaced modifiers, and deforms their result."""
-    obj, _armature = scenes.make_arm()
-    _other, armature = scenes.make_arm(name="Other")
-    scenes.key_pose(armature, 40.0)
-    scenes.add_sinew(obj, "lbs")
-    scenes.put_in_front(obj, "SMOOTH", "Smooth")
-    first = obj.modifiers.new("First", "ARMATURE")
-    first.object = armature
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
-    got = scenes.shapes(obj, [1, 6, 11])
-    assert [m.type for m in scenes.modifiers(obj)] == ["ARMATURE", "SMOOTH", "ARMATURE", "NODES"]
-    properties.of(obj).enabled = False
-    expected = scenes.modifier_shapes(obj, [1, 6, 11], preserve_volume=False)
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_one_view_layer_has_it_for_its_position_alone():
@@ -478,30 +309,3 @@ def test_one_view_layer_has_it_for_its_position_alone():
     expected = scenes.final_points(obj)
     assert scenes.worst(expected, scenes.rest_points(obj)[-len(expected) :]) > 0.05
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.mark.parametrize("what", ["modifier", "transform"])
-def test_applied_with_something_in_front(what, route):
-    """Two objects have the mesh: as with any such mesh, the user must make it single first."""
-    obj, _armature = scenes.make_arm()
-    scenes.put_in_front(obj, "CAST", "Cast").factor = 0.3
-    obj.scale = (1.2, 1.1, 0.9)
-    scenes.add_sinew(obj)
-    bpy.context.scene.frame_set(8)
-    before = scenes.final_points(obj)
-    if what == "modifier":
-        for name in ("Cast", "Sinew"):
-            bpy.ops.object.modifier_apply(modifier=name, single_user=True)
-        bpy.context.view_layer.update()
-        assert not obj.modifiers
-        assert not properties.has_sinew(obj)
-        assert scenes.worst(scenes.final_points(obj), before) <= 1e-6
-    else:
-        bpy.ops.object.transform_apply(isolate_users=True)
-        bpy.context.view_layer.update()
-        got = scenes.final_points(obj)
-        assert tuple(obj.scale) == (1.0, 1.0, 1.0)
-        assert not properties.of(obj).error
-        attach.remove(obj)
-        tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
-        assert scenes.worst(got, scenes.final_points(obj)) <= tolerance

@@ -76,64 +76,6 @@ def test_chained_modifiers_in_another_order(volume, over_sinew):
     check(obj, before)
 
 
-@pytest.mark.parametrize("deleted", ["Armature", "Second"])
-def test_one_of_two_deleted(deleted):
-    obj = make_chained(False, True)
-    obj.modifiers[deleted].show_viewport = False
-    expected = scenes.shapes(obj, FRAMES)
-    obj.modifiers[deleted].show_viewport = True
-    scenes.add_sinew(obj)
-    obj.modifiers.remove(obj.modifiers[deleted])
-    bpy.context.view_layer.update()
-    check(obj, expected)
-    assert len(properties.of(obj).replaced_modifiers) == 1
-
-
-@pytest.mark.by_sinew
-def test_a_third_added():
-    obj = make_chained(False, False)
-    scenes.add_sinew(obj)
-    third = obj.modifiers.new("Third", "ARMATURE")
-    third.object = properties.of(obj).armatures[1]
-    bpy.context.view_layer.update()
-    got = scenes.shapes(obj, FRAMES)
-    assert third.show_viewport
-    attach.remove(obj)
-    session.refresh(bpy.context)
-    assert third.show_viewport
-    assert scenes.worst(got, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.mark.parametrize(
-    ("moved", "place"),
-    [
-        ("Subdivision", "Sinew"),
-        ("Subdivision", "Armature"),
-        ("Subdivision", "Second"),
-        ("Second", "Sinew"),
-        ("Second", "Armature"),
-    ],
-)
-def test_something_moved_between(moved, place):
-    """An Armature modifier that no longer directly follows the first one deforms by itself."""
-    obj = make_chained(False, False)
-    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
-    if moved == "Second":
-        put(obj, "Subdivision", "Armature")
-    scenes.add_sinew(obj)
-    before = scenes.shapes(obj, FRAMES)
-    put(obj, moved, place)
-    got = scenes.shapes(obj, FRAMES)
-    assert properties.of(obj).error == ""
-    order = shown_names(obj)
-    attach.remove(obj)
-    session.refresh(bpy.context)
-    assert shown_names(obj) == [name for name in order if name != "Sinew"]
-    expected = scenes.shapes(obj, FRAMES)
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert expected.shape == before.shape
-
-
 def test_what_is_kept_of_many_modifiers_is_of_each():
     """Blender moves all of them in memory when more are added."""
     obj, armature = scenes.make_arm()
@@ -163,58 +105,10 @@ def test_a_chain_with_a_modifier_that_has_no_armature_follows_the_pose(place):
     assert scenes.worst(got, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-def test_a_keyed_modifier_is_renamed_while_it_is_off():
-    """Sinew's modifier is after it then."""
-    obj, _armature = scenes.make_arm()
-    modifier = obj.modifiers["Armature"]
-    for frame, value in ((3, False), (9, True)):
-        modifier.show_viewport = modifier.show_render = value
-        modifier.keyframe_insert("show_viewport", frame=frame)
-        modifier.keyframe_insert("show_render", frame=frame)
-    bpy.context.scene.frame_set(1)
-    expected = scenes.shapes(obj, FRAMES)
-    bpy.context.scene.frame_set(1)
-    scenes.add_sinew(obj, "lbs")
-    modifier.name = "Other"
-    session.refresh(bpy.context)
-    assert properties.has_sinew(obj)
-    check(obj, expected)
-
-
 def key_visibility(modifier: bpy.types.Modifier, *keys: tuple[int, bool]) -> None:
     for frame, shown in keys:
         modifier.show_viewport = shown
         modifier.keyframe_insert("show_viewport", frame=frame)
-
-
-def test_add_while_keys_hide_the_first_modifier():
-    obj, armature = scenes.make_arm()
-    second = obj.modifiers.new("Second", "ARMATURE")
-    second.object = armature
-    key_visibility(obj.modifiers["Armature"], (2, False), (10, True))
-    frames = [3, 10, 11, 4]
-    expected = scenes.shapes(obj, frames)
-    scenes.add_sinew(obj, "lbs")
-    got = scenes.shapes(obj, frames)
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert scenes.worst(expected[1], expected[2]) > 0.01
-
-
-def test_moved_in_front_and_back_with_keyed_visibility():
-    """There Sinew's modifier is after the Armature modifier, and follows it."""
-    obj, _armature = scenes.make_arm()
-    obj.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1
-    key_visibility(obj.modifiers["Armature"], (1, True), (6, True))
-    obj.modifiers["Armature"].use_deform_preserve_volume = True
-    expected = scenes.shapes(obj, [11])
-    obj.modifiers["Armature"].use_deform_preserve_volume = False
-    scenes.add_sinew(obj, "dq")
-    bpy.context.view_layer.objects.active = obj
-    for place in (0, 2):
-        obj.modifiers.move(list(obj.modifiers).index(obj.modifiers["Solidify"]), place)
-        bpy.context.view_layer.update()
-    assert shown_names(obj) == ["Armature", "Sinew", "Solidify"]
-    assert scenes.worst(scenes.shapes(obj, [11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 @pytest.mark.parametrize("on", [False, True])
@@ -240,21 +134,3 @@ def test_moved_and_renamed_before_anybody_sees_it(on):
     session.refresh(bpy.context)
     for shapes in (got, again):
         assert scenes.worst(shapes, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def test_a_multi_modifier_is_chained_while_sinew_is_off():
-    obj = make_chained(False, False)
-    obj.modifiers["Armature"].use_multi_modifier = True
-    put(obj, "Second", "Armature")
-    chained = scenes.shapes(obj, FRAMES)
-    put(obj, "Armature", "Second")
-    armature = obj.modifiers["Second"].object
-    obj.modifiers.remove(obj.modifiers["Second"])
-    scenes.add_sinew(obj)
-    properties.of(obj).enabled = False
-    obj.modifiers.new("Second", "ARMATURE").object = armature
-    obj.modifiers.move(names(obj).index("Second"), 0)
-    bpy.context.view_layer.update()
-    got = scenes.shapes(obj, FRAMES)
-    assert shown_names(obj) == ["Second", "Armature", "Sinew"]
-    assert scenes.worst(got, chained) <= scenes.TOLERANCE * scenes.diagonal(obj)

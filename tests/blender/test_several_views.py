@@ -72,55 +72,6 @@ def test_a_view_layer_is_shown_for_the_first_time(route):
         bpy.context.window.view_layer = first
 
 
-def test_a_scene_that_redo_brings_back(route):
-    """Blender sends no notification of its first evaluation, and Sinew has just forgotten all objects."""
-    scenes.make_arm()
-    bpy.ops.ed.undo_push(message="before")
-    try:
-        bpy.context.scene.frame_set(8)
-        expected = scenes.final_points(bpy.data.objects["Arm"])
-        scenes.add_sinew(bpy.data.objects["Arm"], "lbs")
-        properties.of(bpy.data.objects["Arm"]).leave_small = False
-        bpy.ops.scene.new(type="LINK_COPY")
-        bpy.context.view_layer.update()
-        bpy.ops.ed.undo_push(message="a copy of the scene")
-        bpy.ops.ed.undo()
-        bpy.ops.ed.redo()
-        bpy.context.view_layer.update()
-        handlers.check_unannounced()
-        bpy.context.view_layer.update()
-        assert len(bpy.data.scenes) == 2
-        assert scenes.worst(scenes.final_points(bpy.data.objects["Arm"]), expected) <= 1e-5
-    finally:
-        bpy.ops.ed.undo()
-
-
-def test_a_view_layer_that_first_shows_a_mesh_with_an_upstream_modifier(tmp_path, route):
-    obj, armature = scenes.make_arm()
-    scenes.put_in_front(obj)
-    collection = bpy.data.collections.new("Character")
-    scene = bpy.context.scene
-    scene.collection.children.link(collection)
-    for each in (obj, armature):
-        scene.collection.objects.unlink(each)
-        collection.objects.link(each)
-    bpy.context.view_layer.layer_collection.children["Character"].exclude = True
-    scene.view_layers.new("Second").layer_collection.children["Character"].exclude = False
-    scenes.add_sinew(obj, "lbs")
-    scene.frame_set(9)
-    path = str(tmp_path / "arm.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    obj = bpy.data.objects["Arm"]
-    bpy.context.window.view_layer = bpy.context.scene.view_layers["Second"]
-    bpy.context.view_layer.update()
-    handlers.check_unannounced()
-    shown = scenes.final_points(obj)
-    properties.of(obj).enabled = False
-    expected = scenes.final_points(obj)
-    assert scenes.worst(shown, expected) <= 1e-5
-
-
 def test_undo_with_a_view_layer_that_is_not_shown(route):
     """Blender keeps the point buffer's evaluated data from before the step that undo goes back to: points
     of another frame, or as many as another subdivision had."""

@@ -108,12 +108,14 @@ SENTENCES = (
 class Step:
     """check  whether the sides are compared afterwards
     push   whether an undo step follows, which makes Blender check everything, too
+    words  what it chooses, where a script says it (walk_script)
     """
 
     operation: str
     seed: int
     check: bool
     push: bool = False
+    words: tuple[str | int | float, ...] = ()
 
 
 @dataclass

@@ -17,6 +17,8 @@ import sys
 import zlib
 from pathlib import Path
 
+import walk_script
+
 
 class Render:
     """The shape of each mesh in Blender's evaluation for a render."""
@@ -90,7 +92,10 @@ class Child:
         if not self.side.is_sinew:
             # The objects that an operation can choose depend on it.
             self.side.adopt(self.claims)
-        numbers = random.Random(seed)
+        words = request["words"]
+        numbers = walk_script.Chosen(seed, words) if words else random.Random(seed)
+        if words:
+            self.walker.chosen = ""
         operation = self.operations.OPERATIONS[name]
         self.walker.rendered, self.walker.rendered_by_library = {}, {}
         outcome, said = "done", None
@@ -115,6 +120,9 @@ class Child:
         if self.side.is_sinew and name == "remove_all" and not result["claims"]:
             result["left over"] = self.side.left_over()
         result["problems"] = self.problems()
+        if words and (outcome != "done" or numbers.words):
+            left = f", {numbers.words} not chosen" if numbers.words else ""
+            result["problems"].append(f"ScriptError: {name} {words}: {outcome}, {said}{left}")
         return result
 
     def open(self, request: dict) -> dict:

@@ -2376,6 +2376,16 @@ def update(w: Walker, r: random.Random) -> str | None:
     return "view_layer.update()"
 
 
+@operation(0)
+def says(w: Walker, r: random.Random) -> str | None:
+    """For scripts: what Sinew has to say about a mesh."""
+    obj = w.mesh(r)
+    if w.side.is_sinew and not any(str(word) in obj.sinew.error for word in r.words):
+        raise ValueError(f"{obj.name}: says {obj.sinew.error!r}")
+    r.words.clear()
+    return f"what is said about {obj.name}"
+
+
 # --- Faults that test_walk plants, to check that they are found; never chosen
 
 

@@ -9,7 +9,21 @@ import window
 import window_scene
 from bpy_extras import view3d_utils
 from mathutils import Vector
-from window_hand import FOLDER, Run, Steps, choose, click, execute, hero, press, rig, set_frame, step, wait
+from window_hand import (
+    FOLDER,
+    Run,
+    Steps,
+    choose,
+    click,
+    execute,
+    hero,
+    playing,
+    press,
+    rig,
+    set_frame,
+    step,
+    wait,
+)
 from window_scene import LARGE, shown_points, worst
 
 
@@ -26,15 +40,12 @@ def drag_a_bone(run: Run) -> Steps:
     yield from wait()
     for key, text in (("R", ""), ("X", ""), ("FOUR", "4"), ("FIVE", "5")):
         press(key, text)
-        yield from wait()
-        run.check_shapes(f"while dragging, after {key}")
+        yield from run.see(f"while dragging, after {key}")
     press("RET")
     yield from wait()
     run.check(bone.matrix != before, "the bone was not dragged")
     run.check_shapes("dragged")
-    press("Z", ctrl=True)
-    yield from wait(4)
-    run.check_shapes("dragged and undone")
+    yield from run.undo("dragged and undone")
     execute("object.mode_set", mode="OBJECT")
     yield from run.check_frames()
 
@@ -74,34 +85,26 @@ def weight_paint(run: Run) -> Steps:
     run.check(found[0] == found[1], f"active group and the armature's mode without Sinew and with: {found}")
     run.check_shapes("in weight paint")
     before = [group.weight for vertex in hero().data.vertices for group in vertex.groups]
-    with window.in_view3d():
-        bpy.ops.screen.animation_play()
-    yield from wait(5)
-    hero().vertex_groups.active_index = 1
-    _stroke()
-    yield from wait(5)
-    with window.in_view3d():
-        bpy.ops.screen.animation_cancel(restore_frame=False)
+    with playing():
+        yield from wait(5)
+        hero().vertex_groups.active_index = 1
+        _stroke()
+        yield from wait(5)
     yield from wait()
     after = [group.weight for vertex in hero().data.vertices for group in vertex.groups]
     run.check(before != after, "nothing was painted")
     run.check_shapes("painted while it played")
-    press("Z", ctrl=True)
-    yield from wait(4)
-    run.check_shapes("painted and undone")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "painting.blend"), copy=True)
-    run.note_saved(FOLDER / "painting.blend")
+    yield from run.undo("painted and undone")
+    run.save("painting.blend", copy=True)
     execute("object.mode_set", "Hero", mode="OBJECT")
     yield from run.check_frames()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "painted.blend"), copy=True)
-    run.note_saved(FOLDER / "painted.blend")
+    run.save("painted.blend", copy=True)
     click("sinew.remove", "Hero")
     run.wanted["Hero"] = ""
     modifier = hero().modifiers["Armature"]
     flags = (modifier.show_viewport, modifier.show_render)
     run.check(flags == (True, True), f"once Sinew is removed, the Armature modifier is on in {flags}")
-    yield from wait()
-    run.check_shapes("without Sinew")
+    yield from run.see("without Sinew")
     press("Z", ctrl=True)
     run.wanted["Hero"] = "dq"
     yield from wait(4)
@@ -189,8 +192,7 @@ def edit_the_mesh(run: Run) -> Steps:
     execute("transform.translate", value=(0.0, 0.0, 0.2))
     yield from wait()
     execute("object.mode_set", mode="OBJECT")
-    yield from wait()
-    run.check_shapes("its vertices moved")
+    yield from run.see("its vertices moved")
     execute("object.mode_set", "Hero", mode="EDIT")
     execute("mesh.subdivide")
     execute("object.mode_set", mode="OBJECT")
@@ -203,8 +205,7 @@ def edit_the_mesh(run: Run) -> Steps:
         yield from wait(4)
     # To its position in edit mode.
     execute("object.mode_set", "Hero", mode="OBJECT")
-    yield from wait()
-    run.check_shapes("subdivided and undone")
+    yield from run.see("subdivided and undone")
     yield from run.check_frames()
 
 
@@ -215,8 +216,7 @@ def edit_the_armature(run: Run) -> Steps:
     rig().data.edit_bones["bone.1"].roll += 0.4
     yield from wait()
     execute("object.mode_set", mode="OBJECT")
-    yield from wait()
-    run.check_shapes("its bones edited")
+    yield from run.see("its bones edited")
     rig().data.bones["bone.1"].name = "elbow"
     yield from wait()
     run.check("elbow" in hero().vertex_groups, "the group was not renamed with its bone")
@@ -230,27 +230,22 @@ def edit_the_armature(run: Run) -> Steps:
     press("Z", ctrl=True)
     yield from wait(4)
     execute("object.mode_set", "Hero Rig", mode="OBJECT")
-    yield from wait()
-    run.check_shapes("renamed and undone")
+    yield from run.see("renamed and undone")
     yield from run.check_frames()
 
 
 @step("modes")
 def methods_while_it_plays(run: Run) -> Steps:
-    with window.in_view3d():
-        bpy.ops.screen.animation_play()
-    for method in ("lbs", "dq", "qv", "dq", "lbs", "dq"):
-        hero().sinew.method = method
+    with playing():
+        for method in ("lbs", "dq", "qv", "dq", "lbs", "dq"):
+            hero().sinew.method = method
+            yield from wait(4)
+        hero().sinew.enabled = False
         yield from wait(4)
-    hero().sinew.enabled = False
-    yield from wait(4)
-    hero().sinew.enabled = True
-    click("sinew.rebind", "Hero")
-    yield from wait(4)
-    with window.in_view3d():
-        bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield from wait()
-    run.check_shapes("after playback")
+        hero().sinew.enabled = True
+        click("sinew.rebind", "Hero")
+        yield from wait(4)
+    yield from run.see("after playback")
     yield from run.check_frames()
 
 
@@ -265,10 +260,7 @@ def remove_sinews_modifier(run: Run) -> Steps:
     run.check(modifier.object == rig(), "its Armature modifier has no armature")
     run.check_shapes("without Sinew's modifier")
     yield from run.check_frames()
-    press("Z", ctrl=True)
-    run.wanted["Hero"] = "dq"
-    yield from wait(4)
-    run.check_shapes("undone")
+    yield from run.undo("undone", "dq")
     yield from run.check_frames()
 
 
@@ -288,27 +280,26 @@ def duplicate(run: Run) -> Steps:
 
 
 @step("modifiers")
-def apply(run: Run) -> Steps:
-    """Freezes the shape, and Sinew is removed."""
-    set_frame(12)
-    yield from wait()
-    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-    before = shown_points(hero(), depsgraph)
-    execute("object.modifier_apply", "Hero", modifier="Sinew")
-    del run.wanted["Hero"]
-    yield from wait()
-    set_frame(3)
-    yield from wait()
-    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-    off = worst(shown_points(hero(), depsgraph), before)
-    run.check(off <= window_scene.TOLERANCE, f"the shape that was applied moves by {off:.4f}")
-    _check_forgotten(run, hero(), "after Apply")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "applied.blend"), copy=True)
-    press("Z", ctrl=True)
-    run.wanted["Hero"] = "dq"
-    yield from wait(4)
-    run.check_shapes("undone")
-    yield from run.check_frames()
+def apply_and_convert(run: Run) -> Steps:
+    """Both freeze the shape, and Sinew is removed."""
+    for name, arguments in (
+        ("object.modifier_apply", {"modifier": "Sinew"}),
+        ("object.convert", {"target": "MESH"}),
+    ):
+        set_frame(12)
+        yield from wait()
+        main = bpy.context.window_manager.windows[0]
+        before = shown_points(hero(), main.view_layer.depsgraph)
+        execute(name, "Hero", **arguments)
+        del run.wanted["Hero"]
+        yield from wait()
+        set_frame(3)
+        yield from wait()
+        off = worst(shown_points(hero(), main.view_layer.depsgraph), before)
+        run.check(off <= window_scene.TOLERANCE, f"after {name} the shape moves by {off:.4f}")
+        _check_forgotten(run, hero(), f"after {name}")
+        yield from run.undo("undone", "dq")
+        yield from run.check_frames()
 
 
 def _check_forgotten(run: Run, obj: bpy.types.Object, when: str) -> None:
@@ -324,28 +315,6 @@ def _check_forgotten(run: Run, obj: bpy.types.Object, when: str) -> None:
 
 
 @step("modifiers")
-def convert_to_mesh(run: Run) -> Steps:
-    set_frame(12)
-    yield from wait()
-    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-    before = shown_points(hero(), depsgraph)
-    execute("object.convert", "Hero", target="MESH")
-    del run.wanted["Hero"]
-    yield from wait()
-    set_frame(3)
-    yield from wait()
-    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-    off = worst(shown_points(hero(), depsgraph), before)
-    run.check(off <= window_scene.TOLERANCE, f"the shape that was converted moves by {off:.4f}")
-    _check_forgotten(run, hero(), "after Convert")
-    press("Z", ctrl=True)
-    run.wanted["Hero"] = "dq"
-    yield from wait(4)
-    run.check_shapes("undone")
-    yield from run.check_frames()
-
-
-@step("modifiers")
 def delete_the_armature(run: Run) -> Steps:
     """Sinew reports it, and the saved file opens; after undo, everything is as before."""
     execute("object.delete", "Hero Rig", confirm=False)
@@ -353,8 +322,7 @@ def delete_the_armature(run: Run) -> Steps:
     run.wanted = {name: method for name, method in wanted.items() if name != "Hero"}
     yield from wait(4)
     set_frame(4)
-    yield from wait()
-    run.check_shapes("without Hero's armature")
+    yield from run.see("without Hero's armature")
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "no-armature.blend"), copy=True)
     press("Z", ctrl=True)
     yield from wait(4)

@@ -4,9 +4,10 @@ comparisons of what is shown and saved."""
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
@@ -90,18 +91,32 @@ class Run:
             yield from wait()
             self.check_shapes(f"at frame {frame}")
 
-    def note_saved(self, path: Path, in_memory: bool = False, names: Collection[str] = ()) -> None:
-        """Records a file for window_read.py, which reads it in another Blender.
+    def see(self, when: str, ticks: int = 2) -> Steps:
+        """What is shown once Blender has redrawn."""
+        yield from wait(ticks)
+        self.check_shapes(when)
 
-        names  of the characters to compare; all if there are none
+    def undo(self, when: str, wanted: str | None = None) -> Steps:
+        """By the key.
+
+        wanted  the method that Hero then shows, if it is another one
         """
+        press("Z", ctrl=True)
+        if wanted is not None:
+            self.wanted["Hero"] = wanted
+        yield from self.see(when, 4)
+
+    def save(self, name: str, **options: object) -> None:
+        bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / name), **options)
+        self.note_saved(FOLDER / name)
+
+    def note_saved(self, path: Path, in_memory: bool = False) -> None:
+        """Records a file for window_read.py, which reads it in another Blender."""
         if not path.exists():
             self.fault(f"{path.name} was not saved")
             return
         characters = {
-            name: {"armature": f"{name} Rig", "method": method}
-            for name, method in self.wanted.items()
-            if not names or name in names
+            name: {"armature": f"{name} Rig", "method": method} for name, method in self.wanted.items()
         }
         kept = FOLDER / f"kept-{GROUPS[-1]}-{len(self.saved)}.blend"
         kept.write_bytes(path.read_bytes())
@@ -152,6 +167,17 @@ def press(key: str, text: str = "", **held: bool) -> None:
     typed = {"unicode": text} if text else {}
     main.event_simulate(type=key, value="PRESS", x=x, y=y, **typed, **held)
     main.event_simulate(type=key, value="RELEASE", x=x, y=y)
+
+
+@contextlib.contextmanager
+def playing() -> Iterator[None]:
+    with window.in_view3d():
+        bpy.ops.screen.animation_play()
+    try:
+        yield
+    finally:
+        with window.in_view3d():
+            bpy.ops.screen.animation_cancel(restore_frame=False)
 
 
 def set_frame(frame: int) -> None:

@@ -17,6 +17,7 @@ from window_hand import (
     Steps,
     click,
     fresh,
+    playing,
     press,
     set_frame,
     step,
@@ -102,15 +103,11 @@ def render_unlocked(run: Run) -> Steps:
 
 @step("renders")
 def render_unlocked_while_it_plays(run: Run) -> Steps:
-    with window.in_view3d():
-        bpy.ops.screen.animation_play()
-    yield from wait(5)
-    _start_render(run, False, 20, {})
-    yield from _end_of_render()
-    with window.in_view3d():
-        bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield from wait()
-    run.check_shapes("after the render")
+    with playing():
+        yield from wait(5)
+        _start_render(run, False, 20, {})
+        yield from _end_of_render()
+    yield from run.see("after the render")
     yield from run.check_frames()
 
 
@@ -149,19 +146,15 @@ def click_during_unlocked_renders(run: Run) -> Steps:
         obj.sinew.enabled = True
         obj.sinew.method = "dq"
         run.wanted[name] = "dq"
-    yield from wait()
-    run.check_shapes("afterwards")
+    yield from run.see("afterwards")
     yield from run.check_frames()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "rendered.blend"), copy=True)
-    run.note_saved(FOLDER / "rendered.blend")
+    run.save("rendered.blend", copy=True)
     click("sinew.remove", "Hero")
     run.wanted["Hero"] = ""
-    yield from wait()
-    run.check_shapes("removed afterwards")
+    yield from run.see("removed afterwards")
     click("sinew.add", "Hero")
     run.wanted["Hero"] = "lbs"
-    yield from wait()
-    run.check_shapes("added afterwards")
+    yield from run.see("added afterwards")
     yield from run.check_frames()
 
 
@@ -196,13 +189,9 @@ def others_throw(run: Run) -> Steps:
         functions.insert(0, throw)
         try:
             set_frame(bpy.context.window_manager.windows[0].scene.frame_current % 20 + 1)
-            yield from wait()
-            run.check_shapes(f"while {event} throws")
-            path = FOLDER / f"throws-{event}.blend"
-            bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-            run.note_saved(path)
-            yield from wait()
-            run.check_shapes(f"after {event} threw")
+            yield from run.see(f"while {event} throws")
+            run.save(f"throws-{event}.blend", copy=True)
+            yield from run.see(f"after {event} threw")
         finally:
             functions.remove(throw)
     yield from run.check_frames()
@@ -221,10 +210,8 @@ def disable_and_enable(run: Run) -> Steps:
         # With Blender's most similar method.
         run.check_shapes(f"disabled, turn {turn}")
         set_frame(7 + turn)
-        yield from wait()
-        run.check_shapes(f"disabled at frame {7 + turn}")
+        yield from run.see(f"disabled at frame {7 + turn}")
         bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / f"disabled{turn}.blend"), copy=True)
         bpy.ops.preferences.addon_enable(module=module)
-        yield from wait()
-        run.check_shapes(f"enabled, turn {turn}")
+        yield from run.see(f"enabled, turn {turn}")
         yield from run.check_frames()

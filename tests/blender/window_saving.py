@@ -9,7 +9,21 @@ from pathlib import Path
 
 import bpy
 import window
-from window_hand import FOLDER, PATIENCE, Run, Steps, click, execute, hero, push, rig, set_frame, step, wait
+from window_hand import (
+    FOLDER,
+    PATIENCE,
+    Run,
+    Steps,
+    click,
+    execute,
+    hero,
+    playing,
+    push,
+    rig,
+    set_frame,
+    step,
+    wait,
+)
 from window_scene import pose
 
 
@@ -20,9 +34,7 @@ def add(run: Run) -> Steps:
 
 @step("files")
 def save_as_with_a_camera(run: Run) -> Steps:
-    path = FOLDER / "saved.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    run.note_saved(path)
+    run.save("saved.blend")
     run.check_shapes("right after saving")
     yield from wait()
 
@@ -35,8 +47,7 @@ def save_with_a_pose_by_hand(run: Run) -> Steps:
     bpy.ops.wm.save_mainfile()
     run.note_saved(FOLDER / "posed.blend")
     run.check_shapes("right after saving")
-    yield from wait()
-    run.check_shapes("after saving")
+    yield from run.see("after saving")
     set_frame(12)
 
 
@@ -54,8 +65,7 @@ def save_incremental(run: Run) -> Steps:
 @step("files")
 def save_a_copy(run: Run) -> Steps:
     hero().location.x += 0.01
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "copy.blend"), copy=True)
-    run.note_saved(FOLDER / "copy.blend")
+    run.save("copy.blend", copy=True)
     yield from wait()
 
 
@@ -70,16 +80,11 @@ def save_where_it_can_not_be(run: Run) -> Steps:
 
 @step("files")
 def save_while_it_plays(run: Run) -> Steps:
-    with window.in_view3d():
-        bpy.ops.screen.animation_play()
-    yield from wait(10)
-    for number in range(3):
-        path = FOLDER / f"playing{number}.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-        run.note_saved(path)
-        yield from wait(3)
-    with window.in_view3d():
-        bpy.ops.screen.animation_cancel(restore_frame=False)
+    with playing():
+        yield from wait(10)
+        for number in range(3):
+            run.save(f"playing{number}.blend", copy=True)
+            yield from wait(3)
     yield from wait()
 
 
@@ -88,9 +93,7 @@ def save_in_modes(run: Run) -> Steps:
     for mode in ("WEIGHT_PAINT", "EDIT", "SCULPT", "OBJECT"):
         execute("object.mode_set", "Hero", mode=mode)
         yield from wait()
-        path = FOLDER / f"mode-{mode}.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-        run.note_saved(path)
+        run.save(f"mode-{mode}.blend", copy=True)
         yield
     yield from run.check_frames()
 
@@ -102,8 +105,7 @@ def save_over_and_over(run: Run) -> Steps:
         pose(rig(), 10.0 * number)
         bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "saved.blend"))
     run.note_saved(FOLDER / "saved.blend")
-    yield from wait()
-    run.check_shapes("saved ten times")
+    yield from run.see("saved ten times")
     set_frame(12)
     yield from run.check_frames()
 
@@ -112,8 +114,7 @@ def save_over_and_over(run: Run) -> Steps:
 def revert(run: Run) -> Steps:
     """The file that the second Blender opened works with Sinew, too."""
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "saved.blend"))
-    yield from wait()
-    run.check_shapes("opened again")
+    yield from run.see("opened again")
     run.check(hero().sinew.method == "dq", f"its method is {hero().sinew.method}")
     modifier = hero().modifiers["Armature"]
     run.check(not modifier.show_viewport, "both deform")
@@ -130,8 +131,7 @@ def revert(run: Run) -> Steps:
 @step("quit")
 def save_and_leave(run: Run) -> Steps:
     """For the second session, which opens last.blend and recovers quit.blend and the autosave."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "last.blend"))
-    run.note_saved(FOLDER / "last.blend")
+    run.save("last.blend")
     bpy.ops.wm.save_userpref()
     yield from wait()
     hero().location.y += 0.1
@@ -165,17 +165,14 @@ def opened_again(run: Run) -> Steps:
 @step("again")
 def recover_last_session(run: Run) -> Steps:
     bpy.ops.wm.recover_last_session()
-    yield from wait(4)
-    run.check_shapes("recovered")
+    yield from run.see("recovered", 4)
     yield from run.check_frames()
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "recovered.blend"))
-    run.note_saved(FOLDER / "recovered.blend")
+    run.save("recovered.blend")
 
 
 @step("again")
 def recover_auto_save(run: Run) -> Steps:
     found = max(FOLDER.glob("last*_autosave.blend"), key=lambda path: path.stat().st_mtime)
     bpy.ops.wm.recover_auto_save(filepath=str(found))
-    yield from wait(4)
-    run.check_shapes("recovered")
+    yield from run.see("recovered", 4)
     yield from run.check_frames()

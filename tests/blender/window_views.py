@@ -8,7 +8,6 @@ from collections.abc import Callable
 import bpy
 import window
 from window_hand import (
-    FOLDER,
     SCENE,
     SECOND,
     Run,
@@ -17,6 +16,7 @@ from window_hand import (
     click,
     execute,
     hero,
+    playing,
     press,
     push,
     rig,
@@ -81,37 +81,29 @@ def undo_and_redo_by_keys(run: Run) -> Steps:
         action()
         history.append(wanted)
         run.wanted["Hero"] = wanted
-        yield from wait()
-        run.check_shapes(f"done {len(history) - 1}")
+        yield from run.see(f"done {len(history) - 1}")
     at = len(history) - 1
     for turn in range(2):
         while at > 0:
             press("Z", ctrl=True)
             at -= 1
             run.wanted["Hero"] = history[at]
-            yield from wait(4)
-            run.check_shapes(f"undone to {at}, turn {turn}")
+            yield from run.see(f"undone to {at}, turn {turn}", 4)
         while at < len(history) - 1:
             press("Z", ctrl=True, shift=True)
             at += 1
             run.wanted["Hero"] = history[at]
-            yield from wait(4)
-            run.check_shapes(f"redone to {at}, turn {turn}")
+            yield from run.see(f"redone to {at}, turn {turn}", 4)
     yield from run.check_frames()
 
 
 @step("undo")
 def save_after_undo(run: Run) -> Steps:
-    press("Z", ctrl=True)
-    run.wanted["Hero"] = "lbs"
-    yield from wait(4)
-    run.check_shapes("undone")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "undone.blend"))
-    run.note_saved(FOLDER / "undone.blend")
+    yield from run.undo("undone", "lbs")
+    run.save("undone.blend")
     press("Z", ctrl=True, shift=True)
     run.wanted["Hero"] = "dq"
-    yield from wait(4)
-    run.check_shapes("redone over a saved file")
+    yield from run.see("redone over a saved file", 4)
     press("Z", ctrl=True)
     yield from wait(4)
     run.wanted["Hero"] = "lbs"
@@ -125,23 +117,17 @@ def undo_while_it_plays(run: Run) -> Steps:
     push("dq")
     hero().location.y += 0.3
     push("Moved")
-    with window.in_view3d():
-        bpy.ops.screen.animation_play()
-    yield from wait(10)
-    press("Z", ctrl=True)
-    yield from wait(10)
-    with window.in_view3d():
-        bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield from wait()
-    run.check_shapes("undone while it played")
+    with playing():
+        yield from wait(10)
+        press("Z", ctrl=True)
+        yield from wait(10)
+    yield from run.see("undone while it played")
     yield from run.check_frames()
 
 
 def _undo_and_redo_twice(run: Run, ticks_after_redo: int = 4) -> Steps:
     for turn in range(2):
-        press("Z", ctrl=True)
-        yield from wait(4)
-        run.check_shapes(f"undone, turn {turn}")
+        yield from run.undo(f"undone, turn {turn}")
         press("Z", ctrl=True, shift=True)
         yield from wait(ticks_after_redo)
         run.check_shapes(f"redone, turn {turn}")
@@ -156,21 +142,17 @@ def mesh_that_another_object_gets(run: Run) -> Steps:
     push("Selected")
     push("The same again")
     execute("object.make_links_data", type="OBDATA")
-    yield from wait()
-    run.check_shapes("its mesh is another's too")
+    yield from run.see("its mesh is another's too")
     yield from _undo_and_redo_twice(run)
     for _time in range(4):
-        press("Z", ctrl=True)
-        yield from wait(4)
-        run.check_shapes("undone to the beginning")
+        yield from run.undo("undone to the beginning")
 
 
 @step("undo")
 def scene_that_redo_brings_back(run: Run) -> Steps:
     """Blender sends no notification of its first evaluation."""
     click("scene.new", type="LINK_COPY")
-    yield from wait()
-    run.check_shapes("in a copy of the scene")
+    yield from run.see("in a copy of the scene")
     # Sinew checks four times a second.
     yield from _undo_and_redo_twice(run, ticks_after_redo=20)
     press("Z", ctrl=True)
@@ -184,8 +166,7 @@ def two_windows_and_scenes(run: Run) -> Steps:
     yield from wait(4)
     first, second = bpy.context.window_manager.windows
     second.scene = bpy.data.scenes[SECOND]
-    yield from wait(4)
-    run.check_shapes("with two windows")
+    yield from run.see("with two windows", 4)
     guest = bpy.data.objects["Guest"]
     area = next(area for area in second.screen.areas if area.type == "VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
@@ -195,34 +176,27 @@ def two_windows_and_scenes(run: Run) -> Steps:
         bpy.ops.sinew.add("INVOKE_DEFAULT")
     guest.sinew.method = "dq"
     run.wanted["Guest"] = "dq"
-    yield from wait(4)
-    run.check_shapes("Guest on, too")
+    yield from run.see("Guest on, too", 4)
     for frame in (5, 20):
         first.scene.frame_set(frame)
         second.scene.frame_set(21 - frame)
-        yield from wait(4)
-        run.check_shapes(f"at frame {frame} and {21 - frame}")
+        yield from run.see(f"at frame {frame} and {21 - frame}", 4)
     pose(rig("Guest"), 60.0)
     pose(rig(), 20.0)
-    yield from wait(4)
-    run.check_shapes("both posed")
+    yield from run.see("both posed", 4)
 
 
 @step("windows")
 def same_scene_in_two_windows(run: Run) -> Steps:
     first, second = bpy.context.window_manager.windows
     second.scene = first.scene
-    yield from wait(4)
-    run.check_shapes("the same scene")
+    yield from run.see("the same scene", 4)
     layer = first.scene.view_layers.new("Other layer")
     second.view_layer = layer
-    yield from wait(4)
-    run.check_shapes("another view layer")
+    yield from run.see("another view layer", 4)
     first.scene.frame_set(7)
-    yield from wait(4)
-    run.check_shapes("another view layer, at frame 7")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "windows.blend"))
-    run.note_saved(FOLDER / "windows.blend")
+    yield from run.see("another view layer, at frame 7", 4)
+    run.save("windows.blend")
     with bpy.context.temp_override(window=second):
         bpy.ops.wm.window_close()
     yield from wait(4)
@@ -237,14 +211,11 @@ def switch_scenes(run: Run) -> Steps:
     for _turn in range(2):
         for name in (SECOND, SCENE):
             main.scene = bpy.data.scenes[name]
-            yield from wait()
-            run.check_shapes(f"in {name}")
+            yield from run.see(f"in {name}")
             main.scene.frame_set(main.scene.frame_current % 20 + 1)
-            yield from wait()
-            run.check_shapes(f"in {name} at another frame")
+            yield from run.see(f"in {name} at another frame")
     main.scene = bpy.data.scenes[SCENE]
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "scenes.blend"))
-    run.note_saved(FOLDER / "scenes.blend")
+    run.save("scenes.blend")
     yield from wait()
 
 
@@ -261,8 +232,7 @@ def views(run: Run) -> Steps:
         with window.in_view3d("WINDOW"):
             category, _dot, operator = name.partition(".")
             getattr(getattr(bpy.ops, category), operator)("EXEC_DEFAULT", **arguments)
-        yield from wait(4)
-        run.check_shapes(f"after {name}")
+        yield from run.see(f"after {name}", 4)
         yield from run.check_frames()
     with window.in_view3d("WINDOW"):
         bpy.ops.view3d.localview("EXEC_DEFAULT", frame_selected=False)

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Edits of a character that Sinew deforms, after each of which all meshes, renders and the file are as in a
+Blender without Sinew. Each caused a fault once. walk_script says how they are written."""
+
+from __future__ import annotations
+
+import pytest
+import walk
+import walk_script
+
+CASES = {
+    # Objects and meshes
+    "the method of the modifier": "armature_options Arm volume; add Arm; frame 11; render",
+    "an unkeyed move of a keyed object": "key_object Arm 2 9; frame 3; ~move_object Arm; add Arm; update; "
+    "move_object Arm; add_modifier Arm CAST; update",
+    "a linked duplicate with a pose of its own": "add Arm; duplicate_armature Rig; duplicate Arm; "
+    "another_armature 'object 2' 'object 1'; frame 6; clear_animation 'object 1'; pose 'object 1' lower; "
+    "frame 1; frame 11; enabled Arm; enabled Arm",
+    "a duplicate renamed, its original deleted": "add Arm; duplicate Arm 0.9; rename_object Rig; "
+    "rename_object 'object 1'; frame 4; delete_object Arm; frame 6; frame 11",
+    "one user of a shared mesh in edit mode": "add Arm; duplicate Arm; frame 3; edit_mesh Arm nothing 0.9; "
+    "frame 6; leave_mode; frame 11",
+    "a linked duplicate made single": "add Arm; duplicate Arm; frame 3; swap_mesh 'object 1'; frame 6; "
+    "remove_all",
+    "a heat map of a shared mesh": "duplicate Arm; add Arm; frame 6; heat Arm; update; frame 7; "
+    "heat Arm 0.9",
+    "appended": "append; frame 2; frame 11",
+    "topology": "add Arm; frame 6; edit_mesh Arm subdivide; frame 11; edit_mesh Arm delete; frame 6",
+    "weights": "add Arm; frame 11; weights Arm upper; frame 6; weights Arm lower; weights Arm hand 0.1; "
+    "update",
+    "without size": "add Arm; no_size Arm 0 6 1 11; no_size Rig 1 6 1 11; no_size Arm 2 6 1 11; frame 11",
+    "without size, by dq": "add Arm dq; no_size Arm 1 6 1 11; no_size Rig 0 6 1 11; no_size Rig 3 6 1 11; "
+    "frame 11",
+    "without size, in a parent": "add Arm; parent Arm Rig OBJECT; no_size Rig 1 6 1 11; "
+    "no_size Arm 0 6 1 11",
+    "without size, by methods of Sinew's": "add Arm 0.9 qv; no_size Arm 1 6 1 11; method Arm 0.9 cor; "
+    "no_size Arm 0 5 1 11; method Arm 0.9 ddm; no_size Rig 1 5 1 11; method Arm 0.9 dib; "
+    "no_size Rig 0 5 1 11",
+    # Armatures
+    "a deleted armature": "add Arm; add Leg; delete_armature Rig; frame 6; says Arm 'armature was deleted'; "
+    "frame 11; remove Arm; frame 6",
+    "an armature in no collection": "add Arm; unlink_armature Rig; frame 6; rebind Arm; frame 11",
+    "the first of two armatures is deleted": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; frame 6; "
+    "delete_armature Rig; update; frame 11",
+    "the same with a heat map": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; heat Arm; "
+    "delete_armature Rig; update; frame 11",
+    "a hidden armature after off and on": "add Arm; enabled Arm; enabled Arm; hide Rig viewport; "
+    "hide Rig render; frame 1; frame 11",
+    "a bone made while Sinew is off": "add Arm; frame 4; enabled Arm; edit_bones Rig roll upper; "
+    "edit_bones Rig new; enabled Arm; frame 6; frame 11",
+    "bones are edited on the rest shape": "add Arm; frame 11; edit_bones Rig roll upper 0.3 0.9; "
+    "leave_mode; frame 6",
+    "undo in edit mode of a shared armature": "duplicate_armature Rig; another_armature Arm 'object 1'; "
+    "add Arm; frame 11; edit_bones Rig new 0.3 0.9; undo; update; leave_mode; frame 6",
+    # Shape keys
+    "a shape key edited, added and removed": "add_shape_key Arm; add Arm; frame 6; shape_key_points Arm; "
+    "add_shape_key Arm; frame 11; delete_shape_key Arm 0.9 'key 1'; frame 6; delete_shape_key Arm 0.1",
+    "a slider and weights after it": "add_shape_key Arm; add Arm; frame 6; shape_key_value Arm; "
+    "weights Arm lower",
+    "the first shape keys": "add Arm; frame 6; add_shape_key Arm 0.9; frame 11",
+    "a pinned shape key": "add_shape_key Arm; add Arm; frame 6; pin_shape_key Arm 1; pin_shape_key Arm 1; "
+    "frame 11",
+    "a muted pinned shape key": "add_shape_key Arm; add Arm; frame 6; shape_key_value Arm 0.9 0.1; "
+    "pin_shape_key Arm 1; frame 11; pin_shape_key Arm 1",
+    # Parts of Sinew
+    **{
+        f"Sinew's {part} taken away": f"add Arm dq; frame 6; frame 11; delete_points Arm {part}; update;"
+        f"delete_points Arm {part}; frame 6; frame 11"
+        for part in ("attribute", "group", "nodes", "links", "sockets", "driver")
+    },
+    "its sockets, while it is hidden": "add Arm dq; frame 11; hide Arm viewport; "
+    "~delete_points Arm sockets; ~touch Arm; ik_chain Rig hand; hide Arm viewport; frame 6",
+    "the same with a heat map, hidden": "add Arm dq; heat Arm; frame 11; hide Arm viewport; "
+    "~delete_points Arm sockets; ~touch Arm; ik_chain Rig hand; hide Arm viewport; frame 6",
+    "registered again at another frame": "add Arm dq; frame 8; restart 11; frame 3; frame 11",
+    "registered again, keyed": "add Arm dq; key_method Arm 1 8 lbs dq; frame 9; restart 3; frame 3; frame 9",
+    # Keys of visibility
+    "deleted keys, on": "key_visibility Arm 1 5 0.0; frame 11; add Arm; frame 4; clear_animation Arm; "
+    "frame 6",
+    "deleted keys, off": "key_visibility Arm 1 5 0.0; frame 11; add Arm; frame 4; clear_animation Arm; "
+    "enabled Arm; frame 6",
+    "deleted keys, removed": "key_visibility Arm 1 5 0.0; frame 11; add Arm; frame 4; clear_animation Arm; "
+    "remove Arm; frame 6",
+    "deleted keys where the modifier is on": "key_visibility Arm 1 8 0.0; add Arm dq; frame 6; frame 8; "
+    "clear_animation Arm; frame 8; frame 11",
+    "keys on a hidden object": "add Arm; hide Arm viewport; key_visibility Arm 3 5 1.0; frame 4; "
+    "enabled Arm; clear_animation Arm; update",
+    "keys while Sinew is on": "clear_animation Rig; add Arm; key_visibility Arm 2 3 0.0; frame 1; "
+    "pose Rig lower; update; frame 3",
+    "a keyed modifier renamed while it is off": "key_visibility Arm 3 9 0.0; add Arm; rename_modifier Arm; "
+    "frame 11; frame 6",
+    "added while keys hide the first": "add_modifier Arm ARMATURE Rig 0.9; "
+    "key_visibility Arm Armature 2 10 0.0; frame 3; ~add Arm; frame 10; frame 11; frame 4",
+    "a render of a hidden mesh": "add Arm dq; key_method Arm 5 11 dq; hide Arm viewport; weights Arm lower; "
+    "frame 9; render 0.9",
+    # Modifiers
+    "a deleted Armature modifier": "add Arm 0.3 0.3; frame 6; delete_modifier Arm 0.1; "
+    "says Arm 'Armature modifier was deleted'; frame 3; touch Arm; frame 4; "
+    "says Arm 'Armature modifier was deleted'; remove_all",
+    "one of two deleted": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; frame 6; "
+    "delete_modifier Arm Armature 0.1 0.1; frame 11",
+    "the other of two deleted": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; frame 6; "
+    "delete_modifier Arm 'Armature 1' 0.1 0.1; frame 11",
+    "a third added": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; frame 6; "
+    "add_modifier Arm ARMATURE Rig 0.9 0.9; frame 11; remove Arm; frame 6",
+    "chained ones swapped": "add_modifier Arm ARMATURE 'Other Rig' 0.9 0.1; add Arm; frame 6; "
+    "move_modifier Arm Armature 'Armature 1'; frame 11; move_modifier Arm Armature 'Armature 1'; frame 6; "
+    "remove Arm",
+    "something moved between": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add_modifier Arm SUBSURF 0.9; "
+    "add Arm; frame 6; move_modifier Arm 'Subsurf 2' 'Armature 1'; frame 11; "
+    "move_modifier Arm 'Subsurf 2' Armature; frame 6; remove Arm",
+    "a second one moved away": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add_modifier Arm CAST 0.9; "
+    "add Arm; move_modifier Arm 'Armature 1' 'Cast 2'; frame 11; move_modifier Arm 'Armature 1' 'Cast 2'; "
+    "frame 6; remove Arm",
+    "in front and back, keyed": "add_modifier Arm SOLIDIFY 0.9; key_visibility Arm 1 6 1.0; add Arm dq; "
+    "move_modifier Arm 'Solidify 1' Armature; update; move_modifier Arm 'Solidify 1' Armature; frame 11",
+    "a multi modifier chained while off": "armature_options Arm multi; add Arm; enabled Arm; "
+    "add_modifier Arm ARMATURE 'Other Rig'; frame 6; enabled Arm; frame 11",
+    # In front of the Armature modifier
+    "shape keys before one in front": "add_shape_key Arm; key_shape_key Arm 1 11; add_modifier Arm SUBSURF; "
+    "add Arm; frame 6; method Arm dq; frame 11",
+    "an animated one": "add_modifier Arm CAST; key_modifier Arm 1 11; add Arm; frame 6; frame 11; "
+    "render 0.9",
+    "weights that change": "add_modifier Arm VERTEX_WEIGHT_EDIT lower; add Arm; frame 6; weights Arm lower; "
+    "frame 11",
+    "nodes": "add_modifier Arm NODES; add Arm; frame 6; move_vertices Arm; frame 11; remove_all",
+    "absolute shape keys": "add_shape_key Arm; absolute_shape_keys Arm; add Arm; frame 6; "
+    "absolute_shape_keys Arm; frame 11",
+    "a parent that deforms": "parent Arm Rig ARMATURE; frame 6; parent Arm none; add Arm; "
+    "parent Arm Rig ARMATURE; frame 11; enabled Arm; frame 6; enabled Arm; remove Arm",
+    "it comes, changes and goes": "add Arm; add_modifier Arm SUBSURF; frame 7; "
+    "toggle_modifier Arm 'Subsurf 1'; add_modifier Arm CAST; frame 6; delete_modifier Arm 'Cast 2' 0.9; "
+    "toggle_modifier Arm 'Subsurf 1'; frame 7; toggle_modifier Arm 'Subsurf 1'; frame 6; remove_all",
+    "edit mode and one update": "add_modifier Arm SUBSURF; add Arm; frame 8; edit_mesh Arm nothing 0.9; "
+    "leave_mode",
+    "sculpt mode and one update": "add_modifier Arm SUBSURF; add Arm; frame 8; sculpt_mode Arm 0.9; "
+    "leave_mode",
+    "added to another": "add_modifier Arm CAST; add Arm; frame 8; add_modifier Arm SUBSURF; frame 9; "
+    "remove_all",
+    "others while one waits": "add Arm; add Leg; hide Leg viewport; frame 8; ~add_modifier Arm SUBSURF; "
+    "~hide Leg viewport; frame 9",
+    "Sinew added while it is hidden": "add_modifier Arm DECIMATE; hide Arm viewport; frame 8; add Arm; "
+    "update; hide Arm viewport",
+    "a copy with points of its own": "add_modifier Arm SUBSURF; add Arm; duplicate Arm; frame 8; "
+    "remove Arm; frame 4; enabled 'object 2'",
+    "an Armature modifier in front of it": "add Arm; add_modifier Arm SMOOTH; "
+    "add_modifier Arm ARMATURE 'Other Rig'; frame 6; frame 11",
+    "a scene that redo brings back": "frame 8; +add Arm; +copy_scene; undo; redo; update",
+    "a view layer that first shows it": "add_modifier Sleeve SUBSURF; add Sleeve; view_layer; view_layer; "
+    "hide_collection Props exclude; frame 9; save_and_load; view_layer; frame 6",
+    "applied": "add_modifier Arm CAST; move_object Arm 0.3 0.1; add Arm; frame 8; apply_modifier Arm; "
+    "update",
+    "an applied transform": "add_modifier Arm CAST; move_object Arm 0.3 0.1; add Arm; frame 8; "
+    "apply_transform Arm; remove Arm",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    found = {route: walk.Pair(route) for route in walk.ROUTES}
+    yield found
+    for pair in found.values():
+        pair.close()
+
+
+# Where the two routes read something at another time.
+ON_BOTH_ROUTES = (
+    *("a bone made while Sinew is off", "undo in edit mode of a shared armature", "others while one waits"),
+    *("deleted keys where the modifier is on", "keys while Sinew is on", "without size, in a parent"),
+    *("a scene that redo brings back", "a view layer that first shows it", "applied"),
+)
+QUICK = [(name, "evaluation", False) for name in CASES] + [(name, "update", False) for name in ON_BOTH_ROUTES]
+SLOW = [(name, *way) for name in CASES for way in (("evaluation", True), ("update", False))]
+
+
+@pytest.mark.parametrize(
+    ("name", "route", "is_left"),
+    [*QUICK, *(pytest.param(*way, marks=pytest.mark.slow) for way in SLOW if way not in QUICK)],
+)
+def test_both_blenders_are_alike(pairs, name, route, is_left):
+    outcome = walk.walk(pairs[route], 0, walk_script.steps_of(CASES[name], is_left))
+    assert outcome.fault is None, f"{outcome.fault.kind}: {outcome.fault.text}\n" + "\n".join(outcome.said)
