@@ -152,6 +152,46 @@ def add_sinew(obj: bpy.types.Object, method: str | None = None) -> None:
     session.refresh(bpy.context)
 
 
+def skinned_arm(method: str | None = None, **options: object) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """make_arm() with Sinew."""
+    obj, armature = make_arm(**options)
+    add_sinew(obj, method)
+    return obj, armature
+
+
+def copied(obj: bpy.types.Object, name: str = "", linked: bool = False) -> bpy.types.Object:
+    """linked  with the same mesh"""
+    copy = obj.copy()
+    if not linked:
+        copy.data = obj.data.copy()
+    copy.name = name or copy.name
+    bpy.context.scene.collection.objects.link(copy)
+    return copy
+
+
+def reopened(path: Path | str, name: str = "Arm") -> bpy.types.Object:
+    """The object of this name, after the file was saved there and opened again."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.data.objects[name]
+
+
+def enter(obj: bpy.types.Object, mode: str) -> None:
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode=mode)
+
+
+@contextlib.contextmanager
+def handler(event: str, function: Callable, first: bool = False) -> Iterator[None]:
+    """Like another add-on's, after Sinew's or before it."""
+    functions = getattr(bpy.app.handlers, event)
+    functions.insert(0 if first else len(functions), function)
+    try:
+        yield
+    finally:
+        functions.remove(function)
+
+
 def states_of(obj: bpy.types.Object) -> list:
     """An object that Sinew deforms, and its state at this frame, for measuring."""
     return session.states_of([obj], bpy.context.evaluated_depsgraph_get())

@@ -112,8 +112,7 @@ def test_posing_live():
 
 
 def test_armature_in_rest_position():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(11)
     armature.data.pose_position = "REST"
     bpy.context.view_layer.update()

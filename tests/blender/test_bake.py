@@ -25,6 +25,7 @@ TOLERANCE = 1e-6
 METHOD = "dq"
 # Bakes to bones only approximate the shape: test_bake_bones.py.
 EXACT = [kind for kind in core.KINDS if kind != core.BONES]
+SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
 
 READ = """
 import sys, bpy, numpy as np
@@ -76,19 +77,26 @@ def shown(obj, frames, method=METHOD):
     return scenes.shapes(obj, frames)
 
 
+def assert_plays_elsewhere(obj, path, tmp_path, kind, frames=FRAMES, method=METHOD):
+    """float32 [frames, vertices, 3]: its shapes by Sinew, which a bake of its file has, too."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    expected, before, out = shown(obj, frames, method), path.read_bytes(), tmp_path / "out"
+    run_sinew(
+        "bake", path, "--method", method, "--to", kind, "--frames", f"{frames[0]}-{frames[-1]}", "--out", out
+    )
+    assert path.read_bytes() == before
+    read = read_elsewhere(out / f"{path.stem}{SUFFIXES.get(kind, '.blend')}", frames, tmp_path)
+    (points,) = (read[name] for name in read if name not in ("uvs", "materials"))
+    assert scenes.worst(points, expected) <= TOLERANCE * scenes.diagonal(obj)
+    assert scenes.worst(expected[0], expected[-1]) > 0.1
+    return expected
+
+
 @pytest.mark.parametrize("method", ["lbs", "dq", "qv"])
 @pytest.mark.parametrize("kind", ["shape-keys", "mdd", "pc2"])
 def test_a_blend_file_plays_the_same_elsewhere(arm, tmp_path, kind, method):
-    obj, path = arm
-    expected = shown(obj, FRAMES, method)
-    out = tmp_path / "out"
-    before = path.read_bytes()
-    run_sinew("bake", path, "--method", method, "--to", kind, "--out", out)
-    assert path.read_bytes() == before
-    read = read_elsewhere(out / "arm.blend", FRAMES, tmp_path)["Arm"]
-    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
-    assert scenes.worst(expected[0], expected[-1]) > 0.1
-    names = {p.name for p in out.rglob("*") if p.is_file()}
+    assert_plays_elsewhere(*arm, tmp_path, kind, method=method)
+    names = {p.name for p in (tmp_path / "out").rglob("*") if p.is_file()}
     assert names == ({"arm.blend"} if kind == "shape-keys" else {"arm.blend", f"Arm.{kind}"})
 
 
@@ -131,20 +139,9 @@ def test_caches_follow_what_stands_in_front_and_behind(arm, tmp_path, kind):
     mirror.use_axis = (False, False, True)
     mirror.use_mirror_merge = False
     obj.modifiers.move(1, 0)
-    smooth = obj.modifiers.new("Subdivision", "SUBSURF")
-    smooth.levels = 1
-    key = obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="Fat")
-    key.points[30].co.z += 0.2
-    key.value = 0.0
-    key.keyframe_insert("value", frame=1)
-    key.value = 1.0
-    key.keyframe_insert("value", frame=11)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    expected = shown(obj, FRAMES)
-    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", tmp_path / "out")
-    read = read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
-    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    scenes.key_shape(obj)
+    assert_plays_elsewhere(obj, path, tmp_path, kind)
     refused = run_sinew(
         "bake", path, "--method", METHOD, "--to", "shape-keys", "--out", tmp_path / "keys", status=1
     )
@@ -168,24 +165,35 @@ def test_a_number_of_vertices_that_changes_is_refused(arm, tmp_path, kind):
     assert not list(out.rglob("*"))
 
 
-def test_shape_keys_of_the_mesh_are_in_the_bake(arm, tmp_path):
-    obj, path = arm
+def with_a_shape_key(obj):
     obj.shape_key_add(name="Basis")
     key = obj.shape_key_add(name="Fat")
     key.points[30].co.z += 0.2
     key.value = 0.5
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    expected = shown(obj, FRAMES)
-    run_sinew("bake", path, "--method", METHOD, "--to", "shape-keys", "--out", tmp_path / "out")
-    read = read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
-    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+def with_a_parent_that_deforms(obj):
+    obj.parent, obj.parent_type = obj.modifiers[0].object, "ARMATURE"
+    obj.modifiers.clear()
+
+
+@pytest.mark.parametrize(
+    ("set_up", "kind"), [(with_a_shape_key, "shape-keys"), (with_a_parent_that_deforms, "pc2")]
+)
+def test_what_deforms_besides_is_in_the_bake_once(arm, tmp_path, set_up, kind):
+    set_up(arm[0])
+    assert_plays_elsewhere(*arm, tmp_path, kind)
 
 
 def test_the_armature_modifier_stays_for_the_way_back(arm, tmp_path):
-    _obj, path = arm
+    """What is hidden stays hidden."""
+    obj, path = arm
+    obj.hide_viewport = obj.hide_render = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
     run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", tmp_path / "out")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "arm.blend"))
     obj = bpy.data.objects["Arm"]
+    assert (obj.hide_viewport, obj.hide_render) == (True, True)
     assert not properties.has_sinew(obj)
     assert [m.type for m in obj.modifiers] == ["MESH_CACHE", "ARMATURE"]
     assert obj.modifiers[0].filepath.replace("\\", "/") == "//arm_cache/Arm.mdd"
@@ -258,17 +266,6 @@ def test_the_operator(arm, tmp_path, kind):
         assert bpy.ops.sinew.bake(kind=kind, frames="1-11", overwrite=True) == {"FINISHED"}
 
 
-def test_a_parent_that_deforms_does_not_deform_twice(arm, tmp_path):
-    obj, path = arm
-    obj.parent, obj.parent_type = obj.modifiers[0].object, "ARMATURE"
-    obj.modifiers.clear()
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    expected = shown(obj, FRAMES)
-    run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "out")
-    read = read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
-    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
-
-
 def test_names_of_objects_and_files(arm, tmp_path):
     """Objects whose names become the same after cleaning, in any alphabet, and a folder that already has
     such files."""
@@ -324,30 +321,9 @@ def test_keyed_visibility(arm, tmp_path, kind, in_strip):
     if in_strip:
         obj.animation_data.nla_tracks.new().strips.new("Strip", 1, obj.animation_data.action)
         obj.animation_data.action = None
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
     rest = scenes.rest_points(obj)
-    expected = shown(obj, FRAMES)
+    expected = assert_plays_elsewhere(obj, path, tmp_path, kind)
     assert scenes.worst(expected[-1], rest) <= TOLERANCE < scenes.worst(expected[4], rest)
-    out = tmp_path / "out"
-    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", out)
-    written = out / ("arm.blend" if kind == "mdd" else "arm.usdc")
-    read = read_elsewhere(written, FRAMES, tmp_path)["Arm"]
-    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
-
-
-def test_what_is_hidden_stays_hidden(arm, tmp_path):
-    obj, path = arm
-    obj.hide_viewport = obj.hide_render = True
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    out = tmp_path / "out"
-    run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--frames", "1,11", "--out", out)
-    bpy.ops.wm.open_mainfile(filepath=str(out / "arm.blend"))
-    baked = bpy.data.objects["Arm"]
-    assert baked.hide_viewport
-    assert baked.hide_render
-
-
-SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
 
 
 def world_shapes(objects, frames):
@@ -441,9 +417,6 @@ def test_frames_before_zero(arm, tmp_path, kind):
         for key in curve.keyframe_points:
             key.co_ui.x -= 11.0
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    frames = [-5, -3, -1]
-    expected = shown(obj, frames)
-    assert scenes.worst(expected[0], expected[-1]) > 0.1
     command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", "-5--1", "--out", tmp_path / "out")
     if kind in ("usd", "gltf"):
         assert "Blender exports no frames before 0" in run_sinew(*command, status=1).stderr
@@ -451,11 +424,8 @@ def test_frames_before_zero(arm, tmp_path, kind):
             gaps = run_sinew(*command, "--frames", "1,5", status=1)
             assert "Blender exports every frame of a range" in gaps.stderr
         assert not (tmp_path / "out").exists()
-        return
-    run_sinew(*command)
-    read = read_elsewhere(tmp_path / "out" / f"arm{SUFFIXES.get(kind, '.blend')}", frames, tmp_path)
-    (points,) = (read[name] for name in read if name not in ("uvs", "materials"))
-    assert scenes.worst(points, expected) <= TOLERANCE * scenes.diagonal(obj)
+    else:
+        assert_plays_elsewhere(obj, path, tmp_path, kind, range(-5, 0))
 
 
 TEXTURES = """
@@ -554,14 +524,8 @@ def test_a_library_override_whose_library_keys_visibility(arm, tmp_path, kind):
         o for o in bpy.data.objects if o.override_library and o.type == "ARMATURE"
     )
     assert obj.animation_data.action.library is not None
-    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
-    expected = shown(obj, FRAMES)
-    assert scenes.worst(expected[0], expected[-1]) > 0.1
+    assert_plays_elsewhere(obj, shot, tmp_path, kind)
     out = tmp_path / "out"
-    run_sinew("bake", shot, "--method", METHOD, "--to", kind, "--frames", "1-11", "--out", out)
-    written = out / f"shot{SUFFIXES.get(kind, '.blend')}"
-    read = read_elsewhere(written, FRAMES, tmp_path)["Arm"]
-    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
     refused = run_sinew("bake", shot, "--method", METHOD, "--to", "shape-keys", "--out", out / "k", status=1)
     assert "a library override can not have shape keys of its own" in refused.stderr
 

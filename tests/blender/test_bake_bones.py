@@ -183,9 +183,7 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     """They share helper bones; shape keys still play, as do motion and scale of the object."""
     obj, path = arm
     rig = obj.modifiers["Armature"].object
-    sleeve = obj.copy()
-    sleeve.data, sleeve.name = obj.data.copy(), "Sleeve"
-    bpy.context.scene.collection.objects.link(sleeve)
+    sleeve = scenes.copied(obj, "Sleeve")
     sleeve.shape_key_add(name="Basis")
     key = sleeve.shape_key_add(name="Wide")
     for point in key.points:

@@ -69,8 +69,7 @@ def assert_limited(obj: bpy.types.Object, before: np.ndarray, **options: object)
 
 def bent_arm(method: str = "dq") -> tuple[bpy.types.Object, np.ndarray]:
     """The object at frame 11, and its shape there without the stage."""
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, method)
+    obj, _armature = scenes.skinned_arm(method, bones=3)
     bpy.context.scene.frame_set(11)
     return obj, scenes.final_points(obj)
 

@@ -30,8 +30,7 @@ def keyed():
 
 
 def test_swapped_bone_names_swap_the_groups():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
+    obj, armature = scenes.skinned_arm()
     bones = armature.data.bones
     bones["bone.0"].name = "x"
     bones["bone.1"].name = "bone.0"
@@ -42,10 +41,8 @@ def test_swapped_bone_names_swap_the_groups():
 
 
 def test_a_bone_renamed_and_another_made_in_one_edit():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
+    obj, armature = scenes.skinned_arm()
+    scenes.enter(armature, "EDIT")
     bpy.context.view_layer.update()
     armature.data.edit_bones["bone.1"].name = "forearm"
     extra = armature.data.edit_bones.new("extra")
@@ -70,8 +67,7 @@ def test_the_final_mesh_has_no_attribute_of_sinews():
 
 @pytest.mark.parametrize("heat", [False, True])
 def test_while_off_the_mesh_has_no_attribute_of_sinews(heat):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "qv")
+    obj, _armature = scenes.skinned_arm("qv")
     properties.of(obj).heat = heat
     frames = [3, 7]
     shown = scenes.shapes(obj, frames)
@@ -91,8 +87,7 @@ def test_while_off_the_mesh_has_no_attribute_of_sinews(heat):
 
 
 def test_points_that_are_never_requested_are_deformed_after_the_update(monkeypatch):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     expected = scenes.shapes(obj, [3, 6, 11])
     monkeypatch.setattr(session.requests, "mesh_requested", lambda _mesh: None)
     monkeypatch.setattr(properties.listeners, "mesh_requested", lambda _mesh: None)
@@ -106,8 +101,7 @@ def test_points_that_are_never_requested_are_deformed_after_the_update(monkeypat
 
 @pytest.mark.usefixtures("route")
 def test_a_character_appended_in_place_of_two_objects(tmp_path):
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = scenes.skinned_arm("dq")
     expected = scenes.shapes(obj, [11])
     path = str(tmp_path / "arm.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -151,8 +145,7 @@ def test_two_objects_swap_their_names():
 
 
 def test_what_the_artist_switched_while_off_stays():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj)
+    obj, _armature = scenes.skinned_arm()
     properties.of(obj).enabled = False
     obj.modifiers["Armature"].show_render = False
     properties.of(obj).enabled = True
@@ -176,8 +169,7 @@ def test_linked_characters_say_so_and_keep_moving(tmp_path):
 
 
 def test_a_driver_that_gives_no_method_is_said_so():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     driver = obj.driver_add("sinew.method").driver
     driver.type = "SUM"
     variable = driver.variables.new()
@@ -219,10 +211,8 @@ def test_a_new_method_reads_only_changed_weights(monkeypatch):
 
 
 def test_a_bone_is_deleted_while_its_armature_is_in_edit_mode():
-    obj, armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
+    obj, armature = scenes.skinned_arm(bones=3)
+    scenes.enter(armature, "EDIT")
     armature.data.edit_bones.remove(armature.data.edit_bones[2])
     armature.update_from_editmode()
     obj.vertex_groups.new(name="another")

@@ -49,10 +49,8 @@ def empty() -> None:
 def test_files_that_are_well(tmp_path):
     scenes.make_arm()
     save(tmp_path / "in" / "plain.blend")
-    obj, _armature = scenes.make_arm(name="Other")
-    scenes.add_sinew(obj, "dq")
-    hidden, _armature = scenes.make_arm(name="Hidden")
-    scenes.add_sinew(hidden, "qv")
+    _obj, _armature = scenes.skinned_arm("dq", name="Other")
+    hidden, _armature = scenes.skinned_arm("qv", name="Hidden")
     hidden.hide_viewport = hidden.hide_render = True
     save(tmp_path / "in" / "deep" / "skinned.blend")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*.blend")}
@@ -69,8 +67,7 @@ def test_files_that_are_well(tmp_path):
 
 
 def test_what_is_switched_off_needs_no_sinew(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).enabled = False
     report = check(save(tmp_path / "off.blend"))["off.blend"]
     assert (report["needs_sinew"], report["notes"]) == (
@@ -101,8 +98,7 @@ def without_settings(obj, armature):
 
 @pytest.mark.parametrize("harm", [simulated, without_armature, without_armature_modifier, without_settings])
 def test_what_sinew_can_not_drive(harm, tmp_path):
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = scenes.skinned_arm("dq")
     wanted = harm(obj, armature)
     report = check(save(tmp_path / "a.blend"), status=1)["a.blend"]
     assert any(wanted in problem for problem in report["problems"]), report
@@ -111,8 +107,7 @@ def test_what_sinew_can_not_drive(harm, tmp_path):
 
 def test_an_armature_modifier_that_was_left_off(tmp_path):
     """The state of a file that lost Sinew's settings: object and modifier are otherwise complete."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     attach.remove(obj)
     modifier = obj.modifiers["Armature"]
     assert "ok" in run_sinew("check", save(tmp_path / "a.blend")).stdout
@@ -123,8 +118,7 @@ def test_an_armature_modifier_that_was_left_off(tmp_path):
 
 def test_what_is_hidden_in_another_scene(tmp_path):
     """Such objects are checked as well."""
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = scenes.skinned_arm("dq")
     other = bpy.data.scenes.new("Other")
     other.collection.objects.link(obj)
     other.collection.objects.link(armature)
@@ -135,8 +129,7 @@ def test_what_is_hidden_in_another_scene(tmp_path):
 
 
 def test_linked_without_an_override(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    _obj, _armature = scenes.skinned_arm("dq")
     library = save(tmp_path / "hero.blend")
     scenes.link(library, "Arm", "Arm Rig")
     (problem,) = check(save(tmp_path / "shot.blend"), status=1)["shot.blend"]["problems"]
@@ -203,8 +196,7 @@ os._exit(0)
 
 @pytest.fixture
 def skinned(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    _obj, _armature = scenes.skinned_arm("dq")
     return save(tmp_path / "skinned.blend")
 
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
-import subprocess
-import time
 
 import bpy
 import numpy as np
-import program
 import pytest
 import scenes
 import sinew
@@ -278,25 +274,6 @@ def test_compare_draws_a_sheet(tmp_path, engine):
     assert np.abs(columns[1] - columns[2]).mean() > 3.0, "the methods look the same"
 
 
-@pytest.mark.slow
-@program.needs_interrupts
-@pytest.mark.parametrize("round", range(4))
-def test_ctrl_c_stops_what_goes_through_frames(arm_file, tmp_path, round):
-    """Wherever it occurs: Blender discards it within its handlers."""
-    path, _shapes = arm_file
-    folder = tmp_path / "page"
-    command = ("compare", path, "--frames", "1-20000", "--pictures", "0", "--out", folder)
-    process = program.start_sinew(*command, stderr=subprocess.PIPE, text=True)
-    assert "Measuring" in process.stderr.readline()
-    time.sleep(0.3 * round)
-    process.send_signal(signal.SIGINT)
-    _output, errors = process.communicate(timeout=60)
-    assert process.returncode == 130, errors
-    assert "Traceback" not in errors
-    assert "stopped" in errors
-    assert not folder.exists() or not any(folder.iterdir())
-
-
 def test_glb_files_are_read(real_rig, tmp_path):
     path = real_rig("Fox.glb")
     report = json.loads(run_sinew("info", path, "--json").stdout)
@@ -359,35 +336,3 @@ def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path):
         assert np.abs(bones_of(armature, list(range(1, 12))) - bones).max() < 1e-5
     assert len(bpy.data.actions) == 4, "the keyed actions stay in the file"
     assert "--overwrite" in run_sinew("inbetween", path, *options, status=1).stderr
-
-
-@pytest.mark.once
-def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
-    path, _expected = keyed_file
-    left, right = bpy.data.objects["Left Rig"], bpy.data.objects["Right Rig"]
-    right.animation_data.action_blend_type = "ADD"
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "strips.blend"))
-    left.animation_data_clear()
-    right.animation_data_clear()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "still.blend"))
-    out = ["--out", tmp_path / "out"]
-    cases = [
-        ([path, "--method", "best", *out], "expected one of matrix_linear", 2),
-        ([path, "--method", "dlb", "--step", "0", *out], "step", 2),
-        ([path, "--method", "dlb", "--out", path.parent], "replace an input", 2),
-        ([tmp_path / "still.blend", "--method", "dlb", *out], "keyed bones", 1),
-        ([tmp_path / "strips.blend", "--method", "dlb", *out], "mixed with NLA strips", 1),
-    ]
-    for arguments, sentence, status in cases:
-        result = run_sinew("inbetween", *arguments, status=status)
-        complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
-        assert len(complaints) == 1, result.stderr
-        assert sentence in complaints[0]
-    # The armature without obstacles was processed.
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["strips.blend"]
-
-
-def test_inbetween_reads_glb_files(real_rig, tmp_path):
-    result = run_sinew("inbetween", real_rig("Fox.glb"), "--method", "dlb", "--step", 4, "--out", tmp_path)
-    assert "1 of 1 files" in result.stdout
-    assert (tmp_path / "Fox.blend").exists()

@@ -139,13 +139,7 @@ def mirrored_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> Non
 
 
 def with_shape_keys(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.shape_key_add(name="Basis")
-    block = obj.shape_key_add(name="Fat")
-    for point in block.data:
-        point.co *= 1.3
-    for frame, value in ((1, 0.0), (11, 1.0)):
-        block.value = value
-        block.keyframe_insert("value", frame=frame)
+    scenes.key_shape(obj)
 
 
 def parent_deforms(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
@@ -159,8 +153,7 @@ def two_modifiers(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
 
 
 def shared_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    twin = obj.copy()
-    bpy.context.scene.collection.objects.link(twin)
+    scenes.copied(obj, linked=True)
 
 
 SETUPS = [
@@ -414,8 +407,7 @@ def test_the_original_is_deleted(tmp_path, skinned):
 
 
 def test_keys_of_the_method_are_the_originals_own():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     obj.keyframe_insert("sinew.method", frame=1)
     properties.of(obj).method = "lbs"
     obj.keyframe_insert("sinew.method", frame=5)
@@ -434,11 +426,8 @@ def test_keys_of_the_method_are_the_originals_own():
 
 def test_clothes_stand_with_their_body():
     body, armature = scenes.make_arm()
-    shirt = body.copy()
-    shirt.data, shirt.name = body.data.copy(), "Shirt"
-    bpy.context.scene.collection.objects.link(shirt)
-    hidden = body.copy()
-    bpy.context.scene.collection.objects.link(hidden)
+    shirt = scenes.copied(body, "Shirt")
+    hidden = scenes.copied(body, linked=True)
     hidden.hide_set(True)
     other, _other_armature = scenes.make_arm(name="Other")
     shirt.location.x = 3.0
@@ -510,8 +499,7 @@ def test_overlay_and_flip():
 
 
 def test_labels_stand_over_the_characters():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "qv")
+    obj, _armature = scenes.skinned_arm("qv")
     compare(obj, {"lbs", "dq"})
     bpy.context.scene.frame_set(11)
     with bpy.context.temp_override(scene=bpy.context.scene):
@@ -622,8 +610,7 @@ def test_commands_leave_copies_out(tmp_path):
 
 
 def test_restore_ends_a_comparison(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     compare(obj, {"qv"})
     path = test_restore.save(tmp_path / "input" / "compared.blend")
     run_sinew("restore", path, "--out", tmp_path / "restored")

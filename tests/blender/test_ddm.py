@@ -79,8 +79,7 @@ def test_a_mesh_that_lies_elsewhere(variant, route):
 
 
 def test_another_radius_makes_the_data_anew(route):
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "ddm")
+    obj, _armature = scenes.skinned_arm("ddm", bones=3)
     bpy.context.scene.frame_set(FRAME)
     assert_equal_to_reference(obj, 0.05)
     before = scenes.final_points(obj)
@@ -117,8 +116,7 @@ def look_until_done() -> None:
 
 
 def test_it_is_kept_in_the_file(tmp_path, monkeypatch):
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "ddm")
+    obj, _armature = scenes.skinned_arm("ddm", bones=3)
     properties.of(obj).ddm.radius = 0.2
     bpy.context.scene.frame_set(FRAME)
     before, name = scenes.final_points(obj), obj.name

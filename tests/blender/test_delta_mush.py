@@ -125,10 +125,6 @@ def test_it_is_corrective_smooth_behind_the_armature_modifier(method, settings):
     assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
 
 
-def with_keys(obj: bpy.types.Object) -> None:
-    scenes.key_shape(obj)
-
-
 def with_lattice_in_front(obj: bpy.types.Object) -> None:
     """Deforms without changing the number of vertices."""
     scenes.put_in_front(obj, "SIMPLE_DEFORM").angle = 0.7
@@ -140,7 +136,7 @@ def with_two_armatures(obj: bpy.types.Object) -> None:
     second.use_multi_modifier = second.use_deform_preserve_volume = True
 
 
-@pytest.mark.parametrize("set_up", [with_keys, with_lattice_in_front, with_two_armatures])
+@pytest.mark.parametrize("set_up", [scenes.key_shape, with_lattice_in_front, with_two_armatures])
 @pytest.mark.parametrize("is_safe", [False, True])
 def test_on_both_routes_with_keys_and_modifiers_in_front(monkeypatch, set_up, is_safe):
     obj = make_rough_arm()
@@ -154,8 +150,7 @@ def test_on_both_routes_with_keys_and_modifiers_in_front(monkeypatch, set_up, is
 
 def applied_in_front(obj: bpy.types.Object) -> bpy.types.Object:
     """A copy whose own mesh is the result of the first modifier."""
-    front = obj.copy()
-    bpy.context.scene.collection.objects.link(front)
+    front = scenes.copied(obj, linked=True)
     for modifier in list(front.modifiers)[1:]:
         front.modifiers.remove(modifier)
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -268,8 +263,7 @@ def test_saved_copied_and_removed(tmp_path):
     expected = scenes.shapes(obj, FRAMES)
     path = tmp_path / "mushed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-    copy = obj.copy()
-    bpy.context.scene.collection.objects.link(copy)
+    copy = scenes.copied(obj, linked=True)
     assert scenes.worst(scenes.shapes(copy, FRAMES), expected) < 1e-6
     attach.remove(copy)
     bpy.data.objects.remove(copy)

@@ -32,9 +32,7 @@ def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)
 
 def test_add_on_the_armature_takes_all_its_meshes():
     first, armature = scenes.make_arm(name="First")
-    second = first.copy()
-    second.data = first.data.copy()
-    bpy.context.scene.collection.objects.link(second)
+    second = scenes.copied(first)
     for obj in bpy.context.scene.objects:
         obj.select_set(obj == armature)
     bpy.context.view_layer.objects.active = armature
@@ -46,8 +44,7 @@ def test_add_on_the_armature_takes_all_its_meshes():
 
 
 def test_a_grey_add_says_why():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
+    obj, armature = scenes.skinned_arm()
     with pytest.raises(RuntimeError, match="The meshes of the armature have Sinew already"):
         bpy.ops.sinew.add()
     armature.select_set(False)
@@ -167,8 +164,7 @@ def test_an_error_refuses_one_object_once_and_no_other(monkeypatch, caplog):
 
 def test_an_unchanged_object_is_not_written(monkeypatch):
     monkeypatch.setattr(safe_mode, "_forced", True)
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj)
+    _obj, _armature = scenes.skinned_arm()
     bpy.context.scene.frame_set(6)
     written = []
     monkeypatch.setattr(point_store, "write", lambda *_args: written.append(1))
@@ -180,8 +176,7 @@ def test_an_unchanged_object_is_not_written(monkeypatch):
 def test_unregister_gives_the_modifiers_their_armatures():
     import sinew_addon
 
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(11)
     sinew_addon.unregister()
     try:
@@ -229,9 +224,7 @@ def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
     if not is_known:
         monkeypatch.setattr(attach, "_NEED_ORIGINAL_MESH", frozenset())
     other, armature = scenes.make_arm()
-    obj = other.copy()
-    obj.data = other.data.copy()
-    bpy.context.scene.collection.objects.link(obj)
+    obj = scenes.copied(other)
     obj.modifiers.clear()
     obj.parent, obj.parent_type = armature, "ARMATURE"
     bpy.context.view_layer.objects.active = obj

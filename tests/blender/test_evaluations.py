@@ -85,10 +85,7 @@ def moving_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
 
 
 def moving_keys(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.shape_key_add(name="Basis")
-    block = obj.shape_key_add(name="Key")
-    block.data[0].co.z += 0.3
-    key(block, "value", 0.0, 1.0)
+    scenes.key_shape(obj)
 
 
 Setup = Callable[[bpy.types.Object, bpy.types.Object], None]
@@ -167,8 +164,7 @@ def test_a_rig_that_follows_a_deformed_mesh_uses_the_same_frame(set_up: Setup):
         shapes.append(mesh_io.read_points(obj.evaluated_get(depsgraph).data))
 
     frames = (5, 9, 2)
-    bpy.app.handlers.frame_change_post.append(record)
-    try:
+    with scenes.handler("frame_change_post", record):
         for modifier in (followed.modifiers["Armature"], obj.modifiers["Armature"]):
             modifier.use_deform_preserve_volume = True
         for frame in frames:
@@ -179,8 +175,6 @@ def test_a_rig_that_follows_a_deformed_mesh_uses_the_same_frame(set_up: Setup):
         shapes.pop()
         for frame in frames:
             bpy.context.scene.frame_set(frame)
-    finally:
-        bpy.app.handlers.frame_change_post.remove(record)
     assert scenes.worst(shapes[0], shapes[1]) > 0.1
     for expected, got in zip(shapes[:3], shapes[3:], strict=True):
         assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
@@ -199,11 +193,8 @@ def test_modifiers_behind_are_evaluated_once_for_a_moving_mesh(set_up: Setup):
     def watch(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         first_round.append(len(obj.evaluated_get(depsgraph).data.vertices))
 
-    bpy.app.handlers.frame_change_post.insert(0, watch)
-    try:
+    with scenes.handler("frame_change_post", watch, first=True):
         got = scenes.shapes(obj, [2, 3, 4, 5])
-    finally:
-        bpy.app.handlers.frame_change_post.remove(watch)
         safe_mode.set_forced(None)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     # From the second frame on: only then is it known that a mesh moves.
@@ -286,8 +277,7 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
     child, armature = scenes.make_arm(name="Child")
     child.modifiers.clear()
     child.parent, child.parent_type = armature, "ARMATURE"
-    skinned, _ = scenes.make_arm(name="Driven")
-    scenes.add_sinew(skinned, "lbs")
+    _skinned, _ = scenes.skinned_arm("lbs", name="Driven")
     bpy.context.scene.frame_set(7)
     path = tmp_path / "all.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -362,8 +352,7 @@ def test_the_memory_of_an_attribute_is_its_meshs_alone():
 
 def test_a_frame_writes_into_the_evaluated_mesh_alone():
     """Not into the mesh itself, of which it is a copy; state_of() returns the same shape."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(1)
     attribute = obj.data.attributes[properties.of(obj).attribute]
     stored = vectors_of(attribute)

@@ -260,8 +260,7 @@ def test_an_older_library_is_named_in_one_sentence(change, sentence):
 
 
 def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "qv")
+    _obj, _armature = scenes.skinned_arm("qv")
     before, after = tmp_path / "before.blend", tmp_path / "after.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(before))
     subprocess.run([sys.executable, "-c", WITHOUT_LIBRARY, before, after], check=True, timeout=60)

@@ -310,36 +310,27 @@ def transfer_normals(modifier):
     modifier.data_types_loops = {"CUSTOM_NORMAL"}
 
 
-def mirror(modifier):
-    modifier.use_axis = (False, True, False)
-
-
-def weigh(modifier):
-    modifier.vertex_group = "bone.1"
-
-
-def nothing(_modifier):
-    """With its default options."""
-
-
 HARMLESS = [
-    ("front", "LATTICE", give_lattice, custom),
-    ("front", "MIRROR", mirror, sharp),
-    ("front", "SUBSURF", nothing, smooth),
-    ("front", "DATA_TRANSFER", transfer_normals, sharp),
-    ("front", "VERTEX_WEIGHT_EDIT", weigh, custom),
-    ("behind", "VERTEX_WEIGHT_EDIT", weigh, custom),
-    ("behind", "COLLISION", nothing, sharp),
+    ("front", "LATTICE", give_lattice, {}, custom),
+    ("front", "MIRROR", None, {"use_axis": (False, True, False)}, sharp),
+    ("front", "SUBSURF", None, {}, smooth),
+    ("front", "DATA_TRANSFER", transfer_normals, {}, sharp),
+    ("front", "VERTEX_WEIGHT_EDIT", None, {"vertex_group": "bone.1"}, custom),
+    ("behind", "VERTEX_WEIGHT_EDIT", None, {"vertex_group": "bone.1"}, custom),
+    ("behind", "COLLISION", None, {}, sharp),
 ]
 
 
 @needs_support
-@pytest.mark.parametrize(("place", "kind", "set_up", "shading"), HARMLESS)
-def test_modifiers_that_leave_normals_to_sinew(place, kind, set_up, shading):
+@pytest.mark.parametrize(("place", "kind", "set_up", "options", "shading"), HARMLESS)
+def test_modifiers_that_leave_normals_to_sinew(place, kind, set_up, options, shading):
     obj, _armature = scenes.make_arm()
     shading(obj)
     modifier = obj.modifiers.new("Other", kind)
-    set_up(modifier)
+    for name, value in options.items():
+        setattr(modifier, name, value)
+    if set_up is not None:
+        set_up(modifier)
     if place == "front":
         obj.modifiers.move(1, 0)
     scenes.add_sinew(obj, "dq")
@@ -391,20 +382,15 @@ def test_modifiers_behind_that_are_off_allow_given_normals():
         assert has_given(obj) == (levels == 0)
 
 
-def add_cast(obj):
-    obj.modifiers.new("Cast", "CAST")
-
-
-def switch_cast_on(obj):
-    obj.modifiers["Off"].show_viewport = True
-
-
-def instance_on_faces(obj):
-    obj.instance_type = "FACES"
+BEHIND = {
+    "cast": lambda obj: obj.modifiers.new("Cast", "CAST"),
+    "switched on": lambda obj: setattr(obj.modifiers["Off"], "show_viewport", True),
+    "instances": instance_faces,
+}
 
 
 @needs_support
-@pytest.mark.parametrize("act", [add_cast, switch_cast_on, instance_on_faces], ids=lambda each: each.__name__)
+@pytest.mark.parametrize("act", BEHIND.values(), ids=BEHIND)
 @pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
 def test_modifiers_that_a_handler_adds_behind_end_given_normals_at_once(event, act):
     """Blender evaluates it without notification."""
@@ -553,28 +539,21 @@ def assert_same_pictures(obj, tmp_path, is_custom):
 
 
 @needs_support
-@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH"])
+@pytest.mark.parametrize("engine", ["CYCLES", "CYCLES blurred", "BLENDER_WORKBENCH"])
 @pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
 def test_pictures_are_the_same(shading, engine, tmp_path):
-    if engine != "CYCLES" and not opengl.has_opengl():
+    if engine == "BLENDER_WORKBENCH" and not opengl.has_opengl():
         pytest.skip("Workbench can not draw here")
     obj, _armature = make(shading)
     light_scene(obj)
-    bpy.context.scene.render.engine = engine
-    obj.scale = (1.0, -1.2, 0.9)
+    render = bpy.context.scene.render
+    render.engine, _space, blur = engine.partition(" ")
+    render.use_motion_blur = bool(blur)
+    render.motion_blur_shutter = 1.5
+    if not render.use_motion_blur:
+        obj.scale = (1.0, -1.2, 0.9)
     bpy.context.view_layer.update()
     assert has_given(obj)
-    assert_same_pictures(obj, tmp_path, shading is custom)
-
-
-@needs_support
-@pytest.mark.parametrize("shading", [smooth, custom], ids=lambda each: each.__name__)
-def test_blurred_pictures_are_the_same(shading, tmp_path):
-    obj, _armature = make(shading)
-    light_scene(obj)
-    scene = bpy.context.scene
-    scene.render.engine, scene.render.use_motion_blur = "CYCLES", True
-    scene.render.motion_blur_shutter = 1.5
     assert_same_pictures(obj, tmp_path, shading is custom)
 
 
@@ -670,8 +649,7 @@ def test_before_4_5_blender_computes_them():
 @needs_support
 def test_objects_with_one_mesh_and_painted_ones():
     obj, _armature = make(custom)
-    other = obj.copy()
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.copied(obj, linked=True)
     for frame in (4, 9):
         bpy.context.scene.frame_set(frame)
         for each in (obj, other):

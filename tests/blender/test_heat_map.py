@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scenes
 import test_linked_data
+import test_shown_colours
 import whole_file
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.heat import HeatScale, linear
@@ -16,6 +17,7 @@ from sinew_addon.core.metrics import METRICS
 from sinew_addon.deform import characters, session
 from sinew_addon.features.heat import heat_legend, heat_map, heat_nodes, live, measures
 from sinew_addon.features.pages import measure
+from test_shown_colours import color_types
 
 
 def shown_colours(obj: bpy.types.Object) -> np.ndarray:
@@ -46,16 +48,6 @@ def choose(quantity: str, **settings: object) -> measures.SinewMeasures:
     return chosen
 
 
-def with_keys(obj: bpy.types.Object) -> None:
-    obj.shape_key_add(name="Basis")
-    block = obj.shape_key_add(name="Key")
-    for point in block.data:
-        point.co.z *= 1.5
-    for frame, value in ((1, 0.0), (11, 1.0)):
-        block.value = value
-        block.keyframe_insert("value", frame=frame)
-
-
 def placed(obj: bpy.types.Object) -> None:
     obj.location, obj.scale = (0.5, 0.2, 0.0), (1.5, 1.5, 1.5)
     armature = obj.modifiers["Armature"].object
@@ -63,7 +55,7 @@ def placed(obj: bpy.types.Object) -> None:
 
 
 @pytest.mark.parametrize("quantity", METRICS)
-@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, with_keys, placed])
+@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, scenes.key_shape, placed])
 def test_colours_are_those_of_the_measure(quantity, set_up):
     obj, armature = scenes.make_arm()
     if set_up is not None:
@@ -96,8 +88,7 @@ def test_the_modifier_compared_with_is_blenders():
 
 
 def test_colours_follow_frames_poses_and_methods():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "lbs")
+    obj, armature = scenes.skinned_arm("lbs")
     choose("stretch", range=measures.FIXED, ratio=2.0)
     bpy.ops.sinew.heat_map()
     seen = []
@@ -141,8 +132,7 @@ def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     second = first.copy()
     second.name = "Twin"
     bpy.context.scene.collection.objects.link(second)
-    rig = armature.copy()
-    bpy.context.scene.collection.objects.link(rig)
+    rig = scenes.copied(armature, linked=True)
     second.modifiers["Armature"].object = rig
     rig.animation_data_clear()
     for bone in rig.pose.bones:
@@ -175,8 +165,7 @@ def test_scenes_have_ranges_of_their_own(set_up):
     before = shown_colours(first)
     one, two = bpy.context.scene, bpy.data.scenes.new("Two")
     bpy.context.window.scene = two
-    second, _armature = scenes.make_arm(name="Second")
-    scenes.add_sinew(second, "lbs")
+    second, _armature = scenes.skinned_arm("lbs", name="Second")
     choose("bulge")
     two.frame_set(5)
     bpy.ops.sinew.heat_map()
@@ -191,30 +180,16 @@ def test_scenes_have_ranges_of_their_own(set_up):
     np.testing.assert_allclose(shown_colours(first), before, atol=1e-6)
 
 
-def color_types() -> list[str]:
-    return [
-        space.shading.color_type
-        for screen in bpy.data.screens
-        for area in screen.areas
-        for space in area.spaces
-        if space.type == "VIEW_3D"
-    ]
-
-
 def painted_arm() -> bpy.types.Object:
     """With the artist's own material and colours."""
-    obj, _armature = scenes.make_arm()
+    obj = test_shown_colours.painted_arm()
     obj.data.materials.append(bpy.data.materials.new("Skin"))
-    obj.data.color_attributes.new("First", "BYTE_COLOR", "CORNER")
-    obj.data.color_attributes.new("Second", "FLOAT_COLOR", "POINT")
     for attribute in obj.data.color_attributes:
         attribute.data.foreach_set("color", np.linspace(0.0, 1.0, 4 * len(attribute.data), dtype=np.float32))
-    obj.data.attributes.active_color_name = "Second"
-    obj.data.attributes.active_index = 2
     return obj
 
 
-@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, with_keys])
+@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, scenes.key_shape])
 def test_switched_off_it_leaves_no_trace(set_up):
     obj = painted_arm()
     if set_up is not None:
@@ -288,8 +263,7 @@ def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
 
 
 def test_undo_and_redo():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(8)
     types = color_types()
     bpy.ops.ed.undo_push(message="before")
@@ -326,8 +300,7 @@ def test_converted_to_a_mesh_it_leaves_nothing_of_itself():
 
 
 def test_a_duplicate_has_colours_of_its_own():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     bpy.ops.sinew.heat_map()
     bpy.context.scene.frame_set(9)
     bpy.ops.object.duplicate(linked=True)
@@ -344,8 +317,7 @@ def test_a_duplicate_has_colours_of_its_own():
 
 def test_colours_wait_for_a_point_buffer_that_is_empty():
     """As for the copy's own, until the copy is deformed."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).heat = True
     bpy.context.scene.frame_set(8)
     before = shown_colours(obj)
@@ -391,8 +363,7 @@ def test_a_render_shows_it(tmp_path):
 
 
 def test_the_legend_says_range_unit_and_methods():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    _obj, _armature = scenes.skinned_arm("dq")
     scene = bpy.context.scene
     scene.unit_settings.system = "METRIC"
     choose("distance", range=measures.FIXED, length=0.02)
@@ -415,8 +386,7 @@ def test_the_legend_says_range_unit_and_methods():
 
 
 def test_off_it_measures_nothing(monkeypatch):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
 
     def fail(*_args: object) -> None:
         raise AssertionError("measured")

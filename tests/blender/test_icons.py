@@ -152,9 +152,7 @@ def _undo(character: Character, rule: Rule, chosen: tuple[str, str], _path: str)
 
 def _duplicate(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: str) -> None:
     old = character.obj
-    new = old.copy()
-    new.data = old.data.copy()
-    bpy.context.scene.collection.objects.link(new)
+    new = scenes.copied(old)
     bpy.context.view_layer.update()
     bpy.data.objects.remove(old)
     new.name = "Arm"
@@ -238,9 +236,7 @@ def test_add_to_what_is_off(shown, rendered_points, capfd):
 def test_add_to_a_bake(kind, tmp_path, capfd):
     """What was baked is off while Sinew is on, and plays again without it."""
     obj, _armature = scenes.make_arm()
-    other = obj.copy()
-    other.data, other.name = obj.data.copy(), "Other"
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.copied(obj, "Other")
     path = str(tmp_path / "arm.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     linear, both = (scenes.modifier_shapes(obj, [1, 6, 11], volume) for volume in (False, True))

@@ -239,8 +239,7 @@ def test_an_object_that_gets_sinew_while_it_is_hidden(event, monkeypatch):
 
 def test_a_proxy_at_the_address_of_a_deleted_object(route):
     """Blender finds evaluated objects by the addresses of their originals: it would return the other's."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj)
+    obj, _armature = scenes.skinned_arm()
     bpy.context.scene.frame_set(8)
     mesh = bpy.data.meshes.new_from_object(obj)
     others = [bpy.data.objects.new("Other", mesh) for _each in range(50)]

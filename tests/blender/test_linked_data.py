@@ -157,14 +157,12 @@ def test_remove_from_a_duplicate_after_the_original_is_deleted():
     """While Sinew is off, its modifier still refers to the other's point buffer. Blender 5.2 counts the
     buffer as used after that modifier is removed."""
     obj, _armature = scenes.make_arm()
-    other = obj.copy()
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.copied(obj, linked=True)
     other.modifiers.clear()
     scenes.add_sinew(obj, "dq")
     assert properties.of(obj).point_buffer is not None
     properties.of(obj).enabled = False
-    copy = obj.copy()
-    bpy.context.scene.collection.objects.link(copy)
+    copy = scenes.copied(obj, linked=True)
     bpy.context.view_layer.update()
     bpy.data.objects.remove(obj)
     bpy.context.view_layer.update()

@@ -107,14 +107,11 @@ def test_files_and_copies_carry_it(tmp_path):
     obj = skinned_model()
     found = shape_of_each(obj)
     obj.sinew.sdef.interpolation = "slerp"
-    copy = obj.copy()
-    bpy.context.scene.collection.objects.link(copy)
+    copy = scenes.copied(obj, linked=True)
     bpy.context.view_layer.update()
     session.refresh(bpy.context)
     assert scenes.worst(scenes.final_points(copy), found["slerp"]) == 0.0
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "model.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "model.blend"))
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.reopened(tmp_path / "model.blend")
     assert obj.sinew.sdef.interpolation == "slerp"
     assert scenes.worst(scenes.final_points(obj), found["slerp"]) == 0.0
 

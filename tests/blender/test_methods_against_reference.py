@@ -100,8 +100,7 @@ def test_a_real_rig(method, real_rig):
 
 
 def test_methods_are_switched_while_bound(route):
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "lbs")
+    obj, _armature = scenes.skinned_arm("lbs", bones=3)
     centres = centres_of(obj)
     for method in ("cor", "dib", "cor", "sbs"):
         properties.of(obj).method = method
@@ -110,8 +109,7 @@ def test_methods_are_switched_while_bound(route):
 
 
 def test_centres_are_made_anew_when_the_mesh_changes(route):
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "cor")
+    obj, _armature = scenes.skinned_arm("cor", bones=3)
     bpy.context.scene.frame_set(8)
     before = centres_of(obj)
     assert_equal_to_reference(obj, "cor", before)

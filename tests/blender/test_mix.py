@@ -129,8 +129,7 @@ def test_under_other_scale_rules_it_is_between_its_two(rule):
 @pytest.mark.parametrize("name", ["", "not there"])
 def test_a_button_makes_the_group_that_is_missing(name):
     """Nothing changes until weights are painted."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "lbs")
+    obj, _armature = scenes.skinned_arm("lbs")
     bpy.context.scene.frame_set(11)
     mix = properties.of(obj).mix
     mix.method, mix.group = "dq", name
@@ -148,8 +147,7 @@ def test_a_button_makes_the_group_that_is_missing(name):
 @pytest.mark.parametrize("stage", ["bulge_limit", "delta_mush"])
 def test_a_button_makes_the_group_of_a_stage(stage):
     """It applies everywhere until weights are painted, as without a group."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(11)
     without = scenes.final_points(obj)
     settings = getattr(properties.of(obj), stage)

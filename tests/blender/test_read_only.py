@@ -98,8 +98,7 @@ def written(tmp_path_factory):
     scene.collection.objects.link(scene.camera)
     scene.render.engine, scene.cycles.samples = "CYCLES", 1
     scene.render.resolution_x = scene.render.resolution_y = 64
-    bpy.context.view_layer.objects.active = arm
-    bpy.ops.object.mode_set(mode="EDIT")
+    scenes.enter(arm, "EDIT")
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     (folder / "sim.blend1").unlink()
     return file, _content(folder)

@@ -27,8 +27,7 @@ bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 assert not hasattr(bpy.types.Object, "sinew")
 scene, obj = bpy.context.scene, bpy.data.objects["Arm"]
 if obj.mode != "OBJECT":
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.object.mode_set(mode="OBJECT")
+    scenes.enter(obj, "OBJECT")
 shapes = []
 for frame in json.loads(sys.argv[3]):
     scene.frame_set(frame)
@@ -103,8 +102,7 @@ def warnings_of(obj: bpy.types.Object) -> list[str]:
 
 def test_no_warning_of_a_missing_sinew_where_it_is_installed(tmp_path):
     """The nodes of the warning are in saved files alone."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     nodes = set(stack.sinew_modifier(obj).node_group.nodes.keys())
     path = tmp_path / "saved.blend"
     save(path)
@@ -118,8 +116,7 @@ def test_no_warning_of_a_missing_sinew_where_it_is_installed(tmp_path):
 
 
 def test_a_group_that_was_taken_apart_is_saved(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     group = stack.sinew_modifier(obj).node_group
     output = next(node for node in group.nodes if node.type == "GROUP_OUTPUT")
     group.links.remove(output.inputs["Geometry"].links[0])
@@ -142,8 +139,7 @@ def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
     newer, _armature = scenes.make_arm(name="Newer")
     expected = scenes.shapes(newer, FRAMES)
     scenes.add_sinew(newer, "dq")
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     _unknown_method(newer)
     # What names the node group's sockets must not rely on what an artist may rename.
     for item in stack.sinew_modifier(obj).node_group.interface.items_tree:
@@ -171,8 +167,7 @@ def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
 
 def test_evaluations_while_saving_change_nothing(tmp_path):
     """A thumbnail evaluates the scene at that time: so does this handler, in background as in a window."""
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(11)
     seen = []
 
@@ -189,11 +184,8 @@ def test_evaluations_while_saving_change_nothing(tmp_path):
         bpy.context.scene.frame_set(11)
         seen.append((before, state()))
 
-    bpy.app.handlers.save_pre.append(neighbour)
-    try:
+    with scenes.handler("save_pre", neighbour):
         save(tmp_path / "saved.blend")
-    finally:
-        bpy.app.handlers.save_pre.remove(neighbour)
     blenders_own = (armature, True, True, False, False)
     assert seen == [(blenders_own, blenders_own)]
     assert state() == (armature, True, True, True, True)
@@ -203,26 +195,21 @@ def test_evaluations_while_saving_change_nothing(tmp_path):
 
 
 def test_edit_by_another_add_on_while_saving(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "lbs")
+    obj, _armature = scenes.skinned_arm("lbs")
     bpy.context.scene.frame_set(11)
 
     def neighbour(*_args: object) -> None:
         obj.vertex_groups["bone.1"].add(range(100), 0.7, "REPLACE")
 
-    bpy.app.handlers.save_pre.append(neighbour)
-    try:
+    with scenes.handler("save_pre", neighbour):
         save(tmp_path / "saved.blend")
-    finally:
-        bpy.app.handlers.save_pre.remove(neighbour)
     got = scenes.shapes(obj, FRAMES)
     properties.of(obj).enabled = False
     assert scenes.worst(got, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_a_save_that_fails_ends_as_one_that_does_not(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     expected = scenes.shapes(obj, FRAMES)
     with pytest.raises(RuntimeError):
         save(tmp_path / "no such folder" / "saved.blend")
@@ -255,8 +242,7 @@ def test_what_fails_for_an_object_while_saving_is_in_its_panel(tmp_path, monkeyp
 
 
 def test_an_error_is_not_saved_as_the_artists_choice(tmp_path, monkeypatch):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     expected = scenes.shapes(obj, FRAMES)
 
     def fail(*_args: object) -> None:
@@ -351,8 +337,7 @@ def test_in_memory_the_modifiers_keep_their_armatures(monkeypatch, set_up, is_sa
 
 def test_a_keyed_pose_that_differs_is_not_lost_by_opening(tmp_path):
     """Blender's first evaluation of an opened file takes poses from their keys."""
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(11)
     armature.pose.bones[1].rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
     save(tmp_path / "saved.blend")
@@ -366,8 +351,7 @@ def test_a_keyed_pose_that_differs_is_not_lost_by_opening(tmp_path):
 
 
 def test_the_menu_of_modifiers_offers_nothing_of_sinews():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).heat = True
     bpy.ops.sinew.compare(methods={"lbs", "dq"})
     groups = [group for group in bpy.data.node_groups if group.get(node_group.MARK)]
@@ -376,8 +360,7 @@ def test_the_menu_of_modifiers_offers_nothing_of_sinews():
 
 
 def test_fbx_has_the_skin(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     ours, at_rest = scenes.shapes(obj, FRAMES), np.ptp(scenes.rest_points(obj), axis=0)
     path = tmp_path / "arm.fbx"
     bpy.ops.export_scene.fbx(filepath=str(path))
@@ -393,8 +376,7 @@ def test_fbx_has_the_skin(tmp_path):
 
 
 def test_an_fbx_export_that_fails_ends_as_one_that_does_not(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     ours = scenes.shapes(obj, FRAMES)
     with pytest.raises(RuntimeError):
         bpy.ops.export_scene.fbx(filepath=str(tmp_path / "no such folder" / "arm.fbx"))

@@ -25,8 +25,7 @@ def left_where_faster(small_meshes_as_users_have_them, monkeypatch):
 
 @pytest.fixture
 def arm():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
+    obj, armature = scenes.skinned_arm()
     return obj, armature
 
 
@@ -141,15 +140,12 @@ def test_edits_are_followed(arm):
     bpy.ops.mesh.subdivide()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert deformer(obj) == "blender"
-    other = armature.copy()
-    other.data = armature.data.copy()
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.copied(armature)
     scenes.bend(other, 30.0)
     obj.modifiers["Armature"].object = other
     assert deformer(obj) == "blender"
     assert properties.of(obj).armature == other
-    bpy.context.view_layer.objects.active = other
-    bpy.ops.object.mode_set(mode="EDIT")
+    scenes.enter(other, "EDIT")
     other.data.edit_bones["bone.0"].name = "new"
     bpy.ops.object.mode_set(mode="OBJECT")
     assert [group.name for group in obj.vertex_groups] == ["new", "bone.1"]
@@ -159,9 +155,7 @@ def test_edits_are_followed(arm):
 def test_a_file_saved_and_opened(arm, tmp_path):
     expected = scenes.shapes(arm[0], FRAMES)
     path = str(tmp_path / "arm.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.reopened(path)
     assert deformer(obj) == "blender"
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
@@ -209,8 +203,7 @@ def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, be
     elif beside == "own keys":
         scenes.key_shape(obj)
     else:
-        other, _rig = scenes.make_arm(name="Other")
-        scenes.add_sinew(other)
+        other, _rig = scenes.skinned_arm(name="Other")
         properties.of(other).enabled = False
     expected = scenes.shapes(obj, FRAMES)
     scenes.add_sinew(obj)
@@ -231,8 +224,7 @@ def test_what_a_script_appends_between_two_frames_is_deformed(arm, tmp_path, bes
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     if beside != "nothing":
-        other, _rig = scenes.make_arm(name="Other")
-        scenes.add_sinew(other)
+        other, _rig = scenes.skinned_arm(name="Other")
         bpy.context.scene.frame_set(1)
         assert deformer(other) == "blender"
     bpy.context.view_layer.update()
@@ -312,13 +304,10 @@ def test_baked(arm, tmp_path, kind):
 
 def test_preserve_volume_of_a_saved_file_is_not_the_artists(tmp_path):
     """A saved file has this flag under dq: that is no reason to leave the mesh to the modifier."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     assert deformer(obj) == "sinew"
     expected = scenes.shapes(obj, FRAMES)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "arm.blend"))
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.reopened(tmp_path / "arm.blend")
     assert deformer(obj) == "sinew"
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 

@@ -24,8 +24,7 @@ def found() -> Suggestion:
 
 
 def test_numbers_are_those_of_each_method():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     assert bpy.ops.sinew.suggest() == {"FINISHED"}
     suggestion = found()
     assert set(suggestion.methods) == set(properties.METHODS)
@@ -46,8 +45,7 @@ def test_numbers_are_those_of_each_method():
 
 
 def test_it_leaves_all_as_it_was():
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj, "lbs")
+    obj, armature = scenes.skinned_arm("lbs")
     bpy.context.scene.frame_set(4)
     scenes.bend(armature, 33.0)
     bpy.context.view_layer.update()
@@ -58,8 +56,7 @@ def test_it_leaves_all_as_it_was():
 
 
 def test_stopped_it_leaves_all_as_it_was():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "lbs")
+    obj, _armature = scenes.skinned_arm("lbs")
     bpy.context.scene.frame_set(7)
     steps = suggest.scan(bpy.context.scene, [obj], "SCENE")
     shares = [next(steps) for _step in range(20)]
@@ -70,8 +67,7 @@ def test_stopped_it_leaves_all_as_it_was():
 
 
 def test_a_click_uses_a_method_and_undo_takes_it_back():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(9)
     bpy.ops.ed.undo_push(message="before")
     assert bpy.ops.sinew.use_method(method="cor") == {"FINISHED"}
@@ -84,8 +80,7 @@ def test_a_click_uses_a_method_and_undo_takes_it_back():
 
 
 def test_what_is_off_is_named():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).enabled = False
     with pytest.raises(RuntimeError, match="Arm is switched off"):
         bpy.ops.sinew.suggest()
@@ -104,8 +99,7 @@ def test_crossings_are_pairs_without_a_common_vertex():
 
 
 def test_values_are_texts_of_their_units():
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    _obj, _armature = scenes.skinned_arm("dq")
     bpy.ops.sinew.suggest()
     scene, texts = bpy.context.scene, {}
     for criterion in CRITERIA:

@@ -48,6 +48,17 @@ def lengths(v):
     return np.linalg.norm(v, axis=-1)
 
 
+def agree_all(function, arguments, want, size, **options):
+    """In each type of numbers."""
+    for dtype in FLOATS:
+        agree(function(*(argument.astype(dtype) for argument in arguments)), want, size, **options)
+
+
+def values(of):
+    """`of`() returns (arguments, result, what errors are relative to)."""
+    return lambda _name, function: agree_all(function, *of())
+
+
 @wanted
 def from_axis_angle():
     rng = np.random.default_rng(20)
@@ -311,8 +322,7 @@ def transform_point(name, function):
         maps = linear_maps(10)
         want = exact_apply(maps, p)
         size = np.linalg.norm(maps[:, :3, :3], axis=(1, 2)) * lengths(p) + lengths(maps[:, :3, 3])
-        for dtype in FLOATS:
-            agree(function(maps.astype(dtype), p.astype(dtype)), want, size)
+        agree_all(function, (maps, p), want, size)
 
 
 def transform_vector(name, function):
@@ -323,9 +333,7 @@ def transform_vector(name, function):
     if name == "affine":
         maps = linear_maps(11)
         want = rounded(e.times(exact_matrix(maps[:, :3, :3]), exact(v)))
-        size = np.linalg.norm(maps[:, :3, :3], axis=(1, 2)) * lengths(v)
-        for dtype in FLOATS:
-            agree(function(maps.astype(dtype), v.astype(dtype)), want, size)
+        agree_all(function, (maps, v), want, np.linalg.norm(maps[:, :3, :3], axis=(1, 2)) * lengths(v))
 
 
 def transform_normal(name, function):
@@ -337,9 +345,7 @@ def transform_normal(name, function):
         maps = linear_maps(12)
         inverted = e.inverse_matrix(exact_matrix(maps[:, :3, :3]))
         want = rounded(e.unit(e.times(np.swapaxes(inverted, 0, 1), exact(n))))
-        condition = np.linalg.cond(maps[:, :3, :3])
-        for dtype in FLOATS:
-            agree(function(maps.astype(dtype), n.astype(dtype)), want, condition)
+        agree_all(function, (maps, n), want, np.linalg.cond(maps[:, :3, :3]))
 
 
 def rigid_distance(name, function):
@@ -409,14 +415,13 @@ def signs(*of):
     return check
 
 
-def dual_norm(_name, function):
+@values
+def dual_norm():
     rng = np.random.default_rng(17)
     size = 10.0 ** rng.uniform(-15, 15, COUNT)
     given = rng.normal(size=(COUNT, 8)) * size[:, None]
     real, dual = exact(given[:, :4]), exact(given[:, 4:])
-    want = rounded(np.stack([e.length(real), e.dot(real, dual) / e.length(real)]))
-    for dtype in FLOATS:
-        agree(function(given.astype(dtype)), want, size)
+    return (given,), rounded(np.stack([e.length(real), e.dot(real, dual) / e.length(real)])), size
 
 
 def dual_log(_name, function):
@@ -471,55 +476,52 @@ def quat(check):
     return of_quaternions
 
 
-def quat_compose(_name, function):
-    a, b = motions(8), motions(9)
-    want = rounded(e.product(a.exact.q, b.exact.q))
-    for dtype in FLOATS:
-        agree(function(a.quat_vec[:, :4].astype(dtype), b.quat_vec[:, :4].astype(dtype)), want, 1.0)
+def unit_quaternions(*seeds):
+    return tuple(motions(seed).quat_vec[:, :4] for seed in seeds)
+
+
+@values
+def quat_compose():
+    return unit_quaternions(8, 9), rounded(e.product(motions(8).exact.q, motions(9).exact.q)), 1.0
 
 
 def quat_conjugate(_name, function):
-    q = motions(6).quat_vec[:, :4]
+    (q,) = unit_quaternions(6)
     np.testing.assert_array_equal(function(q), q * np.array([1.0, -1, -1, -1]))
 
 
-def quat_norm(_name, function):
+@values
+def quat_norm():
     rng = np.random.default_rng(25)
     size = 10.0 ** rng.uniform(-30, 30, COUNT)
     q = rng.normal(size=(COUNT, 4)) * size[:, None]
-    want = e.length(exact(q)).astype(np.float64)
-    for dtype in FLOATS:
-        agree(function(q.astype(dtype)), want, size)
+    return (q,), e.length(exact(q)).astype(np.float64), size
 
 
-def quat_normalized(_name, function):
+@values
+def quat_normalized():
     rng = np.random.default_rng(26)
     q = motions(26).quat_vec[:, :4] * (10.0 ** rng.uniform(-30, 30, COUNT))[:, None]
-    want = rounded(e.unit(exact(q)))
-    for dtype in FLOATS:
-        agree(function(q.astype(dtype)), want, 1.0)
+    return (q,), rounded(e.unit(exact(q))), 1.0
 
 
-def quat_rotate(_name, function):
-    cases, v = motions(11), points(11)
-    want = rounded(e.times(e.matrix(cases.exact.q), exact(v)))
-    for dtype in FLOATS:
-        agree(function(cases.quat_vec[:, :4].astype(dtype), v.astype(dtype)), want, lengths(v))
+@values
+def quat_rotate():
+    v = points(11)
+    return (*unit_quaternions(11), v), rounded(e.times(e.matrix(motions(11).exact.q), exact(v))), lengths(v)
 
 
-def to_rotation_matrix(_name, function):
-    cases = motions(5)
-    for dtype in FLOATS:
-        agree(function(cases.quat_vec[:, :4].astype(dtype)), cases.affine[:, :3, :3], 1.0)
+@values
+def to_rotation_matrix():
+    return unit_quaternions(5), motions(5).affine[:, :3, :3], 1.0
 
 
-def from_rotation_vector(_name, function):
+@values
+def from_rotation_vector():
     rng = np.random.default_rng(27)
     angle = angles(rng) * np.where(np.arange(COUNT) % 5 == 0, 10.0 ** rng.uniform(0, 5, COUNT), 1.0)
     vector = directions(rng) * angle[:, None]
-    want = rounded(e.from_rotation_vector(exact(vector)))
-    for dtype in FLOATS:
-        agree(function(vector.astype(dtype)), want, 1.0 + angle)
+    return (vector,), rounded(e.from_rotation_vector(exact(vector))), 1.0 + angle
 
 
 def to_rotation_vector(_name, function):
@@ -532,11 +534,10 @@ def to_rotation_vector(_name, function):
         agree(vectors, want, lengths(want))
 
 
-def angle_between(_name, function):
+@values
+def angle_between():
     a, b = pairs(13)
-    angle, _apart = exact_distance(a.exact, b.exact)
-    for dtype in FLOATS:
-        agree(function(a.quat_vec[:, :4].astype(dtype), b.quat_vec[:, :4].astype(dtype)), angle, 1.0)
+    return (a.quat_vec[:, :4], b.quat_vec[:, :4]), exact_distance(a.exact, b.exact)[0], 1.0
 
 
 def slerp(_name, function):

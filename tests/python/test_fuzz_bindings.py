@@ -244,31 +244,33 @@ def transform_calls(draw):
     return function, arguments
 
 
-@st.composite
-def blend_calls(draw):
-    function, of_arguments = draw(
-        st.sampled_from(
-            [
-                (sinew.interpolate.between, "transform transform number way"),
-                (sinew.interpolate.blend, "many weights way"),
-                (sinew.spline.catmull_rom, "many times number way"),
-                (sinew.spline.catmull_rom_vector, "many times number"),
-            ]
-        )
-    )
+def blended(draw, calls, one, keys):
+    """One of the calls, (function, kinds of arguments), and arguments for it.
+
+    one, keys  the shapes of one transform and of several, without the layout's own
+    """
     way = draw(WAYS)
     layout = {"m": draw(st.sampled_from(["affine", "rows"])), "q": "quat_vec"}.get(way[0], "dual_quat")
-    count = draw(st.integers(1, 5))
+    function, of_arguments = draw(st.sampled_from(calls))
     wild = wild_one(draw, 4)
     kinds = {
         "transform": lambda wild: of(layout, wild),
+        "one": lambda wild: or_garbage(arrays((*one, *KINDS[layout]), wild), wild),
         "number": lambda wild: of("number", wild),
-        "many": lambda wild: or_garbage(arrays((count, *KINDS[layout]), wild), wild),
-        "weights": lambda wild: or_garbage(arrays((count,), wild), wild),
-        "times": lambda wild: or_garbage(integers(range(count), wild), wild),
+        "many": lambda wild: or_garbage(arrays((*keys, *KINDS[layout]), wild), wild),
+        "weights": lambda wild: or_garbage(arrays(keys[:1], wild), wild),
+        "times": lambda wild: or_garbage(integers(range(keys[0]), wild), wild),
         "way": lambda wild: names(st.just(way), wild).map(lambda name: (name, None)),
     }
     return function, [draw(kinds[kind](wild[i])) for i, kind in enumerate(of_arguments.split())]
+
+
+BLENDS = [
+    (sinew.interpolate.between, "transform transform number way"),
+    (sinew.interpolate.blend, "many weights way"),
+    (sinew.spline.catmull_rom, "many times number way"),
+    (sinew.spline.catmull_rom_vector, "many times number"),
+]
 
 
 class Draw:
@@ -378,9 +380,9 @@ def test_transforms(call):
 
 
 @many(0.2)
-@given(blend_calls())
-def test_blends_and_splines(call):
-    run(*call)
+@given(st.data())
+def test_blends_and_splines(data):
+    run(*blended(data.draw, BLENDS, (), (data.draw(st.integers(1, 5)),)))
 
 
 @many(0.05)
@@ -417,29 +419,14 @@ def test_skeletons(data):
     skeleton = attempt(sinew.Skeleton, [data.draw(parents)[0]], {"parents"})
     if skeleton is None:
         skeleton = sinew.Skeleton(np.arange(-1, count - 1, dtype=np.int32))
-    way = data.draw(WAYS)
-    layout = {"m": data.draw(st.sampled_from(["affine", "rows"])), "q": "quat_vec"}.get(way[0], "dual_quat")
-    keys = data.draw(st.integers(1, 3))
-    one, many = (skeleton.bone_count, *KINDS[layout]), (keys, skeleton.bone_count, *KINDS[layout])
-    kinds = {
-        "one": lambda wild: or_garbage(arrays(one, wild), wild),
-        "many": lambda wild: or_garbage(arrays(many, wild), wild),
-        "times": lambda wild: or_garbage(integers(range(keys), wild), wild),
-        "number": lambda wild: st.floats(-1, 4).map(lambda t: (t, t)) if not wild else of("number", wild),
-        "way": lambda wild: names(st.just(way), wild).map(lambda name: (name, None)),
-    }
-    call, of_arguments = data.draw(
-        st.sampled_from(
-            [
-                (skeleton.root_relative, "one"),
-                (skeleton.interpolate, "one one number way"),
-                (skeleton.spline, "many times number way"),
-                (skeleton.spline_vector, "many times number"),
-            ]
-        )
-    )
-    wild = wild_one(data.draw, 4)
-    run(call, [data.draw(kinds[kind](wild[i])) for i, kind in enumerate(of_arguments.split())])
+    one, keys = (skeleton.bone_count,), data.draw(st.integers(1, 3))
+    calls = [
+        (skeleton.root_relative, "one"),
+        (skeleton.interpolate, "one one number way"),
+        (skeleton.spline, "many times number way"),
+        (skeleton.spline_vector, "many times number"),
+    ]
+    run(*blended(data.draw, calls, one, (keys, *one)))
 
 
 MESH = ("rest_points", "influence_offsets", "influence_bones", "influence_weights", "rest_bones")
