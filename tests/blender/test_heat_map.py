@@ -17,7 +17,6 @@ from sinew_addon.core.metrics import METRICS
 from sinew_addon.deform import characters, session
 from sinew_addon.features.heat import heat_legend, heat_map, heat_nodes, live, measures
 from sinew_addon.features.pages import measure
-from test_shown_colours import color_types
 
 
 def shown_colours(obj: bpy.types.Object) -> np.ndarray:
@@ -182,7 +181,7 @@ def test_scenes_have_ranges_of_their_own(set_up):
 
 def painted_arm() -> bpy.types.Object:
     """With the artist's own material and colours."""
-    obj = test_shown_colours.painted_arm()
+    obj = test_shown_colours.painted_arm("Arm")
     obj.data.materials.append(bpy.data.materials.new("Skin"))
     for attribute in obj.data.color_attributes:
         attribute.data.foreach_set("color", np.linspace(0.0, 1.0, 4 * len(attribute.data), dtype=np.float32))
@@ -196,7 +195,7 @@ def test_switched_off_it_leaves_no_trace(set_up):
         set_up(obj)
     bpy.context.scene.frame_set(6)
     before_sinew = whole_file.content()
-    types = color_types()
+    types = test_shown_colours.color_types()
     scenes.add_sinew(obj, "dq")
     measures.of(bpy.context.scene)
     before = whole_file.content()
@@ -205,34 +204,34 @@ def test_switched_off_it_leaves_no_trace(set_up):
     assert mesh.attributes.active_color_name == heat_nodes.NAME
     assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
     assert [slot.material.name for slot in obj.material_slots] == ["Skin"]
-    assert set(color_types()) == {"VERTEX"}
+    assert set(test_shown_colours.color_types()) == {"VERTEX"}
     bpy.context.scene.frame_set(9)
     bpy.context.scene.frame_set(6)
     bpy.ops.sinew.heat_map()
     bpy.context.view_layer.update()
-    assert color_types() == types
+    assert test_shown_colours.color_types() == types
     whole_file.assert_same(before)
     # It also ends when Sinew is removed while it is on.
     bpy.ops.sinew.heat_map()
     choose("bulge", range=measures.FIXED, length=0.5)
     bpy.context.scene.sinew_most_influences = 2
     bpy.ops.sinew.remove()
-    assert color_types() == types
+    assert test_shown_colours.color_types() == types
     assert obj.data.attributes.active_color_name == "Second"
     whole_file.assert_same(before_sinew)
 
 
 def test_while_sinew_is_off_views_are_as_they_were():
-    obj, types = painted_arm(), color_types()
+    obj, types = painted_arm(), test_shown_colours.color_types()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(6)
     bpy.ops.sinew.heat_map()
     colours = shown_colours(obj)
     properties.of(obj).enabled = False
-    assert color_types() == types
+    assert test_shown_colours.color_types() == types
     assert obj.data.attributes.active_color_name == "Second"
     properties.of(obj).enabled = True
-    assert set(color_types()) == {"VERTEX"}
+    assert set(test_shown_colours.color_types()) == {"VERTEX"}
     np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
 
 
@@ -246,7 +245,7 @@ def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
 
     painted_arm()
     obj = saved_and_opened()
-    types = color_types()
+    types = test_shown_colours.color_types()
     before = whole_file.content()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(6)
@@ -254,10 +253,10 @@ def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
     colours = shown_colours(obj)
     obj = saved_and_opened()
     np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
-    assert set(color_types()) == {"VERTEX"}
+    assert set(test_shown_colours.color_types()) == {"VERTEX"}
     bpy.context.scene.frame_set(1)
     bpy.ops.sinew.remove()
-    assert color_types() == types
+    assert test_shown_colours.color_types() == types
     whole_file.assert_same(before)
     assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
 
@@ -265,7 +264,7 @@ def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
 def test_undo_and_redo():
     obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(8)
-    types = color_types()
+    types = test_shown_colours.color_types()
     bpy.ops.ed.undo_push(message="before")
     bpy.ops.sinew.heat_map()
     bpy.ops.ed.undo_push(message="heat map")
@@ -275,13 +274,13 @@ def test_undo_and_redo():
     obj = bpy.data.objects["Arm"]
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     assert heat_nodes.NAME not in mesh.attributes
-    assert color_types() == types
+    assert test_shown_colours.color_types() == types
     assert mesh.attributes.active_color_name == ""
     bpy.ops.ed.redo()
     session.refresh(bpy.context)
     obj = bpy.data.objects["Arm"]
     np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
-    assert set(color_types()) == {"VERTEX"}
+    assert set(test_shown_colours.color_types()) == {"VERTEX"}
 
 
 def test_converted_to_a_mesh_it_leaves_nothing_of_itself():
@@ -406,7 +405,7 @@ def test_linked_meshes_show_it_too(tmp_path, override, front):
     test_linked_data.link(tmp_path, override)
     obj = test_linked_data.character()
     scenes.add_sinew(obj, "dq")
-    types = color_types()
+    types = test_shown_colours.color_types()
     choose("stretch", range=measures.FIXED, ratio=2.0)
     properties.of(obj).heat = True
     bpy.context.scene.frame_set(11)
@@ -419,6 +418,6 @@ def test_linked_meshes_show_it_too(tmp_path, override, front):
     bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
     np.testing.assert_allclose(shown_colours(test_linked_data.character()), colours, atol=1e-6)
     attach.remove(test_linked_data.character())
-    assert color_types() == types
+    assert test_shown_colours.color_types() == types
     assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
     assert not [g for g in bpy.data.node_groups if g.get("sinew_node_group") and g.library is None]
