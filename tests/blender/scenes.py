@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import ClassVar
 
@@ -81,6 +81,13 @@ def key_pose(armature: bpy.types.Object, degrees: float = 100.0) -> None:
             bone.rotation_quaternion = Quaternion((1, 0, 0), turn) @ Quaternion((0, 1, 0), 0.8 * turn)
         bone.location = (0.0, 0.1 * index, 0.0)
         bone.keyframe_insert("rotation_quaternion", frame=11)
+
+
+def key(owner: bpy.types.bpy_struct, path: str, values: Iterable[tuple[int, object]]) -> None:
+    """Keys a property: (frame, value) of each key."""
+    for frame, value in values:
+        setattr(owner, path, value)
+        owner.keyframe_insert(path, frame=frame)
 
 
 def key_shape(obj: bpy.types.Object) -> None:

@@ -225,9 +225,7 @@ def test_envelopes_with_moving_shape_keys():
 def test_keyed_visibility_of_the_modifier():
     obj, _armature = scenes.make_arm()
     modifier = obj.modifiers["Armature"]
-    for frame, shown in ((1, True), (5, False), (9, True)):
-        modifier.show_viewport = shown
-        modifier.keyframe_insert("show_viewport", frame=frame)
+    scenes.key(modifier, "show_viewport", ((1, True), (5, False), (9, True)))
     assert_equal_to_modifier(obj, [3, 6, 10])
 
 

@@ -108,9 +108,7 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
     if scaled:
         rig.scale, rig.rotation_euler = (2.0, 2.0, 2.0), (0.3, 0.2, 0.1)
         bone = rig.pose.bones["bone.1"]
-        for size, frame in (((1.0, 1.0, 1.0), 1), ((1.2, 1.5, 1.3), 11)):
-            bone.scale = size
-            bone.keyframe_insert("scale", frame=frame)
+        scenes.key(bone, "scale", ((1, (1.0, 1.0, 1.0)), (11, (1.2, 1.5, 1.3))))
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
     scenes.add_sinew(obj, method)
     expected = world_shapes([obj], FRAMES)[0]
@@ -189,17 +187,13 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     for point in key.points:
         point.co.y *= 1.3
         point.co.z *= 1.3
-    for value, frame in ((0.0, 1), (1.0, 11)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
+    scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
     rig.scale, rig.rotation_euler = (2.0, 2.0, 2.0), (0.3, 0.2, 0.1)
     for each in (obj, sleeve):
         each.parent = rig
     # A bone that grows, unevenly at the end.
     bone = rig.pose.bones["bone.0"]
-    for size, frame in (((1.0, 1.0, 1.0), 1), ((1.2, 1.5, 1.3), 11)):
-        bone.scale = size
-        bone.keyframe_insert("scale", frame=frame)
+    scenes.key(bone, "scale", ((1, (1.0, 1.0, 1.0)), (11, (1.2, 1.5, 1.3))))
     bpy.context.scene.render.frame_map_new = 200
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     for each in (obj, sleeve):

@@ -135,9 +135,7 @@ def test_keys_of_its_strength_are_followed():
     obj, before = bent_arm()
     limit(obj)
     stage = properties.of(obj).bulge_limit
-    for frame, strength in ((9, 0.0), (11, 1.0)):
-        stage.strength = strength
-        stage.keyframe_insert("strength", frame=frame)
+    scenes.key(stage, "strength", ((9, 0.0), (11, 1.0)))
     bpy.context.scene.frame_set(9)
     stage.enabled = False
     at_9 = scenes.final_points(obj)

@@ -53,18 +53,12 @@ def evaluations_in(action: Callable[[], object], name: str) -> int:
         return said.read().count(f"BKE_object_eval_uber_data on OB{name} (".encode())
 
 
-def key(block: bpy.types.bpy_struct, path: str, first: object, last: object) -> None:
-    for frame, value in ((1, first), (11, last)):
-        setattr(block, path, value)
-        block.keyframe_insert(path, frame=frame)
-
-
 def still(_obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
     pass
 
 
 def moving_armature(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    key(armature, "location", (0.0, 0.0, 0.0), (3.0, 1.0, 0.0))
+    scenes.key(armature, "location", ((1, (0.0, 0.0, 0.0)), (11, (3.0, 1.0, 0.0))))
 
 
 def modifier_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
@@ -81,7 +75,7 @@ def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
 
 
 def moving_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    key(obj, "location", (0.0, 0.0, 0.0), (3.0, 1.0, 0.0))
+    scenes.key(obj, "location", ((1, (0.0, 0.0, 0.0)), (11, (3.0, 1.0, 0.0))))
 
 
 def moving_keys(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
@@ -157,7 +151,7 @@ def test_a_rig_that_follows_a_deformed_mesh_uses_the_same_frame(set_up: Setup):
     obj, follower = scenes.make_arm()
     constraint = follower.pose.bones[1].constraints.new("COPY_LOCATION")
     constraint.target, constraint.subtarget = followed, followed.vertex_groups[-1].name
-    key(armature, "location", (0.0, 0.0, 0.0), (3.0, 1.0, 0.0))
+    scenes.key(armature, "location", ((1, (0.0, 0.0, 0.0)), (11, (3.0, 1.0, 0.0))))
     shapes: list[np.ndarray] = []
 
     def record(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -305,9 +299,7 @@ def test_objects_that_move_beside_their_armatures():
     several objects, moved by one action."""
     objects = [scenes.make_arm(sides=6, rings=9, name=name)[0] for name in ("One", "Two", "Three")]
     first = objects[0]
-    first.keyframe_insert("location", frame=1)
-    first.location.x = 2.0
-    first.keyframe_insert("location", frame=11)
+    scenes.key(first, "location", ((1, (0.0, 0.0, 0.0)), (11, (2.0, 0.0, 0.0))))
     for obj in objects[1:]:
         animation = obj.animation_data_create()
         animation.action = first.animation_data.action

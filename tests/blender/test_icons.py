@@ -277,9 +277,7 @@ def test_keys_on_sinews_icon(view, rendered_points):
     obj = character.obj
     sinews, frames = obj.modifiers["Sinew"], (9, 10, 11)
     shapes = {frame: (scenes.shapes(obj, [frame])[0], scenes.rest_points(obj)) for frame in frames}
-    for frame, is_on in ((1, True), (10, False), (11, True)):
-        setattr(sinews, f"show_{view}", is_on)
-        sinews.keyframe_insert(f"show_{view}", frame=frame)
+    scenes.key(sinews, f"show_{view}", ((1, True), (10, False), (11, True)))
     bpy.context.view_layer.update()
     for frame in (9, 10, 11, 10, 9):
         bpy.context.scene.frame_set(frame)

@@ -152,9 +152,7 @@ def test_weights_are_painted_where_visibility_is_animated(set_up):
     obj, _armature = scenes.make_arm()
     set_up(obj)
     modifier = obj.modifiers["Armature"]
-    for frame, is_on in ((1, False), (4, True)):
-        modifier.show_viewport = is_on
-        modifier.keyframe_insert("show_viewport", frame=frame)
+    scenes.key(modifier, "show_viewport", ((1, False), (4, True)))
     expected = scenes.shapes(obj, FRAMES)
     scenes.add_sinew(obj, "lbs")
     for mode in ("WEIGHT_PAINT", "OBJECT"):

@@ -78,9 +78,9 @@ def test_setting_one_deforms_by_it(route):
 def test_keys_and_drivers_set_it(route):
     obj = skinned_model()
     found = shape_of_each(obj)
-    for frame, choice in ((FRAME - 1, "nlerp"), (FRAME, "slerp"), (FRAME + 1, "nlerp")):
-        obj.sinew.sdef.interpolation = choice
-        obj.sinew.sdef.keyframe_insert("interpolation", frame=frame)
+    scenes.key(
+        obj.sinew.sdef, "interpolation", ((FRAME - 1, "nlerp"), (FRAME, "slerp"), (FRAME + 1, "nlerp"))
+    )
     for frame in (FRAME - 1, FRAME + 1, FRAME):
         bpy.context.scene.frame_set(frame)
     assert scenes.worst(scenes.final_points(obj), found["slerp"]) == 0.0

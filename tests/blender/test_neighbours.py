@@ -13,7 +13,6 @@ import scenes
 import sinew_addon
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.attach.updates import reaction, updates_suspended
-from sinew_addon.core.scale_rule import BLENDER_3
 from sinew_addon.deform import in_depsgraph, safe_mode, session
 from sinew_addon.deform.plan import State
 from sinew_addon.features.compare import comparison
@@ -87,24 +86,6 @@ def edit_vertices(obj: bpy.types.Object) -> None:
     obj.data.update()
 
 
-@pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
-@pytest.mark.parametrize("setting", ["method", "enabled", "heat", "scale_rule"])
-def test_edit_between_a_setting_and_a_frame(arm, setting, edit):
-    settings = properties.of(arm)
-    if setting == "method":
-        settings.method = "lbs"
-    elif setting == "enabled":
-        settings.enabled = False
-        settings.enabled = True
-    elif setting == "heat":
-        settings.heat = True
-    else:
-        settings.scale_rule = BLENDER_3.name
-    edit(arm)
-    bpy.context.scene.frame_set(10)
-    assert_frame_equals_modifier(arm, 10, preserve_volume=setting != "method")
-
-
 @pytest.mark.parametrize("once", [False, True], ids=["always", "once"])
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
 def test_a_handlers_edit_after_sinews_is_in_the_frame(arm, neighbour, edit, once):
@@ -144,12 +125,6 @@ def test_group_renamed_by_a_handler(arm, neighbour, rendered_points, event, is_f
     properties.of(arm).enabled = False
     expected = rendered_points(arm) if is_rendered else scenes.modifier_shapes(arm, [10], True)[0]
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
-
-
-def test_group_renamed_before_a_frame(arm):
-    arm.vertex_groups["bone.1"].name = "another"
-    bpy.context.scene.frame_set(10)
-    assert_frame_equals_modifier(arm, 10)
 
 
 def beside_nothing(obj: bpy.types.Object) -> None:
@@ -241,20 +216,6 @@ def test_a_handlers_edit_of_an_edited_mesh_is_in_the_next_event(arm, neighbour, 
     assert_equals_modifier(arm)
 
 
-@pytest.mark.parametrize("keyed", [False, True])
-def test_edit_of_a_mesh_with_shape_keys_before_a_frame(route, keyed):
-    obj, _armature = scenes.make_arm()
-    if keyed:
-        scenes.key_shape(obj)
-    else:
-        obj.shape_key_add(name="Basis")
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(4)
-    edit_weights(obj)
-    bpy.context.scene.frame_set(5)
-    assert_equals_modifier(obj)
-
-
 @pytest.mark.parametrize("frame", [1, 6])
 def test_applied(arm, frame, capfd):
     """Also at rest, where a deleted modifier leaves the same shape."""
@@ -272,16 +233,6 @@ def test_applied(arm, frame, capfd):
     assert "nvalid driver" not in "".join(capfd.readouterr())
 
 
-def test_converted_to_a_mesh(arm):
-    shown = scenes.shapes(arm, [6])[0]
-    bpy.ops.object.convert(target="MESH")
-    converted = bpy.context.object
-    for frame in FRAMES:
-        bpy.context.scene.frame_set(frame)
-        assert np.array_equal(scenes.final_points(converted), shown)
-    assert not properties.has_sinew(converted)
-
-
 @pytest.mark.parametrize("frame", [1, 6])
 @pytest.mark.parametrize("enabled", [True, False])
 def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame, capfd):
@@ -297,71 +248,6 @@ def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame, capfd):
     got = scenes.shapes(arm, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
     assert "nvalid driver" not in "".join(capfd.readouterr())
-
-
-def test_copied_modifiers_work(arm):
-    other, _rig = scenes.make_arm(name="Other")
-    other.modifiers.clear()
-    # Its modifier has the same name.
-    another, _rig = scenes.make_arm(name="A First")
-    scenes.add_sinew(another, "lbs")
-    another.select_set(False)
-    for each in (arm, other):
-        each.select_set(True)
-    bpy.context.view_layer.objects.active = arm
-    bpy.ops.object.make_links_data(type="MODIFIERS")
-    bpy.context.view_layer.update()
-    assert properties.has_sinew(other)
-    assert properties.of(other).method == "dq"
-    assert properties.of(other).armature == properties.of(arm).armature
-    assert_equals_modifier(other)
-    assert_equals_modifier(arm)
-
-
-@pytest.mark.parametrize("keyed", [False, True])
-@pytest.mark.parametrize("enabled", [False, True])
-def test_copied_modifiers_are_on_where_the_artists_own_are(arm, enabled, keyed):
-    """Blender does not copy animation with them."""
-    modifier = arm.modifiers["Armature"]
-    properties.of(arm).enabled = enabled
-    if keyed:
-        path = modifier.path_from_id("show_viewport")
-        for frame, value in ((1, True), (5, False)):
-            modifier.show_viewport = value
-            arm.keyframe_insert(path, frame=frame)
-    elif not enabled:
-        modifier.show_viewport = False
-    bpy.context.scene.frame_set(6)
-    other, _rig = scenes.make_arm(name="Other")
-    bpy.context.scene.frame_set(6)
-    other.modifiers.clear()
-    for each in (arm, other):
-        each.select_set(True)
-    bpy.context.view_layer.objects.active = arm
-    bpy.ops.object.make_links_data(type="MODIFIERS")
-    bpy.context.view_layer.update()
-    attach.remove(other)
-    session.refresh(bpy.context)
-    assert other.modifiers["Armature"].show_viewport == (enabled and not keyed)
-    assert other.modifiers["Armature"].show_render
-
-
-def test_copied_modifiers_have_the_mix(arm):
-    other, _rig = scenes.make_arm(name="Other")
-    other.modifiers.clear()
-    settings = properties.of(arm)
-    settings.mix.method, settings.mix.group = "dq", "bone.1"
-    attach.use_one_method(arm, "lbs")
-    for each in (arm, other):
-        each.select_set(True)
-    bpy.context.view_layer.objects.active = arm
-    bpy.ops.object.make_links_data(type="MODIFIERS")
-    bpy.context.view_layer.update()
-    assert properties.of(other).mixed_method == "dq"
-    got, expected = scenes.shapes(other, FRAMES), scenes.shapes(arm, FRAMES)
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
-    settings.mix.method = "OFF"
-    assert scenes.worst(got, scenes.shapes(arm, FRAMES)) > 0.005
 
 
 def test_a_node_group_removed_behind_sinews_handler(arm, neighbour):
@@ -480,29 +366,6 @@ def test_a_neighbour_toggles_modifiers_that_are_suspended_otherwise(gated, neigh
     assert gated.modifiers["Behind"].show_render
     take_off()
     assert_equals_modifier(gated)
-
-
-def test_a_mesh_that_is_off_is_rendered_as_it_is(arm, rendered_points, tmp_path):
-    """Sinew must not suspend its Armature modifier: a render would then show another frame."""
-    other, _rig = scenes.make_arm(name="Other")
-    scenes.add_sinew(other, "dq")
-    rendered_points(arm)
-    arm.shape_key_add(name="Basis")
-    key = arm.shape_key_add(name="key 1")
-    for point in key.data[:20]:
-        point.co.z += 0.3
-    for frame, value in ((1, 0.0), (10, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
-    scenes.shapes(arm, [3, 4])
-    properties.of(arm).enabled = False
-    scene = bpy.context.scene
-    scene.render.filepath = str(tmp_path / "frame")
-    scene.frame_start, scene.frame_end = 5, 6
-    bpy.ops.render.render(animation=True)
-    got = scenes.KeepingEngine.shapes[arm.name]
-    scene.frame_set(6)
-    assert scenes.worst(got, scenes.final_points(arm)) <= 1e-6
 
 
 @pytest.mark.parametrize("keyed", ["viewport", "render"])
@@ -630,9 +493,7 @@ def test_tools_for_weights_see_the_bones_that_deform(arm):
 
 def test_tools_for_weights_where_visibility_is_animated(arm):
     modifier = arm.modifiers["Armature"]
-    for frame, is_on in ((1, False), (4, True)):
-        modifier.show_viewport = is_on
-        modifier.keyframe_insert("show_viewport", frame=frame)
+    scenes.key(modifier, "show_viewport", ((1, False), (4, True)))
     bpy.context.scene.frame_set(6)
     mask = arm.vertex_groups.new(name="mask")
     mask.add(range(252), 0.3, "REPLACE")
@@ -648,23 +509,6 @@ def test_tools_for_weights_where_visibility_is_animated(arm):
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
     assert session.state_of(arm).plan.state is State.AFTER_UPDATE
-    assert_equals_modifier(arm)
-
-
-def test_absolute_shape_keys_in_weight_paint_where_visibility_is_animated(arm):
-    """In that mode Sinew reads nothing, because it only mixes relative keys."""
-    modifier = arm.modifiers["Armature"]
-    modifier.keyframe_insert("show_viewport", frame=1)
-    arm.shape_key_add(name="Basis")
-    arm.shape_key_add(name="moved").data[3].co.x += 0.3
-    bpy.context.view_layer.objects.active = arm
-    bpy.ops.object.mode_set(mode="SCULPT")
-    arm.data.shape_keys.use_relative = False
-    bpy.context.view_layer.update()
-    for mode in ("WEIGHT_PAINT", "OBJECT"):
-        bpy.ops.object.mode_set(mode=mode)
-        bpy.context.view_layer.update()
-        assert not properties.of(arm).error
     assert_equals_modifier(arm)
 
 
@@ -712,18 +556,3 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
     for each in (obj, other):
         assert not animation_paths.animated_paths(each)
         assert not each.is_property_set("sinew")
-
-
-@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
-def test_another_object_renamed_behind_sinews_handler(arm, neighbour, event):
-    """It keeps its shape, whether Sinew's or not."""
-    other, _rig = scenes.make_arm(name="Other")
-    expected = scenes.shapes(other, [9])[0]
-    bpy.context.scene.frame_set(1)
-    take_off = neighbour(event, lambda: setattr(other, "name", "Renamed"))
-    bpy.context.scene.frame_set(9)
-    bpy.context.view_layer.update()
-    take_off()
-    got = scenes.final_points(other)
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(other)
-    assert_equals_modifier(arm)

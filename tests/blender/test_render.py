@@ -109,9 +109,7 @@ def test_after_a_render_the_current_frame_is_shown(tmp_path):
 
 def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     obj.parent = armature
-    for frame, location in ((1, (0.0, 0.0, 0.0)), (11, (0.5, 0.5, 0.0))):
-        armature.location = location
-        armature.keyframe_insert("location", frame=frame)
+    scenes.key(armature, "location", ((1, (0.0, 0.0, 0.0)), (11, (0.5, 0.5, 0.0))))
     obj.modifiers.new("Behind", "SUBSURF").render_levels = 1
 
 
@@ -178,11 +176,8 @@ def test_renders_animate_modifiers_behind_and_other_users_of_the_mesh(tmp_path):
     scene.collection.objects.link(other)
     behind = obj.modifiers.new("Cast", "CAST")
     flags = other.modifiers["Armature"]
-    for frame, value in ((1, 0.0), (4, 1.0)):
-        behind.factor = value
-        behind.keyframe_insert("factor", frame=frame)
-        flags.show_render = value > 0.5
-        flags.keyframe_insert("show_render", frame=frame)
+    scenes.key(behind, "factor", ((1, 0.0), (4, 1.0)))
+    scenes.key(flags, "show_render", ((1, False), (4, True)))
     scene.frame_set(1)
     got, expected = with_and_without(tmp_path, obj, "lbs", (5, 7))
     assert np.abs(got - expected).mean() < 3e-4
@@ -197,14 +192,10 @@ def keyed(request, monkeypatch) -> tuple[bpy.types.Object, Callable[[], None]]:
     key = obj.shape_key_add(name="Key")
     for point in key.data[: len(key.data) // 2]:
         point.co.y += 0.8
-    for frame, value in ((5, 0.0), (9, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
+    scenes.key(key, "value", ((5, 0.0), (9, 1.0)))
     if request.param == "with a modifier":
         behind = obj.modifiers.new("Cast", "CAST")
-        for frame, value in ((5, 0.0), (9, 1.0)):
-            behind.factor = value
-            behind.keyframe_insert("factor", frame=frame)
+        scenes.key(behind, "factor", ((5, 0.0), (9, 1.0)))
     monkeypatch.setattr(small_meshes, "is_used", request.param == "compared")
 
     def add() -> None:
@@ -251,11 +242,8 @@ def test_keys_of_settings_and_of_modifiers_behind_are_rendered(tmp_path):
     scene = bpy.context.scene
     prepare(scene, motion_blur=False)
     flag, cast = obj.modifiers["Armature"], obj.modifiers.new("Cast", "CAST")
-    for frame, value in ((8, False), (9, True)):
-        flag.use_deform_preserve_volume = value
-        flag.keyframe_insert("use_deform_preserve_volume", frame=frame)
-        cast.factor = float(value)
-        cast.keyframe_insert("factor", frame=frame)
+    scenes.key(flag, "use_deform_preserve_volume", ((8, False), (9, True)))
+    scenes.key(cast, "factor", ((8, 0.0), (9, 1.0)))
     scene.frame_set(11)
 
     def key_method() -> None:

@@ -306,9 +306,7 @@ def _put_in_front(obj: bpy.types.Object, kind: str) -> None:
 
 
 def _key_visibility(obj: bpy.types.Object) -> None:
-    for frame, shown in ((1, True), (20, False)):
-        obj.modifiers["Armature"].show_viewport = shown
-        obj.modifiers["Armature"].keyframe_insert("show_viewport", frame=frame)
+    scenes.key(obj.modifiers["Armature"], "show_viewport", ((1, True), (20, False)))
 
 
 @pytest.mark.parametrize(

@@ -74,6 +74,28 @@ CASES = {
     "~delete_points Arm sockets; ~touch Arm; ik_chain Rig hand; hide Arm viewport; frame 6",
     "registered again at another frame": "add Arm dq; frame 8; restart 11; frame 3; frame 11",
     "registered again, keyed": "add Arm dq; key_method Arm 1 8 lbs dq; frame 9; restart 3; frame 3; frame 9",
+    # Between a setting and a frame, before a frame, by others
+    "weights after a method": "add Arm dq; frame 6; ~method Arm lbs; ~weights Arm lower; frame 10",
+    "vertices after off and on": "add Arm dq; frame 6; ~enabled Arm; ~enabled Arm; ~move_vertices Arm; "
+    "frame 10",
+    "weights after a heat map": "add Arm dq; frame 6; ~heat Arm; ~weights Arm lower; frame 10",
+    "vertices after a scale rule": "add Arm dq; frame 6; ~scale_rule Arm 1; ~move_vertices Arm; frame 10",
+    "a group renamed before a frame": "add Arm dq; frame 6; ~groups Arm rename lower; frame 10",
+    "weights of one with shape keys before a frame": "add_shape_key Arm; key_shape_key Arm 1 11; "
+    "add Arm dq; frame 4; ~weights Arm lower; frame 5",
+    "another renamed by a handler": "add Arm dq; neighbour Leg frame_change_post name 9; frame 6; "
+    "neighbour Box depsgraph_update_post name 9; frame 9",
+    "rendered while it is off": "add Arm dq; add Leg; render 0.9; add_shape_key Arm; "
+    "key_shape_key Arm 1 10; frame 3; frame 4; enabled Arm; render 0.1 5; frame 6",
+    "converted to a mesh": "add Arm dq; frame 6; convert_to_mesh Arm; frame 11; remove_all",
+    "copied modifiers": "add Arm dq; add Leg; copy_modifiers Arm Box; frame 6; frame 11; remove Box",
+    "copied modifiers of one that is off": "add Arm dq; enabled Arm; copy_modifiers Arm Box; frame 6; "
+    "remove Box",
+    "copied modifiers with keys": "key_visibility Arm 2 9 0.0; add Arm dq; frame 6; copy_modifiers Arm Box; "
+    "remove Box; frame 11",
+    "copied modifiers with a mix": "add Arm; stages Arm 1; copy_modifiers Arm Box; frame 6; frame 11",
+    "absolute keys in weight paint": "key_visibility Arm 1 5 1.0; add_shape_key Arm; add Arm dq; "
+    "sculpt_mode Arm 0.9; absolute_shape_keys Arm; paint_weights Arm smooth 0.9; leave_mode; frame 6",
     # Keys of visibility
     "deleted keys, on": "key_visibility Arm 1 5 0.0; frame 11; add Arm; frame 4; clear_animation Arm; "
     "frame 6",
@@ -167,6 +189,7 @@ def pairs():
 ON_BOTH_ROUTES = (
     *("a bone made while Sinew is off", "undo in edit mode of a shared armature", "others while one waits"),
     *("deleted keys where the modifier is on", "keys while Sinew is on", "without size, in a parent"),
+    *("weights after a method", "vertices after off and on", "weights after a heat map"),
     *("a scene that redo brings back", "a view layer that first shows it", "applied"),
 )
 QUICK = [(name, "evaluation", False) for name in CASES] + [(name, "update", False) for name in ON_BOTH_ROUTES]

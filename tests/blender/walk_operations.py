@@ -2,7 +2,8 @@
 """The operations of a walk. Each does the same to the file on both sides (walk_sides), depending on its
 random numbers and the file's content.
 
-An operation returns a description of what it did, or None if the file has nothing for it.
+An operation returns a description of what it did, or None if the file has nothing for it: choosing among
+nothing ends it.
 """
 
 from __future__ import annotations
@@ -44,6 +45,10 @@ class Operation:
     act: Callable[[Walker, random.Random], str | None]
 
 
+class NothingError(Exception):
+    """The file has nothing for an operation."""
+
+
 OPERATIONS: dict[str, Operation] = {}
 
 
@@ -51,8 +56,13 @@ def operation(weight: float):
     """weight  its relative frequency"""
 
     def register(act: Callable) -> Callable:
-        name = act.__name__
-        OPERATIONS[name] = Operation(name, weight, act)
+        def attempt(walker: Walker, r: random.Random) -> str | None:
+            try:
+                return act(walker, r)
+            except NothingError:
+                return None
+
+        OPERATIONS[act.__name__] = Operation(act.__name__, weight, attempt)
         return act
 
     return register
@@ -138,28 +148,38 @@ class Walker:
     # --- Choosing
 
     @staticmethod
-    def one(r: random.Random, choices: Sequence):
+    def skip_if(is_so: bool) -> None:
+        if is_so:
+            raise NothingError
+
+    @staticmethod
+    def one_or_none(r: random.Random, choices: Sequence):
         choices = list(choices)
         return r.choice(choices) if choices else None
 
-    def mesh(self, r: random.Random, wanted: Callable | None = None) -> bpy.types.Object | None:
+    @classmethod
+    def one(cls, r: random.Random, choices: Sequence):
+        chosen = cls.one_or_none(r, choices)
+        cls.skip_if(chosen is None)
+        return chosen
+
+    def mesh(self, r: random.Random, wanted: Callable | None = None) -> bpy.types.Object:
         """Often the last chosen one, since faults result from several operations on one object."""
         choices = [o for o in self.meshes() if wanted is None or wanted(o)]
         again = next((o for o in choices if o.name == self.chosen), None)
         chosen = self.one(r, choices)
         if again is not None and r.random() < 0.5:
             chosen = again
-        if chosen is not None:
-            self.chosen = chosen.name
+        self.chosen = chosen.name
         return chosen
 
-    def skinned(self, r: random.Random) -> bpy.types.Object | None:
+    def skinned(self, r: random.Random) -> bpy.types.Object:
         return self.mesh(r, lambda o: bool(armature_modifiers(o)))
 
-    def with_sinew(self, r: random.Random) -> bpy.types.Object | None:
+    def with_sinew(self, r: random.Random) -> bpy.types.Object:
         return self.mesh(r, self.side.has_sinew)
 
-    def editable(self, r: random.Random) -> bpy.types.Object | None:
+    def editable(self, r: random.Random) -> bpy.types.Object:
         """Objects with a mesh that can be edited."""
         return self.mesh(r, self.is_editable)
 
@@ -167,7 +187,7 @@ class Walker:
     def is_editable(obj: bpy.types.Object) -> bool:
         return obj.data.library is None and obj.override_library is None
 
-    def armature(self, r: random.Random) -> bpy.types.Object | None:
+    def armature(self, r: random.Random) -> bpy.types.Object:
         return self.one(r, self.armatures())
 
     # --- Actions
@@ -345,8 +365,6 @@ def add(w: Walker, r: random.Random) -> str | None:
             and any(m.object for m in armature_modifiers(o))
         ),
     )
-    if obj is None:
-        return None
     method, leave = r.choice((None, _method(r))), r.random() < 0.15
     w.object_mode()
     if not any(m.show_viewport or m.show_render for m in armature_modifiers(obj)):
@@ -363,8 +381,6 @@ def add(w: Walker, r: random.Random) -> str | None:
 @operation(2)
 def remove(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None and w.may_lose_sinew(o))
-    if obj is None:
-        return None
     w.object_mode()
     w.side.remove(obj)
     return f"Sinew off {obj.name}"
@@ -387,8 +403,6 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
 @operation(6)
 def method(w: Walker, r: random.Random) -> str | None:
     obj, name = w.mesh(r, lambda o: w.side.has_sinew(o) and not w.side.is_method_keyed(o)), _method(r)
-    if obj is None:
-        return None
     w.side.set_method(obj, name)
     return f"{obj.name} by {name}"
 
@@ -398,8 +412,6 @@ def stages(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, w.side.has_sinew)
     # Without them the shape is Blender's.
     number = r.randrange(1, len(STAGES)) if r.random() < 0.5 else 0
-    if obj is None:
-        return None
     w.side.set_stages(obj, number)
     return f"{obj.name}: stages {STAGES[number] or 'off'}"
 
@@ -408,8 +420,6 @@ def stages(w: Walker, r: random.Random) -> str | None:
 def parameters(w: Walker, r: random.Random) -> str | None:
     """Parameters of methods: changes are visible where the method is used."""
     obj, value = w.mesh(r, w.side.has_sinew), r.choice(("nlerp", "slerp"))
-    if obj is None:
-        return None
     # Sinew evaluates immediately, and with it what was changed before.
     w.before_evaluation()
     bpy.context.view_layer.update()
@@ -431,10 +441,8 @@ def compute_beside(w: Walker, r: random.Random) -> str | None:
 def sdef_keys(w: Walker, r: random.Random) -> str | None:
     """Data as mmd_tools stores it."""
     obj = w.editable(r)
-    if obj is None or obj.data.library is not None or obj.mode != "OBJECT" or w.users(obj.data) > 1:
-        return None
-    if obj.data.shape_keys is not None and len(obj.data.shape_keys.key_blocks) > 4:
-        return None
+    w.skip_if(obj.data.library is not None or obj.mode != "OBJECT" or w.users(obj.data) > 1)
+    w.skip_if(obj.data.shape_keys is not None and len(obj.data.shape_keys.key_blocks) > 4)
     if obj.data.shape_keys is None:
         obj.shape_key_add(name="Basis")
     for name in ("mmd_sdef_c", "mmd_sdef_r0", "mmd_sdef_r1"):
@@ -448,8 +456,6 @@ def sdef_keys(w: Walker, r: random.Random) -> str | None:
 @operation(4)
 def enabled(w: Walker, r: random.Random) -> str | None:
     obj = w.with_sinew(r)
-    if obj is None:
-        return None
     on = not w.side.is_on(obj) or r.random() < 0.1
     w.side.set_enabled(obj, on)
     return f"{obj.name} {'on' if on else 'off'}"
@@ -476,8 +482,6 @@ def icons(w: Walker, r: random.Random) -> str | None:
         ),
     )
     clicks = [(r.choice(("Sinew", "Armature")), r.choice(VIEWS)) for _click in range(r.randint(1, 6))]
-    if obj is None:
-        return None
     w.object_mode()
     # One that is left to Blender has a meaning of its own for them.
     w.side.set_option(obj, "leave_small", False)
@@ -512,8 +516,6 @@ def icons(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def rebind(w: Walker, r: random.Random) -> str | None:
     obj = w.with_sinew(r)
-    if obj is None:
-        return None
     w.side.rebind(obj)
     return f"rebind {obj.name}"
 
@@ -521,8 +523,6 @@ def rebind(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def scale_rule(w: Walker, r: random.Random) -> str | None:
     obj, number = w.with_sinew(r), r.randrange(3)
-    if obj is None:
-        return None
     if w.side.is_sinew:
         rules = [item.identifier for item in obj.sinew.bl_rna.properties["scale_rule"].enum_items]
         obj.sinew.scale_rule = rules[number]
@@ -534,8 +534,6 @@ def scale_rule(w: Walker, r: random.Random) -> str | None:
 @operation(1.5)
 def leave_small(w: Walker, r: random.Random) -> str | None:
     obj, on = w.with_sinew(r), r.random() < 0.4
-    if obj is None:
-        return None
     w.side.set_option(obj, "leave_small", on)
     return f"{obj.name}: {'left to Blender where faster' if on else 'never left to Blender'}"
 
@@ -543,8 +541,6 @@ def leave_small(w: Walker, r: random.Random) -> str | None:
 @operation(1.5)
 def give_normals(w: Walker, r: random.Random) -> str | None:
     obj, who = w.with_sinew(r), r.choice(("AS_BLENDER", "AS_BLENDER", "SKINNED", "LEAVE"))
-    if obj is None:
-        return None
     w.side.set_option(obj, "normals", who)
     return f"{obj.name}: normals {who}"
 
@@ -552,8 +548,6 @@ def give_normals(w: Walker, r: random.Random) -> str | None:
 @operation(3)
 def shade(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None and not o.data.is_editmode)
-    if obj is None:
-        return None
     mesh, what = obj.data, r.choice(("smooth", "smooth", "flat", "edges", "faces", "custom"))
     if what in ("smooth", "flat"):
         mesh.polygons.foreach_set("use_smooth", [what == "smooth"] * len(mesh.polygons))
@@ -570,8 +564,6 @@ def shade(w: Walker, r: random.Random) -> str | None:
 @operation(2)
 def heat(w: Walker, r: random.Random) -> str | None:
     obj, on, quantity = w.with_sinew(r), r.random() < 0.5, r.choice(("stretch", "distance", "bulge"))
-    if obj is None:
-        return None
     w.side.set_heat(obj, on, quantity)
     return f"{obj.name}: heat map {quantity if on else 'off'}"
 
@@ -588,8 +580,7 @@ def compare(w: Walker, r: random.Random) -> str | None:
         ),
     )
     methods = r.sample((*METHODS, "blender"), r.randint(1, 2))
-    if obj is None or not obj.visible_get():
-        return None
+    w.skip_if(not obj.visible_get())
     w.object_mode()
     w.side.start_comparison([obj], methods)
     # Its copies share the mesh, which some operations refuse.
@@ -622,8 +613,7 @@ def _character(w: Walker, r: random.Random) -> bpy.types.Object | None:
     # As in a window between two clicks: by then Sinew knows a modifier's armature.
     w.before_evaluation()
     bpy.context.view_layer.update()
-    if not all(_has_its_armatures(obj) for obj in w.objects("MESH") if w.side.has_sinew(obj)):
-        return None
+    w.skip_if(not all(_has_its_armatures(obj) for obj in w.objects("MESH") if w.side.has_sinew(obj)))
     rigs = [rig for rig in w.armatures() if rig.visible_get()]
     meshes = {rig: w.side.character(rig) for rig in rigs}
     return w.one(r, [rig for rig in rigs if meshes[rig] and all(map(is_free, meshes[rig]))])
@@ -638,8 +628,7 @@ def _has_its_armatures(obj: bpy.types.Object) -> bool:
 @operation(1.5)
 def character_method(w: Walker, r: random.Random) -> str | None:
     rig, name = _character(w, r), _method(r)
-    if rig is None or not w.select(rig):
-        return None
+    w.skip_if(not w.select(rig))
     w.side.set_character_method(rig, name)
     return f"the character of {rig.name} by {name}"
 
@@ -647,9 +636,8 @@ def character_method(w: Walker, r: random.Random) -> str | None:
 @operation(1.5)
 def own_settings(w: Walker, r: random.Random) -> str | None:
     rig = _character(w, r)
-    obj = w.one(r, w.side.character(rig)) if rig is not None else None
-    if obj is None or obj not in w.in_layer() or not w.select(obj):
-        return None
+    obj = w.one(r, w.side.character(rig))
+    w.skip_if(obj not in w.in_layer() or not w.select(obj))
     w.side.switch_own(rig, obj)
     return f"{obj.name} {'keeps settings of its own' if w.side.is_own(obj) else 'follows its character'}"
 
@@ -657,8 +645,7 @@ def own_settings(w: Walker, r: random.Random) -> str | None:
 @operation(0.7)
 def preset(w: Walker, r: random.Random) -> str | None:
     rig = _character(w, r)
-    if rig is None or not w.select(rig):
-        return None
+    w.skip_if(not w.select(rig))
     w.side.use_preset(rig, w.folder)
     return f"a preset for the character of {rig.name}"
 
@@ -670,11 +657,9 @@ def preset(w: Walker, r: random.Random) -> str | None:
 def mend(w: Walker, r: random.Random) -> str | None:
     """Findings of diagnostics in the weights."""
     obj, how, most = w.editable(r), r.choice(("limit", "limit", "normalize", "fill")), r.choice((1, 2, 3))
-    if obj is None or obj.mode != "OBJECT" or obj.data.is_editmode or obj.parent_type == "ARMATURE":
-        return None
+    w.skip_if(obj.mode != "OBJECT" or obj.data.is_editmode or obj.parent_type == "ARMATURE")
     modifiers = armature_modifiers(obj)
-    if len(modifiers) != 1 or modifiers[0].object is None or modifiers[0].object.data.is_editmode:
-        return None
+    w.skip_if(len(modifiers) != 1 or modifiers[0].object is None or modifiers[0].object.data.is_editmode)
     w.before_evaluation()
     bpy.context.view_layer.update()
     found = w.side.mend(obj, how, most)
@@ -698,8 +683,7 @@ def _and_undo(w: Walker, r: random.Random, act: Callable[[], object]) -> None:
 @operation(0.5)
 def bake_to_bones(w: Walker, r: random.Random) -> str | None:
     obj, motion = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.choice(("keys", "pose"))
-    if obj is None or w.compared:
-        return None
+    w.skip_if(w.compared)
     is_alone = len(w.modifiers(obj)) == 1
     name = obj.name
     _and_undo(w, r, lambda: w.side.bake_to_bones(obj, motion, is_alone))
@@ -709,10 +693,9 @@ def bake_to_bones(w: Walker, r: random.Random) -> str | None:
 @operation(0.5)
 def corrective_key(w: Walker, r: random.Random) -> str | None:
     obj, driven = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.random() < 0.5
-    if obj is None or w.compared:
-        return None
+    w.skip_if(w.compared)
     rig = next((m.object for m in armature_modifiers(obj) if m.object is not None), None)
-    bone = w.one(r, rig.pose.bones) if driven and rig is not None else None
+    bone = w.one_or_none(r, rig.pose.bones) if driven and rig is not None else None
     name = obj.name
     _and_undo(w, r, lambda: w.side.add_corrective_key(obj, bone))
     return f"a corrective shape key of {name}, and undo"
@@ -735,8 +718,7 @@ def restart(w: Walker, r: random.Random) -> str | None:
 def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
     # Blender's own button does not remove objects of a library from an override.
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None and w.may_lose_sinew(o))
-    if obj is None or not w.side.is_on(obj):
-        return None
+    w.skip_if(not w.side.is_on(obj))
     w.side.delete_part(obj, "modifier")
     return f"delete Sinew's modifier of {obj.name}"
 
@@ -746,8 +728,7 @@ def delete_points(w: Walker, r: random.Random) -> str | None:
     """What Sinew made for a mesh, and makes again."""
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.mode == "OBJECT" and o.data.library is None)
     part = r.choice(("attribute", "attribute", "driver", "nodes", "links", "sockets", "socket", "group"))
-    if obj is None or (part != "attribute" and obj.override_library is not None):
-        return None
+    w.skip_if(part != "attribute" and obj.override_library is not None)
     if w.side.is_sinew:
         w.side.delete_part(obj, part)
     return f"delete Sinew's {part} of {obj.name}"
@@ -766,8 +747,6 @@ def key_method(w: Walker, r: random.Random) -> str | None:
         ),
     )
     frames = sorted(r.sample(range(1, 12), 2))
-    if obj is None:
-        return None
     w.side.key_method(obj, [(frames[0], r.choice(OF_BLENDER)), (frames[1], r.choice(OF_BLENDER))])
     w.this_frame()
     return f"key the method of {obj.name} at {frames}"
@@ -778,8 +757,7 @@ def unkey_method(w: Walker, r: random.Random) -> str | None:
     # A linked duplicate has the same keys, and on the other side a mark of its own.
     obj = w.mesh(r, lambda o: w.side.is_method_keyed(o) and not w.shares_action(o))
     name = r.choice(OF_BLENDER)
-    if obj is None or not w.side.has_sinew(obj):
-        return None
+    w.skip_if(not w.side.has_sinew(obj))
     w.side.unkey_method(obj, name)
     return f"no keys on the method of {obj.name}, {name}"
 
@@ -831,9 +809,7 @@ def _turn(r: random.Random) -> Euler:
 @operation(6)
 def pose(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    bone = w.one(r, rig.pose.bones) if rig is not None else None
-    if bone is None:
-        return None
+    bone = w.one(r, rig.pose.bones)
     bone.rotation_mode = "XYZ"
     bone.rotation_euler = _turn(r)
     if r.random() < 0.3:
@@ -844,9 +820,7 @@ def pose(w: Walker, r: random.Random) -> str | None:
 @operation(0.5)
 def pose_scale(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    bone = w.one(r, rig.pose.bones) if rig is not None else None
-    if bone is None:
-        return None
+    bone = w.one(r, rig.pose.bones)
     bone.scale = r.choice(((1, 1, 1), (1.3, 0.8, 1.1)))
     return f"scale {bone.name} of {rig.name}: {tuple(bone.scale)}"
 
@@ -854,9 +828,7 @@ def pose_scale(w: Walker, r: random.Random) -> str | None:
 @operation(2)
 def key_pose(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    bone = w.one(r, rig.pose.bones) if rig is not None else None
-    if bone is None:
-        return None
+    bone = w.one(r, rig.pose.bones)
     number = r.randint(*FRAMES)
     bone.rotation_mode = "XYZ"
     bone.rotation_euler = _turn(r)
@@ -868,8 +840,6 @@ def key_pose(w: Walker, r: random.Random) -> str | None:
 @operation(0.6)
 def rest_position(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    if rig is None:
-        return None
     rig.data.pose_position = "REST" if rig.data.pose_position == "POSE" else "POSE"
     return f"{rig.name} in {rig.data.pose_position} position"
 
@@ -877,8 +847,6 @@ def rest_position(w: Walker, r: random.Random) -> str | None:
 @operation(0.7)
 def clear_animation(w: Walker, r: random.Random) -> str | None:
     obj = w.one(r, [*w.armatures(), *(o for o in w.meshes() if not w.side.is_method_keyed(o))])
-    if obj is None:
-        return None
     if obj.type == "ARMATURE":
         obj.animation_data_clear()
     else:
@@ -890,9 +858,8 @@ def clear_animation(w: Walker, r: random.Random) -> str | None:
 def push_action(w: Walker, r: random.Random) -> str | None:
     """Moves it into a strip, as for layers of animation."""
     rig = w.armature(r)
-    animation = rig.animation_data if rig is not None else None
-    if animation is None or animation.action is None or rig.override_library is not None:
-        return None
+    animation = rig.animation_data
+    w.skip_if(animation is None or animation.action is None or rig.override_library is not None)
     action, slot = animation.action, getattr(animation, "action_slot", None)
     strip = animation.nla_tracks.new().strips.new(w.new_name("strip"), 1, action)
     if slot is not None:
@@ -905,7 +872,7 @@ def push_action(w: Walker, r: random.Random) -> str | None:
 @operation(0.7)
 def constrain_bone(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    bone = w.one(r, rig.pose.bones) if rig is not None else None
+    bone = w.one(r, rig.pose.bones)
     target = w.one(r, [a for a in w.armatures() if a != rig])
     if (
         bone is None
@@ -918,8 +885,6 @@ def constrain_bone(w: Walker, r: random.Random) -> str | None:
         bone.constraints.remove(of_artist[0])
         return f"take the constraint off {bone.name} of {rig.name}"
     other = w.one(r, target.pose.bones)
-    if other is None:
-        return None
     constraint = bone.constraints.new("COPY_ROTATION")
     constraint.target, constraint.subtarget, constraint.influence = target, other.name, 0.5
     return f"{bone.name} of {rig.name} copies half the rotation of {other.name} of {target.name}"
@@ -932,12 +897,9 @@ def constrain_bone(w: Walker, r: random.Random) -> str | None:
 def ik_chain(w: Walker, r: random.Random) -> str | None:
     """A chain of bones starts or stops following a target."""
     rig = w.armature(r)
-    if rig is None or rig.override_library is not None or rig.data.is_editmode:
-        return None
+    w.skip_if(rig.override_library is not None or rig.data.is_editmode)
     bone, length = w.one(r, [bone for bone in rig.pose.bones if bone.parent is not None]), r.choice((0, 2))
     place = [r.uniform(-1, 2) for _axis in range(3)]
-    if bone is None:
-        return None
     there = next((c for c in bone.constraints if c.type == "IK"), None)
     if there is not None:
         bone.constraints.remove(there)
@@ -955,8 +917,6 @@ def move_target(w: Walker, r: random.Random) -> str | None:
     target = w.one(r, [o for o in w.objects("EMPTY") if o.name.startswith(TARGET) and o.library is None])
     frame = r.choice((None, r.randint(*FRAMES)))
     place = [r.uniform(-1, 2) for _axis in range(3)]
-    if target is None:
-        return None
     target.location = place
     if frame is None:
         return f"{target.name} moves"
@@ -971,8 +931,6 @@ def move_target(w: Walker, r: random.Random) -> str | None:
 @operation(3)
 def move_object(w: Walker, r: random.Random) -> str | None:
     obj = w.one(r, [*w.meshes(), *w.armatures()])
-    if obj is None:
-        return None
     obj.location = [r.uniform(-1, 1) for _axis in range(3)]
     if r.random() < 0.3:
         obj.rotation_euler = _turn(r)
@@ -984,8 +942,7 @@ def move_object(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def key_object(w: Walker, r: random.Random) -> str | None:
     obj = w.one(r, [*w.meshes(), *w.armatures()])
-    if obj is None or obj.override_library is not None:
-        return None
+    w.skip_if(obj.override_library is not None)
     for number in r.sample(range(1, 12), 2):
         obj.location = [r.uniform(-1, 1) for _axis in range(3)]
         obj.keyframe_insert("location", frame=number)
@@ -1012,8 +969,6 @@ def no_size(w: Walker, r: random.Random) -> str | None:
     obj = w.one(r, [o for o in (*w.meshes(), *w.armatures()) if o.override_library is None])
     scale = r.choice(((0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (float("nan"), 1.0, 1.0), (1.0, float("inf"), 1.0)))
     number, others = r.randint(*FRAMES), r.sample(range(FRAMES[0], FRAMES[1] + 1), 2)
-    if obj is None:
-        return None
     w.object_mode()
     before, found = obj.scale[:], []
     for other in others:
@@ -1044,10 +999,7 @@ def no_size(w: Walker, r: random.Random) -> str | None:
 def parent(w: Walker, r: random.Random) -> str | None:
     obj, rig = w.mesh(r), w.armature(r)
     kind = r.choice(("none", "OBJECT", "OBJECT", "BONE", "ARMATURE"))
-    if obj is None or rig is None or obj.override_library is not None:
-        return None
-    if kind == "ARMATURE" and w.side.has_sinew(obj) is False and w.side.is_sinew is None:
-        return None
+    w.skip_if(obj.override_library is not None)
     obj.parent = None if kind == "none" else rig
     if kind == "none":
         obj.parent_type = "OBJECT"
@@ -1056,7 +1008,7 @@ def parent(w: Walker, r: random.Random) -> str | None:
         return f"{obj.name} without a parent"
     obj.parent_type = kind
     if kind == "BONE":
-        bone = w.one(r, rig.data.bones)
+        bone = w.one_or_none(r, rig.data.bones)
         obj.parent_bone = bone.name if bone is not None else ""
     return f"parent {obj.name} to {rig.name}, {kind}"
 
@@ -1066,9 +1018,8 @@ def parent_as_artists_do(w: Walker, r: random.Random) -> str | None:
     """The command adds an Armature modifier to a mesh if none of its own points to the armature, such as
     those that Sinew has cleared."""
     obj, rig = w.mesh(r, lambda o: not w.side.has_sinew(o)), w.armature(r)
-    is_plain = obj is not None and obj.override_library is None and obj.parent_type != "ARMATURE"
-    if not is_plain or rig is None or len(w.modifiers(obj)) > 5 or not w.select(obj, rig):
-        return None
+    is_plain = obj.override_library is None and obj.parent_type != "ARMATURE"
+    w.skip_if(not is_plain or len(w.modifiers(obj)) > 5 or not w.select(obj, rig))
     before = len(armature_modifiers(obj))
     bpy.ops.object.parent_set(type="ARMATURE")
     for modifier in armature_modifiers(obj)[before:]:
@@ -1094,9 +1045,7 @@ def _show_weights(obj: bpy.types.Object) -> None:
 @operation(8)
 def weights(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.data.override_library is None)
-    group = w.one(r, obj.vertex_groups) if obj is not None else None
-    if group is None:
-        return None
+    group = w.one(r, obj.vertex_groups)
     vertices = _vertices(w, r, obj)
     if r.random() < 0.3:
         group.remove(vertices)
@@ -1112,8 +1061,7 @@ def weights(w: Walker, r: random.Random) -> str | None:
 @operation(3)
 def paint_weights(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
-    if obj is None or not obj.vertex_groups or not w.select(obj):
-        return None
+    w.skip_if(not obj.vertex_groups or not w.select(obj))
     w.push_undo()
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     # As in a window: tools need the armature of the modifiers, which Sinew restores meanwhile.
@@ -1137,9 +1085,7 @@ def paint_weights(w: Walker, r: random.Random) -> str | None:
 @operation(2)
 def groups(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.override_library is None)
-    if obj is None:
-        return None
-    group, what = w.one(r, obj.vertex_groups), r.choice(("new", "rename", "delete", "move", "bone"))
+    group, what = w.one_or_none(r, obj.vertex_groups), r.choice(("new", "rename", "delete", "move", "bone"))
     if what == "new" or group is None:
         made = obj.vertex_groups.new(name=w.new_name("group"))
         made.add(_vertices(w, r, obj), r.random(), "REPLACE")
@@ -1164,8 +1110,7 @@ def groups(w: Walker, r: random.Random) -> str | None:
         # Blender 4.2 by itself continues with the old groups.
         obj.data.update()
         return f"delete group {name} of {obj.name}"
-    if not w.select(obj):
-        return None
+    w.skip_if(not w.select(obj))
     obj.vertex_groups.active_index = group.index
     bpy.ops.object.vertex_group_sort(sort_type="NAME")
     return f"sort the groups of {obj.name}"
@@ -1177,8 +1122,7 @@ def groups(w: Walker, r: random.Random) -> str | None:
 @operation(4)
 def edit_mesh(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
-    if obj is None or not w.select(obj):
-        return None
+    w.skip_if(not w.select(obj))
     what = r.choice(("move", "move", "delete", "extrude", "subdivide", "nothing"))
     w.edit_mode()
     mesh = bmesh.from_edit_mesh(obj.data)
@@ -1215,8 +1159,7 @@ def leave_mode(w: Walker, r: random.Random) -> str | None:
 @operation(0.5)
 def sculpt_mode(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
-    if obj is None or not w.select(obj):
-        return None
+    w.skip_if(not w.select(obj))
     w.push_undo()
     bpy.ops.object.mode_set(mode="SCULPT")
     if r.random() < 0.5:
@@ -1227,8 +1170,6 @@ def sculpt_mode(w: Walker, r: random.Random) -> str | None:
 @operation(4)
 def move_vertices(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None and not o.data.is_editmode)
-    if obj is None:
-        return None
     for index in _vertices(w, r, obj):
         obj.data.vertices[index].co += Vector([r.uniform(-0.1, 0.1) for _axis in range(3)])
     obj.data.update()
@@ -1238,8 +1179,6 @@ def move_vertices(w: Walker, r: random.Random) -> str | None:
 @operation(0.7)
 def rename_mesh(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None)
-    if obj is None:
-        return None
     obj.data.name = w.new_name("mesh")
     return f"rename the mesh of {obj.name} to {obj.data.name}"
 
@@ -1247,8 +1186,7 @@ def rename_mesh(w: Walker, r: random.Random) -> str | None:
 @operation(0.8)
 def swap_mesh(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.mode == "OBJECT" and o.override_library is None and not o.data.is_editmode)
-    if obj is None or obj.data.library is not None:
-        return None
+    w.skip_if(obj.data.library is not None)
     mesh = obj.data.copy()
     mesh.name = w.new_name("mesh")
     obj.data = mesh
@@ -1260,8 +1198,7 @@ def share_mesh(w: Walker, r: random.Random) -> str | None:
     meshes = [
         o for o in w.meshes() if o.mode == "OBJECT" and o.override_library is None and not o.data.is_editmode
     ]
-    if len(meshes) < 2 or not w.select(*r.sample(meshes, 2)):
-        return None
+    w.skip_if(len(meshes) < 2 or not w.select(*r.sample(meshes, 2)))
     bpy.ops.object.make_links_data(type="OBDATA")
     return "link the mesh to another object"
 
@@ -1272,8 +1209,7 @@ def join(w: Walker, r: random.Random) -> str | None:
     others = [o for o in w.meshes() if not w.side.has_sinew(o) and o.override_library is None]
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
     other = w.one(r, [o for o in others if o != obj and w.users(o.data) == 1])
-    if obj is None or other is None or len(obj.data.vertices) > 200 or not w.select(other, obj):
-        return None
+    w.skip_if(len(obj.data.vertices) > 200 or not w.select(other, obj))
     name = other.name
     bpy.ops.object.join()
     return f"join {name} into {obj.name}"
@@ -1283,10 +1219,8 @@ def join(w: Walker, r: random.Random) -> str | None:
 def separate(w: Walker, r: random.Random) -> str | None:
     """Separates a part of a mesh into a new object that keeps all of the old object's data."""
     obj = w.editable(r)
-    if obj is None or len(w.meshes()) > 6 or w.users(obj.data) > 1 or len(obj.data.vertices) < 20:
-        return None
-    if not w.select(obj):
-        return None
+    w.skip_if(len(w.meshes()) > 6 or w.users(obj.data) > 1 or len(obj.data.vertices) < 20)
+    w.skip_if(not w.select(obj))
     before = set(bpy.data.objects)
     w.edit_mode()
     mesh = bmesh.from_edit_mesh(obj.data)
@@ -1305,9 +1239,8 @@ def separate(w: Walker, r: random.Random) -> str | None:
 def remesh(w: Walker, r: random.Random) -> str | None:
     """Another mesh without weights."""
     obj = w.editable(r)
-    is_plain = obj is not None and w.users(obj.data) == 1 and obj.data.shape_keys is None
-    if not is_plain or w.compared or not w.select(obj):
-        return None
+    is_plain = w.users(obj.data) == 1 and obj.data.shape_keys is None
+    w.skip_if(not is_plain or w.compared or not w.select(obj))
     obj.data.remesh_voxel_size = 0.15
     bpy.ops.object.voxel_remesh()
     return f"remesh {obj.name}"
@@ -1317,8 +1250,7 @@ def remesh(w: Walker, r: random.Random) -> str | None:
 def replace_mesh(w: Walker, r: random.Random) -> str | None:
     """Changes it in all that have it, like scripts that update a mesh."""
     obj = w.editable(r)
-    if obj is None or obj.data.is_editmode or obj.mode != "OBJECT":
-        return None
+    w.skip_if(obj.data.is_editmode or obj.mode != "OBJECT")
     old = obj.data
     new = old.copy()
     old.user_remap(new)
@@ -1330,8 +1262,7 @@ def replace_mesh(w: Walker, r: random.Random) -> str | None:
 @operation(0.5)
 def apply_transform(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
-    if obj is None or w.users(obj.data) > 1 or w.compared or not w.select(obj):
-        return None
+    w.skip_if(w.users(obj.data) > 1 or w.compared or not w.select(obj))
     # As the window offers where Sinew evaluates upstream modifiers separately: two objects have the mesh
     # then.
     bpy.ops.object.transform_apply(isolate_users=True)
@@ -1343,8 +1274,7 @@ def apply_transform(w: Walker, r: random.Random) -> str | None:
 def apply_pose(w: Walker, r: random.Random) -> str | None:
     """Applied as the rest pose."""
     rig = w.armature(r)
-    if rig is None or rig.override_library is not None or rig.data.users > 1 or not w.select(rig):
-        return None
+    w.skip_if(rig.override_library is not None or rig.data.users > 1 or not w.select(rig))
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.pose.armature_apply(selected=False)
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -1358,8 +1288,7 @@ def apply_pose(w: Walker, r: random.Random) -> str | None:
 @operation(0.3)
 def replace_armature_data(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    if rig is None or rig.override_library is not None or rig.data.is_editmode:
-        return None
+    w.skip_if(rig.override_library is not None or rig.data.is_editmode)
     rig.data = rig.data.copy()
     rig.data.name = w.new_name("armature")
     return f"{rig.name} has bones of its own"
@@ -1371,10 +1300,10 @@ def replace_armature_data(w: Walker, r: random.Random) -> str | None:
 @operation(1.5)
 def rename_bone(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    bone = w.one(r, rig.data.bones) if rig is not None and rig.override_library is None else None
+    w.skip_if(rig.override_library is not None)
+    bone = w.one(r, rig.data.bones)
     # Blender also renames groups of the mesh, which a comparison's copies share.
-    if bone is None or w.compared:
-        return None
+    w.skip_if(w.compared)
     old, bone.name = bone.name, w.new_name("bone")
     return f"rename bone {old} to {bone.name}"
 
@@ -1382,14 +1311,13 @@ def rename_bone(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def edit_bones(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    if rig is None or rig.override_library is not None or not w.select(rig):
-        return None
+    w.skip_if(rig.override_library is not None or not w.select(rig))
     what = r.choice(("delete", "new", "move", "rename", "roll"))
     if what == "rename" and w.compared:
         what = "roll"
     w.edit_mode()
     bones = rig.data.edit_bones
-    bone = w.one(r, bones)
+    bone = w.one_or_none(r, bones)
     if what == "new" or bone is None:
         made = bones.new(w.new_name("bone"))
         made.head, made.tail = (0.5, 0.0, 0.3), (0.5, 0.0, 1.0)
@@ -1412,9 +1340,8 @@ def edit_bones(w: Walker, r: random.Random) -> str | None:
 @operation(1.5)
 def bone_options(w: Walker, r: random.Random) -> str | None:
     rig = w.armature(r)
-    bone = w.one(r, rig.data.bones) if rig is not None and rig.override_library is None else None
-    if bone is None:
-        return None
+    w.skip_if(rig.override_library is not None)
+    bone = w.one(r, rig.data.bones)
     what = r.choice(("deform", "segments", "envelope", "inherit"))
     if what == "deform":
         bone.use_deform = not bone.use_deform
@@ -1492,19 +1419,14 @@ def _set_up(
 def add_modifier(w: Walker, r: random.Random) -> str | None:
     obj, rig = w.mesh(r), w.armature(r)
     kind, front = r.choice(KINDS), r.random() < 0.4
-    if obj is None or len(w.modifiers(obj)) > 5:
-        return None
+    w.skip_if(len(w.modifiers(obj)) > 5)
     once = ("SUBSURF", "MIRROR", "SOLIDIFY", *IN_FRONT)
-    if kind in once and any(m.type == kind for m in w.modifiers(obj)):
-        return None
+    w.skip_if(kind in once and any(m.type == kind for m in w.modifiers(obj)))
     front |= kind in IN_FRONT
-    if kind in ("HOOK", *IN_FRONT) and (obj.override_library is not None or not obj.vertex_groups):
-        return None
-    if kind == "DECIMATE" and obj.data.get(SHAPED):
-        return None
+    w.skip_if(kind in ("HOOK", *IN_FRONT) and (obj.override_library is not None or not obj.vertex_groups))
+    w.skip_if(kind == "DECIMATE" and obj.data.get(SHAPED))
     modifier = obj.modifiers.new(w.new_name(kind.title()), kind)
-    if modifier is None:
-        return None
+    w.skip_if(modifier is None)
     if kind == "TRIANGULATE":
         # Where both diagonals of a quad are as long, rounding would choose one.
         modifier.quad_method = "FIXED"
@@ -1523,8 +1445,6 @@ def hair(w: Walker, r: random.Random) -> str | None:
     """Hair on a mesh. Its roots can be elsewhere behind Sinew, which has to say so; the mesh is the same."""
     obj = w.mesh(r, lambda o: w.is_editable(o) and o.mode == "OBJECT" and not o.data.is_editmode)
     source = r.choice(("VERT", "FACE"))
-    if obj is None:
-        return None
     there = next((m for m in w.modifiers(obj) if m.type == "PARTICLE_SYSTEM"), None)
     if there is not None:
         obj.modifiers.remove(there)
@@ -1540,8 +1460,7 @@ def hair(w: Walker, r: random.Random) -> str | None:
 def move_modifier(w: Walker, r: random.Random) -> str | None:
     """Moves it to just before or after another one of the artist's; Sinew's is not counted."""
     obj = w.mesh(r, lambda o: len(w.modifiers(o)) > 1 and o.override_library is None)
-    if obj is None or any(m.type in IN_FRONT for m in w.modifiers(obj)):
-        return None
+    w.skip_if(any(m.type in IN_FRONT for m in w.modifiers(obj)))
     here, there = r.sample(w.modifiers(obj), 2)
     names = [m.name for m in obj.modifiers]
     obj.modifiers.move(names.index(here.name), names.index(there.name))
@@ -1552,13 +1471,9 @@ def move_modifier(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def delete_modifier(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None and w.may_lose_sinew(o))
-    if obj is None:
-        return None
     # Rarely the last Armature modifier, since few operations remain for an object without any.
     candidates = [m for m in w.modifiers(obj) if m.type != "ARMATURE" or r.random() < 0.3]
     modifier = w.one(r, candidates)
-    if modifier is None:
-        return None
     name = modifier.name
     if modifier.type == "ARMATURE":
         w.side.delete_part(obj, "armature modifier")
@@ -1569,8 +1484,6 @@ def delete_modifier(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def rename_modifier(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None)
-    if obj is None:
-        return None
     modifier = w.one(r, w.modifiers(obj))
     old, modifier.name = modifier.name, w.new_name("modifier")
     return f"rename modifier {old} of {obj.name} to {modifier.name}"
@@ -1580,11 +1493,7 @@ def rename_modifier(w: Walker, r: random.Random) -> str | None:
 def toggle_modifier(w: Walker, r: random.Random) -> str | None:
     """Excludes those that Sinew has replaced, whose flags it stores."""
     obj = w.mesh(r)
-    if obj is None:
-        return None
     modifier = w.one(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE" or not w.side.has_sinew(obj)])
-    if modifier is None:
-        return None
     on = not modifier.show_viewport
     modifier.show_viewport = on
     if r.random() < 0.6:
@@ -1595,14 +1504,12 @@ def toggle_modifier(w: Walker, r: random.Random) -> str | None:
 @operation(2)
 def armature_options(w: Walker, r: random.Random) -> str | None:
     obj = w.skinned(r)
-    if obj is None:
-        return None
     modifier = w.one(r, armature_modifiers(obj))
     what = r.choice(("multi", "mask", "mask", "invert", "envelopes", "groups", "volume"))
     if what == "multi":
         modifier.use_multi_modifier = not modifier.use_multi_modifier
     elif what == "mask":
-        group = w.one(r, obj.vertex_groups) if r.random() < 0.6 else None
+        group = w.one_or_none(r, obj.vertex_groups) if r.random() < 0.6 else None
         modifier.vertex_group = group.name if group is not None else ""
     elif what == "invert":
         modifier.invert_vertex_group = not modifier.invert_vertex_group
@@ -1621,9 +1528,7 @@ def armature_options(w: Walker, r: random.Random) -> str | None:
 @operation(0.7)
 def key_modifier(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.override_library is None and not w.shares_action(o))
-    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type in ("CAST", "SMOOTH")]) if obj else None
-    if modifier is None:
-        return None
+    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type in ("CAST", "SMOOTH")])
     frames = sorted(r.sample(range(1, 12), 2))
     key(obj, modifier.path_from_id("factor"), [(frames[0], r.random()), (frames[1], r.random())])
     w.this_frame()
@@ -1633,8 +1538,7 @@ def key_modifier(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def another_armature(w: Walker, r: random.Random) -> str | None:
     obj, rig = w.skinned(r), w.armature(r)
-    if obj is None or rig is None or obj.override_library is not None:
-        return None
+    w.skip_if(obj.override_library is not None)
     modifier = w.one(r, armature_modifiers(obj))
     modifier.object = rig
     return f"{modifier.name} of {obj.name} has {rig.name}"
@@ -1643,8 +1547,7 @@ def another_armature(w: Walker, r: random.Random) -> str | None:
 @operation(0.7)
 def key_visibility(w: Walker, r: random.Random) -> str | None:
     obj = w.skinned(r)
-    if obj is None or obj.override_library is not None:
-        return None
+    w.skip_if(obj.override_library is not None)
     modifier = w.one(r, armature_modifiers(obj))
     path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
     frames = sorted(r.sample(range(1, 12), 2))
@@ -1660,8 +1563,7 @@ def drive_visibility(w: Walker, r: random.Random) -> str | None:
     """Sets or removes drivers by an armature's position. Not by a bone's: what follows a bone that was in
     edit mode, Blender does not update until something else changes."""
     obj, rig = w.skinned(r), w.armature(r)
-    if obj is None or rig is None or obj.override_library is not None:
-        return None
+    w.skip_if(obj.override_library is not None)
     modifier = w.one(r, armature_modifiers(obj))
     paths = [modifier.path_from_id(f"show_{where}") for where in ("viewport", "render")]
     # A driver can not set what a curve sets.
@@ -1692,10 +1594,8 @@ def copy_modifiers(w: Walker, r: random.Random) -> str | None:
     meshes = [o for o in w.meshes() if o.override_library is None and not w.side.has_sinew(o)]
     source = w.mesh(r, lambda o: o.override_library is None and not w.side.is_method_keyed(o))
     target = w.one(r, [o for o in meshes if o != source])
-    if source is None or target is None or not w.select(target, source):
-        return None
-    if target.data.get(SHAPED) and any(m.type == "DECIMATE" for m in source.modifiers):
-        return None
+    w.skip_if(not w.select(target, source))
+    w.skip_if(target.data.get(SHAPED) and any(m.type == "DECIMATE" for m in source.modifiers))
     bpy.ops.object.make_links_data(type="MODIFIERS")
     w.side.copied_modifiers(source, target)
     return f"copy the modifiers of {source.name} to {target.name}"
@@ -1720,8 +1620,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
             and not has_scaled_bones(o)
         ),
     )
-    if obj is None or not w.select(obj):
-        return None
+    w.skip_if(not w.select(obj))
     in_front = [modifier.name for modifier in w.modifiers(obj)[:-1]]
     for name in in_front:
         bpy.ops.object.modifier_apply(modifier=name, single_user=True)
@@ -1736,8 +1635,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
 @operation(0.4)
 def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: w.is_editable(o) and w.may_lose_sinew(o) and not has_scaled_bones(o))
-    if obj is None or w.side.has_other_shape(obj) or not w.select(obj):
-        return None
+    w.skip_if(w.side.has_other_shape(obj) or not w.select(obj))
     w.before_evaluation()
     bpy.ops.object.convert(target="MESH")
     obj = bpy.context.view_layer.objects.active
@@ -1757,8 +1655,7 @@ def _keys(obj: bpy.types.Object) -> list[bpy.types.ShapeKey]:
 @operation(2)
 def add_shape_key(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.mode == "OBJECT" and o.data.library is None and o.override_library is None)
-    if obj is None or len(_keys(obj)) > 3 or obj.data.is_editmode:
-        return None
+    w.skip_if(len(_keys(obj)) > 3 or obj.data.is_editmode)
     if obj.data.shape_keys is None:
         obj.shape_key_add(name="Basis", from_mix=False)
     made = obj.shape_key_add(name=w.new_name("key"), from_mix=False)
@@ -1771,8 +1668,6 @@ def add_shape_key(w: Walker, r: random.Random) -> str | None:
 @operation(3)
 def shape_key_value(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(_keys(o)))
-    if obj is None:
-        return None
     block = w.one(r, _keys(obj))
     block.value = r.random()
     if r.random() < 0.2:
@@ -1783,8 +1678,7 @@ def shape_key_value(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def shape_key_points(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.mode == "OBJECT" and o.data.library is None)
-    if obj is None or obj.data.is_editmode:
-        return None
+    w.skip_if(obj.data.is_editmode)
     block = w.one(r, _keys(obj))
     for index in _vertices(w, r, obj):
         block.data[index].co += Vector([r.uniform(-0.1, 0.1) for _axis in range(3)])
@@ -1795,8 +1689,6 @@ def shape_key_points(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def key_shape_key(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None)
-    if obj is None:
-        return None
     block = w.one(r, _keys(obj))
     for number in r.sample(range(1, 12), 2):
         block.value = r.random()
@@ -1809,9 +1701,7 @@ def key_shape_key(w: Walker, r: random.Random) -> str | None:
 def drive_shape_key(w: Walker, r: random.Random) -> str | None:
     """Sets or removes a driver by a bone, as for correctives."""
     obj, rig = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None), w.armature(r)
-    bone = w.one(r, rig.pose.bones) if rig is not None else None
-    if obj is None or bone is None:
-        return None
+    bone = w.one(r, rig.pose.bones)
     block = w.one(r, _keys(obj))
     animation = obj.data.shape_keys.animation_data
     path = block.path_from_id("value")
@@ -1831,8 +1721,7 @@ def drive_shape_key(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def delete_shape_key(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.mode == "OBJECT" and o.data.library is None)
-    if obj is None or obj.override_library is not None:
-        return None
+    w.skip_if(obj.override_library is not None)
     if r.random() < 0.3:
         obj.shape_key_clear()
         return f"delete all shape keys of {obj.name}"
@@ -1843,8 +1732,6 @@ def delete_shape_key(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def pin_shape_key(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(_keys(o)))
-    if obj is None:
-        return None
     obj.active_shape_key_index = r.randrange(len(obj.data.shape_keys.key_blocks))
     obj.show_only_shape_key = not obj.show_only_shape_key
     return f"{obj.name}: {'pin' if obj.show_only_shape_key else 'no pin'}, {obj.active_shape_key.name}"
@@ -1853,8 +1740,6 @@ def pin_shape_key(w: Walker, r: random.Random) -> str | None:
 @operation(0.4)
 def absolute_shape_keys(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None)
-    if obj is None:
-        return None
     keys = obj.data.shape_keys
     keys.use_relative = not keys.use_relative
     keys.eval_time = r.uniform(0.0, 20.0)
@@ -1867,8 +1752,7 @@ def absolute_shape_keys(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def rename_object(w: Walker, r: random.Random) -> str | None:
     obj = w.one(r, [*w.meshes(), *w.armatures()])
-    if obj is None or obj.override_library is not None:
-        return None
+    w.skip_if(obj.override_library is not None)
     old, obj.name = obj.name, w.new_name("object")
     return f"rename {old} to {obj.name}"
 
@@ -1879,8 +1763,7 @@ def _delete(w: Walker, obj: bpy.types.Object, by_script: bool) -> str | None:
     if by_script:
         bpy.data.objects.remove(obj)
         return f"remove {name} by a script"
-    if not w.select(obj):
-        return None
+    w.skip_if(not w.select(obj))
     bpy.ops.object.delete()
     return f"delete {name}"
 
@@ -1907,8 +1790,7 @@ def unlink_armature(w: Walker, r: random.Random) -> str | None:
     """It is then in no collection, as a deleted one is while Sinew knows it. Sinew has to say so. Undone, as
     Blender does not save such an armature where no other data has it."""
     rig = w.armature(r)
-    if rig is None or rig.override_library is not None or w.compared:
-        return None
+    w.skip_if(rig.override_library is not None or w.compared)
     name = rig.name
 
     def act() -> None:
@@ -1927,8 +1809,7 @@ def unlink_armature(w: Walker, r: random.Random) -> str | None:
 def duplicate(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
     linked, by_script = r.random() < 0.4, r.random() < 0.4
-    if obj is None or len(w.meshes()) > 6:
-        return None
+    w.skip_if(len(w.meshes()) > 6)
     name = obj.name
     if by_script:
         w.object_mode()
@@ -1958,8 +1839,7 @@ def duplicate(w: Walker, r: random.Random) -> str | None:
 @operation(0.5)
 def duplicate_armature(w: Walker, r: random.Random) -> str | None:
     rig, linked = w.armature(r), r.random() < 0.5
-    if rig is None or len(w.armatures()) > 4 or rig.override_library is not None:
-        return None
+    w.skip_if(len(w.armatures()) > 4 or rig.override_library is not None)
     w.object_mode()
     made = rig.copy()
     if not linked:
@@ -1974,8 +1854,7 @@ def duplicate_armature(w: Walker, r: random.Random) -> str | None:
 @operation(0.5)
 def single_user(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: w.users(o.data) > 1 and o.override_library is None)
-    if obj is None or not w.select(obj):
-        return None
+    w.skip_if(not w.select(obj))
     bpy.ops.object.make_single_user(type="SELECTED_OBJECTS", object=True, obdata=True)
     obj = bpy.context.view_layer.objects.active
     obj.data.name = w.new_name("mesh")
@@ -1985,8 +1864,6 @@ def single_user(w: Walker, r: random.Random) -> str | None:
 @operation(1.5)
 def hide(w: Walker, r: random.Random) -> str | None:
     obj, how = w.one(r, [*w.meshes(), *w.armatures()]), r.choice(("viewport", "render", "eye", "eye"))
-    if obj is None:
-        return None
     if how == "eye":
         hidden = not obj.hide_get()
         if obj.mode != "OBJECT":
@@ -2004,8 +1881,6 @@ def hide(w: Walker, r: random.Random) -> str | None:
 def hide_collection(w: Walker, r: random.Random) -> str | None:
     layers = [c for c in bpy.context.view_layer.layer_collection.children if not c.name.startswith("Sinew")]
     layer, how = w.one(r, sorted(layers, key=lambda c: c.name)), r.choice(("exclude", "eye", "viewport"))
-    if layer is None:
-        return None
     w.object_mode()
     if how == "exclude":
         layer.exclude = not layer.exclude
@@ -2019,8 +1894,7 @@ def hide_collection(w: Walker, r: random.Random) -> str | None:
 @operation(0.7)
 def move_to_collection(w: Walker, r: random.Random) -> str | None:
     obj, collection = w.mesh(r), w.one(r, w.collections())
-    if obj is None or collection is None or obj.mode != "OBJECT":
-        return None
+    w.skip_if(obj.mode != "OBJECT")
     if collection in list(obj.users_collection):
         if len([c for c in obj.users_collection if not c.name.startswith("Sinew")]) > 1:
             collection.objects.unlink(obj)
@@ -2076,8 +1950,7 @@ def scene(w: Walker, r: random.Random) -> str | None:
 def copy_scene(w: Walker, r: random.Random) -> str | None:
     """As the menu does, with all objects or copies of them."""
     whole = r.random() < 0.5
-    if len(bpy.data.scenes) > 1 or (whole and len(w.objects("MESH")) > 5) or w.compared:
-        return None
+    w.skip_if(len(bpy.data.scenes) > 1 or (whole and len(w.objects("MESH")) > 5) or w.compared)
     w.object_mode()
     # Blender shows the new scene only by keys until something is added or removed in it, such as Sinew's
     # helper objects: then changes without keys are visible again.
@@ -2173,8 +2046,7 @@ def save_and_load(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def revert(w: Walker, r: random.Random) -> str | None:
-    if Path(bpy.data.filepath).name != "walk.blend":
-        return None
+    w.skip_if(Path(bpy.data.filepath).name != "walk.blend")
     bpy.ops.wm.revert_mainfile()
     _read_keys_of_hidden()
     return "revert"
@@ -2200,8 +2072,7 @@ def _has_guest() -> bool:
 
 @operation(0.5)
 def append(w: Walker, r: random.Random) -> str | None:
-    if len(w.meshes()) > 6:
-        return None
+    w.skip_if(len(w.meshes()) > 6)
     guest, rig = _from_library(w, link=False)
     guest.name, guest.data.name = w.new_name("object"), w.new_name("mesh")
     rig.name, rig.data.name = w.new_name("object"), w.new_name("armature")
@@ -2210,8 +2081,7 @@ def append(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def link(w: Walker, r: random.Random) -> str | None:
-    if _has_guest():
-        return None
+    w.skip_if(_has_guest())
     _from_library(w, link=True)
     return "link Guest and Guest Rig"
 
@@ -2221,8 +2091,7 @@ def override(w: Walker, r: random.Random) -> str | None:
     if not _has_guest():
         _from_library(w, link=True)
     guest = next((o for o in w.objects("MESH") if o.library is not None), None)
-    if guest is None or guest not in w.in_layer():
-        return None
+    w.skip_if(guest is None or guest not in w.in_layer())
     w.object_mode()
     guest.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
     return f"override {guest.name}"
@@ -2230,8 +2099,7 @@ def override(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def reload_library(w: Walker, r: random.Random) -> str | None:
-    if not bpy.data.libraries:
-        return None
+    w.skip_if(not bpy.data.libraries)
     w.object_mode()
     bpy.data.libraries[0].reload()
     return "reload the library"
@@ -2281,8 +2149,7 @@ def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: 
 def export(w: Walker, r: random.Random) -> str | None:
     """The data that another program receives."""
     obj = w.mesh(r)
-    if obj is None or not w.select(obj):
-        return None
+    w.skip_if(not w.select(obj))
     w.before_evaluation()
     bpy.context.view_layer.update()
     path = w.folder / "walk.obj"
@@ -2323,9 +2190,8 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
         or obj.data.library is not None
     ):
         return None
-    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE"])
-    if what in ("rename", "toggle", "delete") and modifier is None:
-        return None
+    modifier = w.one_or_none(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE"])
+    w.skip_if(what in ("rename", "toggle", "delete") and modifier is None)
     name, vertices, new = obj.name, _vertices(w, r, obj), w.new_name("neighbour")
     modifier_name = modifier.name if modifier is not None else ""
     handlers = getattr(bpy.app.handlers, when)
@@ -2358,8 +2224,6 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
 @operation(0.5)
 def touch(w: Walker, r: random.Random) -> str | None:
     obj, what = w.one(r, [*w.meshes(), *w.armatures()]), r.choice(("object", "data", "all"))
-    if obj is None:
-        return None
     if what == "object":
         obj.update_tag()
     elif what == "data":
