@@ -49,19 +49,6 @@ def assert_every_mesh_equal():
         assert_equal_to_modifier(obj, list(range(scene.frame_start, scene.frame_end + 1)))
 
 
-def test_subframes():
-    obj, _armature = scenes.make_arm()
-    assert_equal_to_modifier(obj, [1, 2.25, 5.5, 9.75])
-
-
-def test_moving_armature_object():
-    obj, armature = scenes.make_arm()
-    armature.keyframe_insert("location", frame=1)
-    armature.location = (2.0, 1.0, -1.0)
-    armature.keyframe_insert("location", frame=11)
-    assert_equal_to_modifier(obj, [1, 3, 6, 11])
-
-
 def test_far_from_the_origin():
     obj, armature = scenes.make_arm()
     obj.location = armature.location = (300.0, -200.0, 100.0)
@@ -88,46 +75,6 @@ def test_shape_keys_with_values_groups_mutes_and_relative_keys():
     assert_equal_to_modifier(obj, [1, 4.5, 11])
 
 
-def test_modifiers_behind_see_the_deformed_mesh():
-    obj, _armature = scenes.make_arm()
-    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
-    cast = obj.modifiers.new("Cast", "CAST")
-    cast.factor = 0.2
-    assert_equal_to_modifier(obj, [1, 6, 11])
-
-
-def test_posing_live():
-    obj, armature = scenes.make_arm()
-    scenes.forget_keys(armature)
-    expected = {}
-    for degrees in (20.0, 90.0, 140.0):
-        scenes.bend(armature, degrees)
-        bpy.context.view_layer.update()
-        expected[degrees] = scenes.final_points(obj)
-    scenes.add_sinew(obj)
-    for degrees, points in expected.items():
-        scenes.bend(armature, degrees)
-        bpy.context.view_layer.update()
-        assert scenes.worst(scenes.final_points(obj), points) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def test_armature_in_rest_position():
-    obj, armature = scenes.skinned_arm("dq")
-    bpy.context.scene.frame_set(11)
-    armature.data.pose_position = "REST"
-    bpy.context.view_layer.update()
-    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
-
-
-def test_hidden_armature_still_moves_the_mesh():
-    obj, armature = scenes.make_arm()
-    expected = scenes.modifier_shapes(obj, [11], preserve_volume=False)
-    scenes.add_sinew(obj)
-    armature.hide_set(True)
-    armature.hide_viewport = armature.hide_render = True
-    assert scenes.worst(scenes.shapes(obj, [5, 11])[1:], expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
 @pytest.mark.parametrize("method", ["lbs", "qv", "dq"])
 def test_every_method_follows_rigid_motion(method):
     """A whole armature rotated by its root bone rotates the mesh rigidly."""
@@ -142,21 +89,6 @@ def test_every_method_follows_rigid_motion(method):
     motion = np.array(root.matrix @ root.bone.matrix_local.inverted())
     expected = scenes.rest_points(obj) @ motion[:3, :3].T + motion[:3, 3]
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def test_bendy_bones_of_a_hidden_armature():
-    obj, armature = scenes.make_arm(bones=3)
-    for bone in armature.data.bones:
-        bone.bbone_segments = 6
-    armature.hide_viewport = armature.hide_render = True
-    bpy.context.view_layer.update()
-    assert_equal_to_modifier(obj, [1, 5, 11])
-
-
-def test_vertex_groups_switched_off():
-    obj, _armature = scenes.make_arm()
-    obj.modifiers["Armature"].use_vertex_groups = False
-    assert_equal_to_modifier(obj, [1, 11])
 
 
 def with_a_second_armature(behind: str | None = None) -> bpy.types.Object:
@@ -177,16 +109,6 @@ def test_an_armature_modifier_apart_stays_blenders():
     assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     assert obj.modifiers["Second"].object is not None
     assert any("Second" in warning for warning in session.state_of(obj).bound.facts.warnings)
-
-
-def test_each_of_several_armature_modifiers_starts_with_its_own_method():
-    obj = with_a_second_armature()
-    obj.modifiers["Second"].use_deform_preserve_volume = True
-    expected = scenes.shapes(obj, [1, 6, 11])
-    scenes.add_sinew(obj)
-    assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    properties.of(obj).enabled = False
-    assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) == 0.0
 
 
 def test_a_switched_off_armature_modifier_in_front_is_passed_over():
@@ -220,13 +142,6 @@ def test_envelopes_with_moving_shape_keys():
     modifier = obj.modifiers["Armature"]
     modifier.use_bone_envelopes, modifier.use_vertex_groups = True, False
     assert_equal_to_modifier(obj, [1, 6, 11])
-
-
-def test_keyed_visibility_of_the_modifier():
-    obj, _armature = scenes.make_arm()
-    modifier = obj.modifiers["Armature"]
-    scenes.key(modifier, "show_viewport", ((1, True), (5, False), (9, True)))
-    assert_equal_to_modifier(obj, [3, 6, 10])
 
 
 def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:

@@ -189,26 +189,6 @@ def test_rigs(set_up, skinned):
     assert_ends_without_trace(before)
 
 
-def test_posing_by_hand():
-    obj, armature = scenes.make_arm()
-    scenes.forget_keys(armature)
-    compare(obj)
-    for degrees in (40.0, 130.0):
-        scenes.bend(armature, degrees)
-        bpy.context.view_layer.update()
-        got = {
-            method: without_offset(copy, place) for place, (method, copy) in enumerate(copies(obj).items(), 1)
-        }
-        lbs = scenes.final_points(obj)
-        assert scenes.worst(got["lbs"], lbs) <= scenes.TOLERANCE * scenes.diagonal(obj)
-        assert scenes.worst(got[characters.BLENDER], lbs) <= TOLERANCE * scenes.diagonal(obj)
-        obj.modifiers["Armature"].use_deform_preserve_volume = True
-        dq = scenes.final_points(obj)
-        obj.modifiers["Armature"].use_deform_preserve_volume = False
-        assert scenes.worst(got["dq"], dq) <= scenes.TOLERANCE * scenes.diagonal(obj)
-        assert scenes.worst(lbs, dq) > 0.01
-
-
 def test_a_full_scene_is_as_it_was(tmp_path):
     """One comparison after the other, each with another kind of rig, then the end of the last one."""
     bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
@@ -318,15 +298,6 @@ def test_other_methods_replace_the_copies():
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     assert_ends_without_trace(before)
-
-
-def test_a_comparison_replaces_that_of_another_character():
-    obj, _armature = scenes.make_arm()
-    other, _armature = scenes.make_arm(name="Other")
-    compare(obj, {"dq"})
-    compare(other, {"dq"})
-    assert not copies(obj)
-    assert list(copies(other)) == ["dq"]
 
 
 def delete(*objects: bpy.types.Object) -> None:

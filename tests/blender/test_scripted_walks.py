@@ -9,6 +9,18 @@ import walk
 import walk_script
 
 CASES = {
+    # Frames and poses
+    "subframes": "add Arm; subframe 2 0.25; subframe 5 0.5; method Arm dq; subframe 9 0.75",
+    "a moving armature": "key_object Rig 1 11; key_object Arm 2 9; add Arm; frame 3; frame 11; "
+    "method Arm dq; frame 6",
+    "posed by hand": "clear_animation Rig; add Arm; pose Rig lower; pose Rig upper; method Arm dq; "
+    "pose Rig lower",
+    "the rest position": "add Arm dq; frame 11; rest_position Rig; frame 6; rest_position Rig; update",
+    "bendy bones of a hidden armature": "bone_options Rig upper segments 3; "
+    "bone_options Rig lower segments 3; hide Rig viewport; hide Rig render; add Arm; frame 5; "
+    "method Arm dq; frame 11; render 0.9",
+    "modifiers behind": "add_modifier Arm SUBSURF 0.9; add_modifier Arm CAST 0.9; add Arm; frame 6; "
+    "method Arm dq; frame 11; render 0.9",
     # Objects and meshes
     "the method of the modifier": "armature_options Arm volume; add Arm; frame 11; render",
     "an unkeyed move of a keyed object": "key_object Arm 2 9; frame 3; ~move_object Arm; add Arm; update; "
