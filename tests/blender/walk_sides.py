@@ -159,7 +159,20 @@ def key(owner: bpy.types.ID, path: str, values: list[tuple[int, float]]) -> None
     curve.update()
 
 
-class BlenderSide:
+class Side:
+    """What one of the two sides has nothing to do for."""
+
+    def nothing(self, *_given: object, **_options: object) -> None:
+        pass
+
+    prepare = set_safe = compute_beside = wait = nothing
+    may_react = own_modifier = nothing
+    check_warned = check_said_gone = before_render = note_flags = nothing
+    bake_to_bones = add_corrective_key = applied = copied_modifiers = nothing
+    start_comparison = end_comparison = arrange_comparison = nothing
+
+
+class BlenderSide(Side):
     """The Blender without Sinew."""
 
     is_sinew = False
@@ -167,18 +180,6 @@ class BlenderSide:
     def __init__(self) -> None:
         # The modifiers that Sinew reports as replaced, by the name of each object.
         self.runs: dict[str, list[str]] = {}
-
-    def prepare(self, safe: bool) -> None:
-        pass
-
-    def may_react(self, obj: bpy.types.Object) -> bool:
-        return False
-
-    def is_helper(self, obj: bpy.types.Object) -> bool:
-        return False
-
-    def own_modifier(self, obj: bpy.types.Object) -> bpy.types.Modifier | None:
-        return None
 
     def has_sinew(self, obj: bpy.types.Object) -> bool:
         return bool(obj.pass_index & DRIVEN)
@@ -274,15 +275,6 @@ class BlenderSide:
         is_dq = self.method(obj) == "dq" if deformers[shown] == "Sinew" else modifier.show_expanded
         modifier.use_deform_preserve_volume = is_dq
 
-    def check_warned(self, obj: bpy.types.Object, modifier: bpy.types.ParticleSystemModifier) -> None:
-        pass
-
-    def check_said_gone(self, meshes: list[bpy.types.Object], rig: bpy.types.Object) -> None:
-        """meshes  those that were on before the armature was gone"""
-
-    def wait(self) -> None:
-        pass
-
     def rebind(self, obj: bpy.types.Object) -> None:
         self.set_enabled(obj, True)
 
@@ -377,24 +369,12 @@ class BlenderSide:
         mesh_io.write_group_weights(obj, rows)
         return found.name
 
-    def bake_to_bones(self, obj: bpy.types.Object, motion: str, is_alone: bool) -> str:
-        return ""
-
-    def add_corrective_key(self, obj: bpy.types.Object, bone: bpy.types.PoseBone | None) -> str:
-        return ""
-
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
         """A modifier that changes no shape."""
         obj.pass_index ^= CHANGED
 
     def set_heat(self, obj: bpy.types.Object, on: bool, quantity: str) -> None:
         self.set_option(obj, "heat", on)
-
-    def set_safe(self, on: bool) -> None:
-        pass
-
-    def compute_beside(self, on: bool) -> None:
-        pass
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         self._set(obj, KEYED, True)
@@ -411,15 +391,6 @@ class BlenderSide:
 
     def is_method_keyed(self, obj: bpy.types.Object) -> bool:
         return bool(obj.pass_index & KEYED)
-
-    def start_comparison(self, meshes: list[bpy.types.Object], methods: list[str]) -> None:
-        pass
-
-    def end_comparison(self) -> None:
-        pass
-
-    def arrange_comparison(self, arrangement: str) -> None:
-        pass
 
     def restart(self, between: object) -> None:
         between()
@@ -530,7 +501,7 @@ class _Records(logging.Handler):
             self.unanswered += 1
 
 
-class SinewSide:
+class SinewSide(Side):
     """The Blender with Sinew."""
 
     is_sinew = True
@@ -566,9 +537,6 @@ class SinewSide:
         """Whether Sinew made it for another object."""
         return self._properties.is_helper(obj) or self._properties.is_copy(obj)
 
-    def is_helper(self, obj: bpy.types.Object) -> bool:
-        return self._properties.is_helper(obj)
-
     def own_modifier(self, obj: bpy.types.Object) -> bpy.types.Modifier | None:
         from sinew_addon.attach import stack
 
@@ -595,9 +563,6 @@ class SinewSide:
             }
             for name in stage_settings.names_on(obj.sinew)
         }
-
-    def note_flags(self, obj: bpy.types.Object) -> None:
-        pass
 
     def preserve_volume(self, modifier: bpy.types.Modifier) -> bool:
         obj = modifier.id_data
@@ -656,10 +621,8 @@ class SinewSide:
         modifier = self.own_modifier(obj) if which == "Sinew" else armature_modifiers(obj)[0]
         setattr(modifier, f"show_{view}", not getattr(modifier, f"show_{view}"))
 
-    def before_render(self, obj: bpy.types.Object, deformers: dict[str, str]) -> None:
-        pass
-
     def check_said_gone(self, meshes: list[bpy.types.Object], rig: bpy.types.Object) -> None:
+        """meshes  those that were on before the armature was gone"""
         for obj in meshes:
             is_known = any(each.armature == rig for each in obj.sinew.replaced_modifiers)
             if is_known and "in no collection" not in obj.sinew.error:
@@ -862,12 +825,6 @@ class SinewSide:
             modifier.node_group.interface.clear()
         elif what == "socket" and modifier.node_group is not None:
             modifier.node_group.interface.items_tree[0].name = "Renamed"
-
-    def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
-        pass
-
-    def applied(self, obj: bpy.types.Object) -> None:
-        pass
 
     def apply(self, obj: bpy.types.Object) -> None:
         modifier = self.own_modifier(obj)
