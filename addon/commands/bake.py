@@ -7,7 +7,7 @@ import argparse
 import json
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,7 +88,7 @@ class Baked(Outcome):
             "meshes": self.meshes,
             "frames": self.frames,
             "errors": [self.error] if self.error is not None else self.left_out,
-            "bones": [report.as_json() for report in self.bones],
+            "bones": [asdict(report) for report in self.bones],
         }
 
 

@@ -13,7 +13,6 @@ from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.html import require_jinja
-from ..core.metrics import Summary
 from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import page
@@ -166,18 +165,11 @@ def _measure(
     from ..features.pages import measure
 
     batches = measure.batches(subject, frames, len(methods) + 1)
-    summaries: dict[str, list[Summary]] = {method: [] for method in methods}
-    times: dict[str, list[float]] = {method: [] for method in methods}
-    own: dict[str, list[float]] = {method: [] for method in methods}
+    measured = measure.Measurements.of(methods)
     rest: RestFacts | None = None
     for batch in console.progress(batches, len(batches), f"Measuring {path.name}"):
-        measured = measure.measure(subject, methods, args.reference, batch)
-        if rest is None:
-            rest = RestFacts.of(subject.gauge)
-        for method in methods:
-            summaries[method] += measured.summaries[method]
-            times[method] += measured.times[method]
-            own[method] += measured.own[method]
+        measure.measure(subject, methods, args.reference, batch, measured)
+        rest = rest or RestFacts.of(subject.gauge)
     assert rest is not None, "there is at least one frame"
     return Comparison(
         path.name,
@@ -187,9 +179,9 @@ def _measure(
         characters.length_unit(subject.scene),
         rest,
         frames,
-        summaries,
-        times,
-        own,
+        measured.summaries,
+        measured.times,
+        measured.own,
         {
             part.obj.name: [*part.check_weights(args.influences), *part.pose_check.findings()]
             for part in subject.parts

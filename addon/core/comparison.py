@@ -2,8 +2,6 @@
 """The results of a comparison of methods: measures of each frame, worst frames, diagnostics; as CSV and
 JSON."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -11,6 +9,7 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
+from typing import Self
 
 from .diagnostics import Finding
 from .metrics import METRICS, Gauge, Summary
@@ -35,7 +34,7 @@ class RestFacts:
     clashes: int
 
     @classmethod
-    def of(cls, gauge: Gauge) -> RestFacts:
+    def of(cls, gauge: Gauge) -> Self:
         """Returns the facts at the frame last set in `gauge`."""
         surface, rest = gauge.surface, gauge.rest
         return cls(

@@ -4,9 +4,8 @@
 Based on what Blender's Armature modifier does with Bone Envelopes and Envelope Multiply.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
@@ -32,7 +31,7 @@ class Envelopes:
     weights: np.ndarray
     multiply: np.ndarray
 
-    def equals(self, other: Envelopes) -> bool:
+    def equals(self, other: Self) -> bool:
         return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
 
     def reach(self, points: np.ndarray, bones: np.ndarray) -> np.ndarray:

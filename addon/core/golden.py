@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares pictures with golden ones: how much they differ, and a picture of where."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, dataclass, field
 from decimal import Decimal
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -58,7 +57,7 @@ class RenderSettings:
             raise TypeError
 
     @classmethod
-    def read(cls, folder: Path) -> RenderSettings:
+    def read(cls, folder: Path) -> Self:
         """Raises SinewError where `folder` was not written by `sinew render`."""
         path = folder / SETTINGS
         try:

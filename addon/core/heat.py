@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Heat map colours: the range of values, perceptually uniform colour maps, the legend's numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Self
 
 import numpy as np
 
@@ -94,7 +93,7 @@ class HeatScale:
     clipped: bool = False
 
     @classmethod
-    def over(cls, metric: Metric, methods: Sequence[Sequence[Summary]], diagonal: float) -> HeatScale:
+    def over(cls, metric: Metric, methods: Sequence[Sequence[Summary]], diagonal: float) -> Self:
         """Returns a range for all shapes of the summaries, of one frame or of many, so that colours can be
         compared.
 
@@ -104,26 +103,26 @@ class HeatScale:
         return cls._up_to(metric, [_largest(metric, summaries) for summaries in methods], diagonal)
 
     @classmethod
-    def over_values(cls, metric: Metric, least: float, most: float, diagonal: float) -> HeatScale:
+    def over_values(cls, metric: Metric, least: float, most: float, diagonal: float) -> Self:
         """Returns a range for values from `least` to `most`."""
         return cls._up_to(metric, [_magnitude(metric, [least, most])], diagonal)
 
     @classmethod
-    def fixed(cls, metric: Metric, end: float, least: float, most: float) -> HeatScale:
+    def fixed(cls, metric: Metric, end: float, least: float, most: float) -> Self:
         """Returns a range that ends at `end`, a length or a ratio above 1, for values from `least` to
         `most`."""
         beyond = _magnitude(metric, [least, most])
         return cls._to(metric, end, beyond > (np.log2(end) if metric.scale == "log" else end))
 
     @classmethod
-    def _to(cls, metric: Metric, end: float, clipped: bool) -> HeatScale:
+    def _to(cls, metric: Metric, end: float, clipped: bool) -> Self:
         if metric.unit == "share":
             return cls(metric, 0.0, 1.0)
         low = {"linear": 0.0, "signed": -end, "log": 1.0 / end}[metric.scale]
         return cls(metric, low, end, bool(clipped))
 
     @classmethod
-    def _up_to(cls, metric: Metric, largest: Sequence[float], diagonal: float) -> HeatScale:
+    def _up_to(cls, metric: Metric, largest: Sequence[float], diagonal: float) -> Self:
         """largest: the largest magnitude of each method."""
         largest = sorted(largest, reverse=True)
         beyond = max(largest, default=0.0)

@@ -10,8 +10,7 @@ there, the rig's bones keep their motions, and a helper bone starts where the er
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -189,20 +188,6 @@ class Report:
         ]
         most = int((solution.weights > 0.0).sum(axis=1).max(initial=0))
         return cls(armature, len(solution.parents), most, diagonal, *errors)
-
-    def as_json(self) -> dict[str, Any]:
-        """Returns the report, with each error also as a share of the diagonal."""
-        size = self.diagonal or 1.0
-        return asdict(self) | {
-            name: {
-                "rms": errors.rms,
-                "worst": errors.worst,
-                "rms_share": errors.rms / size,
-                "worst_share": errors.worst / size,
-            }
-            for name, errors in vars(self).items()
-            if isinstance(errors, Errors)
-        }
 
     def sentences(self, unit: str) -> list[Phrase]:
         """unit: the name of a scene unit."""

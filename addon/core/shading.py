@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shading of a mesh, and its normals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 import sinew
@@ -29,7 +27,7 @@ class Shading:
     sharp_faces: np.ndarray | None = None
     custom: np.ndarray | None = None
 
-    def equals(self, other: Shading) -> bool:
+    def equals(self, other: Self) -> bool:
         return (
             are_equal(self.sharp_edges, other.sharp_edges)
             and are_equal(self.sharp_faces, other.sharp_faces)

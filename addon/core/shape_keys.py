@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The mix of relative shape keys, which Blender applies before all modifiers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -24,7 +23,7 @@ class ShapeKeys:
     basis: np.ndarray
     deltas: Sequence[np.ndarray | None]
 
-    def equals(self, other: ShapeKeys) -> bool:
+    def equals(self, other: Self) -> bool:
         if self.names != other.names or not np.array_equal(self.basis, other.basis):
             return False
         return all(are_equal(a, b) for a, b in zip(self.deltas, other.deltas, strict=True))

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What stages know about the mesh that they are bound to."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -24,7 +23,7 @@ class Topology:
     corner_vertices: np.ndarray
     edges: np.ndarray
 
-    def equals(self, other: Topology) -> bool:
+    def equals(self, other: Self) -> bool:
         return (
             np.array_equal(self.face_offsets, other.face_offsets)
             and np.array_equal(self.corner_vertices, other.corner_vertices)
@@ -50,7 +49,7 @@ class StageMesh:
     weightings: Sequence[Weighting]
     modifier_masks: Sequence[np.ndarray | None] = ()
 
-    def equals(self, other: StageMesh) -> bool:
+    def equals(self, other: Self) -> bool:
         """Whether both have the same points and faces; both belong to the same Armature modifiers."""
         points, known = self.rest_points, other.rest_points
         if points is None or known is None:

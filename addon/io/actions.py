@@ -109,6 +109,15 @@ def play(obj: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.bpy_st
         animation.action_slot = slot
 
 
+def play_by_handle(player: bpy.types.AnimData | bpy.types.NlaStrip, action: object, handle: int) -> None:
+    """Has `player` play an action, or none, by its slot with this handle: that of a copy is that of its
+    original."""
+    player.action = action
+    slot = next((each for each in getattr(action, "slots", ()) if each.handle == handle), None)
+    if slot is not None:
+        player.action_slot = slot
+
+
 def all_curves(action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None) -> list[bpy.types.FCurve]:
     return [curve for curves in curve_lists(action, slot) for curve in curves] if action is not None else []
 

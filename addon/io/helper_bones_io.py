@@ -145,15 +145,12 @@ def _use_copy_of_action(rig: bpy.types.Object) -> None:
     action = animation.action if animation is not None else None
     if action is None:
         return
-    slot = actions.slot_of(animation)
+    handle = actions.handle_of(actions.slot_of(animation))
     if action.library is None:
         action.use_fake_user = True
     copy = action.copy()
     copy.name = f"{action.name} Helpers"
-    animation.action = copy
-    if slot is not None:
-        handle = actions.handle_of(slot)
-        animation.action_slot = next(each for each in copy.slots if each.handle == handle)
+    actions.play_by_handle(animation, copy, handle)
 
 
 def _channels(bone: bpy.types.Bone, motions: np.ndarray, parent_poses: np.ndarray) -> np.ndarray:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """When each clip is played in a blend, and with which weight."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -38,7 +37,7 @@ class Weights:
     last: np.ndarray
 
     @classmethod
-    def of(cls, given: Sequence, count: int) -> Weights:
+    def of(cls, given: Sequence, count: int) -> Self:
         """given: the weights of `count` clips; or those at the beginning, and those at the end.
 
         Raises WrongUse where they are invalid.

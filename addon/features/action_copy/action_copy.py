@@ -106,11 +106,5 @@ def restore(armature: bpy.types.Object) -> None:
 
 
 def _play(armature: bpy.types.Object, action: bpy.types.Action | None, handle: int) -> None:
-    animation = armature.animation_data
-    if animation is None:
-        return
-    animation.action = action
-    slots = getattr(action, "slots", ())
-    slot = next((each for each in slots if each.handle == handle), None)
-    if slot is not None:
-        animation.action_slot = slot
+    if armature.animation_data is not None:
+        actions.play_by_handle(armature.animation_data, action, handle)

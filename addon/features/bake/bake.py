@@ -50,11 +50,7 @@ class ShapeKeys:
     def place(self) -> None:
         obj, shapes = self.obj, self.samples
         _take_off(obj)
-        mesh = obj.data.copy()
-        # The mesh without the bake stays in the file, so that the artist can return to it.
-        if obj.data.is_editable:
-            obj.data.use_fake_user = True
-        obj.data = mesh
+        mesh = bake_state.use_copy_of_mesh(obj)
         obj.show_only_shape_key = False
         if mesh.shape_keys is not None:
             obj.shape_key_clear()

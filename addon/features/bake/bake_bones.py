@@ -235,11 +235,7 @@ def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None
     modifier.use_deform_preserve_volume = modifier.use_bone_envelopes = False
     modifier.use_multi_modifier = modifier.invert_vertex_group = False
     modifier.use_vertex_groups, modifier.vertex_group = True, ""
-    mesh = obj.data.copy()
-    # The mesh without the bake stays in the file, so that the artist can return to it.
-    if obj.data.is_editable:
-        obj.data.use_fake_user = True
-    obj.data = mesh
+    bake_state.use_copy_of_mesh(obj)
 
 
 def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:

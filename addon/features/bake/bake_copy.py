@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bakes that a batch writes beside a re-skinned copy."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import bpy
@@ -50,7 +51,7 @@ def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
                 for _part in one.sample():
                     pass
                 if isinstance(one, BoneBake):
-                    bakes[-1]["bones"] = [report.as_json() for report in one.reports]
+                    bakes[-1]["bones"] = [asdict(report) for report in one.reports]
                 beside += one.files
                 if kind not in EXPORTS:
                     in_file.append(one)

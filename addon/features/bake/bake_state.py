@@ -67,6 +67,16 @@ def take_off(obj: bpy.types.Object) -> None:
         smooth.show_viewport = smooth.show_render = False
 
 
+def use_copy_of_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """Gives an object its own copy of its mesh, which it returns. The one without the bake stays in the file,
+    so that the artist can return to it."""
+    mesh = obj.data.copy()
+    if obj.data.is_editable:
+        obj.data.use_fake_user = True
+    obj.data = mesh
+    return mesh
+
+
 def check_on(obj: bpy.types.Object) -> None:
     """Raises SinewError where Sinew is off."""
     if not properties.of(obj).enabled:

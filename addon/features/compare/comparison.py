@@ -241,8 +241,6 @@ def _use_own_actions(copy: bpy.types.Object) -> None:
     for player in (animation, *(strip for track in animation.nla_tracks for strip in track.strips)):
         curves = actions.all_curves(player.action, actions.slot_of(player))
         if any(curve.data_path.startswith("sinew.") for curve in curves):
-            slot = actions.slot_of(player)
-            player.action = player.action.copy()
+            handle = actions.handle_of(actions.slot_of(player))
+            actions.play_by_handle(player, player.action.copy(), handle)
             player.action[ACTION_MARK] = True
-            if slot is not None:
-                player.action_slot = player.action.slots[slot.identifier]

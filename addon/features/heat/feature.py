@@ -79,6 +79,7 @@ FEATURE = Feature(
         (subscribers.objects_changed, _objects_changed),
         (subscribers.deformed, _colour),
         (subscribers.frame_shown, redraw.request),
+        (measures.listeners, heat_view.sync_errors),
     ),
     overlays=(heat_legend.draw,),
     begin=_begin,

@@ -5,10 +5,9 @@ by Blender.
 Shapes are the results of skinning alone, in world space; several objects are measured as one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import bpy
 import numpy as np
@@ -207,7 +206,7 @@ class _Other:
     stage_values: StageValues
 
     @classmethod
-    def of(cls, part: Part, other: str) -> _Other:
+    def of(cls, part: Part, other: str) -> Self:
         shown = part.skinned.shown
         if other == properties.BLENDER:
             frames = pose.of_modifiers(part.obj, shown.frames)

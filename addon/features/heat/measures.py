@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The settings of measures and heat maps, stored in the scene."""
 
-from __future__ import annotations
+from collections.abc import Callable
 
 import bpy
 
@@ -38,11 +38,14 @@ BAKE_ERRORS = {
 QUANTITIES = METRICS | BAKE_ERRORS
 
 
-def _changed(_settings: SinewMeasures, context: bpy.types.Context) -> None:
-    from . import heat_view
+# Called after a change: what updates meshes and views.
+listeners: list[Callable[[], None]] = []
 
+
+def _changed(_settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     if not is_rendering_in_window():
-        heat_view.sync_errors()
+        for listener in listeners:
+            listener()
     session.refresh(context)
 
 

@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The keyed poses of an action, and an armature's pose between them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import bpy
 import numpy as np
@@ -114,7 +112,7 @@ class _Bone(NamedTuple):
     @classmethod
     def read(
         cls, bone: bpy.types.PoseBone, row: int, pairs: list[tuple[bpy.types.FCurve, actions.Channel]]
-    ) -> _Bone:
+    ) -> Self:
         curves = [curve for curve, _channel in pairs]
         times = actions.key_times(curves)
         before, after = (actions.gains_of_a_round(curves, times, onwards) for onwards in (False, True))

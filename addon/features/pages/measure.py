@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Self
 
 import bpy
 import numpy as np
@@ -100,6 +101,10 @@ class Measurements:
     times: dict[str, list[float]]
     own: dict[str, list[float]]
 
+    @classmethod
+    def of(cls, methods: Sequence[str]) -> Self:
+        return cls(*({method: [] for method in methods} for _ in range(3)))
+
 
 def gather(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> Subject:
     """Reads meshes that an armature deforms."""
@@ -124,13 +129,12 @@ def batches(subject: Subject, frames: Sequence[float], methods: int) -> list[Seq
 
 
 def measure(
-    subject: Subject, methods: Sequence[str], reference: str, frames: Sequence[float]
-) -> Measurements:
-    """Measures shapes under each method at each frame.
+    subject: Subject, methods: Sequence[str], reference: str, frames: Sequence[float], result: Measurements
+) -> None:
+    """Adds to the result the measures of shapes under each method at each frame.
 
     reference  the method that distances are measured to
     """
-    result = Measurements(*({method: [] for method in methods} for _ in range(3)))
     played = list(dict.fromkeys([*methods, reference]))
     with skinning_alone(subject.meshes):
         rests = _play_rest(subject, frames)
@@ -144,7 +148,6 @@ def measure(
         for method in methods:
             measured = subject.gauge.measure(shapes[method][index], shapes[reference][index])
             result.summaries[method].append(measured.summary())
-    return result
 
 
 def shapes_at(subject: Subject, methods: Sequence[str], frame: float) -> dict[str, np.ndarray]:
