@@ -15,11 +15,15 @@ APPLYING = phrase(
 
 
 def notes(obj: bpy.types.Object) -> list[str]:
-    """Returns a sentence for what an exporter would leave out while Sinew deforms the mesh."""
-    keys, own = obj.data.shape_keys, stack.own_modifiers(obj)
-    if not properties.of(obj).replaces_modifiers or keys is None:
+    """Returns a sentence for each thing that goes wrong while Sinew deforms the mesh."""
+    if not properties.of(obj).replaces_modifiers:
         return []
+    found, own = [], stack.own_modifiers(obj)
+    if properties.of(obj).upstream_proxy is not None:
+        text = "Switch Sinew off before a script applies its modifiers: Sinew also uses its mesh meanwhile"
+        found.append(phrase(text))
     # FBX files have no shape keys where any modifier but the Armature modifier is on.
     others = [m for m in obj.modifiers if m.type != "ARMATURE" and m not in own and stack.is_on(m)]
-    text = "Switch Sinew off before an export to FBX, or the file has no shape keys"
-    return [] if others else [phrase(text)]
+    if obj.data.shape_keys is not None and not others:
+        found.append(phrase("Switch Sinew off before an export to FBX, or the file has no shape keys"))
+    return found

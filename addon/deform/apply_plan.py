@@ -102,6 +102,8 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         attach.adopt_pointers(obj)
         if is_given_up:
             point_store.remove_point_attributes(obj)
+            # Other tools apply no modifier to a mesh with a second user.
+            upstream_proxy.remove(obj)
         elif obj.mode not in ARMATURE_MODIFIER_MODES:
             point_store.remove(obj)
         if wanted.state is State.EDITING and _shows_nearest_volume(obj):

@@ -485,18 +485,17 @@ def icons(w: Walker, r: random.Random) -> str | None:
     w.object_mode()
     # One that is left to Blender has a meaning of its own for them.
     w.side.set_option(obj, "leave_small", False)
-    hidden, aside = dict.fromkeys(VIEWS, False), dict.fromkeys(VIEWS, False)
+    hidden, armature = dict.fromkeys(VIEWS, False), dict.fromkeys(VIEWS, True)
 
     def deformers() -> dict[str, str]:
-        return {v: "Armature" if aside[v] else "" if hidden[v] else "Sinew" for v in VIEWS}
+        return {v: "" if not armature[v] else "Armature" if hidden[v] else "Sinew" for v in VIEWS}
 
     def click(modifier: str, view: str) -> None:
         if modifier == "Armature":
-            aside[view] = not aside[view]
-        elif deformers()[view] == "Sinew":
-            hidden[view] = True
+            armature[view] = not armature[view]
         else:
-            hidden[view] = aside[view] = False
+            hidden[view] = deformers()[view] == "Sinew"
+            armature[view] = not hidden[view]
         w.side.click(obj, modifier, view, deformers())
         bpy.context.view_layer.update()
 
