@@ -255,15 +255,19 @@ def _take_off(obj: bpy.types.Object) -> None:
     properties.clear(obj)
 
 
-def switch(obj: bpy.types.Object, on: bool) -> None:
+def switch(obj: bpy.types.Object, on: bool, is_alone: bool = False) -> None:
     """On: Sinew deforms where the icons say so. Off: the Armature modifiers deform, and Sinew's modifier is
-    off."""
+    off.
+
+    is_alone  where Sinew deforms, the Armature modifiers are off
+    """
     settings = properties.of(obj)
     if on:
         restore_volume(obj)
         adopt_pointers(obj)
         _note_keyed_visibility(obj)
-        _set_icons(obj, Situation.ALONE if _is_alone(obj) else Situation.SINEW)
+        is_alone = is_alone or _is_icon_animated(obj)
+        _set_icons(obj, Situation.ALONE if is_alone else Situation.SINEW)
         return
     if settings.replaces_modifiers:
         restore_builtin(obj)
@@ -567,11 +571,11 @@ def position_modifier(obj: bpy.types.Object) -> None:
     undeformed.position(obj)
 
 
-def _is_alone(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifiers are off while Sinew deforms: in a comparison's copies, to save time, and
-    where an animation sets the icon of Sinew's modifier, as they would deform where it is off."""
+def _is_icon_animated(obj: bpy.types.Object) -> bool:
+    """Whether an animation sets the icon of Sinew's modifier. Where it is off, the Armature modifiers would
+    deform if they were on."""
     nodes = sinew_modifier(obj)
-    return properties.is_copy(obj) or (nodes is not None and is_visibility_animated(obj, nodes))
+    return nodes is not None and is_visibility_animated(obj, nodes)
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.icons import Situation
 from ..core.phrases import phrase
 from . import properties, stack
 
@@ -19,6 +20,10 @@ def notes(obj: bpy.types.Object) -> list[str]:
     if not properties.of(obj).replaces_modifiers:
         return []
     found, own = [], stack.own_modifiers(obj)
+    if Situation(properties.of(obj).situation) is Situation.ALONE:
+        found.append(
+            phrase("Switch Sinew off before other tools look for its Armature modifier: that is off")
+        )
     if properties.of(obj).upstream_proxy is not None:
         text = "Switch Sinew off before a script applies its modifiers: Sinew also uses its mesh meanwhile"
         found.append(phrase(text))

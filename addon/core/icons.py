@@ -4,7 +4,8 @@
 The viewport and renders each have icons of their own, and exactly one of three things deforms there. Sinew,
 as long as its icon and an Armature modifier's are on: so tools of others find that modifier, and get the mesh
 at rest where they hide it. Nothing, once one of the two is switched off. The Armature modifier, where its
-icon is switched on again after Sinew's was switched off.
+icon is switched on again after Sinew's was switched off. Where Blender would compute the Armature modifier,
+too, its icon is off while Sinew deforms (Situation.ALONE), and it deforms once it is switched on.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         if attach.is_off(obj) or (wanted.state is State.REFUSED and is_same):
             attach.position_modifier(obj)
             return
-        attach.switch(obj, on=wanted.state is State.ASIDE)
+        attach.switch(obj, wanted.state is State.ASIDE, wanted.is_alone)
         if wanted.state is State.ASIDE:
             attach.restore_builtin(obj)
         attach.position_modifier(obj)
@@ -113,7 +113,7 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         return
     given = wanted.normals
     point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
-    attach.switch(obj, on=True)
+    attach.switch(obj, on=True, is_alone=wanted.is_alone)
     attach.restore_pointers(obj)
 
 
@@ -145,11 +145,11 @@ def apply_saved(obj: bpy.types.Object) -> None:
         attach.use_nearest_volume(obj)
 
 
-def apply_resumed(obj: bpy.types.Object, was_on: bool) -> None:
-    """was_on: Sinew deformed it before it was saved."""
+def apply_resumed(obj: bpy.types.Object, was_on: bool, is_alone: bool) -> None:
+    """was_on: Sinew deformed it before it was saved. is_alone: as its plan says."""
     attach.restore_volume(obj)
     if stack.sinew_modifier(obj) is not None:
-        attach.switch(obj, on=was_on)
+        attach.switch(obj, was_on, is_alone)
 
 
 def mode_of(obj: bpy.types.Object) -> str:

@@ -67,6 +67,8 @@ class Plan:
                     user chose
     in_buffer       a separate object stores the points (point_buffer.py), not an attribute of the mesh
     after_update    Sinew deforms after Blender's evaluation, not within it
+    is_alone        where Sinew deforms, its Armature modifiers are off: only within the evaluation can they
+                    be on and yet be left out
     normals         the normals given along with the points
     normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
     viewport        what deforms it in the viewport, or would if Blender did not do it for Sinew
@@ -77,6 +79,7 @@ class Plan:
     reason: str = ""
     in_buffer: bool = False
     after_update: bool = False
+    is_alone: bool = False
     normals: Normals = Normals()
     normals_reason: str = ""
     viewport: Deformer = Deformer.SINEW
@@ -188,9 +191,9 @@ def _plan(facts: ObjectFacts) -> Plan:
     if facts.builtin_is_faster and Deformer.ARMATURE not in views:
         reason = "Small: the Armature modifier has the same shape in less time, and deforms it"
         return Plan(State.BUILT_IN, reason)
-    if Deformer.SINEW not in views and not facts.has_upstream:
-        return Plan(State.ASIDE)
     reason = _why_not_in_depsgraph(facts)
+    if Deformer.SINEW not in views and not facts.has_upstream:
+        return Plan(State.ASIDE, is_alone=bool(reason))
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
     normals, normals_reason = _normals(facts)
@@ -203,6 +206,7 @@ def _plan(facts: ObjectFacts) -> Plan:
         facts.waits_for or reason,
         in_buffer,
         bool(reason),
+        is_alone=bool(reason),
         normals=normals,
         normals_reason=normals_reason,
     )

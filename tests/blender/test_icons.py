@@ -26,13 +26,17 @@ SINEW, ARMATURE, NOTHING = Deformer.SINEW, Deformer.ARMATURE, Deformer.NOTHING
 @dataclass
 class Rule:
     """What the icons should mean, apart from Sinew's own code: for each view, whether Sinew's was switched
-    off, and whether the Armature modifier's is on, which goes off with it."""
+    off, and whether the Armature modifier's is on, which goes off with it. After the update, that is off
+    while Sinew deforms, too, and deforms in Sinew's place when it is switched on."""
 
+    after_update: bool = False
     hidden: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, False))
     armature: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, True))
 
     def click(self, modifier: str, view: str) -> None:
-        if modifier == "Armature":
+        if modifier == "Armature" and self.after_update:
+            self.hidden[view], self.armature[view] = self.deformer(view) is not ARMATURE, True
+        elif modifier == "Armature":
             self.armature[view] = not self.armature[view]
         else:
             self.hidden[view] = self.deformer(view) is SINEW
@@ -45,7 +49,7 @@ class Rule:
 
     def icons(self) -> dict[str, tuple[bool, bool]]:
         views = [self.deformer(view) for view in VIEWS]
-        of = {"Sinew": (SINEW,), "Armature": (SINEW, ARMATURE)}
+        of = {"Sinew": (SINEW,), "Armature": (ARMATURE,) if self.after_update else (SINEW, ARMATURE)}
         return {name: tuple(view in meant for view in views) for name, meant in of.items()}
 
 
@@ -190,7 +194,7 @@ def by_route(request):
 @pytest.mark.usefixtures("by_route")
 def test_clicks_among_everything_else(prepare, rendered_points, tmp_path):
     """A long walk: clicks, Sinew off and on, saving and loading, undo, duplicates, modes."""
-    character, rule, dice = Character(prepare), Rule(), random.Random(7)
+    character, rule, dice = Character(prepare), Rule(prepare is _with_keys), random.Random(7)
     others = (_switch, _reopen, _undo, _duplicate, _paint, _edit)
     for step in range(60):
         chosen = dice.choice(CLICKS)

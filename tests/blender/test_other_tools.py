@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import other_tools, properties, stack
+from sinew_addon.deform import safe_mode
 from sinew_addon.jobs.tasks import preflight
 
 FBX = "Switch Sinew off before an export to FBX, or the file has no shape keys"
@@ -425,3 +426,14 @@ def test_it_is_said_before(tmp_path):
     assert other_tools.notes(obj) == [SECOND_USER]
     obj.sinew.enabled = False
     assert other_tools.notes(obj) == []
+
+
+def test_it_is_said_where_the_armature_modifier_is_off(monkeypatch):
+    """After the update, Blender would compute it in each frame if it was on."""
+    monkeypatch.setattr(safe_mode, "_forced", True)
+    obj = make(plain, has_sinew=True)
+    assert skins_of(obj) == []
+    said = "Switch Sinew off before other tools look for its Armature modifier: that is off"
+    assert other_tools.notes(obj) == [said]
+    properties.of(obj).enabled = False
+    assert len(skins_of(obj)) == 1
