@@ -266,7 +266,8 @@ def switch(obj: bpy.types.Object, on: bool, is_alone: bool = False) -> None:
         restore_volume(obj)
         adopt_pointers(obj)
         _note_keyed_visibility(obj)
-        is_alone = is_alone or _is_icon_animated(obj)
+        # Tools for weights find the deforming bones through Armature modifiers that are on.
+        is_alone = (is_alone or _is_icon_animated(obj)) and obj.mode != "WEIGHT_PAINT"
         _set_icons(obj, Situation.ALONE if is_alone else Situation.SINEW)
         return
     if settings.replaces_modifiers:

@@ -168,8 +168,10 @@ def _paint(character: Character, rule: Rule, chosen: tuple[str, str], _path: str
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     bpy.context.view_layer.update()
     assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
-    character.click(*chosen)
-    rule.click(*chosen)
+    # After the update, the Armature modifier's icon has another meaning in this mode, where it is on.
+    if not (rule.after_update and chosen[0] == "Armature"):
+        character.click(*chosen)
+        rule.click(*chosen)
     assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
