@@ -105,31 +105,17 @@ def _matching(root: Path, pattern: Path) -> Iterator[Path]:
 
 
 def _fits(names: tuple[str, ...], parts: tuple[str, ...]) -> bool:
-    # The positions in the pattern up to which the names so far can match.
-    positions = {0}
-    for name in names:
-        shown = not name.startswith(".")
-        after = set()
-        for position in _past_folders(positions, parts):
-            if position == len(parts):
-                continue
-            if parts[position] == "**":
-                after |= {position} if shown else set()
-            elif fnmatchcase(name, parts[position]) and (shown or parts[position].startswith(".")):
-                after.add(position + 1)
-        positions = after
-    # At the end of a pattern, ** also stands for any file.
-    return len(parts) in positions or (parts[-1] == "**" and len(parts) - 1 in positions)
-
-
-def _past_folders(positions: set[int], parts: tuple[str, ...]) -> set[int]:
-    """Returns the positions, with those behind each **, which can also stand for no folder."""
-    found = set(positions)
-    for position in sorted(positions):
-        while position < len(parts) and parts[position] == "**":
-            position += 1
-            found.add(position)
-    return found
+    """Whether a path's names match a pattern's parts."""
+    if not names:
+        # At the end of a pattern, ** also stands for any file.
+        return all(part == "**" for part in parts)
+    if not parts:
+        return False
+    is_shown = not names[0].startswith(".")
+    if parts[0] == "**":
+        return _fits(names, parts[1:]) or (is_shown and _fits(names[1:], parts))
+    fits = fnmatchcase(names[0], parts[0]) and (is_shown or parts[0].startswith("."))
+    return fits and _fits(names[1:], parts[1:])
 
 
 def _fixed_part(pattern: Path) -> Path:
