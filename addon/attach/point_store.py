@@ -193,6 +193,16 @@ def clear_references(obj: bpy.types.Object) -> None:
         nodes.node_group = None
 
 
+def clear_references_to_itself(obj: bpy.types.Object) -> None:
+    """Called after undo and redo, which read an object that changed into new memory. Where a deleted helper
+    was in that memory when the step was made, Blender (4.2 to 5.2) has the object's pointers to the helper
+    point to the object itself: it remaps these before it links the others, in its function
+    read_libblock_undo_restore_at_old_address(). Sinew would write its points into the artist's mesh."""
+    settings = properties.of(obj)
+    if obj in (settings.point_buffer, settings.upstream_proxy):
+        clear_references(obj)
+
+
 def _forget_helpers(settings: properties.SinewSettings) -> None:
     settings.point_buffer = settings.upstream_proxy = None
     settings.upstream_signature = ""

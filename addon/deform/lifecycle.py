@@ -51,6 +51,8 @@ def before_step(_may_react: bool) -> None:
 
 @_handler
 def after_step(_may_react: bool) -> None:
+    for obj in filter(properties.has_sinew, bpy.data.objects):
+        point_store.clear_references_to_itself(obj)
     session.adopt_after_step()
     notify(subscribers.stepped)
 
