@@ -9,8 +9,10 @@ from types import ModuleType
 
 # The parts of the library that the extension uses.
 NAMES = (
-    *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Method", "Normals", "Parameter", "Skeleton"),
+    *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Lock", "Method", "Normals", "Parameter"),
     *(
+        "Precomputation",
+        "Skeleton",
         "SkinnedNormals",
         "Stage",
         "affine",
@@ -20,7 +22,7 @@ NAMES = (
         "ik",
         "interpolate",
     ),
-    *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages"),
+    *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages", "thread_id"),
 )
 
 

@@ -67,7 +67,7 @@ def main() -> None:
             times = []
             for _run in range(arguments.runs):
                 started = time.perf_counter(), time.process_time()
-                kept = make()
+                kept = make().result()
                 times.append((time.perf_counter() - started[0], time.process_time() - started[1]))
             clock, processor = (min(column) for column in zip(*times, strict=True))
             seconds[case] = {"clock": clock, "processor": processor, "rows": len(kept)}

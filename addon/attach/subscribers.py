@@ -25,7 +25,7 @@ class Subscribers:
     frame_shown               what the panel shows of a frame may differ
     saving                    the file is about to be saved
     safe_mode_changed         safe mode was switched on or off
-    precomputation_requested  something is computed on a thread, or will be
+    precomputation_requested  something is computed in the background, or will be
     precomputation_shown      the progress of that may differ
     """
 

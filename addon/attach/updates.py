@@ -4,14 +4,16 @@ A window that renders calls handlers from the render's thread, too."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
+import sinew
 
-_lock = threading.RLock()
+_lock = sinew.Lock()
+# Blender registers extensions on its main thread.
+_main_thread = sinew.thread_id()
 # How many updates_suspended() blocks the thread that has the lock is in.
 _depth = 0
 
@@ -66,18 +68,18 @@ def is_playing_in_window() -> bool:
 
 
 def is_main_thread() -> bool:
-    return threading.get_ident() == threading.main_thread().ident
+    return sinew.thread_id() == _main_thread
 
 
 class _Reaction:
     """A class, as a generator's context takes longer than the work of most frames."""
 
     def __enter__(self) -> bool:
-        _lock.acquire()
+        _lock.__enter__()
         return _depth == 0
 
-    def __exit__(self, *_error: object) -> None:
-        _lock.release()
+    def __exit__(self, *error: object) -> None:
+        _lock.__exit__(*error)
 
 
 def reaction() -> _Reaction:

@@ -21,7 +21,7 @@ from ..jobs.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..jobs.job_file import JobFile, Settings, read_job_file
 from ..jobs.journal import Journal, is_complete
 from ..jobs.report import PICTURES, write_report
-from ..jobs.workers import run_here, run_in_dask, run_on_this_machine
+from ..jobs.workers import run_here, run_on_this_machine
 from .arguments import count, seconds
 from .console import BatchProgress, Console
 
@@ -190,6 +190,11 @@ class _Workers:
                 prepare_blender()
             return run_here(tasks, lambda task: worker.run(task, lambda _doing: None), _versions)
         if self._args.scheduler is not None:
+            try:
+                from ..jobs.dask_cluster import run_in_dask
+            except ImportError:
+                raise SinewError("--scheduler needs dask: pip install 'sinew-blender[cluster]'") from None
+
             return run_in_dask(tasks, self._limits, self._args.scheduler, self._console.complain)
         return run_on_this_machine(tasks, self._limits, self._jobs)
 

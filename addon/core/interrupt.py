@@ -6,7 +6,6 @@ and step of progress."""
 from __future__ import annotations
 
 import signal
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -22,11 +21,12 @@ _ON_BPY = tuple(f"{_PACKAGE}.{room}." for room in ("io", "attach", "deform", "ui
 def deferred() -> Iterator[None]:
     """A context in which Ctrl-C raises KeyboardInterrupt at the next check(); pressed again, at once."""
     global _requested
-    if threading.current_thread() is not threading.main_thread():
+    try:
+        before = signal.signal(signal.SIGINT, _on_interrupt)
+    except ValueError:
         # Only the main thread can handle signals.
         yield
         return
-    before = signal.signal(signal.SIGINT, _on_interrupt)
     try:
         yield
     finally:
@@ -35,8 +35,12 @@ def deferred() -> Iterator[None]:
         signal.signal(signal.SIGINT, before or signal.default_int_handler)
 
 
+def is_requested() -> bool:
+    """Whether Ctrl-C was pressed, and the next check() raises KeyboardInterrupt."""
+    return _requested
+
+
 def check() -> None:
-    """Raises KeyboardInterrupt where Ctrl-C was pressed."""
     if _requested:
         raise KeyboardInterrupt
 

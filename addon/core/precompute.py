@@ -1,93 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Precomputations: run once for each hash of their inputs, on a thread or while the caller waits."""
+"""Precomputations: run once for each hash of their inputs, by threads of the native library. Whoever asks for
+one of them has the results of all that have ended taken."""
 
 from __future__ import annotations
 
-import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
+import sinew
 
+from . import interrupt
+from .errors import SinewError
 from .file_cache import FileCache
 
-Progress: TypeAlias = Callable[[float], bool]
-"""Takes the progress, 0 to 1. Returns False when the work has to end."""
-
-Make: TypeAlias = Callable[[Progress], np.ndarray | None]
-"""Returns None if it was told to end."""
+Start: TypeAlias = Callable[..., sinew.Precomputation]
+"""Takes `gives_way`: whether the artist works meanwhile."""
 
 # Results that took longer are stored in the folder.
 SECONDS_WORTH_A_FILE = 0.1
 # Bytes of results that are kept in memory, so that undo finds them.
 MEMORY = 256 * 2**20
-
-
-class Precomputation:
-    """One run, on its own thread or on the one that waits for it.
-
-    make      uses only numpy arrays, which nobody writes to
-    result    None until it has ended successfully
-    error     the exception of make
-    progress  0 to 1
-    """
-
-    def __init__(self, key: str, make: Make, ended: Callable[[Precomputation], None]) -> None:
-        self.key = key
-        self.progress = 0.0
-        self.result: np.ndarray | None = None
-        self.error: Exception | None = None
-        self.seconds = 0.0
-        self._make = make
-        self._on_end = ended
-        self._cancelled = threading.Event()
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="Sinew precomputation", daemon=True)
-
-    @property
-    def is_cancelled(self) -> bool:
-        return self._cancelled.is_set()
-
-    @property
-    def has_ended(self) -> bool:
-        return self._ended.is_set()
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def run_here(self) -> None:
-        """Runs on this thread, instead of start()."""
-        self._run()
-
-    def cancel(self) -> None:
-        """Returns at once; the run ends a moment later, without a result."""
-        self._cancelled.set()
-
-    def wait(self) -> None:
-        self._ended.wait()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join()
-
-    def _run(self) -> None:
-        started = time.perf_counter()
-        try:
-            self.result = self._make(self._note_progress)
-        except Exception as error:
-            self.error = error
-        except BaseException:
-            # For example Ctrl-C on the thread that waits.
-            self._cancelled.set()
-            raise
-        finally:
-            self.seconds = time.perf_counter() - started
-            self._on_end(self)
-            self._ended.set()
-
-    def _note_progress(self, done: float) -> bool:
-        self.progress = done
-        return not self._cancelled.is_set()
+_SECONDS_BETWEEN_CHECKS = 0.05
 
 
 class Precomputations:
@@ -102,86 +38,88 @@ class Precomputations:
         self.waits = True
         self.cache = cache
         self.stopped: set[str] = set()
-        self._running: dict[str, Precomputation] = {}
+        # With the time when each was started.
+        self._running: dict[str, tuple[sinew.Precomputation, float]] = {}
         self._made: OrderedDict[str, np.ndarray] = OrderedDict()
-        self._lock = threading.Lock()
+        self._lock = sinew.Lock()
 
     @property
-    def running(self) -> list[Precomputation]:
+    def running(self) -> list[sinew.Precomputation]:
         with self._lock:
-            return list(self._running.values())
+            self._take_results()
+            return [run for run, _started in self._running.values()]
 
     def find(self, key: str) -> np.ndarray | None:
         """Returns the result of an earlier run, in this process or another; None where there is none."""
         with self._lock:
+            self._take_results()
             if key in self._made:
                 self._made.move_to_end(key)
                 return self._made[key]
-        found = self.cache.load(key) if self.cache is not None else None
-        if found is not None:
-            self._keep(key, found)
-        return found
+            found = self.cache.load(key) if self.cache is not None else None
+            if found is not None:
+                self._keep(key, found)
+            return found
 
-    def start(self, key: str, make: Make) -> Precomputation:
-        """Starts a run on its own thread, or returns the one that already runs with this key."""
-        run, is_new = self._run_of(key, make)
-        if is_new:
-            self.stopped.discard(key)
-            run.start()
-        return run
+    def start(self, key: str, start: Start, gives_way: bool = True) -> sinew.Precomputation:
+        """Starts a run, or returns the one that already runs with this key."""
+        with self._lock:
+            self._take_results()
+            if key not in self._running:
+                self.stopped.discard(key)
+                self._running[key] = start(gives_way=gives_way), time.monotonic()
+            return self._running[key][0]
 
-    def make_now(self, key: str, make: Make) -> np.ndarray:
-        """Waits for the result. Raises what `make` raises."""
+    def make_now(self, key: str, start: Start) -> np.ndarray:
+        """Waits for the result. Raises what the run raises, and SinewError where Ctrl-C was pressed: Blender
+        prints a KeyboardInterrupt in its handlers, and goes on."""
         while True:
-            run, is_new = self._run_of(key, make)
-            if is_new:
-                run.run_here()
-            run.wait()
-            if run.error is not None:
-                raise run.error
+            run = self.start(key, start, gives_way=False)
+            try:
+                while not run.wait(_SECONDS_BETWEEN_CHECKS):
+                    if interrupt.is_requested():
+                        raise SinewError("stopped by Ctrl-C")
+            except BaseException:
+                run.cancel()
+                raise
+            made = run.result()
             # Otherwise somebody cancelled the run.
-            if run.result is not None:
-                return run.result
+            if made is not None:
+                with self._lock:
+                    self._take_results()
+                return made
 
     def cancel_all(self) -> None:
-        """Ends all runs, and returns when their threads have ended."""
-        running = self.running
-        for run in running:
+        for run in self.running:
             run.cancel()
-        for run in running:
-            run.wait()
 
     def stop(self) -> None:
-        """Cancels all runs. None of these keys is started again on a thread until it is removed from
-        `stopped`."""
-        self.stopped |= {run.key for run in self.running}
-        self.cancel_all()
-
-    def _run_of(self, key: str, make: Make) -> tuple[Precomputation, bool]:
+        """Cancels all runs. In a window none of these keys is started again while it is in `stopped`."""
         with self._lock:
-            run = self._running.get(key)
-            if run is not None and not run.is_cancelled:
-                return run, False
-            run = self._running[key] = Precomputation(key, make, self._ended)
-            return run, True
+            self._take_results()
+            self.stopped |= self._running.keys()
+            self.cancel_all()
 
-    def _ended(self, run: Precomputation) -> None:
-        """Called on the thread that ran it."""
-        if run.result is not None:
-            # Stored before it is no longer listed as running, so that it is always found.
-            self._keep(run.key, run.result)
-            if self.cache is not None and run.seconds > SECONDS_WORTH_A_FILE:
-                self.cache.store(run.key, run.result)
-        with self._lock:
-            if self._running.get(run.key) is run:
-                del self._running[run.key]
+    def _take_results(self) -> None:
+        for key, (run, started) in list(self._running.items()):
+            if not run.has_ended:
+                continue
+            del self._running[key]
+            try:
+                made = run.result()
+            except Exception:
+                # Raised again for whoever started it.
+                continue
+            if made is not None:
+                self._keep(key, made)
+                if self.cache is not None and time.monotonic() - started > SECONDS_WORTH_A_FILE:
+                    self.cache.store(key, made)
 
     def _keep(self, key: str, made: np.ndarray) -> None:
-        with self._lock:
-            self._made[key] = made
-            self._made.move_to_end(key)
-            while len(self._made) > 1 and sum(each.nbytes for each in self._made.values()) > MEMORY:
-                self._made.popitem(last=False)
+        self._made[key] = made
+        self._made.move_to_end(key)
+        while len(self._made) > 1 and sum(each.nbytes for each in self._made.values()) > MEMORY:
+            self._made.popitem(last=False)
 
 
 precomputations = Precomputations()

@@ -6,7 +6,6 @@ from __future__ import annotations
 import hashlib
 import itertools
 import logging
-import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ import sinew
 
 from .influences import Influences
 from .parameters import Value
-from .precompute import Make, Precomputation, Progress, precomputations
+from .precompute import Start, precomputations
 from .rig import Weighting
 from .spaces import transformed
 
@@ -32,31 +31,29 @@ class Provider:
 
     what        its name, for people
     version     part of the hash: raised when the same mesh gives other data
-    make        takes rest points, influences, triangles and progress, and `parameters` by name
+    start       takes rest points, influences, triangles, and by name `gives_way` and `parameters`
     parameters  ids of the method's parameters, all numbers, that the data depends on
     """
 
     what: str
     version: int
-    make: Callable[..., np.ndarray | None]
+    start: Callable[..., sinew.Precomputation]
     parameters: tuple[str, ...] = ()
 
 
 def _centres(
-    points: np.ndarray, influences: Influences, triangles: np.ndarray, progress: Progress
-) -> np.ndarray | None:
-    own = influences
+    points: np.ndarray, own: Influences, triangles: np.ndarray, *, gives_way: bool
+) -> sinew.Precomputation:
     return sinew.centres_of_rotation(
-        points, own.offsets, own.bones, own.weights, triangles, progress=progress
+        points, own.offsets, own.bones, own.weights, triangles, gives_way=gives_way
     )
 
 
 def _moments(
-    points: np.ndarray, influences: Influences, triangles: np.ndarray, progress: Progress, *, radius: float
-) -> np.ndarray | None:
-    own = influences
+    points: np.ndarray, own: Influences, triangles: np.ndarray, *, radius: float, gives_way: bool
+) -> sinew.Precomputation:
     return sinew.direct_delta_mush(
-        points, own.offsets, own.bones, own.weights, triangles, radius, progress=progress
+        points, own.offsets, own.bones, own.weights, triangles, radius, gives_way=gives_way
     )
 
 
@@ -73,10 +70,10 @@ class _Entry:
     """The data of one method. If outdated, `made` has that of the mesh before it changed."""
 
     key: str = ""
-    make: Make | None = None
+    start: Start | None = None
     made: np.ndarray | None = None
     is_outdated: bool = False
-    run: Precomputation | None = None
+    run: sinew.Precomputation | None = None
 
 
 _versions = itertools.count(1)
@@ -114,7 +111,7 @@ class VertexData:
         self.read_at = time.monotonic()
         self._given = dict(given or {})
         self._stored = stored or {}
-        self._lock = threading.Lock()
+        self._lock = sinew.Lock()
         self._entries: dict[str, _Entry] = {}
         self._parameters = {name: _values_of(name, {}) for name in PROVIDERS}
         if before is not None:
@@ -200,7 +197,7 @@ class VertexData:
             entry = self._entries.get(method)
             return entry is not None and entry.made is not None and not entry.is_outdated
 
-    def running(self, method: str) -> Precomputation | None:
+    def running(self, method: str) -> sinew.Precomputation | None:
         """Returns the running computation, if there is one."""
         with self._lock:
             entry = self._entries.get(method)
@@ -225,17 +222,17 @@ class VertexData:
             entry = self._entries.setdefault(method, _Entry())
             if entry.made is not None and not (entry.is_outdated and precomputations.waits):
                 return entry.made
-            make = self._prepare(entry, method, bones_from_model)
+            start = self._prepare(entry, method, bones_from_model)
             if entry.made is not None and not entry.is_outdated:
                 return entry.made
-        made = precomputations.make_now(entry.key, make)
+        made = precomputations.make_now(entry.key, start)
         with self._lock:
             self._put(entry, made)
         return made
 
     def request(self, method: str, bones_from_model: np.ndarray) -> None:
-        """Finds the data, or computes it where precomputations are waited for; otherwise starts to compute it
-        on a thread, unless the artist stopped it. Raises what the computation raises."""
+        """Finds the data, or computes it where precomputations are waited for, and raises what that raises.
+        Otherwise starts to compute it, unless the artist stopped it."""
         if method not in PROVIDERS or self.is_current(method):
             return
         if precomputations.waits:
@@ -245,9 +242,9 @@ class VertexData:
             entry = self._entries.setdefault(method, _Entry())
             if entry.run is not None:
                 return
-            make = self._prepare(entry, method, bones_from_model)
+            start = self._prepare(entry, method, bones_from_model)
             if (entry.made is None or entry.is_outdated) and entry.key not in precomputations.stopped:
-                entry.run = precomputations.start(entry.key, make)
+                entry.run = precomputations.start(entry.key, start)
 
     def take_result(self, method: str) -> bool:
         """Takes the result of a computation that has ended. Returns whether one has. Raises what the
@@ -257,16 +254,15 @@ class VertexData:
             if entry is None or entry.run is None or not entry.run.has_ended:
                 return False
             run, entry.run = entry.run, None
-            if run.error is not None:
-                raise run.error
-            if run.result is not None and entry.key == run.key:
-                self._put(entry, run.result)
+            made = run.result()
+            if made is not None:
+                self._put(entry, made)
             return True
 
-    def _prepare(self, entry: _Entry, method: str, bones_from_model: np.ndarray) -> Make:
+    def _prepare(self, entry: _Entry, method: str, bones_from_model: np.ndarray) -> Start:
         """Finds earlier data; returns what computes it otherwise. Called under the lock."""
-        if entry.make is not None:
-            return entry.make
+        if entry.start is not None:
+            return entry.start
         if self.triangles is None:
             raise RuntimeError(f"{method}: the mesh's triangles were not read")
         points = self.points
@@ -276,7 +272,7 @@ class VertexData:
         provider = PROVIDERS[method]
         values = self._parameters[method]
         entry.key = _key(method, provider.version, values, self.points, influences, self.triangles)
-        entry.make = partial(provider.make, self.points, influences, self.triangles, **values)
+        entry.start = partial(provider.start, self.points, influences, self.triangles, **values)
         found = self._stored.get(entry.key)
         if found is None:
             found = precomputations.find(entry.key)
@@ -284,7 +280,7 @@ class VertexData:
             self._put(entry, found)
         elif found is not None:
             log.warning("The stored %s of a mesh are damaged; they are computed anew", provider.what)
-        return entry.make
+        return entry.start
 
     def _put(self, entry: _Entry, made: np.ndarray) -> None:
         entry.made, entry.is_outdated = made, False

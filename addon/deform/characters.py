@@ -139,6 +139,8 @@ def _use_methods(
                 errors.append(None)
             except SinewError as error:
                 errors.append(error)
+    # It may have ended what methods need computed.
+    interrupt.check()
     for index, (obj, method) in enumerate(wanted):
         if errors[index] is None and method != BLENDER and session.error_of(obj):
             errors[index] = SinewError(session.error_of(obj))

@@ -9,7 +9,6 @@ afterwards and may change the file.
 
 from __future__ import annotations
 
-import threading
 import time
 
 import bpy
@@ -26,24 +25,13 @@ from .skinned_object import Shown, SkinnedObject
 _NO_NORMALS = np.empty((0, 3), dtype=np.float32)
 
 
-class _Thread(threading.local):
-    """What is kept for each of Blender's threads: the object named last.
-
-    Python does not know Blender's threads: each call from one creates a Python thread state and removes it
-    again, which takes 50 to 100 us on two cores. Here the state stays until the thread ends.
-    """
-
-    def __init__(self) -> None:
-        self.requesting: bpy.types.Object | None = None
-        sinew.keep_thread_state()
-
-
 class DepsgraphRequests:
     """The functions that the driver's last variables call: the first names the object, the second, on the
     same thread, its mesh."""
 
     def __init__(self) -> None:
-        self._thread = _Thread()
+        # The object that each thread named last.
+        self._requesting: dict[int, bpy.types.Object] = {}
         # By the object's name, which its evaluated copies share. The dict is replaced, never changed, as
         # other threads may be reading it.
         self._objects: dict[str, SkinnedObject] = {}
@@ -52,10 +40,13 @@ class DepsgraphRequests:
         self._objects = objects
 
     def object_requested(self, evaluated: bpy.types.Object) -> None:
-        self._thread.requesting = evaluated
+        # Python does not know Blender's threads: for each call from one it would create a thread state and
+        # remove it again, which takes 50 to 100 us on two cores.
+        sinew.keep_thread_state()
+        self._requesting[sinew.thread_id()] = evaluated
 
     def mesh_requested(self, evaluated_mesh: bpy.types.Mesh) -> None:
-        evaluated, self._thread.requesting = self._thread.requesting, None
+        evaluated = self._requesting.pop(sinew.thread_id(), None)
         if evaluated is None or not (evaluated.is_evaluated and evaluated_mesh.is_evaluated):
             # Something other than the driver reads the property.
             return

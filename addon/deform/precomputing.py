@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Requests what methods need computed before their first frame, and takes the results of the threads that
-compute it.
+"""Requests what methods need computed before their first frame, and takes the results.
 
 In a window it is computed while the artist works; meanwhile the object has its Armature modifier's shape, or
 the shape from the data of the mesh before it changed. Scripts, commands and renders wait for it instead.
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import sinew
 
 from ..attach import properties, stage_settings, stored_vertex_data
 from ..attach.subscribers import notify, subscribers
@@ -23,7 +23,7 @@ from ..attach.updates import is_main_thread
 from ..core.errors import SinewError
 from ..core.file_cache import FileCache
 from ..core.phrases import phrase
-from ..core.precompute import Precomputation, precomputations
+from ..core.precompute import precomputations
 from ..core.spaces import SAME_SPACE
 from ..core.vertex_data import PROVIDERS, VertexData
 from ..io import addon_preferences, armature_io
@@ -89,7 +89,7 @@ def take_results(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
     return has_ended
 
 
-def running(obj: bpy.types.Object, skinned: SkinnedObject) -> dict[str, Precomputation]:
+def running(obj: bpy.types.Object, skinned: SkinnedObject) -> dict[str, sinew.Precomputation]:
     """Returns what is being computed for the object now, by its name in the panel."""
     runs = ((PROVIDERS[method].what, data.running(method)) for _arm, data, method in _needed(obj, skinned))
     return {what: run for what, run in runs if run is not None}
@@ -166,7 +166,7 @@ def open_cache() -> None:
 
 
 def end() -> None:
-    """Ends all threads, before Blender's data or Blender itself goes away."""
+    """Cancels what runs, as nobody will want it."""
     precomputations.cancel_all()
 
 

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+import sinew
 
 from ..attach import attach, normals, properties, stack, upstream_proxy
 from ..attach.modifier_options import ModifierOptions
@@ -165,7 +165,7 @@ class SkinnedObject:
     plan: Plan
     shown: Shown = field(default_factory=Shown)
     evaluation: Evaluation = field(default_factory=Evaluation)
-    lock: threading.Lock = field(default_factory=threading.Lock)
+    lock: sinew.Lock = field(default_factory=sinew.Lock)
     needs_apply: bool = False
     group_losses: int = 0
     needs_recheck: bool = False

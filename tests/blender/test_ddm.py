@@ -40,7 +40,7 @@ def in_window():
 def moments_of(obj: bpy.types.Object, radius: float) -> np.ndarray:
     points = np.float32([vertex.co[:] for vertex in obj.data.vertices])
     influences, triangles = scenes.weights_of(obj), scenes.triangles_of(obj)
-    return sinew.direct_delta_mush(points, *influences, triangles, np.float32(radius))
+    return sinew.direct_delta_mush(points, *influences, triangles, np.float32(radius)).result()
 
 
 def assert_equal_to_reference(obj: bpy.types.Object, radius: float, variant: str = "0") -> None:

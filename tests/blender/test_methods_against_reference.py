@@ -24,7 +24,7 @@ STEP = 7
 def centres_of(obj: bpy.types.Object) -> np.ndarray:
     points = np.float32([vertex.co[:] for vertex in obj.data.vertices])
     influences, triangles = scenes.weights_of(obj), scenes.triangles_of(obj)
-    return sinew.centres_of_rotation(points, *influences, triangles, exact=len(points) < 1000)
+    return sinew.centres_of_rotation(points, *influences, triangles, exact=len(points) < 1000).result()
 
 
 def assert_equal_to_reference(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Precomputation for cor: on a thread while the artist works, immediately where nobody can look again;
+"""Precomputation for cor: in the background while the artist works, immediately where nobody can look again;
 cached."""
 
 from __future__ import annotations
@@ -13,48 +13,71 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+import sinew
 from program import run_sinew
 from sinew_addon.attach import attach, properties, stored_vertex_data
-from sinew_addon.core import vertex_data
+from sinew_addon.core import interrupt, vertex_data
 from sinew_addon.core.file_cache import FileCache
 from sinew_addon.core.precompute import precomputations
 from sinew_addon.core.vertex_data import VertexData
-from sinew_addon.deform import precompute_watch, precomputing, session
+from sinew_addon.deform import characters, precompute_watch, precomputing, session
 from sinew_addon.deform.plan import State
 
 FRAME = 8
 
 
 class Gate:
-    """Allows the computation of centres, and counts it; while it is closed, they are waited for."""
+    """Starts to compute centres, and counts it; while it is closed, no result comes."""
 
-    def __init__(self, make) -> None:
-        self.count, self.threads = 0, []
-        self._make, self._open, self.is_begun = make, threading.Event(), threading.Event()
-        self._open.set()
+    def __init__(self, start) -> None:
+        self.count, self.is_open = 0, True
+        self._start = start
 
     def close(self) -> None:
-        self._open.clear()
+        self.is_open = False
 
     def open(self) -> None:
-        self._open.set()
+        self.is_open = True
 
-    def __call__(self, points, influences, triangles, progress):
+    def __call__(self, points, influences, triangles, gives_way):
         self.count += 1
-        self.threads.append(threading.current_thread())
-        self.is_begun.set()
-        while not self._open.wait(0.002):
-            if not progress(0.0):
-                return None
-        return self._make(points, influences, triangles, progress)
+        self.gives_way = gives_way
+        return BehindGate(self, self._start(points, influences, triangles, gives_way=gives_way))
+
+
+class BehindGate:
+    """A precomputation whose result the gate keeps back."""
+
+    def __init__(self, gate: Gate, run: sinew.Precomputation) -> None:
+        self._gate, self._run, self._is_cancelled = gate, run, False
+
+    @property
+    def progress(self) -> float:
+        return self._run.progress
+
+    @property
+    def has_ended(self) -> bool:
+        return self._is_cancelled or (self._gate.is_open and self._run.has_ended)
+
+    def cancel(self) -> None:
+        self._is_cancelled = not self.has_ended
+
+    def wait(self, seconds: float) -> bool:
+        end = time.monotonic() + seconds
+        while not self.has_ended and time.monotonic() < end:
+            time.sleep(0.002)
+        return self.has_ended
+
+    def result(self) -> np.ndarray | None:
+        return None if self._is_cancelled else self._run.result()
 
 
 @pytest.fixture(autouse=True)
 def gate(monkeypatch, tmp_path):
     """No results of earlier tests exist, and nothing runs after a test."""
     provider = vertex_data.PROVIDERS["cor"]
-    gate = Gate(provider.make)
-    monkeypatch.setitem(vertex_data.PROVIDERS, "cor", dataclasses.replace(provider, make=gate))
+    gate = Gate(provider.start)
+    monkeypatch.setitem(vertex_data.PROVIDERS, "cor", dataclasses.replace(provider, start=gate))
     monkeypatch.setattr(precomputations, "cache", FileCache(tmp_path / "cache", 10**8))
     monkeypatch.setattr(precomputations, "_made", type(precomputations._made)())
     yield gate
@@ -107,22 +130,23 @@ def test_a_script_has_it_at_once(gate):
     obj, _armature = scenes.make_arm(bones=3)
     scenes.add_sinew(obj, "cor")
     assert plan_of(obj).state is State.IN_DEPSGRAPH
-    assert gate.threads == [threading.main_thread()]
+    assert gate.count == 1
+    assert not gate.gives_way
 
 
 @pytest.mark.parametrize("preserve_volume", [False, True])
 def test_the_modifiers_shape_until_it_is_found(gate, route, preserve_volume):
     expected, by_modifier = shape_by_cor(), shapes_by_modifier(preserve_volume)
     precomputations.waits = False
-    gate.count, gate.threads = 0, []
+    gate.count = 0
     gate.close()
     obj, _armature = scenes.make_arm(bones=3)
     obj.modifiers["Armature"].use_deform_preserve_volume = preserve_volume
     bpy.context.scene.frame_set(FRAME)
     scenes.add_sinew(obj, "cor")
     tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
-    assert gate.is_begun.wait(10)
-    assert gate.threads[0] is not threading.main_thread()
+    assert gate.count == 1
+    assert gate.gives_way
     assert plan_of(obj).state is State.WAITING
     assert "centres of rotation" in plan_of(obj).reason
     assert precomputing.running(obj, session.state_of(obj)).keys() == {"centres of rotation"}
@@ -140,7 +164,7 @@ def test_stopped_it_waits_for_the_button(gate, in_window):
     gate.close()
     obj, _armature = scenes.make_arm(bones=3)
     scenes.add_sinew(obj, "cor")
-    assert gate.is_begun.wait(10)
+    assert gate.count == 1
     bpy.ops.sinew.stop_precomputation()
     assert not precomputations.running
     assert plan_of(obj).state is State.WAITING
@@ -182,6 +206,16 @@ def test_a_render_waits_also_for_what_was_stopped(gate, in_window, rendered_poin
     precomputations.waits = True
     session.rebind(obj, bpy.context)
     assert scenes.worst(points, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_ctrl_c_ends_the_wait(gate, monkeypatch):
+    gate.close()
+    obj, _armature = scenes.make_arm(bones=3)
+    monkeypatch.setattr(interrupt, "_requested", True)
+    with pytest.raises(KeyboardInterrupt):
+        characters.use_method(obj, "cor")
+    assert gate.count == 1
+    assert not precomputations.running
 
 
 def move_weights(obj: bpy.types.Object) -> None:
@@ -241,7 +275,7 @@ def test_what_happens_meanwhile_does_no_harm(gate, in_window, event):
     bpy.ops.ed.undo_push(message="made")
     scenes.add_sinew(obj, "cor")
     bpy.ops.ed.undo_push(message="cor")
-    assert gate.is_begun.wait(10)
+    assert gate.count == 1
     if event == "undo":
         bpy.ops.ed.undo()
     elif event == "delete":
@@ -249,7 +283,6 @@ def test_what_happens_meanwhile_does_no_harm(gate, in_window, event):
     elif event == "load":
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         assert not precomputations.running
-        assert not [t for t in threading.enumerate() if t.name == "Sinew precomputation"]
     elif event == "remove":
         attach.remove(obj)
     else:

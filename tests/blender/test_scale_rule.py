@@ -52,10 +52,10 @@ def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
     triangles = scenes.triangles_of(obj)
     kept = {}
     if method == "cor":
-        kept[method] = sinew.centres_of_rotation(frame.rest_points, *bound, triangles)
+        kept[method] = sinew.centres_of_rotation(frame.rest_points, *bound, triangles).result()
     elif method == "ddm":
         radius = properties.of(obj).ddm.radius
-        kept[method] = sinew.direct_delta_mush(frame.rest_points, *bound, triangles, radius)
+        kept[method] = sinew.direct_delta_mush(frame.rest_points, *bound, triangles, radius).result()
     if rule == "3.x":
         points, _ = reference.deform("lbs", points, *bound, np.linalg.inv(rigid) @ motions)
     motions = motions if rule == "4.0" else rigid

@@ -294,10 +294,10 @@ def _blend(
             keys = read.sdef_keys
             data[name] = None if keys is None else _spheres(keys, armature)
         elif name == "cor":
-            data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles)
+            data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles).result()
         elif name == "ddm":
             radius = parameters.get("ddm.radius", DEFAULTS["ddm.radius"])
-            data[name] = sinew.direct_delta_mush(read.own, *influences, read.triangles, radius)
+            data[name] = sinew.direct_delta_mush(read.own, *influences, read.triangles, radius).result()
         binding = sinew.Binding(points, *influences, rest_bones=armature.rest, vertex_data=data)
         shapes.append(
             sinew.Deformer(binding, name).deform(

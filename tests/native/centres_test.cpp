@@ -41,8 +41,9 @@ struct Tube {
         }
     }
 
-    std::vector<Vec3<float>> centres(const PrecomputeOptions& options = {}) const {
-        return centres_of_rotation(scene.data(), triangles, options).value();
+    std::vector<Vec3<float>> centres() const {
+        Job job;
+        return centres_of_rotation(scene.data(), triangles, job);
     }
 };
 
@@ -58,23 +59,6 @@ TEST(Centres, size_and_origin_go_with_the_mesh) {
                       1e-5 * size);
         }
     }
-}
-
-TEST(Centres, progress_cancels_and_throws) {
-    const Tube tube(5, 201, 40);
-    for (const double at : {0.0, 0.1, 0.6, 1.0}) {
-        const auto cancel = [at](double done) { return done < at; };
-        EXPECT_FALSE(centres_of_rotation(tube.scene.data(), tube.triangles, {3, cancel, false})) << at;
-        const auto raise = [at](double done) {
-            if (done >= at) throw std::runtime_error("enough");
-            return true;
-        };
-        EXPECT_THROW((void)centres_of_rotation(tube.scene.data(), tube.triangles, {3, raise, false}),
-                     std::runtime_error)
-            << at;
-    }
-    // The pool is still usable.
-    EXPECT_EQ(tube.centres().size(), tube.scene.rest_points.size());
 }
 
 TEST(VertexData, that_is_missing_is_never_taken_for_linear_blending) {

@@ -1,28 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Protects what a batch reads, writes and records, without Blender: inputs, job files, journals."""
 
+import argparse
 import glob
 import json
 import sys
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from sinew_addon.commands import batch
 from sinew_addon.core.errors import SinewError, WrongUse
 from sinew_addon.jobs.inputs import plan_jobs
 from sinew_addon.jobs.job_file import ObjectRule, Settings, read_job_file
 from sinew_addon.jobs.job_schema import job_schema, markdown
 from sinew_addon.jobs.journal import NAME, Journal, stamp
 from sinew_addon.jobs.schema import rows
-from sinew_addon.jobs.workers import run_in_dask
 
 METHODS = ("lbs", "dq")
 
 
 def test_without_dask_a_scheduler_is_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.delitem(sys.modules, "sinew_addon.jobs.dask_cluster", raising=False)
+    args = argparse.Namespace(scheduler="tcp://127.0.0.1:1", jobs=None, timeout=None, memory=None)
+    workers = batch._Workers(args, 1, SimpleNamespace(verbose=False))
     with pytest.raises(SinewError, match=r"pip install 'sinew-blender\[cluster\]'"):
-        next(run_in_dask([], None, "tcp://127.0.0.1:1", print))
+        workers.run([{}])
 
 
 @pytest.fixture

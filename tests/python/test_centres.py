@@ -2,10 +2,14 @@
 """Protects optimised centres of rotation: compared with the definition in float64, and their effect on a
 tube."""
 
+import signal
+import subprocess
 import sys
 import threading
+import time
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,63 +84,150 @@ def test_bones_of_a_vertex_may_repeat_in_any_order():
     expected = tube.centres()
     order = np.concatenate([np.arange(e - 1, b - 1, -1) for b, e in pairwise(offsets)])
     swapped = sinew.centres_of_rotation(points, offsets, bones[order], weights[order], tube.triangles)
-    np.testing.assert_allclose(swapped, expected, atol=1e-5)
+    np.testing.assert_allclose(swapped.result(), expected, atol=1e-5)
     twice = sinew.centres_of_rotation(
         points, 2 * offsets, np.repeat(bones, 2), np.repeat(weights, 2), tube.triangles
     )
-    np.testing.assert_allclose(twice, expected, atol=1e-5)
+    np.testing.assert_allclose(twice.result(), expected, atol=1e-5)
 
 
 def test_triangles_without_area_count_for_nothing():
     tube = three_bones()
     flat = np.concatenate([tube.triangles, tube.triangles[:, [0, 1, 1]]])
     for exact in (False, True):
-        found = sinew.centres_of_rotation(*tube.mesh, flat, exact=exact)
+        found = sinew.centres_of_rotation(*tube.mesh, flat, exact=exact).result()
         np.testing.assert_array_equal(found, tube.centres(exact=exact))
 
 
 # --- What both precomputations share
 
 
-COMPUTE = {"cor": lambda tube, **options: tube.centres(**options)}
+START = {"cor": lambda tube, **options: sinew.centres_of_rotation(*tube.mesh, tube.triangles, **options)}
 if "ddm" in {method.name for method in sinew.methods()}:
-    COMPUTE["ddm"] = lambda tube, **options: sinew.direct_delta_mush(
-        *tube.mesh, tube.triangles, 0.3, **options
+    START["ddm"] = lambda tube, **options: sinew.direct_delta_mush(*tube.mesh, tube.triangles, 0.3, **options)
+every_precomputation = pytest.mark.parametrize("start", START.values(), ids=START)
+# Takes so long that it is always cancelled first.
+LONG = """
+import sys
+import numpy as np, sinew
+from tube import Tube
+tube = Tube(2001, 256)
+run = sinew.centres_of_rotation(*tube.mesh, tube.triangles, exact=True)
+print("started", flush=True)
+"""
+
+
+def started(code: str) -> subprocess.Popen:
+    """A Python that runs LONG and then this, once it has started."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", LONG + code],
+        cwd=Path(__file__).parent,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
-every_precomputation = pytest.mark.parametrize("compute", COMPUTE.values(), ids=COMPUTE)
+    assert process.stdout.readline() == "started\n"
+    return process
+
+
+def long_one() -> sinew.Precomputation:
+    tube = Tube(2001, 256)
+    return sinew.centres_of_rotation(*tube.mesh, tube.triangles, exact=True)
 
 
 @every_precomputation
-def test_threads_change_no_bit(compute):
+def test_threads_change_no_bit(start):
     for tube in (Tube(), three_bones()):
-        expected = compute(tube, threads=1)
+        expected = start(tube, threads=1).result()
         for threads in (None, 0, np.int64(4), 10**30):
-            np.testing.assert_array_equal(compute(tube, threads=threads), expected)
+            np.testing.assert_array_equal(start(tube, threads=threads).result(), expected)
 
 
 @every_precomputation
-def test_progress_is_told_on_this_thread(compute):
-    told = []
-    compute(Tube(), progress=lambda done: told.append((done, threading.current_thread())), threads=2)
-    shares = [done for done, _thread in told]
+def test_progress_ends_at_one(start):
+    run = start(Tube(401, 64))
+    shares = [run.progress]
+    while not run.wait(0.001):
+        shares.append(run.progress)
+    shares.append(run.progress)
     assert shares == sorted(shares)
-    assert (shares[0], shares[-1]) == (0.0, 1.0)
-    assert {thread for _done, thread in told} == {threading.current_thread()}
+    assert shares[-1] == 1.0
+    assert run.has_ended
+    assert run.result() is run.result()
 
 
-@every_precomputation
-@pytest.mark.parametrize("at", [0.0, 0.1, 0.4, 0.7, 1.0])
-def test_progress_can_cancel_and_raise(compute, at):
-    assert compute(Tube(), progress=lambda done: done < at) is None
+def test_it_works_on_copies():
+    tube = Tube()
+    mesh, triangles = [array.copy() for array in tube.mesh], tube.triangles.copy()
+    run = sinew.centres_of_rotation(*mesh, triangles)
+    for array in (*mesh, triangles):
+        array[:] = 0
+    np.testing.assert_array_equal(run.result(), tube.centres())
 
-    def stop(done):
-        if done >= at:
-            raise KeyError("enough")
 
-    with pytest.raises(KeyError, match="enough"):
-        compute(Tube(), progress=stop)
-    # Returning nothing, 0 or None does not cancel.
-    assert compute(Tube(), progress=lambda _done: 0) is not None
+def test_cancelled_it_has_no_result():
+    run = long_one()
+    assert not run.has_ended
+    assert not run.wait(0.0)
+    run.cancel()
+    assert run.has_ended
+    assert run.wait()
+    assert run.result() is None
+    done = START["cor"](Tube())
+    expected = done.result()
+    done.cancel()
+    assert done.result() is expected
+
+
+def test_errors_are_those_of_its_result():
+    tube = Tube()
+    run = sinew.centres_of_rotation(*tube.mesh, tube.triangles + len(tube.points))
+    assert run.wait(60)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="triangles: expected numbers of vertices"):
+            run.result()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
+def test_ctrl_c_interrupts_who_waits():
+    process = started("run.result()")
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _out, errors = process.communicate(timeout=60)
+    assert "KeyboardInterrupt" in errors
+    assert time.monotonic() - began < 10
+
+
+ENDS = {
+    "module": "",
+    "no references": "del run",
+    "exit": "sys.exit(0)",
+    "error": "import ctypes; ctypes.CDLL(None).exit(0)",
+    "at once": "import os; os._exit(0)",
+    "in a thread": "import threading; threading.Thread(target=run.result, daemon=True).start()",
+    "fork": """
+import os, signal
+child = os.fork()
+if child == 0:
+    signal.alarm(60)
+    assert run.has_ended and run.wait() and run.result() is None
+    del run
+    small = Tube()
+    assert len(sinew.centres_of_rotation(*small.mesh, small.triangles).result()) == len(small.points)
+    sys.exit(0)
+assert os.waitpid(child, 0)[1] == 0
+assert not run.has_ended
+""",
+}
+
+
+@pytest.mark.parametrize("code", ENDS.values(), ids=ENDS)
+def test_a_process_ends_meanwhile(code):
+    if sys.platform == "win32" and ("fork" in code or "CDLL" in code):
+        pytest.skip("not on this system")
+    process = started(code)
+    _out, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (0, "")
 
 
 def test_other_threads_run_meanwhile():
@@ -172,7 +263,6 @@ BAD = [
     ("triangles", np.int32([[0, 1, 2592]]), "numbers of vertices, below 2592", "2592 at triangle 0"),
     ("threads", -1, "None or an integer, 0 or more", "-1"),
     ("threads", 1.5, "None or an integer, 0 or more", "float"),
-    ("progress", 3, "None or a callable", "int"),
 ]
 
 
@@ -181,7 +271,7 @@ def test_what_is_refused(argument, value, wanted, got):
     tube = Tube()
     arguments = {"triangles": tube.triangles, argument: value}
     with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared
-        sinew.centres_of_rotation(*tube.mesh, **arguments)
+        sinew.centres_of_rotation(*tube.mesh, **arguments).result()
     assert str(caught.value) == f"{argument}: expected {wanted}, got {got}"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects precomputations on threads, and the folder that caches their results."""
+"""Protects who runs precomputations, and the folder that caches their results."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 import types
 from pathlib import Path
 
@@ -26,94 +25,117 @@ precompute = importlib.import_module("sinew_precompute_core.precompute")
 RESULT = np.arange(12, dtype=np.float32).reshape(-1, 3)
 
 
-def counted(calls: list):
-    def make(progress):
-        calls.append(threading.current_thread())
-        assert progress(0.5)
-        return RESULT.copy()
+class Run:
+    """A precomputation that ends when the test says so."""
 
-    return make
+    progress = 0.5
+
+    def __init__(self, may_end: bool = True, error: Exception | None = None) -> None:
+        self._ended, self._error, self._is_cancelled = threading.Event(), error, False
+        if may_end:
+            self.end()
+
+    @property
+    def has_ended(self) -> bool:
+        return self._ended.is_set()
+
+    def end(self) -> None:
+        self._ended.set()
+
+    def cancel(self) -> None:
+        if not self.has_ended:
+            self._is_cancelled = True
+            self.end()
+
+    def wait(self, seconds=None) -> bool:
+        return self._ended.wait(seconds)
+
+    def result(self):
+        assert self.has_ended
+        if self._error is not None:
+            raise self._error
+        return None if self._is_cancelled else RESULT
 
 
-def until_cancelled(begun: threading.Event):
-    def make(progress):
-        begun.set()
-        while progress(0.25):
-            time.sleep(0.001)
-
-    return make
+def run_now(*, gives_way: bool) -> Run:
+    assert not gives_way
+    return Run()
 
 
-def test_each_key_runs_once_on_its_own_thread():
-    calls, all_of_it = [], precompute.Precomputations()
-    run = all_of_it.start("a", counted(calls))
-    run.wait()
-    np.testing.assert_array_equal(run.result, RESULT)
-    assert run.progress == 0.5
-    assert calls[0] is not threading.current_thread()
-    np.testing.assert_array_equal(all_of_it.find("a"), RESULT)
-    assert all_of_it.find("b") is None
+def test_each_key_runs_once():
+    all_of_it, runs = precompute.Precomputations(), [Run(may_end=False), Run()]
+    waiting = iter(runs)
+    assert all_of_it.start("a", lambda **_how: next(waiting)) is runs[0]
+    assert all_of_it.start("a", lambda **_how: next(waiting)) is runs[0]
+    assert all_of_it.running == [runs[0]]
+    assert all_of_it.find("a") is None
+    threading.Timer(0.05, runs[0].end).start()
+    assert all_of_it.make_now("a", lambda **_how: next(waiting)) is RESULT
+    assert next(waiting) is runs[1]
     assert not all_of_it.running
+    assert all_of_it.find("a") is RESULT
+    assert all_of_it.find("b") is None
 
 
-def test_waiting_computes_on_the_waiting_thread():
-    calls, all_of_it = [], precompute.Precomputations()
-    np.testing.assert_array_equal(all_of_it.make_now("a", counted(calls)), RESULT)
-    assert calls == [threading.current_thread()]
-
-
-def test_waiting_for_a_running_one_starts_no_other():
-    all_of_it, go = precompute.Precomputations(), threading.Event()
-    calls = []
-
-    def make(_progress):
-        calls.append(None)
-        assert go.wait(10)
-        return RESULT
-
-    run = all_of_it.start("a", make)
-    assert all_of_it.start("a", make) is run
-    threading.Timer(0.05, go.set).start()
-    assert all_of_it.make_now("a", make) is RESULT
-    assert len(calls) == 1
+def test_a_result_is_taken_when_somebody_looks():
+    all_of_it, run = precompute.Precomputations(), Run(may_end=False)
+    all_of_it.start("a", lambda **_how: run)
+    run.end()
+    assert not all_of_it.running
+    assert all_of_it.find("a") is RESULT
 
 
 def test_a_stopped_one_can_be_computed_again():
-    all_of_it, begun = precompute.Precomputations(), threading.Event()
-    run = all_of_it.start("a", until_cancelled(begun))
-    assert begun.wait(10)
+    all_of_it, run = precompute.Precomputations(), Run(may_end=False)
+    all_of_it.start("a", lambda **_how: run)
     all_of_it.stop()
     assert run.has_ended
-    assert run.result is None
     assert all_of_it.stopped == {"a"}
-    assert not [thread for thread in threading.enumerate() if thread.name == "Sinew precomputation"]
-    np.testing.assert_array_equal(all_of_it.make_now("a", counted([])), RESULT)
+    assert not all_of_it.running
+    assert all_of_it.find("a") is None
+    assert all_of_it.make_now("a", run_now) is RESULT
+    assert not all_of_it.stopped
 
 
-def test_errors_are_reported():
-    def make(_progress):
-        raise ValueError("no such mesh")
+def test_cancelled_while_somebody_waits_it_starts_again():
+    all_of_it, runs = precompute.Precomputations(), [Run(may_end=False), Run()]
+    waiting = iter(runs)
+    threading.Timer(0.05, runs[0].cancel).start()
+    assert all_of_it.make_now("a", lambda **_how: next(waiting)) is RESULT
+    assert not list(waiting)
 
+
+def test_ctrl_c_cancels_it(monkeypatch):
+    monkeypatch.setattr(precompute.interrupt, "_requested", True)
+    all_of_it, run = precompute.Precomputations(), Run(may_end=False)
+    with pytest.raises(precompute.SinewError, match="Ctrl-C"):
+        all_of_it.make_now("a", lambda **_how: run)
+    assert run.has_ended
+    assert not all_of_it.running
+
+
+def test_errors_are_those_of_who_waits():
     all_of_it = precompute.Precomputations()
-    run = all_of_it.start("a", make)
-    run.wait()
-    assert str(run.error) == "no such mesh"
+    run = all_of_it.start("a", lambda **_how: Run(error=ValueError("no such mesh")))
+    assert not all_of_it.running
     with pytest.raises(ValueError, match="no such mesh"):
-        all_of_it.make_now("a", make)
+        run.result()
+    with pytest.raises(ValueError, match="no such mesh"):
+        all_of_it.make_now("a", lambda **_how: run)
 
 
 def test_memory_is_limited(monkeypatch):
     monkeypatch.setattr(precompute, "MEMORY", 3 * RESULT.nbytes)
     all_of_it = precompute.Precomputations()
     for key in "abcd":
-        all_of_it.make_now(key, counted([]))
+        all_of_it.make_now(key, run_now)
     assert [all_of_it.find(key) is not None for key in "abcd"] == [False, True, True, True]
 
 
 def test_another_process_finds_slow_results(tmp_path, monkeypatch):
     monkeypatch.setattr(precompute, "SECONDS_WORTH_A_FILE", 0.0)
     first, other = (precompute.Precomputations(file_cache.FileCache(tmp_path, 10**6)) for _ in range(2))
-    first.make_now("a", counted([]))
+    first.make_now("a", run_now)
     np.testing.assert_array_equal(other.find("a"), RESULT)
 
 

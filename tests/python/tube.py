@@ -35,7 +35,7 @@ class Tube:
         )
 
     def centres(self, **options):
-        return sinew.centres_of_rotation(*self.mesh, self.triangles, **options)
+        return sinew.centres_of_rotation(*self.mesh, self.triangles, **options).result()
 
     def bones(self, axis, degrees):
         joint = translation([0.0, 0.0, 2.0])
@@ -46,7 +46,7 @@ class Tube:
         if method == "cor":
             return {method: self.centres()}
         if method == "ddm":
-            return {method: sinew.direct_delta_mush(*self.mesh, self.triangles, RADIUS)}
+            return {method: sinew.direct_delta_mush(*self.mesh, self.triangles, RADIUS).result()}
         return LINEAR
 
     def deformed(self, method, axis, degrees):

@@ -27,9 +27,11 @@ from ._native import (
     BulgeLimit,
     Deformer,
     DeltaMush,
+    Lock,
     Method,
     Normals,
     Parameter,
+    Precomputation,
     Skeleton,
     SkinnedNormals,
     Stage,
@@ -39,6 +41,7 @@ from ._native import (
     keep_thread_state,
     methods,
     stages,
+    thread_id,
 )
 
 __all__ = [
@@ -46,9 +49,11 @@ __all__ = [
     "BulgeLimit",
     "Deformer",
     "DeltaMush",
+    "Lock",
     "Method",
     "Normals",
     "Parameter",
+    "Precomputation",
     "Skeleton",
     "SkinnedNormals",
     "Stage",
@@ -67,4 +72,5 @@ __all__ = [
     "quat_vec",
     "spline",
     "stages",
+    "thread_id",
 ]

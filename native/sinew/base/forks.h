@@ -3,10 +3,12 @@
 
 #include <cstdint>
 
+#include "sinew/export.h"
+
 namespace sinew {
 
 /// How many forks lie between the process that loaded the library and this one. A forked child has none of its
 /// parent's threads, so their unfinished work stays unfinished in the child.
-[[nodiscard]] std::uint32_t forks() noexcept;
+[[nodiscard]] SINEW_EXPORT std::uint32_t forks() noexcept;
 
 }  // namespace sinew

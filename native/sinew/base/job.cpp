@@ -2,10 +2,15 @@
 #include "sinew/base/job.h"
 
 #include <algorithm>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "sinew/base/forks.h"
 #include "sinew/base/thread_pool.h"
 
 #if defined(_WIN32)
@@ -14,6 +19,7 @@
 #include <pthread/qos.h>
 #elif defined(__linux__)
 #include <sys/resource.h>
+#include <unistd.h>
 #endif
 
 namespace sinew {
@@ -26,18 +32,18 @@ void give_way() noexcept {
 #elif defined(__APPLE__)
     pthread_set_qos_class_self_np(QOS_CLASS_UTILITY, 0);
 #elif defined(__linux__)
-    // On Linux of this thread alone, which then gets half of another thread's share. No less: on a busy machine a
-    // batch waits for it.
-    setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + 3);
+    // 0: this thread, which then gets 1/28 of another one's share. Not SCHED_IDLE: where frames leave no processor idle,
+    // the work would never end. Relative to the main thread, as a thread inherits the value of the one that starts it.
+    setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, static_cast<id_t>(getpid())) + 15);
 #endif
 }
 
 /// Starts a thread. Returns false if the system refuses.
 template <class Run>
-bool start(std::thread& thread, const Run& run) {
+bool start(std::thread& thread, bool gives_way, const Run& run) {
     try {
-        thread = std::thread([run] {
-            give_way();
+        thread = std::thread([gives_way, run] {
+            if (gives_way) give_way();
             run();
         });
     } catch (const std::system_error&) {
@@ -48,33 +54,8 @@ bool start(std::thread& thread, const Run& run) {
 
 }  // namespace
 
-Job::Job(std::size_t threads, Work work)
-    : threads_(threads > 0 ? threads : hardware_threads()), work_(std::move(work)) {
-    if (!start(thread_, [this] { run(); })) run();
-}
-
-Job::~Job() {
-    cancel();
-    if (thread_.joinable()) thread_.join();
-}
-
-void Job::run() noexcept {
-    try {
-        work_(*this);
-    } catch (...) {
-        error_ = std::current_exception();
-    }
-    const std::scoped_lock lock(mutex_);
-    has_ended_ = true;
-    ended_.notify_all();
-}
-
-bool Job::wait_for(std::chrono::milliseconds time) {
-    std::unique_lock lock(mutex_);
-    if (!ended_.wait_for(lock, time, [this] { return has_ended_; })) return false;
-    if (error_) std::rethrow_exception(error_);
-    return true;
-}
+Job::Job(std::size_t threads, bool gives_way) noexcept
+    : threads_(threads > 0 ? threads : hardware_threads()), gives_way_(gives_way) {}
 
 bool Job::go_on(double done) noexcept {
     double before = progress();
@@ -104,13 +85,74 @@ void Job::for_each(std::size_t count, std::size_t chunk,
     std::vector<std::thread> helpers(std::min(threads_, (count + chunk - 1) / chunk));
     // This thread is one of them.
     for (std::size_t i = 1; i < helpers.size(); ++i) {
-        if (!start(helpers[i], take_chunks)) break;
+        if (!start(helpers[i], gives_way_, take_chunks)) break;
     }
     take_chunks();
     for (std::thread& helper : helpers) {
         if (helper.joinable()) helper.join();
     }
     if (error) std::rethrow_exception(error);
+}
+
+struct BackgroundJob::State {
+    Job job;
+    std::function<void(Job&)> work;
+    std::exception_ptr error;
+    std::mutex mutex;
+    std::condition_variable ended;
+    std::atomic<bool> has_ended{false};
+    std::thread thread;
+
+    State(std::size_t threads, bool gives_way, std::function<void(Job&)> its_work)
+        : job(threads, gives_way), work(std::move(its_work)) {}
+
+    void run() noexcept {
+        try {
+            work(job);
+        } catch (...) {
+            error = std::current_exception();
+        }
+        const std::scoped_lock lock(mutex);
+        has_ended.store(true, std::memory_order_release);
+        ended.notify_all();
+    }
+};
+
+BackgroundJob::BackgroundJob(std::size_t threads, bool gives_way, std::function<void(Job&)> work)
+    : state_(std::make_unique<State>(threads, gives_way, std::move(work))), forks_(forks()) {
+    const auto run = [state = state_.get()] { state->run(); };
+    if (!start(state_->thread, gives_way, run)) run();
+}
+
+BackgroundJob::~BackgroundJob() {
+    if (!is_of_this_process()) {
+        // Its threads can not be joined, nor what they may have locked be destroyed.
+        static_cast<void>(state_.release());
+        return;
+    }
+    cancel();
+    if (state_->thread.joinable()) state_->thread.join();
+}
+
+bool BackgroundJob::is_of_this_process() const noexcept { return forks_ == forks(); }
+
+double BackgroundJob::progress() const noexcept { return state_->job.progress(); }
+
+void BackgroundJob::cancel() noexcept { state_->job.cancel(); }
+
+bool BackgroundJob::has_ended() const noexcept {
+    return state_->has_ended.load(std::memory_order_acquire) || !is_of_this_process();
+}
+
+bool BackgroundJob::wait_for(std::chrono::milliseconds time) const {
+    if (has_ended()) return true;
+    std::unique_lock lock(state_->mutex);
+    return state_->ended.wait_for(lock, time, [this] { return has_ended(); });
+}
+
+void BackgroundJob::rethrow() const {
+    if (state_->error && state_->has_ended.load(std::memory_order_acquire))
+        std::rethrow_exception(state_->error);
 }
 
 }  // namespace sinew

@@ -3,36 +3,30 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
-#include <exception>
+#include <cstdint>
 #include <functional>
-#include <mutex>
-#include <thread>
+#include <memory>
+
+#include "sinew/export.h"
 
 namespace sinew {
 
-/// Work that takes longer than a frame. It runs on threads of its own that give way to all others, so that neither
-/// the pool of parallel_for() nor a processor is missing where a frame is deformed meanwhile.
-class Job {
+/// Work that takes longer than a frame: how far it is, whether it was cancelled, and the threads that share it. These
+/// are not those of parallel_for(), which frames need meanwhile.
+class SINEW_EXPORT Job {
 public:
-    using Work = std::function<void(Job&)>;
+    /// threads    at most so many share the work; 0: as many as useful
+    /// gives_way  whether threads that it starts have a lower priority, so that no processor is missing where a frame is
+    ///            deformed meanwhile; on a busy machine the work then takes much longer
+    explicit Job(std::size_t threads = 0, bool gives_way = false) noexcept;
 
-    /// Starts `work`, which at most `threads` threads share; 0: as many as useful.
-    Job(std::size_t threads, Work work);
-    /// Cancels, and waits until the threads have ended.
-    ~Job();
-    Job(const Job&) = delete;
-    Job& operator=(const Job&) = delete;
-
-    // For the thread that started it.
+    // For any thread.
 
     /// The completed share, 0 to 1.
     [[nodiscard]] double progress() const noexcept { return done_.load(std::memory_order_relaxed); }
     /// Returns at once; the work ends a moment later.
     void cancel() noexcept { is_cancelled_.store(true, std::memory_order_relaxed); }
-    /// Waits until the work has ended, and no longer than this. Returns whether it has. Throws what it threw.
-    bool wait_for(std::chrono::milliseconds time);
 
     // For the work, on any of its threads.
 
@@ -44,17 +38,35 @@ public:
                   const std::function<void(std::size_t, std::size_t)>& work);
 
 private:
-    void run() noexcept;
-
     std::size_t threads_;
-    Work work_;
+    bool gives_way_;
     std::atomic<double> done_{0.0};
     std::atomic<bool> is_cancelled_{false};
-    std::mutex mutex_;
-    std::condition_variable ended_;
-    bool has_ended_ = false;
-    std::exception_ptr error_;
-    std::thread thread_;
+};
+
+/// A job on a thread of its own, from the constructor on. A forked child finds it ended.
+class SINEW_EXPORT BackgroundJob {
+public:
+    BackgroundJob(std::size_t threads, bool gives_way, std::function<void(Job&)> work);
+    /// Cancels, and waits until the threads have ended.
+    ~BackgroundJob();
+    BackgroundJob(const BackgroundJob&) = delete;
+    BackgroundJob& operator=(const BackgroundJob&) = delete;
+
+    [[nodiscard]] double progress() const noexcept;
+    void cancel() noexcept;
+    [[nodiscard]] bool has_ended() const noexcept;
+    /// Waits until the work has ended, and no longer than this. Returns whether it has.
+    [[nodiscard]] bool wait_for(std::chrono::milliseconds time) const;
+    /// Throws what the work threw. Only once it has ended.
+    void rethrow() const;
+
+private:
+    struct State;
+    [[nodiscard]] bool is_of_this_process() const noexcept;
+
+    std::unique_ptr<State> state_;
+    std::uint32_t forks_;
 };
 
 }  // namespace sinew

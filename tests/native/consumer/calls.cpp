@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <span>
 #include <vector>
 
 #include "sinew/base/simd.h"
@@ -33,7 +34,10 @@ void deform() {
     pose[0].translation = {10, 20, 30};
     pose[1].translation = {100, 200, 300};
     for (const sinew::MethodInfo& method : sinew::kMethods) {
-        sinew::Deformer deformer({rest, offsets, bones, weights}, method);
+        sinew::BindData data{rest, offsets, bones, weights};
+        const sinew::VertexData linear{method, {}, true};
+        if (method.vertex_floats > 0) data.vertex_data = std::span(&linear, 1);
+        sinew::Deformer deformer(data, method);
         std::vector<sinew::Vec3<float>> points(rest.size());
         expect(deformer.deform(pose, {}, points), "sizes fit");
         expect(points[0] == sinew::Vec3<float>(11, 20, 30), "the first point is moved by its bone");
@@ -106,8 +110,14 @@ void find_centres() {
     const std::vector<sinew::Vec3<float>> rest{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     const std::vector<std::int32_t> offsets{0, 1, 2, 3}, bones{0, 0, 0}, triangles{0, 1, 2};
     const std::vector<float> weights{1.0f, 1.0f, 1.0f};
-    const auto centres = sinew::centres_of_rotation({rest, offsets, bones, weights}, triangles);
-    expect(centres && centres->size() == 3, "a centre for each vertex");
+    std::vector<sinew::Vec3<float>> centres;
+    const sinew::BackgroundJob background(0, false, [&](sinew::Job& job) {
+        centres = sinew::centres_of_rotation({rest, offsets, bones, weights}, triangles, job);
+    });
+    while (!background.wait_for(std::chrono::seconds(1))) {
+    }
+    background.rethrow();
+    expect(centres.size() == 3, "a centre for each vertex");
 }
 
 void interpolate() {

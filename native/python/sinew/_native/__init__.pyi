@@ -16,7 +16,7 @@ from . import fit
 from . import ik
 from . import interpolate
 from . import spline
-__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Method', 'Normals', 'Parameter', 'Skeleton', 'SkinnedNormals', 'Stage', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'fit', 'ik', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages']
+__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'fit', 'ik', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id']
 class Parameter:
     """
     A setting of a method or of a stage.
@@ -532,32 +532,73 @@ class SkinnedNormals:
         """
         Number of frames: as many as normals at rest.
         """
-def centres_of_rotation(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, *, exact: bool = False, threads: typing.SupportsIndex | None = None, progress: collections.abc.Callable[[float], typing.Any] | None = None) -> numpy.typing.NDArray[numpy.float32] | None:
+class Precomputation:
     """
-    The vertex data of the method "cor": the optimised centre of rotation of each vertex, float32
-    [vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest points.
+    A computation of a method's vertex data. It runs on threads of its own, and on copies of its arguments. It is
+    cancelled when nobody refers to it any more, and when Python ends.
+    """
+    def cancel(self) -> None:
+        """
+        Returns at once. The result is then None, unless there already was one.
+        """
+    def result(self) -> numpy.typing.NDArray[numpy.float32] | None:
+        """
+        Waits until it has ended, and returns the array, the same one each time; None if it was cancelled, or if
+        this is a process that was forked meanwhile. Raises what the work raised: ValueError for data that Binding
+        refuses, too.
+        """
+    def wait(self, seconds: float | None = None) -> bool:
+        """
+        Waits until it has ended, at most this long. Returns whether it has. Ctrl-C raises KeyboardInterrupt.
+        """
+    @property
+    def has_ended(self) -> bool:
+        """
+        Whether it is done, has failed or was cancelled.
+        """
+    @property
+    def progress(self) -> float:
+        """
+        The completed share, 0 to 1.
+        """
+class Lock:
+    """
+    For `with`: one thread at a time is inside.
+    """
+    def __enter__(self) -> None:
+        ...
+    def __exit__(self, arg0: typing.Any, arg1: typing.Any, arg2: typing.Any) -> None:
+        ...
+    def __init__(self) -> None:
+        """
+        A thread that is inside may enter again. A forked child finds nobody inside.
+        """
+def centres_of_rotation(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, *, exact: bool = False, threads: typing.SupportsIndex | None = None, gives_way: bool = False) -> Precomputation:
+    """
+    Starts to compute the vertex data of the method "cor": the optimised centre of rotation of each vertex,
+    float32 [vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest
+    points.
 
     rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.
     triangles: int32 [triangles, 3], vertices.
     exact: compute by the definition itself, which is slow; otherwise triangles of similar weights are summed.
-    threads: at most so many; None or 0: as many as useful. They give way to all other threads.
-    progress: None, or a callable that is called on this thread with the completed share, 0 to 1. If it returns
-        False, the work is cancelled and the result is None. An exception that it raises is passed on.
+    gives_way: at a low priority, so that frames which are deformed meanwhile lose little; on a busy machine it then
+        takes much longer.
     """
-def direct_delta_mush(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, exact: bool = False, threads: typing.SupportsIndex | None = None, progress: collections.abc.Callable[[float], typing.Any] | None = None) -> numpy.typing.NDArray[numpy.float32] | None:
+def direct_delta_mush(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, exact: bool = False, threads: typing.SupportsIndex | None = None, gives_way: bool = False) -> Precomputation:
     """
-    The vertex data of the method "ddm": the moments of each bone's smoothed weights around each vertex (Le,
-    Lewis 2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x,
-    y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments).
-    Rows are in ascending order of vertices and, for each vertex, of bones. They belong to these rest points and
-    this radius.
+    Starts to compute the vertex data of the method "ddm": the moments of each bone's smoothed weights around
+    each vertex (Le, Lewis 2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight,
+    first moment (x, y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the
+    vertex's first moments). Rows are in ascending order of vertices and, for each vertex, of bones. They belong to
+    these rest points and this radius.
 
     rest_points, influence_offsets, influence_bones, influence_weights: as for Binding.
     triangles: int32 [triangles, 3], vertices.
     radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard deviation along
         each axis.
     exact: include weights below 1e-6, which are otherwise left out.
-    threads, progress: as for centres_of_rotation().
+    gives_way: as for centres_of_rotation().
 
     RuntimeError if Sinew was built without this method.
     """
@@ -573,6 +614,10 @@ def methods() -> tuple[Method, ...]:
 def stages() -> tuple[Stage, ...]:
     """
     All stages. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush.
+    """
+def thread_id() -> int:
+    """
+    A number that no other thread has as long as this one runs.
     """
 __compiled_in__: str
 __version__: str

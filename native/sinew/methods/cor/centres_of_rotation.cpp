@@ -9,7 +9,6 @@
 #include <type_traits>
 #include <unordered_map>
 
-#include "sinew/base/precompute.h"
 #include "sinew/mesh/check_bind_data.h"
 
 namespace sinew {
@@ -358,33 +357,30 @@ std::vector<Vec3<float>> find_centres(const BindData& data, const NormalisedInfl
 
 }  // namespace
 
-std::optional<std::vector<Vec3<float>>> centres_of_rotation(const BindData& data,
-                                                            std::span<const std::int32_t> triangles,
-                                                            const PrecomputeOptions& options) {
+std::vector<Vec3<float>> centres_of_rotation(const BindData& data, std::span<const std::int32_t> triangles,
+                                             Job& job, bool exact) {
     check(data);
     check_triangles(triangles, data.rest_points.size());
-    return precompute<std::vector<Vec3<float>>>(options, [&](Job& job) -> std::vector<Vec3<float>> {
-        const NormalisedInfluences influences = normalised_influences(data);
-        Collector collector(options.exact);
-        for (std::size_t i = 0; i < triangles.size(); i += 3) {
-            if (i / 3 % kTrianglesBetweenReports == 0 &&
-                !job.go_on(0.5 * static_cast<double>(i) / static_cast<double>(triangles.size()))) {
-                return {};
-            }
-            std::array<Vec3<double>, 3> points;
-            std::array<std::span<const Influence<float>>, 3> of_corners;
-            for (std::size_t corner = 0; corner < 3; ++corner) {
-                const auto vertex = static_cast<std::size_t>(triangles[i + corner]);
-                points[corner] = Vec3<double>(data.rest_points[vertex]);
-                of_corners[corner] = std::span(influences.influences)
-                                         .subspan(influences.offsets[vertex], influences.offsets[vertex + 1] -
-                                                                                  influences.offsets[vertex]);
-            }
-            collector.add(points, of_corners);
+    const NormalisedInfluences influences = normalised_influences(data);
+    Collector collector(exact);
+    for (std::size_t i = 0; i < triangles.size(); i += 3) {
+        if (i / 3 % kTrianglesBetweenReports == 0 &&
+            !job.go_on(0.5 * static_cast<double>(i) / static_cast<double>(triangles.size()))) {
+            return {};
         }
-        return options.exact ? find_centres<double>(data, influences, collector, job)
-                             : find_centres<float>(data, influences, collector, job);
-    });
+        std::array<Vec3<double>, 3> points;
+        std::array<std::span<const Influence<float>>, 3> of_corners;
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+            const auto vertex = static_cast<std::size_t>(triangles[i + corner]);
+            points[corner] = Vec3<double>(data.rest_points[vertex]);
+            of_corners[corner] = std::span(influences.influences)
+                                     .subspan(influences.offsets[vertex],
+                                              influences.offsets[vertex + 1] - influences.offsets[vertex]);
+        }
+        collector.add(points, of_corners);
+    }
+    return exact ? find_centres<double>(data, influences, collector, job)
+                 : find_centres<float>(data, influences, collector, job);
 }
 
 }  // namespace sinew

@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
-#include "sinew/base/precompute_options.h"
+#include "sinew/base/job.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 
@@ -28,10 +27,11 @@ namespace sinew {
 ///
 /// data       rest points and influences; the rest is not read
 /// triangles  [3 x triangles] vertices of the corners; triangles may have area 0
+/// exact      compute by the definition itself, which is slow; for tests
 ///
-/// Returns nullopt if `progress` cancelled. The result does not depend on the number of threads. Throws
+/// Returns nothing useful if the job was cancelled. The result does not depend on the number of threads. Throws
 /// std::invalid_argument as Binding does, and for a corner that is no vertex.
-[[nodiscard]] SINEW_EXPORT std::optional<std::vector<Vec3<float>>> centres_of_rotation(
-    const BindData& data, std::span<const std::int32_t> triangles, const PrecomputeOptions& options = {});
+[[nodiscard]] SINEW_EXPORT std::vector<Vec3<float>> centres_of_rotation(
+    const BindData& data, std::span<const std::int32_t> triangles, Job& job, bool exact = false);
 
 }  // namespace sinew

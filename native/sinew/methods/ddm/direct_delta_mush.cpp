@@ -9,7 +9,6 @@
 #include <map>
 #include <string>
 
-#include "sinew/base/precompute.h"
 #include "sinew/mesh/check_bind_data.h"
 #include "sinew/methods/ddm/block_factor.h"
 
@@ -366,9 +365,8 @@ std::vector<float> find_moments(const BindData& data, std::span<const std::int32
 
 }  // namespace
 
-std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
-                                                    std::span<const std::int32_t> triangles, double radius,
-                                                    const PrecomputeOptions& options) {
+std::vector<float> direct_delta_mush(const BindData& data, std::span<const std::int32_t> triangles,
+                                     double radius, Job& job, bool exact) {
     check(data);
     const std::size_t vertex_count = data.rest_points.size();
     check_triangles(triangles, vertex_count);
@@ -379,8 +377,7 @@ std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
         fail("rest_points", "at most " + std::to_string(kMaxMomentVertices) + " points",
              std::to_string(vertex_count));
     }
-    return precompute<std::vector<float>>(
-        options, [&](Job& job) { return find_moments(data, triangles, radius, options.exact, job); });
+    return find_moments(data, triangles, radius, exact, job);
 }
 
 }  // namespace sinew

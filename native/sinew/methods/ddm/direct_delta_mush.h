@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
-#include "sinew/base/precompute_options.h"
+#include "sinew/base/job.h"
 #include "sinew/binding.h"
 #include "sinew/methods/ddm/moments.h"
 
@@ -24,7 +23,7 @@ namespace sinew {
 /// neighbours, independently of their density; on a plane the radius is the standard deviation along each axis.
 /// The paper divides by L's diagonal instead, and has one number for the whole mesh.
 ///
-/// Unless options.exact, a bone whose weight in the neighbourhood is below kLeastMoment is left out and the other
+/// Unless `exact`, a bone whose weight in the neighbourhood is below kLeastMoment is left out and the other
 /// weights are divided by their sum. This moves a vertex by at most kLeastMoment times the number of omitted
 /// bones times their motion relative to the others. Vertices without influences contribute nothing and have no
 /// rows. A vertex without triangles is its own neighbourhood.
@@ -33,12 +32,12 @@ namespace sinew {
 /// triangles  [3 x triangles] vertices of the corners; triangles may have area 0
 /// radius     finite, >= 0; in units of the rest points
 ///
-/// Returns nullopt if `progress` cancelled. The result does not depend on the number of threads. Throws
+/// Returns nothing useful if the job was cancelled. The result does not depend on the number of threads. Throws
 /// std::invalid_argument as Binding does, for a corner that is no vertex, for an invalid radius, and for more
 /// than kMaxMomentVertices.
-[[nodiscard]] SINEW_EXPORT std::optional<std::vector<float>> direct_delta_mush(
-    const BindData& data, std::span<const std::int32_t> triangles, double radius,
-    const PrecomputeOptions& options = {});
+[[nodiscard]] SINEW_EXPORT std::vector<float> direct_delta_mush(const BindData& data,
+                                                                std::span<const std::int32_t> triangles,
+                                                                double radius, Job& job, bool exact = false);
 
 inline constexpr double kLeastMoment = 1e-6;
 
