@@ -194,12 +194,12 @@ def refresh(context: bpy.types.Context) -> None:
         if not (may_react and may_change_file()):
             # Updates are suspended, or a handler switched an object off: whoever did that goes on from here.
             return
-    # Changes that wait have a reaction of their own, before this one.
-    depsgraph = context.evaluated_depsgraph_get()
-    with reaction():
         current.objects = None
         for state in current.skinned.values():
             state.needs_apply = True
+    # Changes that wait have a reaction of their own, before this one.
+    depsgraph = context.evaluated_depsgraph_get()
+    with reaction():
         update_all(depsgraph, Changes())
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
     if bpy.app.background:
