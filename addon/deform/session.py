@@ -197,15 +197,14 @@ def refresh(context: bpy.types.Context) -> None:
         current.objects = None
         for state in current.skinned.values():
             state.needs_apply = True
-    # Changes that wait have a reaction of their own, before this one.
-    depsgraph = context.evaluated_depsgraph_get()
-    with reaction():
+        depsgraph = context.evaluated_depsgraph_get()
         update_all(depsgraph, Changes())
-    # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
-    if bpy.app.background:
-        # If no object waits, this evaluation only shows what was just changed: Sinew need not react to it.
-        with contextlib.nullcontext() if waiting() else updates_suspended():
-            context.view_layer.update()
+        # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
+        if bpy.app.background:
+            # If no object waits, this evaluation only shows what was just changed: Sinew need not react to
+            # it.
+            with contextlib.nullcontext() if waiting() else updates_suspended():
+                context.view_layer.update()
 
 
 def refresh_between_steps(context: bpy.types.Context) -> None:
