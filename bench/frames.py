@@ -284,6 +284,7 @@ def looks(scene: Scene) -> dict[str, Callable[[], None]]:
                 if smooth.show_viewport != wanted:
                     smooth.show_viewport = wanted
                 obj.sinew.enabled = method is not None
+                obj.sinew.twist_spread.enabled = stage == "twist_spread"
                 obj.sinew.bulge_limit.enabled = stage == "bulge_limit"
                 obj.sinew.delta_mush.enabled = stage == "delta_mush"
                 obj.sinew.mix.method = "lbs" if stage == "mix" else "OFF"

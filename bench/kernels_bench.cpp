@@ -11,6 +11,7 @@
 #include "sinew/base/thread_pool.h"
 #include "sinew/bulge_limit.h"
 #include "sinew/methods/methods.h"
+#include "sinew/twist_spread.h"
 
 namespace {
 
@@ -60,6 +61,31 @@ void bulge_limit(benchmark::State& state, const Shape& shape) {
     for (Vec3<float>& point : scene.points) point *= 1.01f;
     for (auto _ : state) {
         (void)limit.apply(scene.points, scene.pose, {BulgeForm::continuous, 1e-12f, 1});
+        benchmark::ClobberMemory();
+    }
+}
+
+/// The stage twist_spread after a method, along every bone. So weak that the points stay.
+void twist_spread(benchmark::State& state, const Shape& shape, TwistBlend blend) {
+    Scene& scene = scene_of(shape);
+    std::vector<TwistBone> twists;
+    std::vector<Affine<float>> rest_bones;
+    for (std::size_t i = 0; i < shape.bones; ++i) {
+        const auto bone = static_cast<std::int32_t>(i);
+        const auto z = static_cast<float>(i);
+        const auto next = static_cast<std::int32_t>((i + 1) % shape.bones);
+        twists.push_back({bone, bone, next, false, {0, 0, z}, {0, 0, z + 1}});
+        rest_bones.push_back(
+            {Mat3<float>(Vec3<float>(1, 0, 0), Vec3<float>(0, 0, 1), Vec3<float>(0, -1, 0)), {0, 0, z}});
+    }
+    const TwistSpread spread(Binding(scene.data()), {twists, rest_bones});
+    (void)bound(shape).deformer(Dq::info).deform(scene.pose, {{}, 1}, scene.points);
+    TwistSpreadOptions options;
+    options.amount = 1e-3f;
+    options.blend = blend;
+    options.threads = 1;
+    for (auto _ : state) {
+        (void)spread.apply(scene.points, scene.pose, options);
         benchmark::ClobberMemory();
     }
 }
@@ -149,6 +175,10 @@ void register_all() {
             if (vertices != 100'000) continue;
             add("bind/dq" + scene, [=](benchmark::State& s) { bind(s, shape); });
             add("stage/bulge_limit" + scene, [=](benchmark::State& s) { bulge_limit(s, shape); });
+            add("stage/twist_spread/lbs" + scene,
+                [=](benchmark::State& s) { twist_spread(s, shape, TwistBlend::linear); });
+            add("stage/twist_spread/dq" + scene,
+                [=](benchmark::State& s) { twist_spread(s, shape, TwistBlend::rotations); });
             add("rest/dq" + scene, [=](benchmark::State& s) { new_rest_points(s, shape); });
         }
     }

@@ -56,6 +56,7 @@ class Listeners:
     object_requested: Callable[[bpy.types.Object], None] | None = None
     mesh_requested: Callable[[bpy.types.Mesh], None] | None = None
     heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    twist_changed: Callable[[bpy.types.Context], None] | None = None
 
 
 listeners = Listeners()
@@ -174,6 +175,11 @@ class SinewSwitchedOff(bpy.types.PropertyGroup):
     # The modifier's own flags, restored on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+
+
+def _twist_changed(_bone: bpy.types.PoseBone, context: bpy.types.Context) -> None:
+    if listeners.twist_changed is not None:
+        listeners.twist_changed(context)
 
 
 STAGE_GROUPS = stage_settings.groups(_method_changed)
@@ -461,6 +467,28 @@ FEATURE = Feature(
     ),
     {
         "Object.sinew": bpy.props.PointerProperty(type=SinewSettings, override=OVERRIDABLE),
+        # How a bone shares the twist of another, for all meshes of its armature. Not in a group, as Blender
+        # cannot key what is in a pose bone's group.
+        "PoseBone.sinew_twist_amount": bpy.props.FloatProperty(
+            name="Twist Amount",
+            description="How much of the twist this bone shares: 0 nothing, 1 all of it",
+            default=1.0,
+            min=0.0,
+            max=1.0,
+            subtype="FACTOR",
+            update=_twist_changed,
+            override=OVERRIDABLE,
+        ),
+        "PoseBone.sinew_twist_curve": bpy.props.FloatProperty(
+            name="Twist Curve",
+            description="Where along the bone the twist is: 0 evenly, below 0 more of it near the tail, "
+            "above 0 near the head",
+            default=0.0,
+            min=-1.0,
+            max=1.0,
+            update=_twist_changed,
+            override=OVERRIDABLE,
+        ),
         # A property of meshes, so that its getter receives the evaluated mesh and nothing is stored.
         "Mesh.sinew_request": bpy.props.FloatProperty(
             get=_mesh_requested,

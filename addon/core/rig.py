@@ -13,6 +13,7 @@ from .bendy import spread_over_joints
 from .envelopes import Envelopes, fill_from_envelopes, multiply_by_envelopes
 from .influences import Entries, Influences
 from .phrases import phrase
+from .twists import TwistFinder, Twists
 
 NAMES_SHOWN = 5
 
@@ -29,6 +30,7 @@ class Bones:
     curved        bool [bones], those that map vertices along their curve
     first_joints  int32 [bones], the index in `rest` of the first of a bendy bone's segments + 1 joints
     envelopes     of all bones
+    parents       int32 [bones], -1 for none
     complete      False where Blender had not computed the joints yet; bendy bones then count as straight
     """
 
@@ -40,6 +42,7 @@ class Bones:
     curved: np.ndarray
     first_joints: np.ndarray
     envelopes: Envelopes
+    parents: np.ndarray
     complete: bool = True
 
     @classmethod
@@ -49,7 +52,7 @@ class Bones:
         points, flags = np.empty((0, 3), dtype=np.float32), np.empty(0, dtype=bool)
         envelopes = Envelopes(points, points, none, none, none, none, flags)
         rest = np.empty((0, 4, 4), dtype=np.float32)
-        return cls((), flags, rest, none, numbers, flags, numbers, envelopes)
+        return cls((), flags, rest, none, numbers, flags, numbers, envelopes, numbers)
 
     @cached_property
     def bend(self) -> bool:
@@ -71,12 +74,19 @@ class Bones:
         of_joints /= np.where(lengths > 0.0, lengths, 1.0)
         return axes
 
+    @cached_property
+    def twists(self) -> Twists:
+        """The bones that share the twist of another."""
+        finder = TwistFinder(self.names, self.deform, self.parents, self.rest, self.lengths, self.segments)
+        return finder.find(self.first_joints, len(self.rest) - len(self.names))
+
     def equals(self, other: Bones) -> bool:
         return (
             self.names == other.names
             and np.array_equal(self.deform, other.deform)
             and np.array_equal(self.rest, other.rest)
             and np.array_equal(self.segments, other.segments)
+            and np.array_equal(self.parents, other.parents)
             and np.array_equal(self.curved, other.curved)
             and self.envelopes.equals(other.envelopes)
         )

@@ -18,6 +18,7 @@ from .scale_rule import BLENDER_4, IGNORED
 from .spaces import is_same_space, transformed
 from .stage_mesh import StageMesh
 from .stages import StagesAfter, StageValues
+from .twist_spread import TwistInputs
 from .vertex_data import METHODS, PROVIDERS, VertexData
 
 LINEAR = "lbs"
@@ -312,6 +313,7 @@ class SkinStageFrame:
 
     model_from_bones  given where a scale is 0: as in Blender, all vertices are then at the origin of armature
                       space before the bones move them
+    twists            inputs of the stage twist_spread; empty where it is off
     """
 
     method: str
@@ -321,6 +323,11 @@ class SkinStageFrame:
     mix: str = ""
     parameters: dict[str, Value] = field(default_factory=dict)
     model_from_bones: np.ndarray | None = None
+    twists: TwistInputs = ()
+
+
+def _twists(frames: Sequence[SkinStageFrame | None]) -> list[TwistInputs]:
+    return [() if frame is None else frame.twists for frame in frames]
 
 
 class SkinStack:
@@ -386,7 +393,7 @@ class SkinStack:
         if self.stages_after is None:
             values = NO_STAGES
         changed = self._deform_skin(rest_points, frames, out)
-        changed |= values != self._values or self._has_other_mesh
+        changed |= values != self._values or self._has_other_mesh or _twists(frames) != _twists(self._frames)
         self._frames, self._values, self._has_other_mesh = frames, values, False
         if changed or out is not None:
             self._staged = None

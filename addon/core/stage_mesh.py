@@ -42,12 +42,14 @@ class StageMesh:
     weightings      of the Armature modifiers
     modifier_masks  float32 [vertices], the share of each Armature modifier's deformation that each vertex
                     gets, None for all of it; empty: none has a mask
+    mix_weights     float32 [vertices], the share of the second method of the stage mix; None for no share
     """
 
     topology: Topology
     rest_points: np.ndarray | None
     weightings: Sequence[Weighting]
     modifier_masks: Sequence[np.ndarray | None] = ()
+    mix_weights: np.ndarray | None = None
 
     def equals(self, other: Self) -> bool:
         """Whether both have the same points and faces; both belong to the same Armature modifiers."""

@@ -13,6 +13,7 @@ import sinew
 from .bulge_limit import BulgeLimit
 from .delta_mush import DeltaMush
 from .stage_mesh import StageMesh
+from .twist_spread import TwistSpread
 
 StageValues = Mapping[str, Mapping[str, Any]]
 """For each stage that is on, its parameters by their ids, without vertex groups."""
@@ -34,6 +35,7 @@ class Stage(Protocol):
 
 
 STAGES: dict[str, Callable[[StageMesh, np.ndarray | None], Stage]] = {
+    "twist_spread": TwistSpread,
     "bulge_limit": BulgeLimit,
     "delta_mush": DeltaMush,
 }

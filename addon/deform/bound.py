@@ -230,7 +230,9 @@ def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> d
 def _stage_mesh(read_now: Source, stages: list[SkinStage]) -> StageMesh:
     weightings = [stage.deformer.weighting for stage in stages]
     masks = [stage.mask for stage in stages]
-    return StageMesh(read_now.topology, read_now.own_points, weightings, masks)
+    return StageMesh(
+        read_now.topology, read_now.own_points, weightings, masks, stages[0].deformer.mix_weights
+    )
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:

@@ -270,6 +270,7 @@ _HANDLERS = {
 def register() -> None:
     session.forget()
     properties.listeners.method_changed = session.setting_changed
+    properties.listeners.twist_changed = session.refresh
     properties.listeners.error_requested = session.error_of
     properties.listeners.object_requested = session.requests.object_requested
     properties.listeners.mesh_requested = session.requests.mesh_requested

@@ -76,7 +76,9 @@ def read(
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
         values = _parameters(evaluated, settings, own, mix)
-        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values, back))
+        bones = stage.deformer.bones
+        twists = armature_io.read_twists(armature, bones) if settings.twist_spread.enabled else ()
+        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values, back, twists))
     return frames
 
 

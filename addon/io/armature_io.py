@@ -5,11 +5,12 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Quaternion, Vector
 
 from ..core.envelopes import Envelopes
 from ..core.rig import Bones
 from ..core.spaces import SAME_SPACE
+from ..core.twist_spread import NOT_TOLD, TwistInputs
 
 # Before, a mesh object with a scale of 0 had no inverse, and Blender moved all its vertices to its origin.
 _MESH_HAS_INVERSE = bpy.app.version >= (5, 0)
@@ -47,6 +48,7 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
         np.array([bone.bbone_mapping_mode == "CURVED" for bone in bones], dtype=bool),
         first_joints,
         _read_envelopes(bones),
+        _read_parents(bones),
         complete,
     )
 
@@ -111,6 +113,34 @@ def _read_envelopes(bones: bpy.types.bpy_prop_collection) -> Envelopes:
         weights=read("envelope_weight"),
         multiply=read("use_envelope_multiply", dtype=bool),
     )
+
+
+def _read_parents(bones: bpy.types.bpy_prop_collection) -> np.ndarray:
+    numbers = {bone.name: number for number, bone in enumerate(bones)}
+    parents = [-1 if bone.parent is None else numbers[bone.parent.name] for bone in bones]
+    return np.array(parents, dtype=np.int32).reshape(-1)
+
+
+def read_twists(evaluated_armature: bpy.types.Object, bones: Bones) -> TwistInputs:
+    """Returns the inputs of the stage twist_spread, from the properties and channels of pose bones."""
+    pose_bones, inputs = evaluated_armature.pose.bones, []
+    for name, tip in zip(bones.twists.bones, bones.twists.tips, strict=True):
+        bone = pose_bones[name]
+        inputs.append((bone.sinew_twist_amount, bone.sinew_twist_curve, *_turns_told(pose_bones[tip])))
+    return tuple(inputs)
+
+
+def _turns_told(bone: bpy.types.PoseBone) -> tuple[float, ...]:
+    """Returns the rotation of a bone's channels, and the angles that they give beyond half a turn."""
+    mode = bone.rotation_mode
+    if mode == "QUATERNION":
+        return NOT_TOLD
+    if mode == "AXIS_ANGLE":
+        angle, *axis = bone.rotation_axis_angle
+        direction = Vector(axis).normalized()
+        return (*Quaternion(direction, angle), *(angle * direction))
+    euler = bone.rotation_euler
+    return (*euler.to_quaternion(), *euler)
 
 
 def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarray:

@@ -5,10 +5,13 @@ import bpy
 import sinew
 
 from ..attach import corrective_smooth, normals, properties, stage_settings
-from ..deform import method_needs, small_meshes
+from ..deform import method_needs, session, small_meshes
 from . import operators
 from .sidebar import draw_text
 from .translations import tr
+
+# Sentences about bones without a twist.
+MOST_LEFT_OUT = 4
 
 
 def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
@@ -37,6 +40,8 @@ def draw_stages(
     for stage in stage_settings.STAGES.values():
         if stage.name != "mix":
             _draw_stage(layout, settings, obj, stage, only)
+            if stage.name == "twist_spread" and settings.twist_spread.enabled:
+                _draw_twists(layout, context, obj)
     _draw_take_over(layout, context, obj, only)
     layout.prop(settings, "scale_rule")
     if normals.ARE_SUPPORTED:
@@ -98,6 +103,28 @@ def _draw_stage(
             _draw_make_group(column, settings, obj, stage.name, only)
         else:
             column.prop(group, parameter.id)
+
+
+def _draw_twists(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """Draws the bones that share a twist, with their own settings, and why others do not."""
+    state, armature = session.state_of(obj), properties.of(obj).armature
+    if state is None or armature is None:
+        return
+    twists = state.bound.first_deformer.bones.twists
+    column = layout.column(align=True)
+    for name, tip in zip(twists.bones, twists.tips, strict=True):
+        bone = armature.pose.bones.get(name)
+        if bone is None:
+            continue
+        row = column.row(align=True)
+        icon = "BACK" if name == tip else "FORWARD"
+        row.label(text=name, icon=icon, translate=False)
+        row.prop(bone, "sinew_twist_amount", text="")
+        row.prop(bone, "sinew_twist_curve", text="")
+    if not twists.bones:
+        draw_text(layout, context, "No bone was found whose twist can be spread", icon="INFO")
+    for sentence in twists.left_out[:MOST_LEFT_OUT]:
+        draw_text(layout, context, sentence, icon="INFO")
 
 
 def _draw_take_over(

@@ -12,6 +12,7 @@ PYBIND11_MODULE(_native, m) {
     sinew::bindings::bind_ik(m);
     sinew::bindings::bind_interpolate(m);
     sinew::bindings::bind_deformer(m);
+    sinew::bindings::bind_twist_spread(m);
     sinew::bindings::bind_bulge_limit(m);
     sinew::bindings::bind_delta_mush(m);
     sinew::bindings::bind_normals(m);

@@ -9,6 +9,7 @@ void bind_compiled_in(pybind11::module_& m);
 void bind_methods(pybind11::module_& m);
 void bind_skeleton(pybind11::module_& m);
 void bind_threads(pybind11::module_& m);
+void bind_twist_spread(pybind11::module_& m);
 void bind_transforms(pybind11::module_& m);
 void bind_fit(pybind11::module_& m);
 void bind_ik(pybind11::module_& m);

@@ -671,9 +671,11 @@ def check_stages(
 
 
 def choose_stages_after(rng: np.random.Generator, settings: bpy.types.PropertyGroup, diagonal: float) -> None:
-    """One of the stages, or both, with random parameters."""
+    """One or several of the stages, with random parameters."""
     which = int(rng.integers(3))
-    limit, mush = settings.bulge_limit, settings.delta_mush
+    spread, limit, mush = settings.twist_spread, settings.bulge_limit, settings.delta_mush
+    spread.enabled, spread.amount = bool(rng.random() < 0.5), rng.uniform(0.1, 1.0)
+    spread.turns = bool(rng.random() < 0.8)
     limit.enabled, mush.enabled = which != 1, which != 0
     limit.strength = rng.uniform(0.1, 1.0)
     limit.form = str(rng.choice(["continuous", "kim_han"]))
@@ -682,7 +684,7 @@ def choose_stages_after(rng: np.random.Generator, settings: bpy.types.PropertyGr
     mush.smooth_type = str(rng.choice(["simple", "length_weighted"]))
     mush.pin_boundary, mush.invert_group = bool(rng.random() < 0.3), bool(rng.random() < 0.4)
     mush.scale = rng.uniform(-1.0, 2.0) if rng.random() < 0.5 else 1.0
-    for stage in (limit, mush):
+    for stage in (spread, limit, mush):
         stage.group = str(rng.choice(["", *PAINTED]))
 
 

@@ -8,7 +8,7 @@ Sinew reads the same from Blender, poses and weights, for `lbs` and `dq`, whose 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,9 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import bulge_limit_reference
 import delta_mush_reference
 import reference
+import twist_spread_reference
 from sinew_addon.core.bulge_limit import segments
+from sinew_addon.core.twist_spread import blend_of
 
 METHODS = {method.name: method for method in sinew.methods()}
 MARGIN = 1e-3
@@ -76,6 +78,9 @@ def stages_after(
     """
     after = stack.stages_after
     points = points.astype(np.float64) + rounding
+    if "twist_spread" in values:
+        mask = after.masks.get("twist_spread")
+        points = _twisted(stack, points, rest_points, frames, mask, values["twist_spread"])
     if "bulge_limit" in values:
         mask = after.masks.get("bulge_limit")
         points = _limited(stack, points, rest_points, frames, mask, values["bulge_limit"])
@@ -92,15 +97,19 @@ def stages_after(
     return points
 
 
-def _limited(
+def _of_first_bones(
     stack: skin_stack.SkinStack,
     points: np.ndarray,
     rest_points: np.ndarray,
     frames: list[skin_stack.SkinStageFrame | None],
     mask: np.ndarray | None,
-    options: Mapping[str, Any],
+    stage_of: Callable[..., np.ndarray],
 ) -> np.ndarray:
-    """Uses the bones of the first participating modifier whose own mask contains all of a vertex."""
+    """Uses the bones of the first participating modifier whose own mask contains all of a vertex.
+
+    stage_of  takes the points, rest points and influences in armature space, the motions, the mask, the
+              modifier's stage and its frame
+    """
     number = next((i for i, frame in enumerate(frames) if frame is not None), None)
     if number is None:
         return points
@@ -111,18 +120,44 @@ def _limited(
     space, weighting = frame.bones_from_model, stage.deformer.weighting
     rest = _moved(space, rest_points.astype(np.float64))
     influences = weighting.influences_over_joints(rest)
-    result = bulge_limit_reference.limit(
-        _moved(space, points),
-        rest,
-        influences.offsets,
-        influences.bones,
-        influences.weights,
-        *segments(weighting.bones),
-        frame.pose.astype(np.float64) @ np.linalg.inv(weighting.bones.rest.astype(np.float64)),
-        mask=mask,
-        **options,
-    )
+    mesh = rest, influences.offsets, influences.bones, influences.weights
+    motions = frame.pose.astype(np.float64) @ np.linalg.inv(weighting.bones.rest.astype(np.float64))
+    result = stage_of(_moved(space, points), mesh, motions, mask, stage, frame)
     return _moved(np.linalg.inv(space), result)
+
+
+def _limited(*given: Any) -> np.ndarray:
+    *of_mesh, options = given
+
+    def limited(points, mesh, motions, mask, stage, _frame):
+        ends = segments(stage.deformer.bones)
+        return bulge_limit_reference.limit(points, *mesh, *ends, motions, mask=mask, **options)
+
+    return _of_first_bones(*of_mesh, limited)
+
+
+def _twisted(*given: Any) -> np.ndarray:
+    *of_mesh, options = given
+
+    def twisted(points, mesh, motions, mask, stage, frame):
+        bones, inputs = stage.deformer.bones, np.array(frame.twists, np.float32).reshape(-1, 9)
+        twists = bones.twists
+        return twist_spread_reference.spread(
+            points,
+            *mesh,
+            *(twists.rows, twists.heads, twists.tails, bones.rest_axes, motions),
+            parents=twists.parents,
+            amount=options["amount"],
+            amounts=inputs[:, 0],
+            curves=inputs[:, 1],
+            channels=inputs[:, 2:] if options["turns"] else None,
+            blend=blend_of(frame.method),
+            mix_blend=blend_of(frame.mix or frame.method),
+            mask=mask,
+            mix=stage.deformer.mix_weights if frame.mix else None,
+        )[0]
+
+    return _of_first_bones(*of_mesh, twisted)
 
 
 def _by_one_modifier(

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every stage in all features that measure, show and write shapes: each uses the final mesh of an object
-with that stage, whose own oracle is in test_mix, test_bulge_limit and test_delta_mush."""
+with that stage, whose own oracle is in test_mix, test_twist_spread, test_bulge_limit and test_delta_mush."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ FRAMES = [1, 6, 11]
 GROUP = "painted"
 STAGES = {
     "mix": ("mix=lbs", f"mix.group={GROUP}"),
+    "twist_spread": ("twist_spread=on", "twist_spread.amount=0.9", f"twist_spread.group={GROUP}"),
     "bulge_limit": ("bulge_limit=on", "bulge_limit.strength=0.8", f"bulge_limit.group={GROUP}"),
     "delta_mush": ("delta_mush=on", "delta_mush.iterations=12", "delta_mush.pin_boundary=on"),
 }
@@ -43,6 +44,8 @@ def set_on(obj: bpy.types.Object, stage: str) -> None:
     own = getattr(properties.of(obj), stage)
     if stage == "mix":
         own.method, own.group = "lbs", GROUP
+    elif stage == "twist_spread":
+        own.amount, own.group, own.enabled = 0.9, GROUP, True
     elif stage == "bulge_limit":
         own.strength, own.group, own.enabled = 0.8, GROUP, True
     else:

@@ -16,6 +16,42 @@ def mix(case, points, method, group):
     return (1 - share) * points + share * skin.skin(case, method, {})
 
 
+# --- Twist Spread, along bones that follow each other; bendy ones spread their roll themselves
+
+
+def fade(degrees):  # from 150 degrees to 180, where a matrix does not tell which way round a bone went
+    t = np.clip((degrees - 150) / 30, 0, 1)
+    return 1 - t * t * (3 - 2 * t)
+
+
+def twist_of(motion, next_motion, next_rest, axis):
+    relative = np.linalg.inv(motion) @ next_motion @ next_rest
+    q = skin.quaternion(skin.axes(relative) @ skin.axes(next_rest).T)
+    along = q[1:] @ axis
+    angle, swing = 2 * np.arctan2(along, q[0]), 2 * np.arccos(min(1, np.hypot(along, q[0])))
+    return angle * fade(abs(np.degrees(angle))) * fade(np.degrees(swing))
+
+
+def turned(axis, angle, arm):
+    across = np.cross(axis, arm)
+    return arm + np.sin(angle) * across + (1 - np.cos(angle)) * np.cross(axis, across)
+
+
+def twist_spread(case, points, amount, group):  # after linear blending
+    to, motion, result = case["armature_from_mesh"], skin.bones(case).motion, points.copy()
+    for bone in np.flatnonzero(case["segments"][:-1] == 1):
+        rest, length = case["rest"][bone], case["lengths"][bone]
+        head, axis = rest[:3, 3], rest[:3, 1] / np.linalg.norm(rest[:3, 1])
+        angle = twist_of(motion[bone], motion[bone + 1], case["rest"][bone + 1], axis)
+        for v, x in enumerate(skin.moved_by(to, case["points"])):
+            of, w = skin.influences(case, v, x)
+            share = np.clip((x - head) @ axis / length, 0, 1) * amount * np.clip(case[group][v], 0, 1)
+            change = turned(axis, share * angle, x - head) - (x - head)
+            by = w[of == bone].sum() * motion[bone][:3, :3] @ change
+            result[v] += np.linalg.inv(to[:3, :3]) @ by
+    return result
+
+
 # --- Limit Bulge
 
 

@@ -29,6 +29,7 @@ def bones_called(names):
         np.zeros(count, bool),
         np.full(count, -1, np.int32),
         Envelopes(no_vectors, no_vectors, zeros, zeros, zeros, zeros, np.zeros(count, bool)),
+        np.arange(-1, count - 1, dtype=np.int32),
     )
 
 

@@ -574,6 +574,53 @@ def test_skinned_normals(data):
 
 @many(0.1)
 @given(st.data())
+def test_twist_spreads(data):
+    vertices, bones = data.draw(st.sampled_from([0, 1, 2, 20])), data.draw(st.integers(1, 4))
+    d = Draw(data.draw, 14)
+    twists = data.draw(st.integers(0, bones))
+    given_data = [
+        *d.skin(vertices, data.draw(st.integers(0, 4)), bones),
+        (
+            np.column_stack([np.arange(twists), *([np.arange(twists) % bones] * 2), np.arange(twists) % 2]),
+            None,
+        ),
+        d.array(twists, 3),
+        d.array(twists, 3),
+        d.array(bones, 4, 4),
+    ]
+    more = {
+        "bones_from_model": d.array(4, 4, optional=True)[0],
+        "weights": d.array(vertices, optional=True)[0],
+        "mix": d.array(vertices, optional=True)[0],
+    }
+    known = {*MESH, "twists", "heads", "tails", "rest_bones", *more}
+    spread = attempt(
+        lambda *given: sinew.TwistSpread(sinew.Binding(*given[:4]), *given[4:], **more),
+        [given for given, _ in given_data],
+        known,
+    )
+    if spread is None:
+        return
+    repr(spread)
+    attempt(lambda *given: spread.set_rest_points(*given) or True, [d.array(vertices, 3)[0]], {"rest_points"})
+    posed, pose = d.array(vertices, 3)[0], d.array(spread.bone_count, 4, 4)[0]
+    how = {
+        "amount": d.one(st.floats(0, 1)),
+        "amounts": d.array(twists, optional=True)[0],
+        "curves": d.array(twists, optional=True)[0],
+        "channels": d.array(twists, 7, optional=True)[0],
+        "blend": d.one(st.sampled_from(["linear", "matrices", "rotations", "logarithms"])),
+    }
+    known = {"points", "bone_transforms", "out", *how}
+    attempt(spread.angles, [pose, how["channels"]], known)
+    result = attempt(lambda *given: spread.apply(*given, **how), [posed, pose, d.out(vertices)], known)
+    if result is not None:
+        assert result.shape == (spread.vertex_count, 3)
+        same(result, pickle.loads(pickle.dumps(spread)).apply(posed, pose, **how, threads=1))
+
+
+@many(0.1)
+@given(st.data())
 def test_bulge_limits(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 2, 20])), data.draw(st.integers(1, 4))
     d = Draw(data.draw, 14)

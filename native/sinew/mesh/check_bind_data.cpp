@@ -15,6 +15,11 @@ bool is_finite(const Vec3<T>& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+bool is_finite(const Affine<float>& a) {
+    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
+           is_finite(a.translation);
+}
+
 void check_limit(const std::string& argument, const std::string& of, std::size_t limit, std::size_t got) {
     if (got > limit) fail(argument, "at most " + std::to_string(limit) + " " + of, std::to_string(got));
 }
@@ -35,11 +40,29 @@ void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bon
              std::to_string(rest_bones.size()));
     }
     for (std::size_t bone = 0; bone < rest_bones.size(); ++bone) {
-        const auto& [linear, translation] = rest_bones[bone];
-        if (!is_finite(linear[0]) || !is_finite(linear[1]) || !is_finite(linear[2]) ||
-            !is_finite(translation)) {
+        if (!is_finite(rest_bones[bone])) {
             fail("rest_bones", "finite values", "NaN or infinity at bone " + std::to_string(bone));
         }
+    }
+}
+
+void check_weights(const char* argument, std::span<const float> weights, std::size_t vertex_count) {
+    if (weights.empty()) return;
+    if (weights.size() != vertex_count) {
+        fail(argument, "none, or one for each of the " + std::to_string(vertex_count) + " vertices",
+             std::to_string(weights.size()));
+    }
+    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
+        if (std::isnan(weights[vertex])) {
+            fail(argument, "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
+        }
+    }
+}
+
+void check_space(const Affine<float>& bones_from_model) {
+    if (!is_finite(bones_from_model)) fail("bones_from_model", "finite values", "NaN or infinity");
+    if (glm::determinant(Mat3<double>(bones_from_model.linear)) == 0.0) {
+        fail("bones_from_model", "an invertible transform", "one of determinant 0");
     }
 }
 

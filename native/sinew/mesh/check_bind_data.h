@@ -19,6 +19,12 @@ void check_points(std::span<const Vec3<float>> points);
 /// bone_count  one more than the highest bone index in the influences
 void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
 
+/// Throws if there are some but not `vertex_count` weights, or if one is NaN.
+void check_weights(const char* argument, std::span<const float> weights, std::size_t vertex_count);
+
+/// Throws if a value is not finite, or if the transform has no inverse.
+void check_space(const Affine<float>& bones_from_model);
+
 /// Throws as Binding does. Does not check rest bones and vertex data.
 void check(const BindData& data);
 

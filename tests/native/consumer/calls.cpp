@@ -17,6 +17,7 @@
 #include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/skinned_normals.h"
 #include "sinew/transform/make.h"
+#include "sinew/twist_spread.h"
 
 namespace {
 
@@ -106,6 +107,20 @@ void limit_bulges() {
     expect(glm::length(points[0] - rest[0]) < 1e-5f, "a vertex is no further from its bones than at rest");
 }
 
+void spread_twists() {
+    const std::vector<sinew::Vec3<float>> rest{{1, 1, 0}};
+    const std::vector<std::int32_t> offsets{0, 1}, bones{0};
+    const std::vector<float> weights{1.0f};
+    const std::vector<sinew::TwistBone> twists{{0, 0, 1, false, {0, 0, 0}, {0, 2, 0}}};
+    const std::vector<sinew::Affine<float>> rest_bones(2);
+    const sinew::TwistSpread spread(sinew::Binding({rest, offsets, bones, weights}), {twists, rest_bones});
+    std::vector<sinew::Vec3<float>> points{rest};
+    const auto turn = sinew::from_axis_angle<sinew::QuatVec>(sinew::Vec3<float>(0, 1, 0), 1.0f);
+    expect(spread.apply(points, std::vector<sinew::Affine<float>>{{}, sinew::to_affine(turn)}), "sizes fit");
+    expect(glm::length(points[0] - sinew::Vec3<float>(std::cos(0.5f), 1, -std::sin(0.5f))) < 1e-5f,
+           "half of the twist in the middle of the bone");
+}
+
 void find_centres() {
     const std::vector<sinew::Vec3<float>> rest{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     const std::vector<std::int32_t> offsets{0, 1, 2, 3}, bones{0, 0, 0}, triangles{0, 1, 2};
@@ -136,6 +151,7 @@ int main() {
     compute_normals();
     move_normals();
     limit_bulges();
+    spread_twists();
     find_centres();
     interpolate();
     const std::vector<std::int32_t> parents{-1, 0};

@@ -16,7 +16,7 @@ from . import fit
 from . import ik
 from . import interpolate
 from . import spline
-__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'fit', 'ik', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id']
+__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'fit', 'ik', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id']
 class Parameter:
     """
     A setting of a method or of a stage.
@@ -336,6 +336,78 @@ class Deformer:
         """
         Number of vertices.
         """
+class TwistSpread:
+    """
+    The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist
+    bones do. Applied after Deformer.deform() and before all other stages. Can be pickled.
+    """
+    def __getstate__(self) -> tuple:
+        ...
+    def __init__(self, binding: Binding, twists: numpy.typing.ArrayLike, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike, *, parents: numpy.typing.ArrayLike | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None, mix: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        binding: the mesh. Its memory is shared.
+        twists: int32 [twists, 4], a bone before those that it carries. The first bone's vertices share, about its Y axis,
+            the twist of the third bone relative to the second. The fourth number is 0 where it is added towards the tail
+            (the hand's twist to the forearm), 1 where it is taken back towards the head (an upper arm's own).
+        heads, tails: float32 [twists, 3], between which the share of the twist grows from 0 to 1, at rest, in the space of
+            the bone transforms.
+        rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], each bone at rest in that space, Y along it.
+        parents: None, or int32 [bones], -1 for none. Only twists beyond half a turn need them.
+        bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
+        weights: None, or float32 [vertices], how much each vertex takes part, 0 to 1; clamped.
+        mix: None, or float32 [vertices], the weights of Deformer's `mix`.
+        """
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: typing.Any) -> None:
+        ...
+    def angles(self, bone_transforms: numpy.typing.ArrayLike, channels: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        The twists in a pose, float32 [twists], radians, as apply() spreads them by an amount of 1: faded from 150
+        degrees to 180, where a matrix does not tell them.
+
+        bone_transforms, channels: as for apply().
+        """
+    def apply(self, points: numpy.typing.ArrayLike, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, *, amount: float = 1.0, amounts: numpy.typing.ArrayLike | None = None, curves: numpy.typing.ArrayLike | None = None, channels: numpy.typing.ArrayLike | None = None, blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', mix_blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        The twisted points, float32 [vertices, 3], model space.
+
+        points: float32 [vertices, 3], deformed, model space.
+        bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
+        out: None, or float32 [vertices, 3], written and returned. May be `points`.
+        amount: how much of each twist is spread, 0 to 1.
+        amounts: None, or float32 [twists], the same for each bone.
+        curves: None, or float32 [twists], -1 to 1: below 0 more of the twist is near the tail, above 0 near the head.
+        channels: None, or float32 [twists, 7], the rotation channels of each tip: its rotation from rest on its own rest
+            axes, (w, x, y, z), and Euler angles or the product of angle and unit axis, radians. They say how far beyond half
+            a turn it went, up to two turns, unless something else rotates the bone as well. All 0: unknown.
+        blend: how the method of the points blends rotations: "linear" (lbs), "matrices" (ddm), "rotations" (all others), or
+            "logarithms" (log, dib). With "linear" the bone's matrix M of each vertex becomes M R; otherwise the vertex is
+            rotated about the posed axis by its weight times its share of the twist.
+        mix_blend: the same for the second method, where `mix` is above 0.
+        threads: at most so many; None or 0: as many as useful.
+
+        Where no bone is twisted, no bit changes.
+        """
+    def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        Sets other rest points, float32 [vertices, 3], or another space of the bones.
+        """
+    @property
+    def bone_count(self) -> int:
+        """
+        How many bones a pose must have.
+        """
+    @property
+    def twist_count(self) -> int:
+        """
+        Number of twists.
+        """
+    @property
+    def vertex_count(self) -> int:
+        """
+        Number of vertices.
+        """
 class BulgeLimit:
     """
     The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
@@ -613,7 +685,7 @@ def methods() -> tuple[Method, ...]:
     """
 def stages() -> tuple[Stage, ...]:
     """
-    All stages. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush.
+    All stages. `mix` is an argument of Deformer, `twist_spread` is TwistSpread, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush.
     """
 def thread_id() -> int:
     """

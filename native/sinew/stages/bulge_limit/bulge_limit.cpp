@@ -37,29 +37,6 @@ void check_segments(std::span<const BoneSegment<float>> segments, std::size_t bo
     }
 }
 
-void check_weights(std::span<const float> weights, std::size_t vertex_count) {
-    if (weights.empty()) return;
-    if (weights.size() != vertex_count) {
-        fail("weights", "none, or one for each of the " + std::to_string(vertex_count) + " vertices",
-             std::to_string(weights.size()));
-    }
-    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
-        if (std::isnan(weights[vertex])) {
-            fail("weights", "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
-        }
-    }
-}
-
-void check_space(const Affine<float>& bones_from_model) {
-    const auto& [linear, translation] = bones_from_model;
-    if (!is_finite(linear[0]) || !is_finite(linear[1]) || !is_finite(linear[2]) || !is_finite(translation)) {
-        fail("bones_from_model", "finite values", "NaN or infinity");
-    }
-    if (glm::determinant(Mat3<double>(linear)) == 0.0) {
-        fail("bones_from_model", "an invertible transform", "one of determinant 0");
-    }
-}
-
 /// Whether a motion preserves lengths.
 bool is_orthonormal(const Mat3<double>& m) {
     const Mat3<double> products = glm::transpose(m) * m - Mat3<double>(1.0);
@@ -92,7 +69,7 @@ struct BulgeLimit::State {
 
 BulgeLimit::State::State(const Binding& binding, const BulgeLimitData& data) : packed(binding.packed()) {
     check_segments(data.segments, packed->bone_count);
-    check_weights(data.weights, packed->vertex_count);
+    check_weights("weights", data.weights, packed->vertex_count);
     check_space(data.bones_from_model);
     for (const std::int32_t bone : mesh.used_bones) {
         segments.push_back(data.segments[static_cast<std::size_t>(bone)]);

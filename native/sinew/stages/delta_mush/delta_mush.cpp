@@ -43,16 +43,7 @@ void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& se
     if (!(settings.factor >= 0.0f && settings.factor <= 1.0f)) {
         fail("factor", "a number from 0 to 1", std::to_string(settings.factor));
     }
-    if (settings.weights.empty()) return;
-    if (settings.weights.size() != vertices) {
-        fail("weights", "none, or one for each of the " + std::to_string(vertices) + " vertices",
-             std::to_string(settings.weights.size()));
-    }
-    for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
-        if (std::isnan(settings.weights[vertex])) {
-            fail("weights", "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
-        }
-    }
+    check_weights("weights", settings.weights, vertices);
 }
 
 Float4 float4_of(const Vec3<float>& point) { return {{point.x, point.y, point.z, 0.0f}}; }

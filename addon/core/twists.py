@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which bones share the twist of another, found from the bones' places, names and parents."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .phrases import phrase
+
+# Words of bones' names, in the common rigs: Rigify, Mixamo, Unreal, MakeHuman, MikuMikuDance.
+UPPER = r"upper_?arm|up_?arm|thigh|up_?leg|upper_?leg|femur|humerus"
+LOWER = r"fore_?arm|lower_?arm|low_?arm|shin|calf|lower_?leg|low_?leg|radius|ulna|tibia"
+NEITHER = (
+    r"shoulder|clavicle|collar|hand|wrist|foot|ankle|toe|heel|ball|thumb|index|middle|ring|pinky|little|finger|"
+    r"metacarpal|palm|pelvis|hips?|head|eye|jaw|tongue|root|breast"
+)
+OWN_TWIST = r"twist|roll"
+# Mixamo has Arm above ForeArm and UpLeg above Leg.
+ARM, LEG = r"(?<![a-z])arm(?![a-z])", r"(?<![a-z])leg(?![a-z])"
+# A child starts at its parent's tail within so many of the parent's lengths.
+NEAR = 0.25
+# Without names, a chain goes on where the child points on within 45 degrees.
+STRAIGHT = np.cos(np.radians(45.0))
+
+
+@dataclass(frozen=True)
+class Twists:
+    """
+    rows          int32 [twists, 4] as sinew.TwistSpread takes them, a bone before those that it carries
+    heads, tails  float32 [twists, 3] of the twisted bones at rest, armature space
+    bones, tips   names, [twists]
+    parents       int32 [bones + joints], -1 for none
+    left_out      a sentence for each bone that gets no twist though others like it do
+    """
+
+    rows: np.ndarray
+    heads: np.ndarray
+    tails: np.ndarray
+    bones: tuple[str, ...]
+    tips: tuple[str, ...]
+    parents: np.ndarray
+    left_out: tuple[str, ...]
+
+
+class TwistFinder:
+    """Of bones as in rig.Bones."""
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        deform: np.ndarray,
+        parents: np.ndarray,
+        rest: np.ndarray,
+        lengths: np.ndarray,
+        segments: np.ndarray,
+    ) -> None:
+        self._names, self._deform, self._parents = names, deform, parents
+        self._segments = segments
+        count = len(names)
+        self._heads = rest[:count, :3, 3].astype(np.float64)
+        self._axes = rest[:count, :3, 1].astype(np.float64)
+        self._lengths = lengths.astype(np.float64)
+        self._tails = self._heads + self._lengths[:, None] * self._axes
+        self._left_out: list[str] = []
+
+    def find(self, first_joints: np.ndarray, joint_count: int) -> Twists:
+        found = [row for bone in self._from_the_root() if (row := self._twist_of(bone)) is not None]
+        rows = np.array(found, np.int32).reshape(-1, 4)
+        parents = np.concatenate([self._parents, np.full(joint_count, -1, np.int32)])
+        for bone in np.flatnonzero(self._segments > 1):
+            parents[first_joints[bone] : first_joints[bone] + self._segments[bone] + 1] = bone
+        of = rows[:, 0]
+        return Twists(
+            rows,
+            self._heads[of].astype(np.float32),
+            self._tails[of].astype(np.float32),
+            tuple(self._names[bone] for bone in of),
+            tuple(self._names[bone] for bone in rows[:, 2]),
+            parents,
+            tuple(self._left_out),
+        )
+
+    @cached_property
+    def _children(self) -> list[list[int]]:
+        """The deforming bones that each bone carries next, by its chain."""
+        children: list[list[int]] = [[] for _name in self._names]
+        for bone in np.flatnonzero(self._deform):
+            parent = self._carrier(int(bone))
+            if parent >= 0:
+                children[parent].append(int(bone))
+        return children
+
+    def _carrier(self, bone: int) -> int:
+        """The nearest deforming bone above. In rigs whose deforming bones hang on others, the one at whose
+        tail the bone starts. -1 for none."""
+        above = int(self._parents[bone])
+        while above >= 0 and not self._deform[above]:
+            above = int(self._parents[above])
+        if above >= 0:
+            return above
+        apart = np.linalg.norm(self._tails - self._heads[bone], axis=1)
+        meets = np.flatnonzero(self._deform & (apart <= 1e-3 * self._lengths))
+        meets = meets[meets != bone]
+        return int(meets[0]) if len(meets) == 1 else -1
+
+    def _from_the_root(self) -> list[int]:
+        depths = np.zeros(len(self._names), np.int32)
+        for bone in range(len(self._names)):
+            above = int(self._parents[bone])
+            while above >= 0:
+                depths[bone] += 1
+                above = int(self._parents[above])
+        return [int(bone) for bone in np.argsort(depths, kind="stable") if self._deform[bone]]
+
+    def _twist_of(self, bone: int) -> tuple[int, int, int, int] | None:
+        """Returns its row, or None. Notes why, where it is a limb."""
+        role = self._role(bone)
+        if role == NEITHER or not self._lengths[bone] > 0.0:
+            return None
+        if role == UPPER:
+            base = self._carrier(bone)
+            base = int(self._parents[bone]) if base < 0 else base
+            if base < 0:
+                self._leave_out(bone, "{bone} has no parent to be twisted against")
+                return None
+            return None if self._spreads_itself(bone) else (bone, base, bone, 1)
+        tip = self._tip(bone, is_limb=role == LOWER)
+        return None if tip is None or self._spreads_itself(bone) else (bone, bone, tip, 0)
+
+    def _spreads_itself(self, bone: int) -> bool:
+        """Whether bendy segments or twist bones spread it already."""
+        if self._segments[bone] > 1:
+            self._leave_out(bone, "{bone} is a bendy bone, which spreads its roll itself")
+            return True
+        own = [child for child in self._children[bone] if re.search(OWN_TWIST, self._names[child].lower())]
+        if own:
+            self._leave_out(bone, "{bone} has twist bones of its own")
+        return bool(own)
+
+    def _tip(self, bone: int, is_limb: bool) -> int | None:
+        """The child whose twist the bone shares."""
+        at_tail = [
+            child
+            for child in self._children[bone]
+            if np.linalg.norm(self._heads[child] - self._tails[bone]) <= NEAR * self._lengths[bone]
+        ]
+        if not is_limb:
+            straight = [child for child in at_tail if self._axes[child] @ self._axes[bone] >= STRAIGHT]
+            if len(at_tail) == 1 and not straight:
+                return None
+        if len(at_tail) > 1:
+            self._leave_out(bone, "{bone} carries {count} bones, which may twist apart", len(at_tail))
+            return None
+        if not at_tail:
+            if is_limb:
+                self._leave_out(bone, "{bone} carries no deforming bone at its tail")
+            return None
+        return at_tail[0]
+
+    def _role(self, bone: int) -> str:
+        """UPPER, LOWER or NEITHER by its name, or empty."""
+        name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._names[bone]).lower()
+        if re.search(OWN_TWIST, name):
+            return NEITHER
+        for role in (LOWER, UPPER):
+            if re.search(role, name):
+                return role
+        parent = int(self._parents[bone])
+        above = self._names[parent].lower().replace("_", "") if parent >= 0 else ""
+        if re.search(LEG, name):
+            return LOWER if re.search("upleg|upperleg|thigh", above) else NEITHER
+        if re.search(ARM, name):
+            return UPPER if re.search("shoulder|clavicle|collar", above) else NEITHER
+        return NEITHER if re.search(rf"(?<![a-z])({NEITHER})", name) else ""
+
+    def _leave_out(self, bone: int, text: str, count: int = 0) -> None:
+        self._left_out.append(phrase(text, bone=self._names[bone], count=count))

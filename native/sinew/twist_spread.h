@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sinew/binding.h"
+#include "sinew/export.h"
+#include "sinew/stages/twist_spread/twist_spread.h"
+
+namespace sinew {
+
+/// What a TwistSpread is constructed from besides a Binding. No reference is kept.
+struct TwistSpreadData {
+    std::span<const TwistBone> twists;  // each bone at most once, a bone before those that it carries
+    // [bones] at rest, Y along the bone, in the space of posed_from_rest
+    std::span<const Affine<float>> rest_bones;
+    std::span<const std::int32_t> parents{};  // [bones] of each bone, -1 for none; empty: none has one
+    Affine<float> bones_from_model{};         // maps rest points to that space; invertible
+    std::span<const float> weights{};  // [vertices] of the vertex group, clamped to 0 to 1; empty: all 1
+    std::span<const float> mix{};      // [vertices] those of the stage `mix`; empty: all 0
+};
+
+/// How to spread the twists of one frame.
+struct TwistSpreadOptions {
+    float amount = 1.0f;               // clamped to 0 to 1; NaN: 1
+    std::span<const float> amounts{};  // [twists] the same for each bone
+    std::span<const float> curves{};   // [twists] clamped to -1 to 1; NaN: 0
+    // [twists] the channels of each tip; empty: unknown
+    std::span<const TwistChannels<float>> channels{};
+    TwistBlend blend = TwistBlend::linear;      // of the method that made the points
+    TwistBlend mix_blend = TwistBlend::linear;  // of the second, where `mix` is above 0
+    std::size_t threads = 0;                    // at most; 0: as many as useful
+};
+
+/// The stage `twist_spread` (stages/twist_spread/twist_spread.h) for one mesh, applied after Deformer::deform() and
+/// before all other stages. A constructed object is valid; apply() can not fail and does not allocate. Concurrent
+/// calls on one object wait for each other. A moved-from object can only be assigned to or destroyed.
+class SINEW_EXPORT TwistSpread {
+public:
+    /// Shares the memory of `binding`.
+    ///
+    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: bones beyond
+    /// rest_bones; a bone that is listed twice; values that are not finite; rest bones without a Y axis; a singular
+    /// transform; weights that are NaN; a number of weights or parents that does not match.
+    TwistSpread(const Binding& binding, const TwistSpreadData& data);
+
+    TwistSpread(TwistSpread&&) noexcept;
+    TwistSpread& operator=(TwistSpread&&) noexcept;
+    ~TwistSpread();
+
+    /// Sets other rest points [vertices], or the same points with another bones_from_model. Throws as the
+    /// constructor does; the object is then unchanged.
+    void set_rest_points(std::span<const Vec3<float>> rest_points,
+                         const Affine<float>& bones_from_model = {});
+
+    [[nodiscard]] std::size_t vertex_count() const noexcept;
+    /// Of rest_bones. Poses have as many, or fewer.
+    [[nodiscard]] std::size_t bone_count() const noexcept;
+    [[nodiscard]] std::size_t twist_count() const noexcept;
+
+    /// The twist of each tip in a pose, radians [twists], with fades and turns, without amounts.
+    [[nodiscard]] std::vector<float> angles(std::span<const Affine<float>> posed_from_rest,
+                                            std::span<const TwistChannels<float>> channels = {}) const;
+
+    /// Spreads the twists in place.
+    ///
+    /// points           [vertices] deformed, model space
+    /// posed_from_rest  [bones] finite; missing bones stay at rest
+    ///
+    /// Where no bone is twisted, no bit changes. The result does not depend on the number of threads. Returns false,
+    /// and writes nothing, if the number of points, amounts, curves or channels is wrong.
+    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+                             const TwistSpreadOptions& options = {}) const noexcept;
+
+    /// The data that the object was constructed from. An object made of it gives the same bits.
+    struct Parts {
+        BoundMesh mesh;  // with the current rest points, without rest bones and vertex data
+        std::vector<TwistBone> twists;
+        std::vector<Affine<float>> rest_bones;
+        std::vector<std::int32_t> parents;
+        Affine<float> bones_from_model;
+        std::vector<float> weights;
+        std::vector<float> mix;
+    };
+    [[nodiscard]] Parts parts() const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace sinew

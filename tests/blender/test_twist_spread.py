@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stage twist_spread: its oracle is the float64 reference, from the shape before it and Blender's
+poses."""
+
+import math
+
+import bpy
+import fuzz_reference
+import numpy as np
+import pytest
+import routes
+import scenes
+from sinew_addon.attach import properties, stage_settings
+from sinew_addon.deform import session
+
+
+def spread(obj: bpy.types.Object, **values: object) -> None:
+    stage = properties.of(obj).twist_spread
+    for name, value in values.items():
+        setattr(stage, name, value)
+    stage.enabled = True
+
+
+def assert_spread(obj: bpy.types.Object, before: np.ndarray, least: float = 0.005) -> None:
+    """before: float32 [vertices, 3], the shape without the stage"""
+    found, state = scenes.final_points(obj), session.state_of(obj)
+    values = {"twist_spread": stage_settings.values_of(properties.of(obj), "twist_spread")}
+    shown = state.shown
+    expected = fuzz_reference.stages_after(
+        state.bound.skin_stack, before, shown.rest_points, shown.frames, values
+    )
+    assert np.abs(expected - before).max() > least
+    assert scenes.worst(found, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def arm(method: str = "lbs") -> tuple[bpy.types.Object, bpy.types.Object]:
+    """A tube of three bones, of which the last is the hand, without keys and with Euler angles."""
+    obj, armature = scenes.make_arm(bones=3)
+    scenes.forget_keys(armature)
+    for bone in armature.pose.bones:
+        bone.rotation_mode = "YXZ"
+        bone.rotation_euler = (0.0, 0.0, 0.0)
+    scenes.add_sinew(obj, method)
+    return obj, armature
+
+
+def twist(armature: bpy.types.Object, degrees: float, bend: float = 0.0) -> None:
+    armature.pose.bones["bone.2"].rotation_euler = (math.radians(bend), math.radians(degrees), 0.0)
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("method", ["lbs", "dq", "cor", "log"])
+@pytest.mark.parametrize("degrees", [120.0, -170.0, 300.0])
+def test_a_twisted_hand_has_the_shape_of_the_reference(method, degrees, route):
+    obj, armature = arm(method)
+    twist(armature, degrees, bend=30.0)
+    before = scenes.final_points(obj)
+    spread(obj)
+    assert_spread(obj, before)
+    twist(armature, 0.0)
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) < 1e-7
+    twist(armature, degrees, bend=30.0)
+    assert_spread(obj, before)
+    assert routes.taken(obj, 0) == route
+
+
+def test_it_turns_on_beyond_half_a_turn(route):
+    """A whole turn has the same matrices as none, so only channels tell it."""
+    obj, armature = arm()
+    spread(obj)
+    twist(armature, 360.0)
+    rest = scenes.rest_points(obj)
+    assert scenes.worst(scenes.final_points(obj), rest) > 0.2
+    armature.pose.bones["bone.2"].rotation_euler.y = 0.0
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), rest) < 1e-6
+    twist(armature, 360.0)
+    spread(obj, turns=False)
+    assert scenes.worst(scenes.final_points(obj), rest) < 1e-5
+    spread(obj, turns=True)
+    # A quaternion tells no turns.
+    armature.pose.bones["bone.2"].rotation_mode = "QUATERNION"
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), rest) < 1e-5
+
+
+def test_bones_have_an_amount_and_a_curve_that_can_be_keyed(route):
+    obj, armature = arm()
+    spread(obj)
+    twist(armature, 90.0)
+    whole = scenes.final_points(obj)
+    own = armature.pose.bones["bone.1"]
+    own.sinew_twist_amount = 0.0
+    bpy.context.view_layer.update()
+    plain = scenes.final_points(obj)
+    assert scenes.worst(whole, plain) > 0.05
+    for frame, amount, curve in ((1, 0.0, 0.0), (11, 1.0, 0.8)):
+        own.sinew_twist_amount, own.sinew_twist_curve = amount, curve
+        own.keyframe_insert("sinew_twist_amount", frame=frame)
+        own.keyframe_insert("sinew_twist_curve", frame=frame)
+    at = scenes.shapes(obj, [1, 6, 11])
+    assert scenes.worst(at[0], plain) < 1e-6
+    bpy.context.scene.frame_set(6)
+    assert_spread(obj, plain)
+    assert scenes.worst(at[2], whole) > 0.01
+    assert routes.taken(obj, 0) == route
+
+
+def test_a_mix_and_a_vertex_group_get_their_share(route):
+    obj, armature = arm("lbs")
+    group = obj.vertex_groups.new(name="where")
+    for vertex in obj.data.vertices:
+        group.add([vertex.index], float(np.clip(vertex.co.x / 3.0, 0.0, 1.0)), "REPLACE")
+    properties.of(obj).mix.method, properties.of(obj).mix.group = "dq", "where"
+    twist(armature, 100.0, bend=20.0)
+    before = scenes.final_points(obj)
+    spread(obj, group="where")
+    assert_spread(obj, before)
+
+
+def test_scaled_bones_and_other_scale_rules(route):
+    obj, armature = arm("dq")
+    armature.pose.bones["bone.1"].scale = (1.5, 1.0, 0.7)
+    twist(armature, 100.0)
+    for rule in ("4.0", "none"):
+        properties.of(obj).twist_spread.enabled = False
+        properties.of(obj).scale_rule = rule
+        before = scenes.final_points(obj)
+        spread(obj)
+        found = scenes.final_points(obj)
+        assert scenes.worst(found, before) > 0.05
+        if rule == "4.0":
+            assert_spread(obj, before)
+
+
+def test_bones_are_found_by_names_and_chains():
+    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    made = {}
+
+    def bone(name: str, parent: str, head: tuple, tail: tuple) -> None:
+        made[name] = armature.data.edit_bones.new(name)
+        made[name].head, made[name].tail = head, tail
+        made[name].parent = made.get(parent)
+
+    bone("spine", "", (0, 0, 0), (0, 0, 1))
+    bone("neck", "spine", (0, 0, 1), (0, 0, 1.3))
+    bone("head", "neck", (0, 0, 1.3), (0, 0, 1.6))
+    for side, x in ((".L", 1.0), (".R", -1.0)):
+        bone("clavicle" + side, "spine", (0.05 * x, 0, 1), (0.2 * x, 0, 1))
+        bone("upper_arm" + side, "clavicle" + side, (0.2 * x, 0, 1), (0.5 * x, 0, 1))
+        bone("forearm" + side, "upper_arm" + side, (0.5 * x, 0, 1), (0.8 * x, 0, 1))
+        bone("hand" + side, "forearm" + side, (0.8 * x, 0, 1), (0.9 * x, 0, 1))
+        for number in range(2):
+            bone(f"index.0{number}{side}", "hand" + side, (0.9 * x, 0.1 * number, 1), (x, 0.1 * number, 1))
+        bone("thigh" + side, "spine", (0.1 * x, 0, 0), (0.1 * x, 0, -0.5))
+        bone("shin" + side, "thigh" + side, (0.1 * x, 0, -0.5), (0.1 * x, 0, -1))
+        bone("foot" + side, "shin" + side, (0.1 * x, 0, -1), (0.1 * x, -0.2, -1))
+    bone("hub", "", (3, 0, 0), (3, 0, 1))
+    for number in range(3):
+        bone(f"spoke{number}", "hub", (3, 0, 1), (3, 0.2 * number, 2))
+    bone("tail", "", (5, 0, 0), (5, 0, 1))
+    bone("tail.001", "tail", (5, 0, 1), (5, 0, 2))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    from sinew_addon.io import armature_io
+
+    armature.data.bones["tail.001"].bbone_segments = 4
+    bpy.context.view_layer.update()
+    twists = armature_io.read_bones(armature).twists
+    from_parent = dict(zip(twists.bones, twists.rows[:, 3].tolist(), strict=True))
+    tips = dict(zip(twists.bones, twists.tips, strict=True))
+    sides = (".L", ".R")
+    assert from_parent == {
+        **{f"{name}{side}": 1 for name in ("upper_arm", "thigh") for side in sides},
+        **{f"{name}{side}": 0 for name in ("forearm", "shin") for side in sides},
+        **{"neck": 0, "tail": 0},
+    }
+    assert {f"forearm{side}": f"hand{side}" for side in sides}.items() <= tips.items()
+    assert tips["neck"] == "head"
+    assert tips["thigh.L"] == "thigh.L"
+    assert "hub carries 3 bones, which may twist apart" in twists.left_out

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Protects the kernels of the stage `twist_spread` on each instruction set against the definition in double,
+// its threads and options.
+#include "sinew/twist_spread.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "scene.h"
+#include "sinew/base/simd.h"
+#include "sinew/transform/convert.h"
+#include "sinew/transform/split_scale.h"
+
+namespace sinew {
+namespace {
+
+using test::deformed;
+using test::distance;
+using test::kTolerance;
+using test::Random;
+using test::random_scene;
+using test::Scene;
+
+constexpr std::int32_t kBones = 12;
+
+/// Many vertices with the same bones, then some with one to eight bones.
+Scene scene_of_sets(std::uint32_t seed) {
+    Random random(seed);
+    Scene scene = random_scene(seed, 0, 1.0);
+    for (int i = 0; i < 600; ++i) {
+        const auto count = static_cast<std::size_t>(1 + i % 6);
+        auto influences = random.influences<float>(count, kBones);
+        for (std::size_t k = 0; k < count; ++k) {
+            influences[k].bone = static_cast<std::int32_t>((static_cast<std::size_t>(i % 6) + k) % kBones);
+        }
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
+    }
+    for (int i = 0; i < 100; ++i) {
+        const auto count = static_cast<std::size_t>(1 + random.index(8));
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), random.influences<float>(count, kBones));
+    }
+    return scene;
+}
+
+/// Bones 0, 2, 4 ... share the twist of the next, or their own.
+std::vector<TwistBone> twists_of(const Scene& scene) {
+    Random random(99);
+    std::vector<TwistBone> twists;
+    for (std::int32_t bone = 0; bone + 1 < kBones; bone += 2) {
+        const Affine<float>& rest = scene.rest_bones[static_cast<std::size_t>(bone)];
+        const bool is_from_parent = bone % 4 == 0;
+        const std::int32_t next = bone + 1;
+        twists.push_back({bone, is_from_parent ? next : bone, is_from_parent ? bone : next, is_from_parent,
+                          rest.translation, rest.translation + Vec3<float>(random.vector(1.0))});
+    }
+    return twists;
+}
+
+std::vector<std::int32_t> chain() {
+    std::vector<std::int32_t> parents;
+    for (std::int32_t bone = 0; bone < kBones; ++bone) parents.push_back(bone - 1);
+    return parents;
+}
+
+/// Channels of turns that the poses do not tell, where they are to be trusted.
+std::vector<TwistChannels<float>> channels_of(const Scene& scene, const std::vector<TwistBone>& twists) {
+    std::vector<TwistChannels<float>> channels;
+    for (const TwistBone& twist : twists) {
+        const auto tip = static_cast<std::size_t>(twist.tip);
+        const auto rest = cast<double>(scene.rest_bones[tip]);
+        const auto base = cast<double>(scene.posed_from_rest[static_cast<std::size_t>(twist.base)]);
+        const auto relative =
+            split_scale(inverse(base) * cast<double>(scene.posed_from_rest[tip]), rest).rigid.linear;
+        const Quat<double> axes = to_quat(rotation_keeping_y(rest.linear));
+        const auto own = Quat<float>(glm::conjugate(axes) * to_quat(relative) * axes);
+        channels.push_back({own, Vec3<float>(0.3f, twist.bone % 3 == 0 ? 9.0f : -6.5f, -0.2f)});
+    }
+    return channels;
+}
+
+std::vector<float> mixed(const Scene& scene) {
+    std::vector<float> mix;
+    for (std::size_t i = 0; i < scene.rest_points.size(); ++i)
+        mix.push_back(0.25f * static_cast<float>(i % 5));
+    return mix;
+}
+
+/// The twisted points by the definition, in double.
+std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadData& data,
+                                        const std::vector<Vec3<float>>& points,
+                                        const TwistSpreadOptions& options) {
+    const TwistSpread spread(Binding(scene.data()), data);
+    std::vector<Vec3<double>> result;
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        const auto influences = test::normalised_influences_of<double>(scene, vertex);
+        const Vec3<double> rest(scene.rest_points[vertex]);
+        Vec3<double> point(points[vertex]);
+        for (std::size_t i = data.twists.size(); i-- > 0;) {
+            const TwistBone& twist = data.twists[i];
+            const auto tip_rest = cast<double>(scene.rest_bones[static_cast<std::size_t>(twist.tip)]);
+            const auto motion_of = [&](std::int32_t bone) {
+                return cast<double>(scene.posed_from_rest[static_cast<std::size_t>(bone)]);
+            };
+            const auto relative =
+                split_scale(inverse(motion_of(twist.base)) * motion_of(twist.tip), tip_rest).rigid.linear;
+            const Quat<double> rotation = glm::normalize(to_quat(relative));
+            const auto bone_rest = cast<double>(scene.rest_bones[static_cast<std::size_t>(twist.bone)]);
+            const Vec3<double> axis = glm::normalize(bone_rest.linear[1]);
+            double expected = 0.0;
+            if (!options.channels.empty()) {
+                const TwistChannels<double> told{glm::normalize(Quat<double>(options.channels[i].rotation)),
+                                                 Vec3<double>(options.channels[i].angles)};
+                expected = TwistSpreadStage::expected(told, rotation,
+                                                      to_quat(rotation_keeping_y(tip_rest.linear)), axis);
+            }
+            const auto [angle, around, part] = TwistSpreadStage::read(rotation, axis, expected);
+            const double factor =
+                static_cast<double>(options.amount) * static_cast<double>(options.amounts[i]);
+            const TwistSpreadStage::Bone<double> bone{
+                motion_of(twist.bone),
+                bone_rest.translation,
+                axis,
+                Vec3<double>(twist.head),
+                Vec3<double>(twist.tail),
+                static_cast<double>(options.curves[i]),
+                factor * angle,
+                around,
+                factor * part,
+                twist.is_from_parent,
+                split_scale(motion_of(twist.bone), bone_rest).has_scale};
+            double weight = 0.0;
+            double below = 0.0;
+            for (const auto& influence : influences) {
+                if (influence.bone == twist.bone) weight += influence.weight;
+                if (influence.bone >= twist.tip) below += influence.weight;
+            }
+            if (weight == 0.0 && !(below > 0.0)) continue;
+            const double share = data.mix.empty() ? 0.0 : static_cast<double>(data.mix[vertex]);
+            const bool is_linear = options.blend == TwistBlend::linear;
+            const double linear =
+                (is_linear ? 1.0 - share : 0.0) + (options.mix_blend == TwistBlend::linear ? share : 0.0);
+            point = TwistSpreadStage::deform_vertex(
+                bone, linear, is_linear ? options.mix_blend : options.blend, weight, below,
+                static_cast<double>(data.weights[vertex]), rest, point);
+        }
+        result.push_back(point);
+    }
+    return result;
+}
+
+class SpreadTwists : public testing::TestWithParam<std::string_view> {
+protected:
+    SpreadTwists() { use_simd_target(GetParam()); }
+    ~SpreadTwists() override { use_simd_target(simd_targets().front()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(every, SpreadTwists, testing::ValuesIn(simd_targets()),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST_P(SpreadTwists, kernel_agrees_with_the_definition) {
+    for (const std::uint32_t seed : {1u, 2u, 3u}) {
+        const Scene scene = scene_of_sets(seed);
+        const auto twists = twists_of(scene);
+        const auto parents = chain();
+        const auto mix = mixed(scene);
+        std::vector<float> weights(scene.rest_points.size(), 1.0f);
+        for (std::size_t i = 0; i < weights.size(); i += 3) weights[i] = 0.5f;
+        const auto channels = channels_of(scene, twists);
+        const std::vector<float> amounts{1.0f, 0.8f, 0.6f, 1.0f, 0.0f, 1.0f};
+        const std::vector<float> curves{0.0f, 1.0f, -1.0f, 0.5f, 0.0f, -0.25f};
+        const auto before = deformed(Deformer(scene.data(), Lbs::info), scene);
+        for (const auto& [first, second] :
+             std::vector<std::pair<TwistBlend, TwistBlend>>{{TwistBlend::linear, TwistBlend::linear},
+                                                            {TwistBlend::linear, TwistBlend::rotations},
+                                                            {TwistBlend::logarithms, TwistBlend::linear},
+                                                            {TwistBlend::rotations, TwistBlend::rotations},
+                                                            {TwistBlend::matrices, TwistBlend::matrices}}) {
+            for (const bool are_known : {false, true}) {
+                TwistSpreadData data{twists, scene.rest_bones, parents, {}, weights, mix};
+                TwistSpreadOptions options{0.9f, amounts, curves, {}, first, second};
+                if (are_known) options.channels = channels;
+                auto points = before;
+                EXPECT_TRUE(
+                    TwistSpread(Binding(scene.data()), data).apply(points, scene.posed_from_rest, options));
+                const auto expected = by_definition(scene, data, before, options);
+                std::size_t changed = 0;
+                for (std::size_t i = 0; i < points.size(); ++i) {
+                    ASSERT_LT(distance(Vec3<double>(points[i]), expected[i]), 40.0 * kTolerance) << i;
+                    changed += points[i] != before[i] ? 1 : 0;
+                }
+                EXPECT_GT(changed, points.size() / 3);
+            }
+        }
+    }
+}
+
+TEST_P(SpreadTwists, threads_change_no_bit_and_the_rest_pose_stays) {
+    const Scene scene = scene_of_sets(4);
+    const auto twists = twists_of(scene);
+    const TwistSpread spread(Binding(scene.data()), {twists, scene.rest_bones});
+    for (const TwistBlend blend : {TwistBlend::linear, TwistBlend::rotations}) {
+        TwistSpreadOptions options;
+        options.blend = blend;
+        auto one = deformed(Deformer(scene.data(), Dq::info), scene);
+        auto many = one;
+        options.threads = 1;
+        EXPECT_TRUE(spread.apply(one, scene.posed_from_rest, options));
+        options.threads = 5;
+        EXPECT_TRUE(spread.apply(many, scene.posed_from_rest, options));
+        EXPECT_TRUE(one == many);
+        auto rest = scene.rest_points;
+        // Without a pose, all bones are at rest.
+        EXPECT_TRUE(spread.apply(rest, {}, options));
+        EXPECT_TRUE(rest == scene.rest_points);
+    }
+}
+
+TEST(TwistSpread, options_become_valid_and_wrong_sizes_change_nothing) {
+    const Scene scene = scene_of_sets(6);
+    const auto twists = twists_of(scene);
+    const TwistSpread spread(Binding(scene.data()), {twists, scene.rest_bones});
+    const auto before = deformed(Deformer(scene.data(), Lbs::info), scene);
+    const auto by = [&](float amount) {
+        auto points = before;
+        TwistSpreadOptions options;
+        options.amount = amount;
+        EXPECT_TRUE(spread.apply(points, scene.posed_from_rest, options));
+        return points;
+    };
+    EXPECT_TRUE(by(-1.0f) == before);
+    EXPECT_TRUE(by(5.0f) == by(1.0f));
+    EXPECT_TRUE(by(std::numeric_limits<float>::quiet_NaN()) == by(1.0f));
+    std::vector<Vec3<float>> few(3, Vec3<float>(9.0f));
+    EXPECT_FALSE(spread.apply(few, scene.posed_from_rest));
+    EXPECT_TRUE(few == std::vector<Vec3<float>>(3, Vec3<float>(9.0f)));
+    auto points = before;
+    const std::vector<float> two(2, 1.0f);
+    TwistSpreadOptions options;
+    options.amounts = two;
+    EXPECT_FALSE(spread.apply(points, scene.posed_from_rest, options));
+    EXPECT_TRUE(points == before);
+}
+
+}  // namespace
+}  // namespace sinew
