@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import runpy
-import subprocess
-import sys
 
 import pytest
 import walk
@@ -57,22 +55,3 @@ def test_what_is_planted_is_found_and_made_small(planted, kind, tmp_path, capsys
     steps = runpy.run_path(str(script))["STEPS"]
     assert walk.replay(steps, "evaluation") == 1
     assert kind in capsys.readouterr().out
-
-
-@pytest.mark.once
-def test_a_walk_where_nothing_is_wrong_says_so(capsys):
-    assert walk.replay(steps_of("add", "frame", "pose", "remove_all"), "update") == 0
-    out = capsys.readouterr().out
-    assert "nothing goes wrong" in out
-    assert "Sinew on" in out
-
-
-@pytest.mark.once
-def test_the_program_itself(tmp_path):
-    """As ./dev runs it."""
-    options = ("--steps", "40", "--seed", "2", "--route", "update", "--keep", tmp_path)
-    ran = subprocess.run(
-        [sys.executable, walk.__file__, *options], capture_output=True, text=True, timeout=300
-    )
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert "update: 40 steps in 1 walks, 0 failed" in ran.stdout
