@@ -42,6 +42,7 @@ def make_engine(walker, points_of) -> type:
                 if obj.type == "MESH" and not walker.side.may_react(obj.original):
                     name = f"{obj.original.name_full} in the render, frame {scene.frame_current}"
                     walker.rendered[name] = points_of(obj)
+                    walker.rendered[f"{name}, coordinates"] = points_of(obj, "undeformed_co")
                     walker.expect_rendered(name, obj.original, depsgraph)
             result = self.begin_result(0, 0, 4, 4)
             self.end_result(result)
@@ -193,10 +194,10 @@ class Child:
         self.bpy.context.view_layer.update()
         return found
 
-    def points_of(self, evaluated):
+    def points_of(self, evaluated, name="co"):
         mesh = evaluated.data
         points = self.np.empty((len(mesh.vertices), 3), dtype=self.np.float32)
-        mesh.vertices.foreach_get("co", points.ravel())
+        mesh.vertices.foreach_get(name, points.ravel())
         return points
 
     def shapes(self, depsgraph) -> tuple[dict, list[str]]:
