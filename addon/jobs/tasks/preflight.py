@@ -34,21 +34,21 @@ def check(task: dict, report: Callable[..., None]) -> dict:
         if obj.is_editable:
             attach.follow_icons(obj)
     # Read before they are tried, which switches them on.
+    enabled = [obj for obj in skinned if properties.of(obj).enabled]
     meshes = [
         {"object": obj.name, "method": properties.of(obj).method}
-        for obj in skinned
-        if properties.of(obj).enabled and attach.deforms(obj)
+        for obj in enabled
+        if attach.deforms(obj)
     ]
-    off = [obj.name for obj in skinned if not properties.of(obj).enabled]
+    off = [obj.name for obj in skinned if obj not in enabled]
     told = [
         f"{obj.name}: {sentence}"
-        for obj in skinned
-        if properties.of(obj).enabled
+        for obj in enabled
         for sentence in (*session.plan_of(obj).view_reasons, *attach.notes(obj))
     ]
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
     problems += _not_deformable(skinned)
-    by_sinew = [obj for obj in skinned if properties.of(obj).replaces_modifiers]
+    by_sinew = [obj for obj in enabled if properties.of(obj).replaces_modifiers]
     told += [f"{obj.name}: {sentence}" for obj in by_sinew for sentence in other_tools.notes(obj)]
     if by_sinew:
         told.append(other_tools.APPLYING)
