@@ -24,7 +24,7 @@ from . import (
 )
 from .subscribers import subscribers
 
-ATTRIBUTE, NORMALS_ATTRIBUTE = "sinew_points", "sinew_normals"
+ATTRIBUTE, NORMALS_ATTRIBUTE = ".sinew_points", ".sinew_normals"
 # Earlier versions also stored colours in the mesh.
 _OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, "sinew_colours")
 

@@ -15,6 +15,7 @@ import scenes
 from program import checked, run_sinew, without_sinew
 from pygltflib import GLTF2
 from scipy.spatial import cKDTree
+from sinew_addon.attach import point_store
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake
@@ -308,7 +309,7 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     # Numbers are read from the mesh once, until it changes.
     assert bake_error.summary_of(obj.data) is bake_error.summary_of(obj.data)
     kept = {"Sinew bake error", "Sinew bake error before"}
-    assert set(obj.data.attributes.keys()) - kept == set(before) - {"sinew_points"}
+    assert set(obj.data.attributes.keys()) - kept == set(before) - {point_store.ATTRIBUTE}
     assert obj.data.attributes.active_color_name == "Paint"
     assert bake_error.shown(bpy.context.scene) == []
     settings = measures.of(bpy.context.scene)
