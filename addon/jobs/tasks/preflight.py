@@ -36,9 +36,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     # Read before they are tried, which switches them on.
     enabled = [obj for obj in skinned if properties.of(obj).enabled]
     meshes = [
-        {"object": obj.name, "method": properties.of(obj).method}
-        for obj in enabled
-        if attach.deforms(obj)
+        {"object": obj.name, "method": properties.of(obj).method} for obj in enabled if attach.deforms(obj)
     ]
     off = [obj.name for obj in skinned if obj not in enabled]
     told = [
