@@ -510,8 +510,11 @@ def _replaced_modifier(
     if found is None:
         found = replaced_modifiers.add()
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
+        found.visibility_is_keyed = is_visibility_animated(obj, modifier)
+        is_alone = Situation(properties.of(obj).situation) is Situation.ALONE
         for name in VIEWS:
-            if getattr(properties.of(obj), f"hidden_{name}"):
+            is_hidden = is_alone or getattr(properties.of(obj), f"hidden_{name}")
+            if is_hidden and not found.visibility_is_keyed:
                 _show_in(modifier, name, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
     properties.store(found, "name", modifier.name)
