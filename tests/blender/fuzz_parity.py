@@ -611,10 +611,10 @@ def must_be_refused(obj: bpy.types.Object) -> bool:
     kinds = [modifier.type for modifier in obj.modifiers]
     place = kinds.index("ARMATURE")
     is_mixed = obj.parent_type == "ARMATURE" or (place and kinds[place - 1] in MIXED_BY_MULTI_MODIFIERS)
-    # Blender puts a Multiresolution in front of a subdivision that is in front.
-    return not {*kinds[place:]}.isdisjoint(REFUSED_BEHIND) or bool(
-        obj.modifiers[place].use_multi_modifier and is_mixed
-    )
+    # Blender puts a Multiresolution in front of a subdivision that is in front, where it is no obstacle. A
+    # Soft Body is one everywhere, as a simulation.
+    is_obstacle = "SOFT_BODY" in kinds or "MULTIRES" in kinds[place:]
+    return is_obstacle or bool(obj.modifiers[place].use_multi_modifier and is_mixed)
 
 
 def check_refusal(

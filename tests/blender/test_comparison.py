@@ -364,7 +364,7 @@ def test_the_original_is_deleted(tmp_path, skinned):
     delete(opened())
     for mesh in bpy.data.meshes:
         # Those of a deleted object with Sinew; ending its comparison removes them, too.
-        for name in [each.name for each in mesh.attributes if each.name.startswith("sinew")]:
+        for name in [each.name for each in mesh.attributes if each.name.lstrip(".").startswith("sinew")]:
             mesh.attributes.remove(mesh.attributes[name])
     before = whole_file.content()
     obj = opened()

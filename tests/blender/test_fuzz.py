@@ -77,6 +77,7 @@ def test_a_shape_of_another_pose_is_not_taken_for_this_one():
     obj, _armature = scenes.make_arm()
     routes.force(routes.EVALUATION)
     scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(5)
     state = session.state_of(obj)
     with pytest.raises(routes.NotBySinewError, match="for this pose"):
         routes.taken(obj, state.shown.number)

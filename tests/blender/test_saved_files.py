@@ -27,7 +27,8 @@ bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 assert not hasattr(bpy.types.Object, "sinew")
 scene, obj = bpy.context.scene, bpy.data.objects["Arm"]
 if obj.mode != "OBJECT":
-    scenes.enter(obj, "OBJECT")
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="OBJECT")
 shapes = []
 for frame in json.loads(sys.argv[3]):
     scene.frame_set(frame)

@@ -811,7 +811,7 @@ class SinewSide(Side):
         if what == "modifier":
             obj.modifiers.remove(modifier)
         elif what == "attribute":
-            for name in [a.name for a in obj.data.attributes if a.name.startswith("sinew")]:
+            for name in [a.name for a in obj.data.attributes if a.name.lstrip(".").startswith("sinew")]:
                 obj.data.attributes.remove(obj.data.attributes[name])
         elif what == "driver":
             for curve in obj.animation_data.drivers if obj.animation_data is not None else ():

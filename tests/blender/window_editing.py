@@ -308,7 +308,7 @@ def _check_forgotten(run: Run, obj: bpy.types.Object, when: str) -> None:
         f"Sinew's settings stay {when}",
     )
     run.check(not any(m.type == "NODES" for m in obj.modifiers), f"a modifier of Sinew's stays {when}")
-    ours = [a.name for a in obj.data.attributes if a.name.startswith("sinew")]
+    ours = [a.name for a in obj.data.attributes if a.name.lstrip(".").startswith("sinew")]
     run.check(not ours, f"attributes stay {when}: {ours}")
     drivers = obj.animation_data.drivers if obj.animation_data is not None else []
     run.check(not len(drivers), f"drivers stay {when}")
