@@ -523,14 +523,14 @@ def pixels(path):
     return found
 
 
-def assert_same_pictures(obj, tmp_path, is_custom):
+def assert_same_pictures(obj, tmp_path, is_custom, step=0.0):
     given, left = both(obj, lambda _obj: pixels(tmp_path / "picture.exr"))
     if is_custom:
         # Their rounding differs. This changes a pixel by at most one step, except where a ray just hits or
         # misses.
         assert (np.abs(given - left) > 1e-4).mean() < 1e-4
     else:
-        np.testing.assert_array_equal(given, left)
+        np.testing.assert_allclose(given, left, rtol=0, atol=step)
     # Other normals would be visible.
     properties.of(obj).enabled = False
     (flat if evaluated(obj).normals_domain != "FACE" else smooth)(obj)
@@ -554,7 +554,8 @@ def test_pictures_are_the_same(shading, engine, tmp_path):
         obj.scale = (1.0, -1.2, 0.9)
     bpy.context.view_layer.update()
     assert has_given(obj)
-    assert_same_pictures(obj, tmp_path, shading is custom)
+    # Cycles mixes the normals of several moments: in 4.5, three pixels of a thousand differ by a step.
+    assert_same_pictures(obj, tmp_path, shading is custom, 2e-7 if blur and shading is sharp else 0.0)
 
 
 @needs_support
