@@ -15,6 +15,7 @@ NAMES = (
         "Skeleton",
         "SkinnedNormals",
         "Stage",
+        "TwistSpread",
         "affine",
         "centres_of_rotation",
         "direct_delta_mush",
