@@ -155,12 +155,13 @@ class HeatScale:
         return _linear_table(self.ramp).take(indices, axis=0)
 
     def _shares(self, values: np.ndarray) -> np.ndarray:
-        """Positions of values on the scale: 0 at `low`, 1 at `high`."""
+        """Positions of values on the scale: 0 at `low`, 1 at `high`; 2 where a shape is not finite, so that a
+        value is not a number."""
         if self.metric.scale == "log":
             values, low, high = np.log(np.maximum(values, 1e-12)), np.log(self.low), np.log(self.high)
         else:
             low, high = self.low, self.high
-        return (values - low) / (high - low)
+        return np.fmin((values - low) / (high - low), 2.0)
 
     def severity(self, values: np.ndarray) -> np.ndarray:
         """How far each value is from that of an undeformed mesh: the larger, the worse."""

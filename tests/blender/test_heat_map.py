@@ -126,6 +126,15 @@ def expected_at(obj: bpy.types.Object, method: str, quantity: str) -> np.ndarray
     return linear(HeatScale.fixed(METRICS[quantity], 2.0, 1.0, 1.0).colours(values))
 
 
+@pytest.mark.parametrize("quantity", ["stretch", "bulge", "distance"])
+def test_what_is_not_finite_has_the_colour_of_the_worst(quantity):
+    scale = HeatScale.fixed(METRICS[quantity], 2.0, 1.0, 1.0)
+    values = np.array([np.nan, np.inf, 1e9])
+    for colours in (scale.colours(values), scale.linear_colours(values)):
+        assert np.array_equal(colours[0], colours[2])
+        assert np.array_equal(colours[1], colours[2])
+
+
 def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     first, armature = scenes.make_arm()
     second = first.copy()
