@@ -618,7 +618,13 @@ class SinewSide(Side):
         return kept.show_viewport and kept.show_render
 
     def click(self, obj: bpy.types.Object, which: str, view: str, deformers: dict[str, str]) -> None:
-        modifier = self.own_modifier(obj) if which == "Sinew" else armature_modifiers(obj)[0]
+        own, (armature,) = self.own_modifier(obj), armature_modifiers(obj)
+        if obj.sinew.situation == "alone":
+            # The Armature modifier's icon is off while Sinew deforms: other clicks come to the same.
+            setattr(armature, f"show_{view}", deformers[view] == "Armature")
+            setattr(own, f"show_{view}", deformers[view] == "Sinew")
+            return
+        modifier = own if which == "Sinew" else armature
         setattr(modifier, f"show_{view}", not getattr(modifier, f"show_{view}"))
 
     def check_said_gone(self, meshes: list[bpy.types.Object], rig: bpy.types.Object) -> None:
