@@ -82,6 +82,19 @@ py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_
     return has_type<T>(array) ? in_order<T>(array) : as_type<T>(array, argument, wanted);
 }
 
+/// None, or an array of numbers, one for each of `count`: empty for None.
+///
+/// type  its name in messages, such as float32
+template <class T>
+py::array_t<T> one_for_each(const py::object& values, const char* argument, std::size_t count,
+                            const char* type) {
+    const std::string wanted = std::string("None or ") + type + " [" + std::to_string(count) + "]";
+    if (values.is_none()) return {};
+    auto array = checked<T>(values, argument, 1, wanted, std::max(count, std::size_t{1}));
+    if (static_cast<std::size_t>(array.shape(0)) != count) fail(argument, wanted, describe(values));
+    return array;
+}
+
 /// An array [n, 3], n at most kMaxVertices.
 py::array_t<float> checked_points(const py::handle& value, const char* argument);
 

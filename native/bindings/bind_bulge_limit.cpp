@@ -14,13 +14,6 @@
 namespace sinew::bindings {
 namespace {
 
-const Parameter& parameter_of(std::string_view id) {
-    for (const Parameter& parameter : BulgeLimitStage::kParameters) {
-        if (parameter.id == id) return parameter;
-    }
-    throw std::logic_error("BulgeLimitStage has no such parameter");
-}
-
 Timed<BulgeLimit> make(const Binding& binding, const ArrayLike& heads, const ArrayLike& tails,
                        const OptionalArrayLike& bones_from_model, const OptionalArrayLike& weights) {
     const auto first = checked_points(heads, "heads");
@@ -33,17 +26,9 @@ Timed<BulgeLimit> make(const Binding& binding, const ArrayLike& heads, const Arr
     for (std::size_t bone = 0; bone < as_points(first).size(); ++bone) {
         segments.push_back({as_points(first)[bone], as_points(last)[bone]});
     }
-    BulgeLimitData data{segments, checked_affine(bones_from_model, "bones_from_model")};
-    py::array_t<float> mask;
-    if (!weights.is_none()) {
-        mask = checked<float>(weights, "weights", 1, "None or float32 [vertices]", kMaxVertices);
-        if (static_cast<std::size_t>(mask.shape(0)) != binding.vertex_count()) {
-            fail("weights", "None or float32 [" + std::to_string(binding.vertex_count()) + "]",
-                 describe(weights));
-        }
-        data.weights = as_span(mask);
-    }
-    return BulgeLimit(binding, data);
+    const auto mask = one_for_each<float>(weights, "weights", binding.vertex_count(), "float32");
+    return BulgeLimit(binding,
+                      {segments, checked_affine(bones_from_model, "bones_from_model"), as_span(mask)});
 }
 
 void set_rest_points(Timed<BulgeLimit>& limit, const ArrayLike& rest_points,
@@ -65,10 +50,12 @@ py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points
              std::to_string(bones.size()));
     }
     BulgeLimitOptions options;
-    options.strength = static_cast<float>(
-        checked_parameter(strength, parameter_of("strength"), "strength", "bulge_limit.strength"));
-    options.form = static_cast<BulgeForm>(
-        static_cast<int>(checked_parameter(form, parameter_of("form"), "form", "bulge_limit.form")));
+    const auto checked_option = [](const py::object& value, const std::string& id) {
+        const Parameter& parameter = parameter_of(BulgeLimitStage::kParameters, id);
+        return checked_parameter(value, parameter, id.c_str(), "bulge_limit." + id);
+    };
+    options.strength = static_cast<float>(checked_option(strength, "strength"));
+    options.form = static_cast<BulgeForm>(static_cast<int>(checked_option(form, "form")));
     options.threads = checked_threads(threads);
     py::array_t<float> result = checked_out(out, limit.vertex_count());
     const auto to = as_points_to_write(result);

@@ -17,24 +17,6 @@ namespace {
 constexpr py::ssize_t kTwistColumns = 4;
 constexpr py::ssize_t kChannelColumns = 7;
 
-const Parameter& amount_parameter() {
-    for (const Parameter& parameter : TwistSpreadStage::kParameters) {
-        if (parameter.id == "amount") return parameter;
-    }
-    throw std::logic_error("TwistSpreadStage has no such parameter");
-}
-
-/// None, or an array of numbers, one for each of `count`.
-template <class T>
-py::array_t<T> one_for_each(const py::object& values, const char* argument, std::size_t count,
-                            const char* type) {
-    const std::string wanted = std::string("None or ") + type + " [" + std::to_string(count) + "]";
-    if (values.is_none()) return {};
-    auto array = checked<T>(values, argument, 1, wanted, std::max(count, std::size_t{1}));
-    if (static_cast<std::size_t>(array.shape(0)) != count) fail(argument, wanted, describe(values));
-    return array;
-}
-
 Timed<TwistSpread> make(const Binding& binding, const ArrayLike& twists, const ArrayLike& heads,
                         const ArrayLike& tails, const ArrayLike& rest_bones, const OptionalArrayLike& parents,
                         const OptionalArrayLike& bones_from_model, const OptionalArrayLike& weights,
@@ -111,8 +93,9 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
     const auto curved = one_for_each<float>(curves, "curves", spread.twist_count(), "float32");
     const auto told = checked_channels(channels, spread.twist_count());
     TwistSpreadOptions options;
+    const Parameter& parameter = parameter_of(TwistSpreadStage::kParameters, "amount");
     options.amount =
-        static_cast<float>(checked_parameter(amount, amount_parameter(), "amount", "twist_spread.amount"));
+        static_cast<float>(checked_parameter(amount, parameter, "amount", "twist_spread.amount"));
     options.amounts = as_span(of_bones);
     options.curves = as_span(curved);
     options.channels = told;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <sstream>
+#include <stdexcept>
 
 #include "arrays.h"
 
@@ -73,6 +74,13 @@ double checked_parameter(const py::handle& value, const Parameter& parameter, co
     const double number = value_of(value, parameter);
     if (std::isnan(number)) fail(argument, "of " + full_name + " " + wanted_of(parameter), text_of(value));
     return number;
+}
+
+const Parameter& parameter_of(std::span<const Parameter> parameters, std::string_view id) {
+    for (const Parameter& parameter : parameters) {
+        if (parameter.id == id) return parameter;
+    }
+    throw std::logic_error("no parameter has this id");
 }
 
 }  // namespace sinew::bindings

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "sinew/base/thread_pool.h"
 #include "sinew/lanes/palette_store.h"
 #include "sinew/mesh/bone_sets.h"
 #include "sinew/mesh/check_bind_data.h"
@@ -16,12 +15,6 @@
 
 namespace sinew {
 namespace {
-
-// Below this, waking a second thread costs more than it saves.
-constexpr std::size_t kVerticesWorthAThread = 32768;
-
-// 4096 vertices: few enough to balance threads of unequal speed, many enough that fetching a chunk costs nothing.
-constexpr std::size_t kBlocksOfAChunk = 256;
 
 /// The parameters of one method for one frame. One more than the maximum, which may be 0.
 using ParameterValues = std::array<double, kMaxMethodParameters + 1>;
@@ -165,17 +158,14 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
                           parameters[k].data(),
                           points.data()};
     }
-    // A single reference: with a larger capture std::function would allocate.
-    parallel_for(
-        packed.mesh.blocks.size(), useful_threads(options.threads, points.size(), kVerticesWorthAThread),
-        [&work](std::size_t begin, std::size_t end) {
-            if (work.state.mix) {
-                deform_mix(work.state.kernels, work.frames, *work.state.mix, begin, end);
-            } else {
-                work.state.kernels[0]->deform[target_in_use()](work.frames[0], begin, end);
-            }
-        },
-        kBlocksOfAChunk);
+    parallel_for_blocks(packed.mesh, points.size(), options.threads,
+                        [&work](std::size_t begin, std::size_t end) {
+                            if (work.state.mix) {
+                                deform_mix(work.state.kernels, work.frames, *work.state.mix, begin, end);
+                            } else {
+                                work.state.kernels[0]->deform[target_in_use()](work.frames[0], begin, end);
+                            }
+                        });
     return true;
 }
 

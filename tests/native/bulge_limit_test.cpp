@@ -19,26 +19,8 @@ using test::deformed;
 using test::distance;
 using test::kTolerance;
 using test::Random;
-using test::random_scene;
 using test::Scene;
-
-/// Many vertices with the same bones, then some with one to eight bones.
-Scene scene_of_sets(std::uint32_t seed) {
-    Random random(seed);
-    Scene scene = random_scene(seed, 0, 1.0);
-    for (int i = 0; i < 600; ++i) {
-        const auto count = static_cast<std::size_t>(1 + i % 6);
-        auto influences = random.influences<float>(count, 12);
-        for (std::size_t k = 0; k < count; ++k)
-            influences[k].bone = static_cast<std::int32_t>((i % 6 + k) % 12);
-        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
-    }
-    for (int i = 0; i < 100; ++i) {
-        const auto count = static_cast<std::size_t>(1 + random.index(8));
-        scene.add_vertex(Vec3<float>(random.vector(1.0)), random.influences<float>(count, 12));
-    }
-    return scene;
-}
+using test::scene_of_shared_bones;
 
 std::vector<BoneSegment<float>> segments_of(const Scene& scene) {
     Random random(99);
@@ -79,18 +61,13 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const std::vector<Bo
     return result;
 }
 
-class LimitBulge : public testing::TestWithParam<std::string_view> {
-protected:
-    LimitBulge() { use_simd_target(GetParam()); }
-    ~LimitBulge() override { use_simd_target(simd_targets().front()); }
-};
+class LimitBulge : public test::OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, LimitBulge, testing::ValuesIn(simd_targets()),
-                         [](const auto& info) { return std::string(info.param); });
+INSTANTIATE_TEST_SUITE_P(every, LimitBulge, testing::ValuesIn(simd_targets()), test::name_of_target);
 
 TEST_P(LimitBulge, kernel_agrees_with_the_definition) {
     for (const std::uint32_t seed : {1u, 2u, 3u}) {
-        const Scene scene = scene_of_sets(seed);
+        const Scene scene = scene_of_shared_bones(seed);
         const auto segments = segments_of(scene);
         const BulgeLimit limit(Binding(scene.data()), {segments});
         for (const BulgeForm form : {BulgeForm::continuous, BulgeForm::kim_han}) {
@@ -109,7 +86,7 @@ TEST_P(LimitBulge, kernel_agrees_with_the_definition) {
 }
 
 TEST_P(LimitBulge, threads_change_no_bit_and_the_rest_pose_stays) {
-    const Scene scene = scene_of_sets(4);
+    const Scene scene = scene_of_shared_bones(4);
     const auto segments = segments_of(scene);
     const BulgeLimit limit(Binding(scene.data()), {segments});
     for (const BulgeForm form : {BulgeForm::continuous, BulgeForm::kim_han}) {
@@ -126,7 +103,7 @@ TEST_P(LimitBulge, threads_change_no_bit_and_the_rest_pose_stays) {
 }
 
 TEST(BulgeLimit, options_become_valid_and_points_of_another_number_stay) {
-    const Scene scene = scene_of_sets(6);
+    const Scene scene = scene_of_shared_bones(6);
     const auto segments = segments_of(scene);
     const BulgeLimit limit(Binding(scene.data()), {segments});
     const auto before = bulging(scene);

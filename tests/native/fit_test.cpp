@@ -31,7 +31,7 @@ TYPED_TEST(Fit, what_does_not_decide_a_rotation_is_finite_and_said) {
     const auto along = fit_rigid<T>({.source = line, .target = line});
     EXPECT_FALSE(along.is_defined);
     EXPECT_LT(along.error, this->kTolerance);
-    EXPECT_TRUE(test::is_finite(to_affine(along.transform)));
+    EXPECT_TRUE(sinew::is_finite(to_affine(along.transform)));
 }
 
 TYPED_TEST(Fit, averages_leave_outliers_out_where_asked) {

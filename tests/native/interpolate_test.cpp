@@ -40,7 +40,7 @@ protected:
     static double apart(const Transform& a, const Transform& b) {
         return distance(to_affine(a), to_affine(b));
     }
-    static bool is_finite(const Transform& a) { return test::is_finite(to_affine(a)); }
+    static bool is_finite(const Transform& a) { return sinew::is_finite(to_affine(a)); }
 };
 
 using Cases =

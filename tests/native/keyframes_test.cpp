@@ -41,7 +41,7 @@ TYPED_TEST(Keyframes, half_turns_between_keys_are_finite) {
     }
     for (const double time : {0.0, 0.5, 1.0, 1.2, 2.0, 4.0, 5.0}) {
         const auto value = catmull_rom<TypeParam, double>(std::span<const Transform>(keys), kTimes, time);
-        EXPECT_TRUE(test::is_finite(to_affine(value.transform))) << time;
+        EXPECT_TRUE(sinew::is_finite(to_affine(value.transform))) << time;
     }
 }
 

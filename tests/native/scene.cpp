@@ -139,7 +139,6 @@ void Scene::transform(const Affine<float>& by) {
 Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent) {
     Random random(seed);
     Scene scene;
-    constexpr int kBones = 12;
     for (int bone = 0; bone < kBones; ++bone) {
         const Affine<double> rest = to_affine(random.motion(extent));
         Affine<double> motion = to_affine(random.motion(extent));
@@ -155,6 +154,24 @@ Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent) {
     for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
         const auto count = static_cast<std::size_t>(1 + random.index(8));
         scene.add_vertex(Vec3<float>(random.vector(extent)), random.influences<float>(count, kBones));
+    }
+    return scene;
+}
+
+Scene scene_of_shared_bones(std::uint32_t seed) {
+    Random random(seed);
+    Scene scene = random_scene(seed, 0, 1.0);
+    for (int i = 0; i < 600; ++i) {
+        const auto count = static_cast<std::size_t>(1 + i % 6);
+        auto influences = random.influences<float>(count, kBones);
+        for (std::size_t k = 0; k < count; ++k) {
+            influences[k].bone = (i % 6 + static_cast<std::int32_t>(k)) % kBones;
+        }
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
+    }
+    for (int i = 0; i < 100; ++i) {
+        const auto count = static_cast<std::size_t>(1 + random.index(8));
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), random.influences<float>(count, kBones));
     }
     return scene;
 }

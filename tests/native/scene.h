@@ -2,12 +2,17 @@
 // Meshes and poses for tests of kernels, and the definition of each method in any scalar, their oracle.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <ostream>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
+#include "sinew/base/simd.h"
 #include "sinew/deformer.h"
 #include "sinew/methods/methods.h"
 #include "support.h"
@@ -57,6 +62,22 @@ private:
 
 /// Bones 2, 5, ... are stretched along their own axes, and every second of those is mirrored; 1 to 8 influences.
 Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent);
+
+inline constexpr std::int32_t kBones = 12;
+
+/// Many vertices with the same bones, then some with one to eight bones. Bones as of random_scene().
+Scene scene_of_shared_bones(std::uint32_t seed);
+
+/// Its tests run on each instruction set.
+class OnEachTarget : public testing::TestWithParam<std::string_view> {
+protected:
+    OnEachTarget() { use_simd_target(GetParam()); }
+    ~OnEachTarget() override { use_simd_target(simd_targets().front()); }
+};
+
+inline std::string name_of_target(const testing::TestParamInfo<std::string_view>& info) {
+    return std::string(info.param);
+}
 
 /// With the given weights.
 std::vector<Influence<float>> influences_of(const Scene& scene, std::size_t vertex);

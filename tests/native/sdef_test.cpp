@@ -52,14 +52,9 @@ double largest_error(const std::vector<Vec3<float>>& points, const std::vector<V
     return error;
 }
 
-class EveryTarget : public testing::TestWithParam<std::string_view> {
-protected:
-    EveryTarget() { use_simd_target(GetParam()); }
-    ~EveryTarget() override { use_simd_target(simd_targets().front()); }
-};
+using EveryTarget = test::OnEachTarget;
 
-INSTANTIATE_TEST_SUITE_P(Sdef, EveryTarget, testing::ValuesIn(simd_targets()),
-                         [](const auto& info) { return std::string(info.param); });
+INSTANTIATE_TEST_SUITE_P(Sdef, EveryTarget, testing::ValuesIn(simd_targets()), test::name_of_target);
 
 TEST_P(EveryTarget, kernel_agrees_with_the_definition) {
     for (const bool scaled : {false, true}) {

@@ -15,7 +15,6 @@ namespace {
 
 using test::about;
 using test::distance;
-using test::is_finite;
 using test::Random;
 using test::scaling;
 

@@ -12,7 +12,6 @@ namespace {
 
 using test::about;
 using test::distance;
-using test::is_finite;
 using test::Random;
 using test::rotation_error;
 using test::scaling;

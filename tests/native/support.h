@@ -77,17 +77,6 @@ Affine<T> scaling(const Vec3<T>& factors) {
 }
 
 template <class T>
-bool is_finite(const Vec3<T>& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-template <class T>
-bool is_finite(const Affine<T>& a) {
-    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
-           is_finite(a.translation);
-}
-
-template <class T>
 double distance(const Vec3<T>& a, const Vec3<T>& b) {
     return static_cast<double>(glm::length(a - b));
 }

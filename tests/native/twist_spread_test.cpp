@@ -20,31 +20,11 @@ namespace {
 
 using test::deformed;
 using test::distance;
+using test::kBones;
 using test::kTolerance;
 using test::Random;
-using test::random_scene;
 using test::Scene;
-
-constexpr std::int32_t kBones = 12;
-
-/// Many vertices with the same bones, then some with one to eight bones.
-Scene scene_of_sets(std::uint32_t seed) {
-    Random random(seed);
-    Scene scene = random_scene(seed, 0, 1.0);
-    for (int i = 0; i < 600; ++i) {
-        const auto count = static_cast<std::size_t>(1 + i % 6);
-        auto influences = random.influences<float>(count, kBones);
-        for (std::size_t k = 0; k < count; ++k) {
-            influences[k].bone = static_cast<std::int32_t>((static_cast<std::size_t>(i % 6) + k) % kBones);
-        }
-        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
-    }
-    for (int i = 0; i < 100; ++i) {
-        const auto count = static_cast<std::size_t>(1 + random.index(8));
-        scene.add_vertex(Vec3<float>(random.vector(1.0)), random.influences<float>(count, kBones));
-    }
-    return scene;
-}
+using test::scene_of_shared_bones;
 
 /// Bones 0, 2, 4 ... share the twist of the next, or their own.
 std::vector<TwistBone> twists_of(const Scene& scene) {
@@ -152,18 +132,13 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
     return result;
 }
 
-class SpreadTwists : public testing::TestWithParam<std::string_view> {
-protected:
-    SpreadTwists() { use_simd_target(GetParam()); }
-    ~SpreadTwists() override { use_simd_target(simd_targets().front()); }
-};
+class SpreadTwists : public test::OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, SpreadTwists, testing::ValuesIn(simd_targets()),
-                         [](const auto& info) { return std::string(info.param); });
+INSTANTIATE_TEST_SUITE_P(every, SpreadTwists, testing::ValuesIn(simd_targets()), test::name_of_target);
 
 TEST_P(SpreadTwists, kernel_agrees_with_the_definition) {
     for (const std::uint32_t seed : {1u, 2u, 3u}) {
-        const Scene scene = scene_of_sets(seed);
+        const Scene scene = scene_of_shared_bones(seed);
         const auto twists = twists_of(scene);
         const auto parents = chain();
         const auto mix = mixed(scene);
@@ -199,7 +174,7 @@ TEST_P(SpreadTwists, kernel_agrees_with_the_definition) {
 }
 
 TEST_P(SpreadTwists, threads_change_no_bit_and_the_rest_pose_stays) {
-    const Scene scene = scene_of_sets(4);
+    const Scene scene = scene_of_shared_bones(4);
     const auto twists = twists_of(scene);
     const TwistSpread spread(Binding(scene.data()), {twists, scene.rest_bones});
     for (const TwistBlend blend : {TwistBlend::linear, TwistBlend::rotations}) {
@@ -220,7 +195,7 @@ TEST_P(SpreadTwists, threads_change_no_bit_and_the_rest_pose_stays) {
 }
 
 TEST(TwistSpread, options_become_valid_and_wrong_sizes_change_nothing) {
-    const Scene scene = scene_of_sets(6);
+    const Scene scene = scene_of_shared_bones(6);
     const auto twists = twists_of(scene);
     const TwistSpread spread(Binding(scene.data()), {twists, scene.rest_bones});
     const auto before = deformed(Deformer(scene.data(), Lbs::info), scene);

@@ -55,21 +55,9 @@ template <class T>
 }
 
 template <class T>
-[[nodiscard]] bool is_finite(const Vec3<T>& v) noexcept {
-    using std::isfinite;
-    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
-}
-
-template <class T>
 [[nodiscard]] bool is_finite(const Quat<T>& q) noexcept {
     using std::isfinite;
     return isfinite(q.w) && is_finite(vector_part(q));
-}
-
-template <class T>
-[[nodiscard]] bool is_finite(const Affine<T>& a) noexcept {
-    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
-           is_finite(a.translation);
 }
 
 template <class T>

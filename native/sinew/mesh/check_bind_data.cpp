@@ -10,16 +10,6 @@ namespace {
 // How far the sum of normalised weights may be from 1, since each was rounded.
 constexpr double kNormalised = 1e-5;
 
-template <class T>
-bool is_finite(const Vec3<T>& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-bool is_finite(const Affine<float>& a) {
-    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
-           is_finite(a.translation);
-}
-
 void check_limit(const std::string& argument, const std::string& of, std::size_t limit, std::size_t got) {
     if (got > limit) fail(argument, "at most " + std::to_string(limit) + " " + of, std::to_string(got));
 }

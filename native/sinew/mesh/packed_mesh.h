@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -103,5 +104,15 @@ struct UnpackedMesh {
 /// without a vertex repeat the last one.
 [[nodiscard]] std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values,
                                                     std::size_t count = 1);
+
+/// pack_values() of weights [vertices], clamped to 0..1; empty if there are none.
+[[nodiscard]] std::vector<Lanes<float>> pack_weights(const PackedMesh& mesh, std::span<const float> weights);
+
+/// Calls work(begin, end) for all blocks, on `threads` threads as everywhere.
+///
+/// vertices  of the mesh
+/// work      captures a single reference: with a larger capture std::function would allocate
+void parallel_for_blocks(const PackedMesh& mesh, std::size_t vertices, std::size_t threads,
+                         const std::function<void(std::size_t, std::size_t)>& work);
 
 }  // namespace sinew

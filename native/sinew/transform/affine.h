@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 
 #include "sinew/transform/nearest_rotation.h"
 #include "sinew/transform/rotation.h"
@@ -14,6 +15,18 @@ struct Affine {
     Mat3<T> linear{T(1)};
     Vec3<T> translation{T(0)};
 };
+
+template <class T>
+[[nodiscard]] bool is_finite(const Vec3<T>& v) noexcept {
+    using std::isfinite;
+    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const Affine<T>& a) noexcept {
+    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
+           is_finite(a.translation);
+}
 
 /// Applies `b` first, then `a`: model_from_bone * bone_from_rest = model_from_rest.
 template <class T>

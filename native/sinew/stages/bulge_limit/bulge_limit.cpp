@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "sinew/base/fork_safe.h"
-#include "sinew/base/thread_pool.h"
 #include "sinew/mesh/check_bind_data.h"
 #include "sinew/methods/packed_binding.h"
 #include "sinew/stages/bulge_limit/bulge_kernel.h"
@@ -16,14 +15,6 @@
 
 namespace sinew {
 namespace {
-
-// As in Deformer.
-constexpr std::size_t kVerticesWorthAThread = 32768;
-constexpr std::size_t kBlocksOfAChunk = 256;
-
-bool is_finite(const Vec3<float>& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 void check_segments(std::span<const BoneSegment<float>> segments, std::size_t bone_count) {
     if (segments.size() < bone_count) {
@@ -76,12 +67,7 @@ BulgeLimit::State::State(const Binding& binding, const BulgeLimitData& data) : p
     }
     bones.resize(segments.size());
     for (std::vector<Lanes<float>>& of_form : distances) of_form.resize(mesh.blocks.size());
-    if (!data.weights.empty()) {
-        weights = pack_values(mesh, data.weights);
-        for (Lanes<float>& block : weights) {
-            for (float& weight : block.lane) weight = std::clamp(weight, 0.0f, 1.0f);
-        }
-    }
+    weights = pack_weights(mesh, data.weights);
     measure(unpack(mesh, mesh.rest_points, packed->vertex_count).rest_points, data.bones_from_model);
 }
 
@@ -106,10 +92,9 @@ void BulgeLimit::State::measure(std::span<const Vec3<float>> points, const Affin
         bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
     }
     const BulgeFrame all = frame(rest_points);
-    parallel_for(
-        mesh.blocks.size(), useful_threads(0, points.size(), kVerticesWorthAThread),
-        [&all](std::size_t begin, std::size_t end) { bulge_kernel().measure(all, begin, end); },
-        kBlocksOfAChunk);
+    parallel_for_blocks(mesh, points.size(), 0, [&all](std::size_t begin, std::size_t end) {
+        bulge_kernel().measure(all, begin, end);
+    });
 }
 
 BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
@@ -158,10 +143,9 @@ bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
     work.frame.form = options.form;
     work.frame.is_stretched = is_stretched;
     work.frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);
-    parallel_for(
-        state.mesh.blocks.size(), useful_threads(options.threads, points.size(), kVerticesWorthAThread),
-        [&work](std::size_t begin, std::size_t end) { work.kernel.limit(work.frame, begin, end); },
-        kBlocksOfAChunk);
+    parallel_for_blocks(
+        state.mesh, points.size(), options.threads,
+        [&work](std::size_t begin, std::size_t end) { work.kernel.limit(work.frame, begin, end); });
     return true;
 }
 

@@ -39,10 +39,9 @@ void mix_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Fr
 }  // namespace
 
 MixWeights pack_mix(const PackedMesh& mesh, std::span<const float> weights) {
-    MixWeights mix{pack_values(mesh, weights), {}};
+    MixWeights mix{pack_weights(mesh, weights), {}};
     mix.shares.reserve(mix.weights.size());
-    for (Lanes<float>& block : mix.weights) {
-        for (float& weight : block.lane) weight = std::clamp(weight, 0.0f, 1.0f);
+    for (const Lanes<float>& block : mix.weights) {
         const auto [least, most] = std::ranges::minmax(block.lane);
         mix.shares.push_back(most == 0.0f ? Share::none : least == 1.0f ? Share::all : Share::some);
     }

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "sinew/base/fork_safe.h"
-#include "sinew/base/thread_pool.h"
 #include "sinew/mesh/check_bind_data.h"
 #include "sinew/methods/packed_binding.h"
 #include "sinew/stages/twist_spread/twist_kernel.h"
@@ -16,14 +15,6 @@
 
 namespace sinew {
 namespace {
-
-// As in Deformer.
-constexpr std::size_t kVerticesWorthAThread = 32768;
-constexpr std::size_t kBlocksOfAChunk = 256;
-
-bool is_finite(const Vec3<float>& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 void check_twists(std::span<const TwistBone> twists, std::span<const Affine<float>> rest_bones) {
     std::vector<bool> is_listed(rest_bones.size());
@@ -61,15 +52,6 @@ void check_parents(std::span<const std::int32_t> parents, std::size_t bone_count
                  std::to_string(parents[bone]) + " at bone " + std::to_string(bone));
         }
     }
-}
-
-std::vector<Lanes<float>> packed_weights(const PackedMesh& mesh, std::span<const float> weights) {
-    if (weights.empty()) return {};
-    std::vector<Lanes<float>> packed = pack_values(mesh, weights);
-    for (Lanes<float>& block : packed) {
-        for (float& weight : block.lane) weight = std::clamp(weight, 0.0f, 1.0f);
-    }
-    return packed;
 }
 
 /// For each used bone, whether it is `tip` or one that `tip` carries.
@@ -144,8 +126,8 @@ TwistSpread::State::State(const Binding& binding, const TwistSpreadData& data)
     check_weights("mix", data.mix, packed->vertex_count);
     check_space(bones_from_model);
     space_rows = SpaceRows(bones_from_model);
-    weights = packed_weights(mesh, data.weights);
-    mix = packed_weights(mesh, data.mix);
+    weights = pack_weights(mesh, data.weights);
+    mix = pack_weights(mesh, data.mix);
     for (const TwistBone& twist : twists) {
         const auto found = std::ranges::lower_bound(mesh.used_bones, twist.bone);
         const bool is_used = found != mesh.used_bones.end() && *found == twist.bone;
@@ -204,13 +186,13 @@ void TwistSpread::State::prepare(std::span<const Affine<float>> posed,
         const Vec3<double> axis = glm::normalize(rest.linear[1]);
         const Vec3<double> posed_axis = by.linear * axis;
         const double length = glm::length(posed_axis);
-        const double side = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
+        const double sign = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
         TwistedBone bone{};
         bone.rest = spin(rest.translation, axis, by.linear);
         bone.has_axis = length > 0.0;
         if (bone.has_axis) {
             bone.posed =
-                spin(transform_point(by, rest.translation), side / length * posed_axis, Mat3<double>(1.0));
+                spin(transform_point(by, rest.translation), sign / length * posed_axis, Mat3<double>(1.0));
         }
         std::array<Float4, kDisplacementRows> rows;
         write_displacement(by, rows.data());
@@ -301,9 +283,8 @@ bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<fl
         blends_short && is_beyond,
         state.space_rows.spaces(),
         points.data()};
-    parallel_for(
-        state.mesh.blocks.size(), useful_threads(options.threads, points.size(), kVerticesWorthAThread),
-        [&frame](std::size_t begin, std::size_t end) { spread_twists(frame, begin, end); }, kBlocksOfAChunk);
+    parallel_for_blocks(state.mesh, points.size(), options.threads,
+                        [&frame](std::size_t begin, std::size_t end) { spread_twists(frame, begin, end); });
     return true;
 }
 
