@@ -69,8 +69,8 @@ class View:
 
     @property
     def taking_part(self) -> tuple[bool, ...]:
-        """For each Armature modifier, whether Sinew deforms by it where Sinew deforms."""
-        return self.shown if self.hidden else self.on
+        switched = self.switched or (False,) * len(self.shown)
+        return _each(lambda shown, other: takes_part(shown, self.hidden, other), self.shown, switched)
 
     @property
     def deformer(self) -> Deformer:
@@ -87,6 +87,11 @@ class View:
             return View(self.shown, self.forced)
         shown = wanted or (True,) * len(self.shown)
         return View(shown, shown)
+
+
+def takes_part(shown: bool, hidden: bool, switched: bool) -> bool:
+    """Returns whether Sinew deforms by an Armature modifier, where Sinew deforms. Arguments as in View."""
+    return shown != (switched and not hidden)
 
 
 def taking_part(shown: Sequence[bool], in_other_view: Sequence[bool]) -> Sequence[bool]:

@@ -313,7 +313,7 @@ class SkinStageFrame:
 
     model_from_bones  given where a scale is 0: as in Blender, all vertices are then at the origin of armature
                       space before the bones move them
-    twists            inputs of the stage twist_spread; empty where it is off
+    twists            inputs of the stage twist_spread, of the first that takes part; empty where it is off
     """
 
     method: str

@@ -17,6 +17,7 @@ from ..core.scale_rule import BLENDER_4
 from ..core.skin_stack import NO_STAGES, SkinStageFrame
 from ..core.spaces import SAME_SPACE
 from ..core.stages import ORDER, StageValues
+from ..core.twist_spread import TwistInputs
 from ..io import armature_io
 from .bound import Bound
 from .skinned_object import SkinnedObject
@@ -76,8 +77,10 @@ def read(
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
         values = _parameters(evaluated, settings, own, mix)
-        bones = stage.deformer.bones
-        twists = armature_io.read_twists(armature, bones) if settings.twist_spread.enabled else ()
+        twists: TwistInputs = ()
+        if settings.twist_spread.enabled and all(frame is None for frame in frames):
+            # The stage follows the bones of the first that takes part.
+            twists = armature_io.read_twists(armature, stage.deformer.bones)
         frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values, back, twists))
     return frames
 
@@ -148,8 +151,11 @@ def _taking_part(
         [
             getattr(evaluated.modifiers[replaced.name], f"show_{name}")
             if is_keyed
-            else getattr(replaced, f"show_{name}")
-            != (getattr(replaced, f"switched_{name}") and not getattr(evaluated.sinew, f"hidden_{name}"))
+            else icons.takes_part(
+                getattr(replaced, f"show_{name}"),
+                getattr(evaluated.sinew, f"hidden_{name}"),
+                getattr(replaced, f"switched_{name}"),
+            )
             for (replaced, _armature), is_keyed in zip(modifiers, are_keyed, strict=False)
         ]
         for name in icons.VIEWS
