@@ -5,23 +5,19 @@ import argparse
 import json
 from collections.abc import Generator
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
-
-import sinew
 
 from ..blender_process import BlenderLost, BlenderProcess, Limits
 from ..core.errors import WrongUse
 from ..jobs.inputs import blend_files_below
-from ..other_blender import BlenderStatus, blender_status
 from .arguments import add_json, seconds
 from .console import Console
 
 SUMMARY = "check that files can be rendered with Sinew, before they are sent to a farm"
 HELP = """\
 Prints a line for each file: whether Sinew deforms anything in it, and what prevents that: objects that Sinew
-can not deform, data of Sinew without its settings, a Blender without Sinew. Files are only read; a file that
-crashes or hangs Blender is reported as such.
+can not deform, data of Sinew without its settings. Files are only read; a file that crashes or hangs Blender
+is reported as such. Run it in the Blender that will render.
 
 Exit status 0: all can be rendered; 1: a file has a problem; 2: wrong use."""
 
@@ -30,34 +26,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "files", nargs="+", type=Path, metavar="FILE_OR_FOLDER", help=".blend; a folder: all below it"
     )
-    parser.add_argument(
-        "--blender",
-        metavar="PROGRAM",
-        help="the Blender that will render, if it is another: it is started in the background with its own "
-        "preferences and checked for Sinew (default: the Blender that runs this)",
-    )
     add_json(parser)
     parser.add_argument(
         "--timeout",
         type=seconds,
         default=300.0,
         metavar="SECONDS",
-        help="how long --blender, and each file, may take (default: %(default)g; 0: any time)",
+        help="how long a file may take (default: %(default)g; 0: any time)",
     )
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
     paths = [path for given in args.files for path in _files_of(given)]
-    status = blender_status(args.blender, args.timeout) if args.blender is not None else None
     reports = []
     with closing(_checked(paths, Limits(timeout=args.timeout, verbose=console.verbose))) as outcomes:
         for path, outcome in outcomes:
-            reports.append(_report(path, outcome, status))
+            reports.append(_report(path, outcome))
             if not args.json:
                 console.say(line_of(reports[-1]))
     if args.json:
-        blender = None if status is None else asdict(status)
-        console.say(json.dumps({"blender": blender, "files": reports}, indent=2, ensure_ascii=False))
+        console.say(json.dumps(reports, indent=2, ensure_ascii=False))
     return 1 if any(report["problems"] for report in reports) else 0
 
 
@@ -87,31 +75,18 @@ def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], 
             blender.end()
 
 
-def _report(path: Path, outcome: dict, status: BlenderStatus | None) -> dict:
+def _report(path: Path, outcome: dict) -> dict:
     meshes = outcome.get("meshes", [])
     problems = list(outcome.get("problems", []))
     if "error" in outcome:
         problems.append(outcome["error"].removeprefix(f"{path.absolute()}: "))
-    needs_sinew = bool(meshes)
-    if needs_sinew and status is not None:
-        problems = [*_missing(status), *problems]
     return {
         "file": str(path),
-        "needs_sinew": needs_sinew,
+        "needs_sinew": bool(meshes),
         "meshes": meshes,
         "problems": problems,
         "notes": outcome.get("notes", []),
     }
-
-
-def _missing(status: BlenderStatus) -> list[str]:
-    """Returns why the other Blender cannot deform as this one does."""
-    name = f"{status.program} (Blender {status.blender})"
-    if status.problem is not None:
-        return [f"needs Sinew, which {name} does not have: {status.problem}; install and enable it there"]
-    if status.sinew != sinew.__version__:
-        return [f"{name} has Sinew {status.sinew}, this is {sinew.__version__}; install the same"]
-    return []
 
 
 def line_of(report: dict) -> str:

@@ -56,7 +56,8 @@ function compileJob(job) {
         const options = ["--method", settings.method || "dq", "--out", out, "--resume"];
         const more = settings.options ? shellSplit(settings.options) : [];
         reskin.addCommand(sinew(settings, ["reskin", ...part.files, ...options, ...more]));
-        reskin.addCommand(sinew(settings, ["check", out, "--blender", "{blender}"]));
+        // In the Blender that will render.
+        reskin.addCommand(sinew({ program: "extension" }, ["check", out]));
         reskin.addDependency(check);
         job.addTask(reskin);
     }

@@ -31,7 +31,7 @@ MAY_INCLUDE[""] = set(MAY_INCLUDE) | {""}
 # The rooms of addon/, lowest first: a file may import from its own room and from those before it. Files
 # directly in addon/ that start a process may be imported by all.
 ROOMS = ("core", "io", "attach", "deform", "ui", "features", "jobs", "commands")
-FOR_ALL = {"native", "blender_process", "other_blender"}
+FOR_ALL = {"native", "blender_process"}
 FOR_COMMANDS = {"prepare", "worker"}
 
 # Modules that nothing in addon/core may import: Blender and what is built on it.
