@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Protects the kernels of ddm on each instruction set against the definition in double, and the moments that
-// it keeps.
+// Protects the kernels of ddm on each instruction set against the definition in double.
 #if SINEW_WITH_DDM
 
 #include "sinew/methods/ddm/ddm.h"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -14,12 +12,10 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 #include "sinew/deformer.h"
-#include "sinew/methods/ddm/direct_delta_mush.h"
 
 namespace sinew {
 namespace {
 
-using test::distance;
 using test::kTolerance;
 using test::Random;
 using test::Scene;
@@ -86,7 +82,7 @@ Bound bound_scene(std::uint32_t seed, std::size_t bones, std::size_t of_vertex, 
     return bound;
 }
 
-double largest_error(const Bound& bound, double variant, const DeformOptions& space = {}) {
+double error_of(const Bound& bound, double variant, const DeformOptions& space = {}) {
     const Scene& scene = bound.scene;
     BindData data = scene.data();
     const VertexData rows = bound.data();
@@ -100,17 +96,16 @@ double largest_error(const Bound& bound, double variant, const DeformOptions& sp
         bones.push_back(
             Ddm::prepare(cast<double>(scene.posed_from_rest[bone]), cast<double>(scene.rest_bones[bone])));
     }
-    double largest = 0.0;
+    std::vector<Vec3<double>> expected;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         const auto influences = test::normalised_influences_of<double>(scene, vertex);
         const std::vector<double> own(
             bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex]),
             bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex + 1]));
-        const Vec3<double> expected = Ddm::deform_vertex<double>(
-            bones, influences, Vec3<double>(scene.rest_points[vertex]), own, parameters);
-        largest = std::max(largest, distance(Vec3<double>(points[vertex]), expected));
+        expected.push_back(Ddm::deform_vertex<double>(
+            bones, influences, Vec3<double>(scene.rest_points[vertex]), own, parameters));
     }
-    return largest;
+    return test::largest_error(points, expected);
 }
 
 class DdmKernels : public testing::TestWithParam<std::tuple<std::string_view, double>> {
@@ -134,20 +129,19 @@ TEST_P(DdmKernels, agree_with_skinning_in_double) {
             for (const std::size_t count : {1, 2, 3, 4, 7}) {
                 const Bound bound =
                     bound_scene(static_cast<std::uint32_t>(count), 12, count, is_mixed, is_scaled);
-                EXPECT_LT(largest_error(bound, variant()), 2.0 * kTolerance)
-                    << is_mixed << is_scaled << count;
+                EXPECT_LT(error_of(bound, variant()), 2.0 * kTolerance) << is_mixed << is_scaled << count;
             }
         }
     }
 }
 
 TEST_P(DdmKernels, agree_for_more_bones_than_are_prepared) {
-    EXPECT_LT(largest_error(bound_scene(20, 50, 40, false, false), variant()), 2.0 * kTolerance);
-    EXPECT_LT(largest_error(bound_scene(21, 50, 40, true, false), variant()), 2.0 * kTolerance);
+    EXPECT_LT(error_of(bound_scene(20, 50, 40, false, false), variant()), 2.0 * kTolerance);
+    EXPECT_LT(error_of(bound_scene(21, 50, 40, true, false), variant()), 2.0 * kTolerance);
 }
 
 TEST_P(DdmKernels, a_far_bone_of_small_weight_costs_no_digits) {
-    EXPECT_LT(largest_error(bound_scene(22, 4, 4, false, false, 1e4), variant()), 2e-5);
+    EXPECT_LT(error_of(bound_scene(22, 4, 4, false, false, 1e4), variant()), 2e-5);
 }
 
 // Such as where envelopes or bendy bones give other weights than those from which the moments were computed.
@@ -155,63 +149,8 @@ TEST_P(DdmKernels, take_bones_that_the_moments_alone_name) {
     for (const bool is_mixed : {false, true}) {
         Bound bound = bound_scene(23, 12, 4, is_mixed, true);
         std::ranges::fill(bound.scene.bones, 5);
-        EXPECT_LT(largest_error(bound, variant()), 2.0 * kTolerance) << is_mixed;
+        EXPECT_LT(error_of(bound, variant()), 2.0 * kTolerance) << is_mixed;
     }
-}
-
-TEST(DirectDeltaMush, a_vertex_without_faces_has_no_extent) {
-    // Near the origin, where rounding of the mesh's other coordinates is largest relative to its own.
-    const std::vector<Vec3<float>> points{{1e-3f, 2e-3f, 1e-3f}, {3, 0, 5}, {4, 1, 5}, {3, 2, 6}};
-    const std::int32_t offsets[] = {0, 2, 4, 6, 8};
-    const std::int32_t bones[] = {0, 1, 0, 1, 0, 1, 0, 1};
-    const float weights[] = {0.3f, 0.7f, 0.3f, 0.7f, 0.3f, 0.7f, 0.3f, 0.7f};
-    const std::int32_t triangle[] = {1, 2, 3};
-    Job job;
-    const auto rows = direct_delta_mush({points, offsets, bones, weights}, triangle, 0.1, job);
-    ASSERT_EQ(rows.size(), 8 * kMomentFloats);
-    for (std::size_t row = 0; row < 8; ++row) {
-        float largest = 0.0f;
-        for (std::size_t n = 6; n < kMomentFloats; ++n) {
-            largest = std::max(largest, std::abs(rows[row * kMomentFloats + n]));
-        }
-        EXPECT_EQ(largest == 0.0f, row < 2) << row;
-    }
-}
-
-// tests/python/test_ddm.py compares the best one with another solver. There are more bones than are solved
-// together.
-TEST(DirectDeltaMush, has_the_same_rows_on_each_instruction_set) {
-    constexpr std::int32_t kSide = 20;
-    Random random(25);
-    Scene scene;
-    std::vector<std::int32_t> triangles;
-    for (std::int32_t v = 0; v < kSide * kSide; ++v) {
-        const double x = v / kSide;
-        const double y = v % kSide;
-        scene.add_vertex(Vec3<float>(Vec3<double>(x, y, 0.0) + random.vector(0.3)),
-                         random.influences<float>(4, 7));
-        if (v / kSide + 1 == kSide || v % kSide + 1 == kSide) continue;
-        triangles.insert(triangles.end(), {v, v + kSide, v + kSide + 1, v, v + kSide + 1, v + 1});
-    }
-    Job job;
-    const auto expected = direct_delta_mush(scene.data(), triangles, 3.0, job);
-    for (const std::string_view target : simd_targets()) {
-        use_simd_target(target);
-        const auto rows = direct_delta_mush(scene.data(), triangles, 3.0, job);
-        ASSERT_EQ(rows.size(), expected.size()) << target;
-        float largest = 0.0f;
-        for (std::size_t i = 0; i < rows.size(); ++i) {
-            largest = std::max(largest, std::abs(rows[i] - expected[i]));
-        }
-        EXPECT_LT(largest, 1e-6f) << target;
-    }
-    use_simd_target(simd_targets().front());
-}
-
-TEST(DirectDeltaMush, of_a_mesh_without_vertices_has_no_rows) {
-    const std::int32_t offsets[] = {0};
-    Job job;
-    EXPECT_TRUE(direct_delta_mush({{}, offsets, {}, {}}, {}, 0.1, job).empty());
 }
 
 }  // namespace

@@ -130,18 +130,9 @@ std::vector<Vec3<float>> mushed(const DeltaMush& mush, std::vector<Vec3<float>> 
     return points;
 }
 
-bool same(const std::vector<Vec3<float>>& a, const std::vector<Vec3<float>>& b) {
-    return std::ranges::equal(a, b, same_bits<float>);
-}
+class Mushes : public test::OnEachTarget {};
 
-class Mushes : public testing::TestWithParam<std::string_view> {
-protected:
-    void SetUp() override { use_simd_target(GetParam()); }
-    void TearDown() override { use_simd_target(simd_targets().front()); }
-};
-
-INSTANTIATE_TEST_SUITE_P(every, Mushes, testing::ValuesIn(simd_targets()),
-                         [](const auto& info) { return std::string(info.param); });
+INSTANTIATE_TEST_SUITE_P(every, Mushes, testing::ValuesIn(simd_targets()), test::name_of_target);
 
 TEST_P(Mushes, agree_with_the_definition_in_double) {
     const Mesh mesh = random_mesh(1, 20);
@@ -195,7 +186,7 @@ TEST_P(Mushes, threads_change_no_bit) {
         const DeltaMush mush(mesh.topology(), mesh.rest_points, {.iterations = 7, .type = type});
         const auto expected = mushed(mush, points, 1.0f, 1);
         for (const std::size_t threads : {2, 3, 8}) {
-            EXPECT_TRUE(same(mushed(mush, points, 1.0f, threads), expected)) << threads;
+            EXPECT_TRUE(same_bits(mushed(mush, points, 1.0f, threads), expected)) << threads;
         }
     }
 }

@@ -11,14 +11,6 @@
 namespace sinew {
 namespace {
 
-TEST(Methods, find_method_finds_no_other) {
-    for (const std::string_view name : {"", "LBS", "lb", "lbs ", "nothing"}) {
-        EXPECT_FALSE(find_method(name)) << name;
-    }
-    EXPECT_EQ(index_of(MethodInfo{1000, "lbs", "", MethodGroup::blender, "", "", Needs::nothing}),
-              kMethodCount);
-}
-
 TEST(Methods, have_parameters_that_a_frame_can_take) {
     for (const MethodInfo& method : kMethods) {
         EXPECT_LE(method.parameters.size(), kMaxMethodParameters) << method.name;

@@ -61,10 +61,6 @@ std::vector<Vec3<float>> computed(const Normals& normals, NormalDomain domain,
     return result;
 }
 
-bool same(const std::vector<Vec3<float>>& a, const std::vector<Vec3<float>>& b) {
-    return std::ranges::equal(a, b, same_bits<float>);
-}
-
 Normals normals_of(const Mesh& mesh, const Flags& flags = {}) {
     return {mesh.topology(), mesh.rest_points.size(), flags.sharpness()};
 }
@@ -87,14 +83,9 @@ Mesh mesh_with_large_faces() {
     return mesh;
 }
 
-class NormalKernels : public testing::TestWithParam<std::string_view> {
-protected:
-    void SetUp() override { use_simd_target(GetParam()); }
-    void TearDown() override { use_simd_target(simd_targets().front()); }
-};
+class NormalKernels : public test::OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, NormalKernels, testing::ValuesIn(simd_targets()),
-                         [](const auto& info) { return std::string(info.param); });
+INSTANTIATE_TEST_SUITE_P(every, NormalKernels, testing::ValuesIn(simd_targets()), test::name_of_target);
 
 TEST_P(NormalKernels, have_the_bits_of_any_other) {
     const Mesh mesh = mesh_with_large_faces();
@@ -105,7 +96,7 @@ TEST_P(NormalKernels, have_the_bits_of_any_other) {
             use_simd_target(simd_targets().back());
             const auto expected = computed(normals, domain, mesh.rest_points);
             use_simd_target(GetParam());
-            EXPECT_TRUE(same(computed(normals, domain, mesh.rest_points), expected));
+            EXPECT_TRUE(same_bits(computed(normals, domain, mesh.rest_points), expected));
         }
     }
 }
@@ -116,71 +107,8 @@ TEST_P(NormalKernels, threads_change_no_bit) {
     for (const NormalDomain domain : kDomains) {
         const auto expected = computed(normals, domain, mesh.rest_points, 1);
         for (const std::size_t threads : {0, 2, 3, 8}) {
-            EXPECT_TRUE(same(computed(normals, domain, mesh.rest_points, threads), expected)) << threads;
+            EXPECT_TRUE(same_bits(computed(normals, domain, mesh.rest_points, threads), expected)) << threads;
         }
-    }
-}
-
-TEST_P(NormalKernels, tilt_and_turn_custom_normals) {
-    Mesh mesh;
-    // A pyramid without a base; its edges are at 45 degrees to the normal of its top.
-    mesh.rest_points = {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}};
-    for (std::int32_t i = 1; i < 5; ++i) mesh.add_face({0, i, i % 4 + 1});
-    mesh.add_edges_of_faces();
-    Flags flags;
-    flags.custom.assign(2 * mesh.corners.size(), 0);
-    // The walk starts at the edge to vertex 1, which is the first corner's following edge.
-    const auto at_top = [&](std::int16_t tilt, std::int16_t turn) {
-        for (std::size_t corner = 0; corner < mesh.corners.size(); corner += 3) {
-            flags.custom[2 * corner] = tilt;
-            flags.custom[2 * corner + 1] = turn;
-        }
-        return Point(computed(normals_of(mesh, flags), NormalDomain::corner, mesh.rest_points)[0]);
-    };
-    const double whole = 3.0 * 0.7853981633974483;  // from +z to the edges, which go down
-    EXPECT_LT(distance(at_top(0, 20000), Point(0, 0, 1)), 1e-6);
-    EXPECT_LT(distance(at_top(32767, 0), Point(std::sin(whole), 0, std::cos(whole))), 1e-4);
-    EXPECT_LT(distance(at_top(16384, 8192), Point(0, std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
-    EXPECT_LT(distance(at_top(16384, 24575), Point(0, -std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
-    // Backwards: 360 degrees minus the angle.
-    EXPECT_LT(distance(at_top(-32767, 0), Point(std::sin(whole), 0, std::cos(whole))), 1e-4);
-    // For corners with different numbers, the mean, rounded towards 0.
-    at_top(16384, 8192);
-    flags.custom[0] = 16384 - 3;
-    const auto result = computed(normals_of(mesh, flags), NormalDomain::corner, mesh.rest_points);
-    EXPECT_LT(distance(Point(result[0]), Point(0, std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
-    EXPECT_TRUE(same_bits(result[0], result[3]));
-}
-
-TEST_P(NormalKernels, degenerate_faces_have_defined_normals) {
-    Mesh mesh;
-    mesh.rest_points = {{3, 4, 0}, {3, 4, 0}, {3, 4, 0}, {4, 4, 0}, {5, 4, 0}, {0, 0, 0}};
-    mesh.add_face({0, 1, 2});  // one point
-    mesh.add_face({0, 3, 4});  // a line
-    mesh.add_face({1});
-    mesh.add_face({});
-    mesh.add_face({2, 3});
-    const Normals normals = normals_of(mesh);
-    for (const auto& normal : computed(normals, NormalDomain::face, mesh.rest_points)) {
-        EXPECT_EQ(normal, Vec3<float>(0, 0, 1));
-    }
-    const auto vertices = computed(normals, NormalDomain::vertex, mesh.rest_points);
-    // 3 is in the middle of the line, with an angle of pi; the others' angles are 0, except pi / 2 where an edge
-    // has length 0.
-    EXPECT_EQ(vertices[3], Vec3<float>(0, 0, 1));
-    EXPECT_EQ(vertices[0], Vec3<float>(0, 0, 1));
-    EXPECT_EQ(vertices[4], Vec3<float>(0, 0, 0));
-    // A vertex without faces, at the origin.
-    EXPECT_EQ(vertices[5], Vec3<float>(0, 0, 0));
-}
-
-TEST_P(NormalKernels, faces_back_to_back_cancel) {
-    Mesh mesh;
-    mesh.rest_points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    mesh.add_face({0, 1, 2});
-    mesh.add_face({0, 2, 1});
-    for (const auto& normal : computed(normals_of(mesh), NormalDomain::vertex, mesh.rest_points)) {
-        EXPECT_EQ(normal, Vec3<float>(0, 0, 0));
     }
 }
 
@@ -213,22 +141,6 @@ TEST_P(NormalKernels, any_points_give_finite_normals) {
             ASSERT_LT(glm::length(normal), 1.00001f);
         }
     }
-}
-
-TEST(Normals, say_their_domain) {
-    Mesh mesh = random_mesh(7, 6);
-    const auto domain = [&](double edges, double faces) {
-        return normals_of(mesh, random_flags(mesh, edges, faces)).domain();
-    };
-    EXPECT_EQ(normals_of(mesh).domain(), NormalDomain::vertex);
-    EXPECT_EQ(domain(0.0, 0.0), NormalDomain::vertex);
-    EXPECT_EQ(domain(0.3, 0.0), NormalDomain::corner);
-    EXPECT_EQ(domain(0.0, 0.3), NormalDomain::corner);
-    EXPECT_EQ(domain(1.0, 0.0), NormalDomain::face);
-    EXPECT_EQ(domain(0.3, 1.0), NormalDomain::face);
-    EXPECT_EQ(normals_of(mesh, with_custom({}, mesh)).domain(), NormalDomain::corner);
-    EXPECT_EQ(normals_of(mesh, with_custom(random_flags(mesh, 0.0, 1.0), mesh)).domain(),
-              NormalDomain::corner);
 }
 
 TEST(Normals, take_meshes_without_faces_and_without_vertices) {

@@ -16,6 +16,7 @@ using test::deformed;
 using test::distance;
 using test::in_double;
 using test::kTolerance;
+using test::largest_error;
 using test::Random;
 using test::random_scene;
 using test::Scene;
@@ -42,14 +43,6 @@ Scene scene_of_pairs(std::uint32_t seed, bool scaled) {
         scene.add_vertex(Vec3<float>(random.vector(1.0)), random.influences<float>(count, 12));
     }
     return scene;
-}
-
-double largest_error(const std::vector<Vec3<float>>& points, const std::vector<Vec3<double>>& expected) {
-    double error = 0.0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        error = std::max(error, distance(Vec3<double>(points[i]), expected[i]));
-    }
-    return error;
 }
 
 using EveryTarget = test::OnEachTarget;

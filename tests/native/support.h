@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -89,16 +90,23 @@ double distance(const Affine<T>& a, const Affine<T>& b) {
     return largest;
 }
 
-/// How far `linear` is from a right-handed rotation.
-template <class T>
-double rotation_error(const Mat3<T>& linear) {
-    const Affine<T> product{glm::transpose(linear) * linear, Vec3<T>(T(0))};
-    return distance(product, Affine<T>{}) + std::abs(static_cast<double>(glm::determinant(linear)) - 1.0);
-}
-
 template <class T>
 bool same_bits(const Vec3<T>& a, const Vec3<T>& b) {
     return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
+inline bool same_bits(const std::vector<Vec3<float>>& a, const std::vector<Vec3<float>>& b) {
+    return std::ranges::equal(a, b, [](const auto& one, const auto& other) { return same_bits(one, other); });
+}
+
+/// The largest distance of two points with the same index.
+inline double largest_error(const std::vector<Vec3<float>>& points,
+                            const std::vector<Vec3<double>>& expected) {
+    double largest = 0.0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        largest = std::max(largest, distance(Vec3<double>(points[i]), expected[i]));
+    }
+    return largest;
 }
 
 }  // namespace sinew::test

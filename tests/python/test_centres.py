@@ -91,6 +91,14 @@ def test_bones_of_a_vertex_may_repeat_in_any_order():
     np.testing.assert_allclose(twice.result(), expected, atol=1e-5)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_size_goes_with_the_mesh(size):
+    tube = three_bones()
+    expected = tube.centres()
+    tube.points = size * tube.points
+    np.testing.assert_allclose(tube.centres() / size, expected, atol=1e-5)
+
+
 def test_triangles_without_area_count_for_nothing():
     tube = three_bones()
     flat = np.concatenate([tube.triangles, tube.triangles[:, [0, 1, 1]]])
@@ -254,40 +262,3 @@ def test_other_threads_run_meanwhile():
         stop.set()
         thread.join()
     assert seen
-
-
-BAD = [
-    ("triangles", [0, 1, 2], "int32 [triangles, 3]", f"list of {np.dtype(int)} [3]"),
-    ("triangles", np.zeros((2, 3)), "int32 [triangles, 3]", "float64 [2, 3]"),
-    ("triangles", np.zeros((2, 4), np.int32), "int32 [triangles, 3]", "int32 [2, 4]"),
-    ("triangles", np.int32([[0, 1, 2592]]), "numbers of vertices, below 2592", "2592 at triangle 0"),
-    ("threads", -1, "None or an integer, 0 or more", "-1"),
-    ("threads", 1.5, "None or an integer, 0 or more", "float"),
-]
-
-
-@pytest.mark.parametrize(("argument", "value", "wanted", "got"), BAD)
-def test_what_is_refused(argument, value, wanted, got):
-    tube = Tube()
-    arguments = {"triangles": tube.triangles, argument: value}
-    with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared
-        sinew.centres_of_rotation(*tube.mesh, **arguments).result()
-    assert str(caught.value) == f"{argument}: expected {wanted}, got {got}"
-
-
-BAD_DATA = [
-    ([1], "None or a dict of arrays by names of methods", f"list of {np.dtype(int)} [1]"),
-    ({"dq": np.zeros((2, 0), np.float32)}, "that of methods that need it", "that of dq"),
-    ({"cor": np.zeros((2, 2), np.float32)}, "of cor float32 [vertices, 3]", "float32 [2, 2]"),
-    ({"cor": np.zeros((1, 3), np.float32)}, "6 numbers of cor", "3"),
-    ({"cor": np.full((2, 3), np.nan, np.float32)}, "finite values", "NaN or infinity of cor at vertex 0"),
-]
-
-
-@pytest.mark.parametrize(("data", "wanted", "got"), BAD_DATA)
-def test_vertex_data_that_is_refused(data, wanted, got):
-    mesh = np.zeros((2, 3), np.float32), np.int32([0, 1, 2]), np.int32([0, 0]), np.float32([1, 1])
-    for call in (sinew.Binding, sinew.Deformer):
-        with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared
-            call(*mesh, vertex_data=data)
-        assert str(caught.value) == f"vertex_data: expected {wanted}, got {got}"

@@ -261,30 +261,3 @@ def test_the_moments_say_which_bones_move_a_vertex():
     assert np.abs(others.deform(motions) - expected).max() < 1e-6
     with pytest.raises(ValueError, match="bone_transforms"):
         others.deform(motions[:1])
-
-
-@pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
-def test_a_radius_that_is_none_is_refused(radius):
-    with pytest.raises(ValueError, match=r"^radius: expected a number of 0 or more, got "):
-        moments(Tube(5, 4), radius)
-
-
-GOOD = [0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]
-
-
-@pytest.mark.parametrize(
-    ("rows", "wanted", "got"),
-    [
-        (np.zeros((2, 3), np.float32), "of ddm float32 [rows, 12]", "float32 [2, 3]"),
-        ([[*GOOD[:5], np.inf, *GOOD[6:]]], "finite values in column 5 of ddm", "inf in row 0"),
-        ([[2, *GOOD[1:]]], "numbers of vertices in column 0 of ddm", "2.000000 in row 0"),
-        ([[0, 0.5, *GOOD[2:]]], "numbers of bones in column 1 of ddm", "0.500000 in row 0"),
-        ([[0, 0, -0.5, *GOOD[3:]]], "weights of 0 and more in column 2 of ddm", "-0.500000 in row 0"),
-        ([GOOD, GOOD], "rows of ddm in ascending order of vertices and bones", "another order in row 1"),
-    ],
-)
-def test_rows_that_are_refused(rows, wanted, got):
-    mesh = np.zeros((2, 3), np.float32), np.int32([0, 1, 2]), np.int32([0, 0]), np.float32([1, 1])
-    with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared
-        sinew.Binding(*mesh, vertex_data={"ddm": np.asarray(rows, np.float32)})
-    assert str(caught.value) == f"vertex_data: expected {wanted}, got {got}"

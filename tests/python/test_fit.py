@@ -136,9 +136,9 @@ def test_mirrored_rods_are_mirror_images():
 def test_no_weight_gives_the_identity_and_weights_of_0_leave_points_out():
     rng = np.random.default_rng(5)
     source, target, weights = random_pairs(rng, 1, noise=0)
-    nothing = fit.rigid(source[0], target[0], np.zeros(12))
-    assert not nothing.is_defined
-    np.testing.assert_array_equal(matrix(nothing.transforms, "quat_vec"), np.eye(4))
+    for nothing in (fit.rigid(source[0], target[0], np.zeros(12)), fit.rigid(source[0, :0], target[0, :0])):
+        assert not nothing.is_defined
+        np.testing.assert_array_equal(matrix(nothing.transforms, "quat_vec"), np.eye(4))
     weights[0, :4] = 0
     target[0, :4] = 100
     part = fit.rigid(source[0], target[0], weights[0])
@@ -252,23 +252,3 @@ def test_robust_average_of_equal_poses_is_that_pose():
     # Weights decide which half counts.
     weights = np.array([1.0] * 4 + [0.1] * 5)
     assert not np.allclose(fit.average(poses, weights, robust=True).transforms, right)
-
-
-def test_arguments_are_named():
-    points = np.zeros((4, 3))
-    poses = np.zeros((4, 8))
-    poses[:, 0] = 1
-    for call, argument in (
-        (lambda: fit.rigid(points, points[:3]), "target"),
-        (lambda: fit.rigid(points[0], points), "source"),
-        (lambda: fit.rigid(points, points, np.ones(3)), "weights"),
-        (lambda: fit.rigid(points, points, -np.ones(4)), "weights"),
-        (lambda: fit.rigid(points, points, source_directions=points), "target_directions"),
-        (lambda: fit.rigid(points * np.nan, points), "source"),
-        (lambda: fit.hand_eye(poses, poses[:3]), "b"),
-        (lambda: fit.hand_eye(points, points), "a"),
-        (lambda: fit.average(poses[:0]), "poses"),
-        (lambda: fit.average(poses, np.ones(5)), "weights"),
-    ):
-        with pytest.raises(ValueError, match=f"^{argument}: expected"):
-            call()

@@ -226,39 +226,3 @@ def test_poles_bend_to_their_side():
         axis = poses_of(rest, found.rotations)[0][0][:, 0] * (1, 0, 1)
         wanted = np.multiply(side, (1, 0, 1))
         assert axis @ wanted / np.linalg.norm(axis) / np.linalg.norm(wanted) > 1 - 1e-8
-
-
-@pytest.mark.parametrize(
-    ("words", "call"),
-    [
-        ("effectors", lambda: ik.Solver([-1], [])),
-        ("effectors", lambda: ik.Solver([-1], [ik.Effector(1)])),
-        ("effectors", lambda: ik.Solver([-1], [ik.Effector(0, has_pole=np.zeros(2))])),
-        ("effectors", lambda: ik.Solver([-1], np.array({}, dtype=object))),
-        ("weights", lambda: ik.Solver([-1], [ik.Effector(0, -1.0)])),
-        ("parents", lambda: ik.Solver([0], [ik.Effector(0)])),
-        ("limits", lambda: chain([-1, 0], limits=np.zeros((2, 3)))),
-        ("limits", lambda: chain([-1], limits=np.full((1, 3, 2), np.nan))),
-        ("stiffness", lambda: chain([-1], stiffness=[[1, 0, 0]])),
-        ("rest", lambda: chain([-1]).solve(rest_of([1, 1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]])),
-        ("goals", lambda: chain([-1]).solve(rest_of([1]), [[0, 1, 0]], [1, 0, 0, 0, 0, 1, 0])),
-        ("tips", lambda: chain([-1]).solve(rest_of([1]), [[0, np.inf, 0]], [[1, 0, 0, 0, 0, 1, 0]])),
-        (
-            "method",
-            lambda: chain([-1]).solve(rest_of([1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]], method="fabrik"),
-        ),
-        (
-            "iterations",
-            lambda: chain([-1]).solve(rest_of([1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]], iterations=-1),
-        ),
-        (
-            "poles",
-            lambda: ik.Solver([-1], [ik.Effector(0, has_pole=True)]).solve(
-                rest_of([1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]]
-            ),
-        ),
-    ],
-)
-def test_wrong_arguments_are_named(words, call):
-    with pytest.raises(ValueError, match=words):
-        call()

@@ -66,9 +66,29 @@ def test_not_defined_is_said_and_finite(method, dtype):
     assert between(array[0], array[1], np.array([0, 1], dtype), method).is_defined.all()
     many = blend(array, np.array([0.0, 0.5, 0.5], dtype), method)
     assert np.isfinite(many.transforms).all()
-    nothing = blend(array, np.zeros(3, dtype), method)
-    np.testing.assert_array_equal(matrix(nothing.transforms, name), matrix(array[0], name))
-    assert not nothing.is_defined
+    # Weights without a sum give the heaviest.
+    for weights, heaviest in (((0, 0, 0), 0), ((-1, 1, 0), 1), ((-2, -1, -3), 1)):
+        nothing = blend(array, np.array(weights, dtype), method)
+        np.testing.assert_array_equal(nothing.transforms, array[heaviest])
+        assert not nothing.is_defined
+    # Rotations by 180 degrees about three axes and none: their matrices have the sum 0.
+    turns = Rotation.from_rotvec(np.pi * np.eye(4, 3, -1))
+    cancelling = blend(layout(RigidTransform.from_rotation(turns), name, dtype), np.ones(4, dtype), method)
+    assert np.isfinite(cancelling.transforms).all()
+    assert cancelling.is_defined == defined
+
+
+@ALL
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_weights_of_any_size_are_shares(method, dtype):
+    """Their sum overflows, or 1 over it does."""
+    name = LAYOUT_OF[method]
+    array = layout(rigid(np.random.default_rng(6), 2), name, dtype)[[0, 1, 0]]
+    want = blend(array, np.array([1, 0.5, 1], dtype), method)
+    for size in (np.finfo(dtype).max, 16 * np.finfo(dtype).smallest_subnormal):
+        got = blend(array, size * np.array([1, 0.5, 1], dtype), method)
+        assert got.is_defined == want.is_defined
+        close(got.transforms, want.transforms, 4096 * np.finfo(dtype).eps)
 
 
 @given(rigid_motions(), rigid_motions())
@@ -102,7 +122,7 @@ def test_the_largest_translations_are_finite_and_never_falsely_defined(method, d
             end[4:] = sign * (large / 2) * np.array([-x, w, z, -y], dtype)
         else:
             end[where] = [sign * large, sign * large, -sign * large]
-    for t in (-1.0, 0.0, 0.3, 0.5, 1.0, 2.0):
+    for t in (-1.0, 0.0, 0.3, 0.5, 1.0, 2.0, -1e30, 3e38):
         for result in (
             between(a, b, t, method),
             blend(np.stack([a, b, a]), np.array([1 - t, t, 0.1], dtype), method),
@@ -115,6 +135,18 @@ def test_the_largest_translations_are_finite_and_never_falsely_defined(method, d
     ends = np.array([-large, large], dtype)
     between_times = sinew.spline.catmull_rom_vector(np.stack([a, b]), ends, 0.0)
     assert np.isfinite(between_times.transforms).all()
+
+
+def test_matrix_polar_is_the_nearest_rotation_even_to_a_mirror():
+    """The mean of rotations by 180 degrees about three axes is -1/3: all rotations are equally near."""
+    turns = layout(RigidTransform.from_rotation(Rotation.from_rotvec(np.pi * np.eye(3))), "affine")
+    tie = blend(turns, np.ones(3), "matrix_polar")
+    assert not tie.is_defined
+    close(tie.transforms[:3, :3] @ tie.transforms[:3, :3].T, np.eye(3))
+    # A slightly larger weight breaks the tie.
+    uneven = blend(turns, [1, 1, 1.5], "matrix_polar")
+    assert uneven.is_defined
+    close(uneven.transforms, turns[2], 1e-12)
 
 
 SIGNED = ("qv_nlerp", "qv_slerp", "dlb", "dib")
@@ -209,9 +241,3 @@ def test_angles_that_are_not_known_are_not_defined(method, dtype):
         result = between(*ends, 1e150, method)
         assert not result.is_defined
         assert np.isfinite(result.transforms).all()
-
-
-def test_other_rules_of_signs_are_refused():
-    one, half = sinew.dual_quat.from_axis_angle([0, 0, 1], np.radians([20.0, 60]))
-    with pytest.raises(ValueError, match="signs: expected one of heaviest, running_sum, as_given"):
-        blend([one, half], [0.5, 0.5], "dlb", signs="shortest")

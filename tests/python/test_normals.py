@@ -96,6 +96,20 @@ def test_its_domain_is_the_smallest_that_suffices():
     np.testing.assert_array_equal(corners, np.repeat(normals.compute(points), sizes, axis=0))
 
 
+def test_degenerate_faces_have_defined_normals():
+    points = np.float32([[3, 4, 0], [3, 4, 0], [3, 4, 0], [4, 4, 0], [5, 4, 0], [0, 0, 0]])
+    # A point, a line, one corner, none, two; in the middle of the line the angle is pi.
+    faces = [[0, 1, 2], [0, 3, 4], [1], [], [2, 3]]
+    offsets = np.cumsum([0, *map(len, faces)])
+    normals = sinew.Normals(6, offsets, np.concatenate(faces).astype(int))
+    np.testing.assert_array_equal(normals.compute(points, "face"), np.tile([0, 0, 1], (5, 1)))
+    np.testing.assert_array_equal(
+        normals.compute(points)[[0, 3, 4, 5]], [[0, 0, 1], [0, 0, 1], [0, 0, 0], [0, 0, 0]]
+    )
+    back_to_back = sinew.Normals(3, [0, 3, 6], [0, 1, 2, 0, 2, 1])
+    assert not back_to_back.compute([[0, 0, 0], [1, 0, 0], [0, 1, 0]]).any()
+
+
 def test_edges_are_needed_only_for_sharp_meshes():
     mesh = mesh_of(2)
     points, offsets, corners, edges = arrays_of(mesh)
@@ -130,32 +144,3 @@ def test_can_be_pickled(is_sharp):
     domain = "corner" if is_sharp else "vertex"
     faces = len(mesh[1])
     assert repr(copy) == repr(normals) == f"<sinew.Normals: 148 vertices, {faces} faces, domain {domain}>"
-
-
-def test_says_what_it_refuses():
-    mesh = mesh_of(7)
-    points, offsets, corners, edges = arrays_of(mesh)
-    for arguments, sharp, message in (
-        ((-1, offsets, corners, edges), {}, "vertex_count: expected an integer from 0 to 536870911, got -1"),
-        ((1.5, offsets, corners, edges), {}, "vertex_count: expected an integer .*, got float"),
-        ((100, offsets, corners, edges), {}, "corner_vertices: expected vertices from 0 to 99"),
-        ((148, offsets[:-1], corners, edges), {}, "face_offsets: expected to rise"),
-        ((148, offsets, corners, edges.ravel()), {}, r"edges: expected int32 \[edges, 2\]"),
-        ((148, offsets, corners, edges), {"sharp_edges": [True]}, "sharp_edges: expected none, or one for"),
-        (
-            (148, offsets, corners, edges),
-            {"sharp_faces": "x"},
-            r"sharp_faces: expected None or bool \[faces\]",
-        ),
-    ):
-        with pytest.raises(ValueError, match=message):
-            sinew.Normals(*arguments, **sharp)
-    normals = sinew.Normals(148, offsets, corners, edges)
-    with pytest.raises(ValueError, match=r"points: expected float32 \[148, 3\]"):
-        normals.compute(points[:-1])
-    with pytest.raises(ValueError, match="domain: expected one of vertex, corner, face, got 'edge'"):
-        normals.compute(points, "edge")
-    with pytest.raises(ValueError, match="out: expected writable"):
-        normals.compute(points, out=np.zeros((148, 3)))
-    with pytest.raises(ValueError, match="out: expected another array than the points"):
-        normals.compute(points, out=points)

@@ -57,22 +57,6 @@ def test_the_mixed_method_has_its_parameters_and_other_methods_none():
     np.testing.assert_array_equal(rig.deform("dq", parameters=SLERP), rig.deform("dq"))
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        (["slerp"], "None or a dict of values by names such as METHOD.PARAMETER, got list"),
-        ({"sdef": "slerp"}, "names of parameters of methods, METHOD.PARAMETER, got 'sdef'"),
-        ({"dq.interpolation": "slerp"}, "names of parameters of methods, .*, got 'dq.interpolation'"),
-        ({"sdef.interpolation": "dlb"}, "of sdef.interpolation one of nlerp, slerp, got 'dlb'"),
-        ({"sdef.interpolation": 1}, "of sdef.interpolation one of nlerp, slerp, got 1"),
-    ],
-)
-@pytest.mark.parametrize("method", ["sdef", "lbs"])
-def test_wrong_parameters_are_refused_with_a_sentence(method, parameters, message):
-    with pytest.raises(ValueError, match=f"^parameters: expected {message}$"):
-        pairs(5).deform(method, parameters=parameters)
-
-
 @pytest.mark.parametrize("parameters", [{}, SLERP], ids=["nlerp", "slerp"])
 def test_half_turns_and_opposite_quaternions_are_finite_and_near(parameters):
     rig = pairs(7)
