@@ -2,8 +2,8 @@
 """Protects everything that the library exports from arbitrary arguments: the outcome is a result, or an error
 that names an argument.
 
-Accepted arguments must give the same result as plain contiguous arrays of the same numbers.
-SINEW_FUZZ_EXAMPLES (default 8000, which takes under a minute) is the number for all cases together.
+Accepted arguments must give the same result as plain contiguous arrays of the same numbers, or as a pickle.
+SINEW_FUZZ_EXAMPLES is the number for all cases together: 2000 by default, 8000 in ./dev test --all.
 """
 
 import itertools
@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from rigs import LINEAR
 
 REFUSALS = (ValueError, TypeError, MemoryError, OverflowError)
-EXAMPLES = int(os.environ.get("SINEW_FUZZ_EXAMPLES", "8000"))
+EXAMPLES = int(os.environ.get("SINEW_FUZZ_EXAMPLES", "8000" if "SINEW_TEST_ALL" in os.environ else "2000"))
 
 
 class Raises:
@@ -165,32 +165,33 @@ WAYS = st.sampled_from(sinew.interpolate.METHODS)
 
 
 def names_of_arguments(function):
-    """The arguments that a native function lists in its signature."""
-    return set(re.findall(r"(\w+): ", function.__doc__.split("->")[0])) | {"state"}
+    """The arguments that a native function or class lists in its signature."""
+    text = (function.__init__ if isinstance(function, type) else function).__doc__
+    signatures = re.findall(r"^(?:\d+\. )?\w+\((.*)\) ->", text, re.MULTILINE)
+    return set(re.findall(r"(\w+): ", "".join(signatures))) | {"state"}
 
 
-def by_position(function, *keywords):
-    """The function with its last arguments, which have these keywords, by position as well."""
-
-    def call(*arguments):
-        plain, named = arguments[: -len(keywords)], arguments[-len(keywords) :]
-        return function(*plain, **dict(zip(keywords, named, strict=True)))
-
-    call.__doc__ = function.__doc__
-    return call
-
-
-def attempt(call, arguments, known):
-    """The result, or None if it was refused correctly."""
+def attempt(function, given, named=None, known=()):
+    """The result, or None if it was refused correctly. given, named: arguments by position and by name;
+    known: what an error may name besides the function's own."""
     try:
-        return call(*arguments)
+        result = function(*given, **(named or {}))
     except REFUSALS as error:
         if not isinstance(error, MemoryError):
             text = str(error)
             # Pybind's own message contains the signature, with every name.
-            assert any(name in text for name in known), (known, text)
+            assert any(name in text for name in {*known, *names_of_arguments(function)}), text
             assert "\n" not in text or "incompatible" in text
         return None
+    return True if result is None else result
+
+
+def made(kind, given, named=None, known=()):
+    """The object, or None if it was refused correctly."""
+    thing = attempt(kind, given, named, known)
+    if thing is not None:
+        repr(thing)
+    return thing
 
 
 def flat(result):
@@ -336,12 +337,11 @@ def fit_calls(draw):
         if draw(st.booleans()):
             directions = [d.array(count, 3), d.array(count, 3), (None, None)]
         keywords = ("source_directions", "target_directions", "direction_weights")
-        rigid = by_position(sinew.fit.rigid, *keywords)
-        return rigid, [d.array(count, 3), d.array(count, 3), weights, *directions]
+        return sinew.fit.rigid, [d.array(count, 3), d.array(count, 3), weights, *directions], *keywords
     poses = d.array(count, *KINDS[layout])
     if draw(st.booleans()):
         return sinew.fit.hand_eye, [poses, d.array(count, *KINDS[layout]), weights]
-    return by_position(sinew.fit.average, "robust"), [poses, weights, (draw(st.booleans()), None)]
+    return sinew.fit.average, [poses, weights, (draw(st.booleans()), None)], "robust"
 
 
 @st.composite
@@ -351,16 +351,35 @@ def ik_calls(draw):
     effector = sinew.ik.Effector(count - 1, 1.0, 0.5, has_pole=True, pole_angle=0.2)
     solver = sinew.ik.Solver(np.arange(-1, count - 1, dtype=np.int32), [effector])
     method = d.one(st.sampled_from(sinew.ik.METHODS)), None
-    return by_position(solver.solve, "rotations", "root", "method", "tolerance", "iterations"), [
-        *(d.array(count, *shape), d.array(1, 3), d.array(1, *shape), d.array(1, 3), d.array(count, 4)),
-        *((None, None), method, (1e-6, None), (5, None)),
+    given = [
+        d.array(count, *shape),
+        d.array(1, 3),
+        d.array(1, *shape),
+        d.array(1, 3),
+        d.array(count, 4),
+        method,
     ]
+    return solver.solve, [*given, (5, None)], "rotations", "method", "iterations"
 
 
-def run(function, arguments):
-    result = attempt(function, [given for given, _ in arguments], names_of_arguments(function))
+def run(function, arguments, *keywords):
+    """The last arguments have these keywords."""
+    given, plain = [given for given, _ in arguments], plain_of(arguments)
+    count = len(given) - len(keywords)
+    result = attempt(function, given[:count], dict(zip(keywords, given[count:], strict=True)))
     if result is not None:
-        same(result, function(*plain_of(arguments)))
+        same(result, function(*plain[:count], **dict(zip(keywords, plain[count:], strict=True))))
+
+
+def same_by_a_pickle(thing, method, given, shape, **named):
+    """Calls a method that takes the arguments `out` and `threads`."""
+    call = getattr(thing, method)
+    result = attempt(call, given, named)
+    if result is not None:
+        assert result.shape == shape
+        named |= {"out": None, "threads": 1}
+        same(result, getattr(pickle.loads(pickle.dumps(thing)), method)(*given, **named))
+    return result
 
 
 def many(part):
@@ -404,11 +423,10 @@ def test_solvers_of_inverse_kinematics(data):
     fields = [d.one(st.just(count - 1)), *(d.one(st.floats(-1, 4)) for _ in range(2))]
     fields += [d.one(st.booleans()), d.one(st.floats(-4, 4))]
     effectors = d.one(st.just([sinew.ik.Effector(*fields)]))
-    drawn = [d.integers(range(-1, count - 1)), (effectors, None)]
-    drawn += [d.array(count, *shape, optional=True) for shape in ((3,), (3, 2), (3,))]
-    arguments = {"parents", "effectors", "weights", "pole_angle", "locked", "limits", "stiffness"}
-    solver = by_position(sinew.ik.Solver, "locked", "limits", "stiffness")
-    attempt(solver, [given for given, _ in drawn], arguments)
+    shapes = {"locked": (3,), "limits": (3, 2), "stiffness": (3,)}
+    named = {name: d.array(count, *shape, optional=True)[0] for name, shape in shapes.items()}
+    given_data = [d.integers(range(-1, count - 1))[0], effectors]
+    attempt(sinew.ik.Solver, given_data, named, ("weights", "pole_angle"))
 
 
 @many(0.15)
@@ -416,7 +434,7 @@ def test_solvers_of_inverse_kinematics(data):
 def test_skeletons(data):
     count = data.draw(st.integers(0, 4))
     parents = or_garbage(integers(range(-1, count - 1)), data.draw(st.booleans()))
-    skeleton = attempt(sinew.Skeleton, [data.draw(parents)[0]], {"parents"})
+    skeleton = attempt(sinew.Skeleton, [data.draw(parents)[0]])
     if skeleton is None:
         skeleton = sinew.Skeleton(np.arange(-1, count - 1, dtype=np.int32))
     one, keys = (skeleton.bone_count,), data.draw(st.integers(1, 3))
@@ -427,9 +445,6 @@ def test_skeletons(data):
         (skeleton.spline_vector, "many times number"),
     ]
     run(*blended(data.draw, calls, one, (keys, *one)))
-
-
-MESH = ("rest_points", "influence_offsets", "influence_bones", "influence_weights", "rest_bones")
 
 
 def plain_mesh(values):
@@ -447,26 +462,23 @@ def test_meshes(data):
     each, bones = data.draw(st.integers(0, 4)), data.draw(st.integers(1, 4))
     d = Draw(data.draw, 16)
     mesh = [*d.skin(vertices, each, bones), d.array(bones, 4, 4, optional=True)]
-    binding = attempt(sinew.Binding, [*(given for given, _ in mesh), LINEAR], MESH)
+    binding = made(sinew.Binding, [*(given for given, _ in mesh), LINEAR])
     if binding is None:
         return
-    repr(binding)
     method, other = d.one(METHODS), d.one(METHODS)
     mix = d.one(st.sampled_from([None, (other, d.array(vertices)[0])]))
-    deformer = attempt(sinew.Deformer, [binding, method, mix], {"method", "mix", "binding"})
+    deformer = made(sinew.Deformer, [binding, method, mix])
     if deformer is None:
         return
-    repr(deformer)
     points = d.array(vertices, 3)
-    moved = attempt(lambda *given: deformer.set_rest_points(*given) or True, [points[0]], {"rest_points"})
+    moved = attempt(deformer.set_rest_points, [points[0]])
     pose, out, threads = d.array(binding.bone_count, 4, 4), d.out(vertices), d.threads()
     space = d.array(4, 4, optional=True)
     inverses = d.array(binding.bone_count, 4, 4, optional=True)
     key = st.sampled_from(["sdef.interpolation", "sdef", "", "dq.interpolation", b"sdef", 3, None, (1,)])
     value = d.one(st.just("slerp"))
     parameters = d.one(st.sampled_from([None, {}, {"sdef.interpolation": value}, {data.draw(key): value}]))
-    known = {"bone_transforms", "out", "threads", "bones_from_model", "rest_inverses", "parameters"}
-    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0], parameters], known)
+    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0], parameters])
     if result is None:
         return
     assert result.shape == (binding.vertex_count, 3)
@@ -502,18 +514,11 @@ def test_delta_mush(data):
         "pin_boundary": d.one(st.booleans()),
         "weights": d.array(vertices, optional=True)[0],
     }
-    known = {"rest_points", "face_offsets", "corner_vertices", "edges", *settings}
-    mush = attempt(lambda *given: sinew.DeltaMush(*given, **settings), d.faces(vertices), known)
-    if mush is None:
-        return
-    repr(mush)
-    attempt(lambda *given: mush.bind(*given, **settings) or True, [d.array(vertices, 3)[0]], known)
-    posed, scale = d.array(vertices, 3)[0], d.one(st.floats(-2, 2))
-    given_data = [posed, d.out(vertices), scale, d.threads()]
-    result = attempt(mush.apply, given_data, {"points", "out", "scale", "threads"})
-    if result is not None:
-        assert result.shape == (mush.vertex_count, 3)
-        same(result, pickle.loads(pickle.dumps(mush)).apply(posed, None, scale, 1))
+    mush = made(sinew.DeltaMush, d.faces(vertices), settings)
+    if mush is not None:
+        attempt(mush.bind, [d.array(vertices, 3)[0]], settings)
+        how = {"scale": d.one(st.floats(-2, 2)), "out": d.out(vertices), "threads": d.threads()}
+        same_by_a_pickle(mush, "apply", [d.array(vertices, 3)[0]], (mush.vertex_count, 3), **how)
 
 
 @many(0.2)
@@ -529,19 +534,14 @@ def test_normals(data):
         "sharp_faces": d.integers([i % 2 for i in range(len(plain_offsets) - 1)], optional=True)[0],
         "custom_normals": d.one(st.sampled_from([None, custom])),
     }
-    known = {"vertex_count", "face_offsets", "corner_vertices", "edges", *sharp}
-    given_data = [d.one(st.just(vertices)), offsets, corners, edges]
-    normals = attempt(lambda *given: sinew.Normals(*given, **sharp), given_data, known)
+    normals = made(sinew.Normals, [d.one(st.just(vertices)), offsets, corners, edges], sharp)
     if normals is None:
         return
-    repr(normals)
-    posed, domain = d.array(vertices, 3)[0], d.one(st.sampled_from([None, "vertex", "corner", "face"]))
-    given_data = [posed, domain, d.out(vertices), d.threads()]
-    result = attempt(normals.compute, given_data, {"points", "domain", "out", "threads"})
-    if result is not None:
-        assert result.shape == (getattr(normals, f"{domain or normals.domain}_count"), 3)
-        assert np.isfinite(result).all()
-        same(result, pickle.loads(pickle.dumps(normals)).compute(posed, domain, None, 1))
+    domain = d.one(st.sampled_from([None, "vertex", "corner", "face"]))
+    given_data, how = [d.array(vertices, 3)[0], domain], {"out": d.out(vertices), "threads": d.threads()}
+    count = getattr(normals, f"{domain}_count", getattr(normals, f"{normals.domain}_count"))
+    result = same_by_a_pickle(normals, "compute", given_data, (count, 3), **how)
+    assert result is None or np.isfinite(result).all()
 
 
 @many(0.2)
@@ -554,22 +554,34 @@ def test_skinned_normals(data):
     frames = data.draw(st.sampled_from([vertices, 3 * vertices]))
     of_frames = None if frames == vertices else [i % vertices for i in range(frames)]
     given_data = [binding, d.array(frames, 3)[0], d.array(frames, 3, optional=True)[0]]
-    given_data += [d.one(st.just(of_frames)), d.one(METHODS), d.one(st.none())]
-    known = {"binding", "normals", "tangents", "vertices", "method", "mix"}
-    skinned = attempt(sinew.SkinnedNormals, given_data, known)
+    skinned = made(
+        sinew.SkinnedNormals, [*given_data, d.one(st.just(of_frames)), d.one(METHODS), d.one(st.none())]
+    )
     if skinned is None:
         return
-    repr(skinned)
     pose, options = d.array(bones, 4, 4)[0], [d.threads(), *(d.one(st.none()) for _ in range(3))]
-    known = {"bone_transforms", "threads", "bones_from_model", "rest_inverses", "parameters"}
-    result = attempt(skinned.deform, [pose, *options], known)
+    result = attempt(skinned.deform, [pose, *options])
     if result is not None:
-        assert result[0].shape == (vertices, 3)
-        assert result[1].shape == (skinned.frame_count, 3)
-    given_data = [pose, d.array(vertices, 3)[0], None, *options]
-    alone = attempt(skinned.deform_normals, given_data, known | {"points"})
-    if alone is not None:
-        assert alone.shape == (skinned.frame_count, 3)
+        assert (result[0].shape, result[1].shape) == ((vertices, 3), (skinned.frame_count, 3))
+    alone = attempt(skinned.deform_normals, [pose, d.array(vertices, 3)[0], None, *options])
+    assert alone is None or alone.shape == (skinned.frame_count, 3)
+
+
+def stage(d, kind, skin, given_data, named):
+    """One that takes a Binding, with other rest points, or None if it was refused correctly."""
+    binding = made(sinew.Binding, [given for given, _ in skin])
+    if binding is None:
+        return None
+    thing = made(kind, [binding, *given_data], named, ("segments",))
+    if thing is not None:
+        attempt(thing.set_rest_points, [d.array(thing.vertex_count, 3)[0]])
+    return thing
+
+
+def apply_stage(d, thing, named):
+    count = thing.vertex_count
+    given_data = [d.array(count, 3)[0], d.array(thing.bone_count, 4, 4)[0]]
+    same_by_a_pickle(thing, "apply", given_data, (count, 3), out=d.out(count), **named)
 
 
 @many(0.1)
@@ -577,46 +589,27 @@ def test_skinned_normals(data):
 def test_twist_spreads(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 2, 20])), data.draw(st.integers(1, 4))
     d = Draw(data.draw, 14)
-    twists = data.draw(st.integers(0, bones))
-    given_data = [
-        *d.skin(vertices, data.draw(st.integers(0, 4)), bones),
-        (
-            np.column_stack([np.arange(twists), *([np.arange(twists) % bones] * 2), np.arange(twists) % 2]),
-            None,
-        ),
-        d.array(twists, 3),
-        d.array(twists, 3),
-        d.array(bones, 4, 4),
-    ]
+    count = data.draw(st.integers(0, bones))
+    twists = np.column_stack([np.arange(count), *([np.arange(count) % bones] * 2), np.arange(count) % 2])
+    skin = d.skin(vertices, data.draw(st.integers(0, 4)), bones)
+    given_data = [twists, d.array(count, 3)[0], d.array(count, 3)[0], d.array(bones, 4, 4)[0]]
     more = {
         "bones_from_model": d.array(4, 4, optional=True)[0],
         "weights": d.array(vertices, optional=True)[0],
         "mix": d.array(vertices, optional=True)[0],
     }
-    known = {*MESH, "twists", "heads", "tails", "rest_bones", *more}
-    spread = attempt(
-        lambda *given: sinew.TwistSpread(sinew.Binding(*given[:4]), *given[4:], **more),
-        [given for given, _ in given_data],
-        known,
-    )
+    spread = stage(d, sinew.TwistSpread, skin, given_data, more)
     if spread is None:
         return
-    repr(spread)
-    attempt(lambda *given: spread.set_rest_points(*given) or True, [d.array(vertices, 3)[0]], {"rest_points"})
-    posed, pose = d.array(vertices, 3)[0], d.array(spread.bone_count, 4, 4)[0]
     how = {
         "amount": d.one(st.floats(0, 1)),
-        "amounts": d.array(twists, optional=True)[0],
-        "curves": d.array(twists, optional=True)[0],
-        "channels": d.array(twists, 7, optional=True)[0],
+        "amounts": d.array(count, optional=True)[0],
+        "curves": d.array(count, optional=True)[0],
+        "channels": d.array(count, 7, optional=True)[0],
         "blend": d.one(st.sampled_from(["linear", "matrices", "rotations", "logarithms"])),
     }
-    known = {"points", "bone_transforms", "out", *how}
-    attempt(spread.angles, [pose, how["channels"]], known)
-    result = attempt(lambda *given: spread.apply(*given, **how), [posed, pose, d.out(vertices)], known)
-    if result is not None:
-        assert result.shape == (spread.vertex_count, 3)
-        same(result, pickle.loads(pickle.dumps(spread)).apply(posed, pose, **how, threads=1))
+    attempt(spread.angles, [d.array(spread.bone_count, 4, 4)[0], how["channels"]])
+    apply_stage(d, spread, how)
 
 
 @many(0.1)
@@ -624,32 +617,15 @@ def test_twist_spreads(data):
 def test_bulge_limits(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 2, 20])), data.draw(st.integers(1, 4))
     d = Draw(data.draw, 14)
-    given_data = [
-        *d.skin(vertices, data.draw(st.integers(0, 4)), bones),
-        d.array(bones, 3),
-        d.array(bones, 3),
-    ]
+    skin = d.skin(vertices, data.draw(st.integers(0, 4)), bones)
     more = {
         "bones_from_model": d.array(4, 4, optional=True)[0],
         "weights": d.array(vertices, optional=True)[0],
     }
-    known = {*MESH, "heads", "tails", "segments", *more}
-    limit = attempt(
-        lambda *given: sinew.BulgeLimit(sinew.Binding(*given[:4]), *given[4:], **more),
-        [given for given, _ in given_data],
-        known,
-    )
-    if limit is None:
-        return
-    repr(limit)
-    attempt(lambda *given: limit.set_rest_points(*given) or True, [d.array(vertices, 3)[0]], {"rest_points"})
-    posed, pose = d.array(vertices, 3)[0], d.array(limit.bone_count, 4, 4)[0]
-    how = {"strength": d.one(st.floats(0, 1)), "form": d.one(st.sampled_from(["continuous", "kim_han"]))}
-    known = {"points", "bone_transforms", "out", *how}
-    result = attempt(lambda *given: limit.apply(*given, **how), [posed, pose, d.out(vertices)], known)
-    if result is not None:
-        assert result.shape == (limit.vertex_count, 3)
-        same(result, pickle.loads(pickle.dumps(limit)).apply(posed, pose, **how, threads=1))
+    limit = stage(d, sinew.BulgeLimit, skin, [d.array(bones, 3)[0], d.array(bones, 3)[0]], more)
+    if limit is not None:
+        form = d.one(st.sampled_from(["continuous", "kim_han"]))
+        apply_stage(d, limit, {"strength": d.one(st.floats(0, 1)), "form": form})
 
 
 def positive(pair):
