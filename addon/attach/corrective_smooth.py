@@ -108,6 +108,7 @@ def _values(modifier: bpy.types.CorrectiveSmoothModifier) -> dict[str, Any]:
     values = {name: getattr(modifier, of_modifier) for name, of_modifier in NAMES.items()}
     return values | {
         "radius": 0.0,
+        "weld": False,
         "smooth_type": modifier.smooth_type.lower(),
         "scale": 0.0 if modifier.use_only_smooth else modifier.scale,
     }

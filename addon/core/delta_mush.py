@@ -8,6 +8,7 @@ import numpy as np
 import sinew
 
 from .stage_mesh import StageMesh
+from .weld import Weld, weld
 
 # Parameters of the binding: where a key changes one, it is bound again, in about the time of a frame.
 BIND_PARAMETERS = ("iterations", "radius", "factor", "smooth_type", "pin_boundary")
@@ -22,29 +23,44 @@ class DeltaMush:
         self._native: sinew.DeltaMush | None = None
         self._settings: tuple[Any, ...] = ()
         self._rest_points: np.ndarray | None = None
+        self._weld: Weld | None = None
 
     def apply(
         self, points: np.ndarray, values: Mapping[str, Any], rest_points: np.ndarray, frames: Sequence[Any]
     ) -> None:
         own = self._mesh.rest_points
-        self._bind(values, rest_points if own is None else own).apply(
-            points, out=points, scale=values["scale"]
-        )
+        native = self._bind(values, rest_points if own is None else own)
+        if self._weld is None:
+            native.apply(points, out=points, scale=values["scale"])
+            return
+        first, places = self._weld.first, self._weld.places
+        standing = points[first]
+        # Vertices of one place that shape keys move apart stay apart.
+        points += (native.apply(standing, scale=values["scale"]) - standing)[places]
 
     def _bind(self, values: Mapping[str, Any], rest_points: np.ndarray) -> sinew.DeltaMush:
-        settings = tuple(values[name] for name in (*BIND_PARAMETERS, "invert_group"))
+        settings = tuple(values[name] for name in (*BIND_PARAMETERS, "invert_group", "weld"))
         if self._native is not None and settings == self._settings and rest_points is self._rest_points:
             return self._native
-        weights = self._mask
+        mesh, weights = self._mesh, self._mask
+        if self._native is None or values["weld"] != self._settings[-1]:
+            self._native, self._weld = None, None
+            if values["weld"] and mesh.rest_points is not None:
+                moved_by = [each.entries.influences() for each in mesh.weightings]
+                self._weld = weld(mesh.rest_points, moved_by, (weights, *mesh.modifier_masks))
         if weights is not None and values["invert_group"]:
             weights = 1.0 - weights
+        bound = rest_points
+        if self._weld is not None:
+            bound = bound[self._weld.first]
+            weights = None if weights is None else weights[self._weld.first]
         arguments = {name: values[name] for name in BIND_PARAMETERS} | {"weights": weights}
         if self._native is None:
-            topology = self._mesh.topology
+            topology = mesh.topology if self._weld is None else self._weld.topology(mesh.topology)
             self._native = sinew.DeltaMush(
-                rest_points, topology.face_offsets, topology.corner_vertices, topology.edges, **arguments
+                bound, topology.face_offsets, topology.corner_vertices, topology.edges, **arguments
             )
         else:
-            self._native.bind(rest_points, **arguments)
+            self._native.bind(bound, **arguments)
         self._settings, self._rest_points = settings, rest_points
         return self._native

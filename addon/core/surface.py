@@ -150,7 +150,10 @@ def joined(surfaces: Sequence[Surface]) -> Surface:
 
 def coincident_vertices(points: np.ndarray) -> np.ndarray:
     """int [vertices]: for each of `points` [vertices, 3], the first one with exactly the same coordinates."""
-    # Adding zero turns -0.0 into 0.0.
-    rows = np.ascontiguousarray(points + 0.0).view([("", points.dtype)] * 3).ravel()
-    _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)
-    return first[inverse.ravel()]
+    order = np.lexsort(points.T)
+    ordered = points[order]
+    starts = np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)][: len(points)]
+    # The sort keeps the order of equal ones.
+    first = np.empty(len(points), dtype=np.int64)
+    first[order] = order[np.flatnonzero(starts)[np.cumsum(starts) - 1]]
+    return first

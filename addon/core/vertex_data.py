@@ -19,6 +19,7 @@ from .parameters import Value
 from .precompute import Start, precomputations
 from .rig import Weighting
 from .spaces import transformed
+from .weld import Weld, weld
 
 METHODS = {method.name: method for method in sinew.methods()}
 
@@ -33,12 +34,14 @@ class Provider:
     version     part of the hash: raised when the same mesh gives other data
     start       takes rest points, influences, triangles, and by name `gives_way` and `parameters`
     parameters  ids of the method's parameters, all numbers, that the data depends on
+    welds       it has a parameter `weld`, and its rows begin with their vertex
     """
 
     what: str
     version: int
     start: Callable[..., sinew.Precomputation]
     parameters: tuple[str, ...] = ()
+    welds: bool = False
 
 
 def _centres(
@@ -59,7 +62,7 @@ def _moments(
 
 _ALL = {
     "cor": Provider("centres of rotation", 1, _centres),
-    "ddm": Provider("smoothed weights", 2, _moments, ("radius",)),
+    "ddm": Provider("smoothed weights", 2, _moments, ("radius", "weld"), welds=True),
 }
 # A build may lack one of them.
 PROVIDERS = {name: provider for name, provider in _ALL.items() if name in METHODS}
@@ -67,10 +70,17 @@ PROVIDERS = {name: provider for name, provider in _ALL.items() if name in METHOD
 
 @dataclass
 class _Entry:
-    """The data of one method. If outdated, `made` has that of the mesh before it changed."""
+    """The data of one method. If outdated, `made` has that of the mesh before it changed.
+
+    weld      the places of the mesh that it is computed for; None for all vertices
+    computed  of these
+    made      of all vertices
+    """
 
     key: str = ""
     start: Start | None = None
+    weld: Weld | None = None
+    computed: np.ndarray | None = None
     made: np.ndarray | None = None
     is_outdated: bool = False
     run: sinew.Precomputation | None = None
@@ -132,13 +142,13 @@ class VertexData:
 
     @property
     def made(self) -> dict[str, tuple[str, np.ndarray]]:
-        """The key and the data of each method that has current data."""
+        """For files: the key and what was computed, for each method that has current data."""
         with self._lock:
             entries = self._entries.items()
             return {
-                method: (entry.key, entry.made)
+                method: (entry.key, entry.computed)
                 for method, entry in entries
-                if entry.made is not None and not entry.is_outdated
+                if entry.computed is not None and not entry.is_outdated
             }
 
     def add_triangles(self, triangles: np.ndarray) -> None:
@@ -270,20 +280,26 @@ class VertexData:
             points = transformed(points, bones_from_model)
         influences = self.weighting.influences_over_joints(points)
         provider = PROVIDERS[method]
-        values = self._parameters[method]
-        entry.key = _key(method, provider.version, values, self.points, influences, self.triangles)
-        entry.start = partial(provider.start, self.points, influences, self.triangles, **values)
+        values, points, triangles = dict(self._parameters[method]), self.points, self.triangles
+        if provider.welds and values.pop("weld"):
+            entry.weld = weld(points, [influences])
+        if entry.weld is not None:
+            points, influences = points[entry.weld.first], entry.weld.influences(influences)
+            triangles = entry.weld.triangles(triangles)
+        entry.key = _key(method, provider.version, values, points, influences, triangles)
+        entry.start = partial(provider.start, points, influences, triangles, **values)
         found = self._stored.get(entry.key)
         if found is None:
             found = precomputations.find(entry.key)
-        if found is not None and _fits(METHODS[method], found, self.points, influences):
+        if found is not None and _fits(METHODS[method], found, points, influences):
             self._put(entry, found)
         elif found is not None:
             log.warning("The stored %s of a mesh are damaged; they are computed anew", provider.what)
         return entry.start
 
     def _put(self, entry: _Entry, made: np.ndarray) -> None:
-        entry.made, entry.is_outdated = made, False
+        entry.computed, entry.is_outdated = made, False
+        entry.made = made if entry.weld is None else entry.weld.rows_of_vertices(made)
         self.version = next(_versions)
 
 

@@ -588,12 +588,11 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
-            # Smoothed weights follow edges, so they end at a seam.
-            if is_split and method != "ddm":
+            if is_split:
                 torn = outcome.errors.get((route, TORN), 0.0)
                 outcome.errors[route, TORN] = max(torn, distance_at_seams(obj))
         if has(seed, "stages", features):
-            check_stages(obj, armature, seed, is_split, outcome, route)
+            check_stages(obj, armature, seed, outcome, route)
         attach.remove(obj)
         session.forget()
     routes.release()
@@ -651,7 +650,7 @@ def distance_at_seams(obj: bpy.types.Object) -> float:
 
 
 def check_stages(
-    obj: bpy.types.Object, armature: bpy.types.Object, seed: int, is_split: bool, outcome: Outcome, route: str
+    obj: bpy.types.Object, armature: bpy.types.Object, seed: int, outcome: Outcome, route: str
 ) -> None:
     """Checks a mix of two random methods, then random stages after it; records the errors."""
     rng = numbers(seed, "stages")
@@ -662,9 +661,6 @@ def check_stages(
     try:
         outcome.errors[route, MIX] = error_to_reference(obj, armature, method, seed, outcome, route)
         choose_stages_after(rng, properties.of(obj), scenes.diagonal(obj))
-        if is_split:
-            # Smoothing makes points of its islands, which rounding turns.
-            properties.of(obj).delta_mush.enabled, properties.of(obj).bulge_limit.enabled = False, True
         outcome.errors[route, AFTER] = error_of_stages(obj, armature, method, outcome, route)
     except routes.NotBySinewError as why:
         outcome.errors[route, AFTER], outcome.reason = float("inf"), str(why)
@@ -683,6 +679,7 @@ def choose_stages_after(rng: np.random.Generator, settings: bpy.types.PropertyGr
     mush.radius = rng.uniform(0.02, 0.1) * diagonal if rng.random() < 0.3 else 0.0
     mush.smooth_type = str(rng.choice(["simple", "length_weighted"]))
     mush.pin_boundary, mush.invert_group = bool(rng.random() < 0.3), bool(rng.random() < 0.4)
+    mush.weld = bool(rng.random() < 0.7)
     mush.scale = rng.uniform(-1.0, 2.0) if rng.random() < 0.5 else 1.0
     for stage in (spread, limit, mush):
         stage.group = str(rng.choice(["", *PAINTED]))

@@ -21,6 +21,7 @@ import bulge_limit_reference
 import delta_mush_reference
 import reference
 import twist_spread_reference
+import weld_reference
 from sinew_addon.core.bulge_limit import segments
 from sinew_addon.core.twist_spread import blend_of
 
@@ -92,8 +93,24 @@ def stages_after(
         topology, own = after.mesh.topology, after.mesh.rest_points
         faces = np.split(topology.corner_vertices, topology.face_offsets[1:-1])
         faces = [face.tolist() for face in faces if len(face)]
-        mesh = (rest_points if own is None else own, faces, topology.edges)
-        points = delta_mush_reference.delta_mush(points, mesh, weights=weights, rounding=rounding, **options)
+        first = list(range(len(points)))
+        if options.pop("weld") and own is not None:
+            moved_by = [each.entries.influences() for each in after.mesh.weightings]
+            rows = [weld_reference.rows_of(each.offsets, each.bones, each.weights) for each in moved_by]
+            masks = [
+                mask
+                for mask in (after.masks.get("delta_mush"), *after.mesh.modifier_masks)
+                if mask is not None
+            ]
+            first = weld_reference.standing_for(own, *rows, *masks)
+        rest = rest_points if own is None else own
+
+        def smooth(kept, start, faces, edges, weights):
+            mesh = rest[kept], faces, edges
+            error = rounding[kept] if np.ndim(rounding) else rounding
+            return delta_mush_reference.delta_mush(start, mesh, weights=weights, rounding=error, **options)
+
+        points = weld_reference.smoothed_by_places(smooth, first, points, faces, topology.edges, weights)
     return points
 
 

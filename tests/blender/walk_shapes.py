@@ -9,6 +9,7 @@ visibility.
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ import bpy
 import numpy as np
 import sinew
 import walk_sides
+import weld_reference
 
 # Parameters, by their full names.
 DEFAULTS = {f"{m.name}.{p.id}": p.default for m in sinew.methods() for p in m.parameters}
@@ -31,6 +33,10 @@ class _Influences:
     offsets: np.ndarray
     bones: np.ndarray
     weights: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.offsets, self.bones, self.weights
 
 
 @dataclass
@@ -285,8 +291,7 @@ def _blend(
     mix: tuple[str, dict[int, float]] | None,
     parameters: Mapping[str, Any],
 ) -> np.ndarray:
-    own = armature.influences
-    influences = (own.offsets, own.bones, own.weights)
+    influences = armature.influences.arrays
     shapes = []
     for name in (method,) if mix is None else (method, mix[0]):
         data = {}
@@ -296,8 +301,7 @@ def _blend(
         elif name == "cor":
             data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles).result()
         elif name == "ddm":
-            radius = parameters.get("ddm.radius", DEFAULTS["ddm.radius"])
-            data[name] = sinew.direct_delta_mush(read.own, *influences, read.triangles, radius).result()
+            data[name] = _moments(read, armature.influences, parameters)
         binding = sinew.Binding(points, *influences, rest_bones=armature.rest, vertex_data=data)
         shapes.append(
             sinew.Deformer(binding, name).deform(
@@ -336,9 +340,8 @@ def _limit(read: _Read, points: np.ndarray, options: Mapping[str, Any] | None) -
     if armature.mask is not None:
         whole = (armature.mask >= 1.0).astype(np.float32)
         mask = whole if mask is None else whole * mask
-    own = armature.influences
     stage = sinew.BulgeLimit(
-        sinew.Binding(read.rest, own.offsets, own.bones, own.weights),
+        sinew.Binding(read.rest, *armature.influences.arrays),
         *armature.ends,
         bones_from_model=armature.bones_from_model,
         weights=mask,
@@ -356,5 +359,47 @@ def _mush(read: _Read, points: np.ndarray, options: Mapping[str, Any] | None) ->
         name: options[name] for name in ("iterations", "radius", "factor", "smooth_type", "pin_boundary")
     }
     rest = read.rest if read.own is None else read.own
-    stage = sinew.DeltaMush(rest, *read.topology, weights=weights, **bound)
-    return stage.apply(points, scale=options["scale"])
+    first = list(range(len(points)))
+    if options["weld"] and read.own is not None:
+        rows = [weld_reference.rows_of(*a.influences.arrays) for a in read.armatures]
+        masks = [mask for mask in (weights, *(a.mask for a in read.armatures)) if mask is not None]
+        first = weld_reference.standing_for(rest, *rows, *masks)
+
+    def smooth(
+        kept: list[int], start: np.ndarray, faces: list[list[int]], edges: np.ndarray, own: np.ndarray | None
+    ) -> np.ndarray:
+        offsets = np.cumsum([0, *map(len, faces)])
+        corners = [vertex for face in faces for vertex in face]
+        stage = sinew.DeltaMush(rest[kept], offsets, corners, edges, weights=own, **bound)
+        return stage.apply(start, scale=options["scale"])
+
+    offsets, corners, edges = read.topology
+    faces = [corners[begin:end].tolist() for begin, end in itertools.pairwise(offsets)]
+    return weld_reference.smoothed_by_places(smooth, first, points, faces, edges, weights)
+
+
+def _moments(read: _Read, influences: _Influences, parameters: Mapping[str, Any]) -> np.ndarray:
+    """The data of ddm: of each place, for all vertices that are one there."""
+    options = DEFAULTS | parameters
+    rows = weld_reference.rows_of(*influences.arrays)
+    first = list(range(len(rows)))
+    if options["ddm.weld"]:
+        first = weld_reference.standing_for(read.own, rows)
+    kept = sorted(set(first))
+    place = np.searchsorted(kept, first)
+    triangles = [each for each in place[read.triangles].tolist() if len(set(each)) == 3]
+    offsets = np.cumsum([0, *(len(rows[vertex]) for vertex in kept)])
+    bones, weights = np.array([pair for vertex in kept for pair in rows[vertex]]).reshape(-1, 2).T
+    found = sinew.direct_delta_mush(
+        read.own[kept],
+        offsets,
+        bones.astype(np.int32),
+        weights.astype(np.float32),
+        np.array(triangles, np.int32).reshape(-1, 3),
+        options["ddm.radius"],
+    ).result()
+    of_places = [found[found[:, 0] == number] for number in range(len(kept))]
+    of_vertices = [of_places[number].copy() for number in place]
+    for vertex, own in enumerate(of_vertices):
+        own[:, 0] = vertex
+    return np.concatenate(of_vertices)

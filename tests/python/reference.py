@@ -294,7 +294,7 @@ LEAST_SINGULAR = 0.05
 LEAST_EXTENT = 1e-10
 
 
-def ddm(point, motions, rotations, weights, heads, neighbourhood=None, variant="0", radius=None):
+def ddm(point, motions, rotations, weights, heads, neighbourhood=None, variant="0", radius=None, weld=True):
     """neighbourhood: its moments [bones, 10], and motions, rotations and heads of these bones. The polar
     factor is by singular values, whose tie counts where there is one."""
     if neighbourhood is None:

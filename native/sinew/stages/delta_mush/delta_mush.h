@@ -34,6 +34,8 @@ struct DeltaMushStage {
          ParameterKind::choice, 0.0, 0.0, 1.0, kSmoothTypes},
         {"pin_boundary", "Pin Boundary", "The ends of edges with one face are not smoothed", "",
          ParameterKind::boolean, 0.0, 0.0, 1.0},
+        {"weld", "Weld", "Vertices at one place that the same bones move count as one, as if seams were closed",
+         "", ParameterKind::boolean, 1.0, 0.0, 1.0},
         {"scale", "Scale", "How much of the details comes back: 1 all, 0 none", "factor",
          ParameterKind::number, 1.0, -100.0, 100.0},
         {"group", "Vertex Group", "How much each vertex is smoothed: 0 not at all, 1 fully", "factor",
