@@ -21,7 +21,7 @@ bool is_finite(const float* values, py::ssize_t count) {
 }
 
 /// str(value), for any content.
-std::string text_of(const py::handle& value) {
+std::string printed(const py::handle& value) {
     const py::str text(value);
     return py::reinterpret_steal<py::bytes>(
         PyUnicode_AsEncodedString(text.ptr(), "utf-8", "backslashreplace"));
@@ -43,7 +43,7 @@ py::array_t<T> narrowed(const py::array_t<Wide>& wide, const char* argument, con
             to[i] = static_cast<T>(from[i]);
         }
         if (!fits) {
-            fail(argument, std::string("numbers that ") + type + " holds", text_of(py::cast(from[i])));
+            fail(argument, std::string("numbers that ") + type + " holds", printed(py::cast(from[i])));
         }
     }
     return narrow;
@@ -53,6 +53,18 @@ py::array_t<T> narrowed(const py::array_t<Wide>& wide, const char* argument, con
 
 void fail(const char* argument, const std::string& wanted, const std::string& got) {
     throw py::value_error(std::string(argument) + ": expected " + wanted + ", got " + got);
+}
+
+std::string shape_text(const Shape& shape) {
+    std::string text = "[";
+    for (const py::ssize_t length : shape) text += (text.size() > 1 ? ", " : "") + std::to_string(length);
+    return text + "]";
+}
+
+std::string one_of(std::span<const std::string_view> names) {
+    std::string text = "one of ";
+    for (const std::string_view name : names) text += (name == names[0] ? "" : ", ") + std::string(name);
+    return text;
 }
 
 py::array as_array(const py::handle& value, const char* argument) {
@@ -101,7 +113,7 @@ py::array_t<std::int32_t> as_type(const py::array& array, const char* argument, 
 }
 
 std::string describe(const py::handle& value) {
-    const auto name_of_type = [&] { return text_of(py::type::of(value).attr("__name__")); };
+    const auto name_of_type = [&] { return printed(py::type::of(value).attr("__name__")); };
     py::array array;
     if (py::isinstance<py::array>(value)) {
         array = py::reinterpret_borrow<py::array>(value);
@@ -109,13 +121,9 @@ std::string describe(const py::handle& value) {
         array = as_array(value, "");
         if (!array || array.ndim() == 0 || !is_numeric(array)) return name_of_type();
     }
-    std::string text = py::isinstance<py::array>(value) ? "" : name_of_type() + " of ";
-    text += text_of(array.dtype()) + " [";
-    for (py::ssize_t axis = 0; axis < array.ndim(); ++axis) {
-        if (axis > 0) text += ", ";
-        text += std::to_string(array.shape(axis));
-    }
-    return text + "]";
+    const std::string text = py::isinstance<py::array>(value) ? "" : name_of_type() + " of ";
+    return text + printed(array.dtype()) + " " +
+           shape_text(Shape(array.shape(), array.shape() + array.ndim()));
 }
 
 std::string checked_name(const py::handle& value, const char* argument, const std::string& wanted) {
@@ -134,8 +142,7 @@ std::string checked_name(const py::handle& value, const char* argument, const st
 
 std::size_t checked_choice(const py::handle& value, const char* argument,
                            std::span<const std::string_view> names) {
-    std::string wanted = "one of ";
-    for (const std::string_view name : names) wanted += (name == names[0] ? "" : ", ") + std::string(name);
+    const std::string wanted = one_of(names);
     const std::string given = checked_name(value, argument, wanted);
     const auto found = std::ranges::find(names, given);
     if (found == names.end()) fail(argument, wanted, "'" + given + "'");
@@ -222,6 +229,21 @@ void check_apart(const py::array_t<float>& out, const py::array_t<float>& points
     }
 }
 
+double checked_number(const py::handle& value, const char* argument, const std::string& wanted) {
+    if (!PyFloat_Check(value.ptr()) && !PyLong_Check(value.ptr())) {
+        // float() would take arrays of one number, and drop an imaginary part, with only a warning.
+        const py::array array = as_array(value, argument);
+        const bool is_complex = array && array.dtype().kind() == 'c';
+        if (is_complex || py::isinstance<py::array>(value)) fail(argument, wanted, describe(value));
+    }
+    const double number = PyFloat_AsDouble(value.ptr());
+    if (number == -1.0 && PyErr_Occurred() != nullptr) {
+        PyErr_Clear();
+        fail(argument, wanted, describe(value));
+    }
+    return number;
+}
+
 std::size_t checked_integer(const py::handle& value, const char* argument, const std::string& wanted,
                             std::size_t most) {
     const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(value.ptr()));
@@ -246,7 +268,6 @@ std::size_t checked_threads(const py::object& threads) {
     return checked_integer(threads, "threads", "None or an integer, 0 or more", kAnyLength);
 }
 
-/// The item `index` of a pickled state, which must have `size` items.
 py::object part_of(const py::object& state, std::size_t size, std::size_t index) {
     const std::string wanted = "a tuple of " + std::to_string(size) + ", as pickling makes it";
     if (!py::isinstance<py::tuple>(state)) fail("state", wanted, describe(state));

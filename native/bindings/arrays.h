@@ -24,6 +24,14 @@ inline constexpr std::size_t kAnyLength = std::numeric_limits<std::size_t>::max(
 /// Raises ValueError "`argument`: expected `wanted`, got `got`".
 [[noreturn]] void fail(const char* argument, const std::string& wanted, const std::string& got);
 
+using Shape = std::vector<py::ssize_t>;
+
+/// The shape as text, such as "[2, 3]".
+std::string shape_text(const Shape& shape);
+
+/// "one of a, b, c".
+std::string one_of(std::span<const std::string_view> names);
+
 /// Describes `value` for an error: "float64 [120, 4]" for an array, "list of float64 [120, 4]" for something that
 /// numpy converts to an array of numbers, otherwise the type's name.
 std::string describe(const py::handle& value);
@@ -136,6 +144,9 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count);
 
 /// ValueError if `out` shares memory with `points`.
 void check_apart(const py::array_t<float>& out, const py::array_t<float>& points);
+
+/// A number of Python or numpy, but no array. ValueError for anything else.
+double checked_number(const py::handle& value, const char* argument, const std::string& wanted);
 
 /// An integer from 0 to `most`, also one of numpy's.
 std::size_t checked_integer(const py::handle& value, const char* argument, const std::string& wanted,

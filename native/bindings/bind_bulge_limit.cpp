@@ -45,10 +45,7 @@ py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points
                          const Threads& threads) {
     const auto given = checked_points(points, "points", limit.vertex_count());
     const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
-    if (bones.size() < limit.bone_count()) {
-        fail("bone_transforms", "at least " + std::to_string(limit.bone_count()) + " bones",
-             std::to_string(bones.size()));
-    }
+    check_bone_count(bones, limit.bone_count());
     BulgeLimitOptions options;
     const auto checked_option = [](const py::object& value, const std::string& id) {
         const Parameter& parameter = parameter_of(BulgeLimitStage::kParameters, id);
@@ -121,11 +118,10 @@ rest again, which takes about as long as apply().)")
 
 points: float32 [vertices, 3], deformed, model space.
 bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
-out: None, or float32 [vertices, 3], written and returned. May be `points`.
+out: may be `points`.
 strength: how much of the bulge is removed, 0 to 1.
 form: "continuous": distances to all bones of a vertex, weighted; "kim_han": only to the heaviest, which tears
     the surface where that changes.
-threads: at most so many; None or 0: as many as useful.
 
 Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. A scaled
 bone allows a distance larger by the largest factor by which it stretches vectors perpendicular to it.)");

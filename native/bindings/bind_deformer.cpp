@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "arrays.h"
@@ -15,19 +15,6 @@
 #include "sinew/methods/methods.h"
 
 namespace sinew::bindings {
-namespace {
-
-std::string names_of_methods() {
-    std::string names;
-    for (const MethodInfo& method : kMethods) {
-        if (!names.empty()) names += ", ";
-        names += method.name;
-    }
-    return names;
-}
-
-}  // namespace
-
 MeshArguments::MeshArguments(const py::object& rest_points, const py::object& influence_offsets,
                              const py::object& influence_bones, const py::object& influence_weights)
     : points(checked_points(rest_points, "rest_points")),
@@ -39,10 +26,9 @@ MeshArguments::MeshArguments(const py::object& rest_points, const py::object& in
                              kMaxInfluences)) {}
 
 MethodInfo checked_method(const py::object& method, const char* argument) {
-    const std::string wanted = "one of " + names_of_methods();
-    const std::string name = checked_name(method, argument, wanted);
-    if (const std::optional<MethodInfo> found = find_method(name)) return *found;
-    fail(argument, wanted, "'" + name + "'");
+    std::array<std::string_view, kMethodCount> names;
+    std::ranges::transform(kMethods, names.begin(), &MethodInfo::name);
+    return kMethods[checked_choice(method, argument, names)];
 }
 
 namespace {
@@ -293,16 +279,19 @@ Parameters checked_parameters(const Deformer& deformer, const py::object& parame
 
 }  // namespace
 
+void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_t least) {
+    if (bone_transforms.size() >= least) return;
+    fail("bone_transforms", "at least " + std::to_string(least) + " bones",
+         std::to_string(bone_transforms.size()));
+}
+
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
                                const py::object& threads, const py::object& bones_from_model,
                                const py::object& rest_inverses, const py::object& parameters) {
     DeformArguments arguments;
     arguments.bones = rest_inverses.is_none() ? checked_affines(bone_transforms, "bone_transforms")
                                               : posed_from_rest(bone_transforms, rest_inverses);
-    if (arguments.bones.size() < deformer.bone_count()) {
-        fail("bone_transforms", "at least " + std::to_string(deformer.bone_count()) + " bones",
-             std::to_string(arguments.bones.size()));
-    }
+    check_bone_count(arguments.bones, deformer.bone_count());
     DeformOptions& options = arguments.options;
     options.threads = checked_threads(threads);
     arguments.values = checked_parameters(deformer, parameters);
@@ -399,8 +388,6 @@ Other threads may deform meanwhile: each of their results has either the old poi
              R"(The deformed points, float32 [vertices, 3], model space.
 
 bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
-out: None, or float32 [vertices, 3], written and returned.
-threads: at most so many; None or 0: as many as useful.
 bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone transforms, in which the
     bones are blended; the result is mapped back. None: the same space.
 rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. If given, bone_transforms are the posed bones, and each

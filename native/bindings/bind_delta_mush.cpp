@@ -22,14 +22,7 @@ struct SettingArguments {
 };
 
 float checked_float(const py::object& value, const char* argument) {
-    // Accepts numpy's numbers, too, but not arrays of one number, which numpy would convert with a warning.
-    if (py::isinstance<py::array>(value)) fail(argument, "a number", describe(value));
-    const double number = PyFloat_AsDouble(value.ptr());
-    if (PyErr_Occurred() != nullptr) {
-        PyErr_Clear();
-        fail(argument, "a number", describe(value));
-    }
-    return static_cast<float>(number);
+    return static_cast<float>(checked_number(value, argument, "a number"));
 }
 
 using SmoothTypeName = Typed<"typing.Literal['simple', 'length_weighted']">;
@@ -158,9 +151,8 @@ The arguments and errors are those of the constructor; after an error the object
              R"(The smoothed points, float32 [vertices, 3].
 
 points: float32 [vertices, 3], deformed, in the space of the rest points.
-out: None, or float32 [vertices, 3], written and returned. May be `points`.
+out: may be `points`.
 scale: how much of the details is added back; 1: all.
-threads: at most so many; None or 0: as many as useful.
 
 A vertex without faces is smoothed and has no details.)");
 }

@@ -155,11 +155,8 @@ py::object hand_eye_items(const std::array<py::object, 3>& values) {
 NamedTuple<"HandEye"> solve_hand_eye(const ArrayLike& a, const ArrayLike& b,
                                      const OptionalArrayLike& weights) {
     const auto values = promoted<3>({"a", "b", "weights"}, {a, b, weights});
-    return with_representation(values[0], "a", "..", [&]<class Row>(Row) {
-        return with_element(values[0], "a", "", [&]<class T>(T) {
-            return hand_eye_items<typename Row::template Transform<T>, T>(values);
-        });
-    });
+    return with_layout(values[0], "a", "..",
+                       [&]<class Transform, class T>() { return hand_eye_items<Transform, T>(values); });
 }
 
 template <class Transform, class T>
@@ -192,10 +189,8 @@ py::object average_items(const std::array<py::object, 2>& values, bool is_robust
 NamedTuple<"Averaged"> average_poses(const ArrayLike& any_poses, const OptionalArrayLike& any_weights,
                                      bool is_robust) {
     const auto values = promoted<2>({"poses", "weights"}, {any_poses, any_weights});
-    return with_representation(values[0], "poses", "..", [&]<class Row>(Row) {
-        return with_element(values[0], "poses", "", [&]<class T>(T) {
-            return average_items<typename Row::template Transform<T>, T>(values, is_robust);
-        });
+    return with_layout(values[0], "poses", "..", [&]<class Transform, class T>() {
+        return average_items<Transform, T>(values, is_robust);
     });
 }
 

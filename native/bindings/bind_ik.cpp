@@ -18,7 +18,7 @@ struct Solver {
 template <class T>
 py::array_t<T> checked_shape(const py::object& value, const char* argument, const Shape& shape,
                              const std::string& element) {
-    const std::string wanted = element + " " + text_of(shape);
+    const std::string wanted = element + " " + shape_text(shape);
     auto array = checked<T>(value, argument, static_cast<py::ssize_t>(shape.size()), wanted);
     for (std::size_t axis = 0; axis < shape.size(); ++axis) {
         if (array.shape(static_cast<py::ssize_t>(axis)) != shape[axis])
@@ -129,22 +129,18 @@ Input<double> checked_each(const py::object& value, const char* argument, std::s
 
 /// Transforms in any layout as unit dual quaternions.
 py::array_t<double> as_dual_quats(const py::object& value, const char* argument, const std::string& axes) {
-    const auto given = promoted<1>({argument}, {value});
-    py::array_t<double> result;
-    with_representation(given[0], argument, axes, [&]<class Row>(Row) {
-        using Transform = typename Row::template Transform<double>;
-        const auto array = in_order<double>(given[0]);
-        const auto input = checked_input<double, Transform>(array, argument);
+    py::object given = promoted<1>({argument}, {value})[0];
+    if (py::isinstance<py::array_t<float>>(given)) given = in_order<double>(given);
+    return with_layout(given, argument, axes, [&]<class Transform, class T>() {
+        const auto input = checked_input<T, Transform>(given, argument);
         Output<DualQuat<double>> output(input.lead);
         const py::ssize_t count = count_of(input.lead);
         for (py::ssize_t i = 0; i < count; ++i) {
-            output.write(i,
-                         to_dual_quat(normalized(Item<Transform>::read(input.data + i * input.item_size))));
+            const Transform transform = Item<Transform>::read(input.data + i * input.item_size);
+            output.write(i, cast<double>(to_dual_quat(normalized(transform))));
         }
-        result = output.array;
-        return py::none();
+        return output.array;
     });
-    return result;
 }
 
 IkOptions checked_options(const py::object& method, const py::object& tolerance,

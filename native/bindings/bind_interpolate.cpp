@@ -78,32 +78,30 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
 Blended blend(const ArrayLike& any_transforms, const ArrayLike& any_weights, const Method& method,
               const Typed<"sinew.interpolate.Signs">& signs) {
     const auto [transforms, weights] = promoted<2>({"transforms", "weights"}, {any_transforms, any_weights});
-    return with_method(method, [&]<class Method>(Method) {
+    return with_method(method, transforms, "transforms", [&]<class Method, class T>() {
         return with_signs(signs, [&]<Signs choice>(std::integral_constant<Signs, choice>) {
-            return with_element(
-                transforms, "transforms", Item<typename Method::template Transform<double>>::kShape,
-                [&]<class T>(T) { return blend_items<Method, choice, T>(transforms, weights); });
+            return blend_items<Method, choice, T>(transforms, weights);
         });
     });
 }
 
-// Calls combine(span, four keys) for each time in `at`.
-template <class T, class Transform, class Combine>
-py::object spline_items(const py::object& keys, const py::object& times, const py::object& at,
-                        Combine combine) {
-    const auto input = checked_input<T, Transform>(keys, "keys");
+// Calls evaluate(keys, times, time) for each time in `at`.
+template <class T, class Key, class Evaluate>
+py::object along_keys(const py::object& keys, const py::object& times, const py::object& at,
+                      Evaluate evaluate) {
+    const auto input = checked_input<T, Key>(keys, "keys");
     if (input.lead.size() != 1 || input.lead[0] == 0) {
         fail("keys", "one axis of keys, at least one", describe(keys));
     }
-    const std::vector<Transform> items = items_of<Transform>(input);
+    const std::vector<Key> items = items_of<Key>(input);
     const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
     const auto moments = checked_input<T, T>(at, "at");
-    Output<Blend<Transform>> output(moments.lead);
+    Output<Blend<Key>> output(moments.lead);
     const py::ssize_t count = count_of(moments.lead);
     without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
-            const SplineSpan<T> span = spline_span(std::span<const T>(key_times), moments.data[i]);
-            const auto result = combine(span, keys_of(span, std::span<const Transform>(items)));
+            const auto result =
+                evaluate(std::span<const Key>(items), std::span<const T>(key_times), moments.data[i]);
             output.write(i, {result.transform, result.is_defined});
         }
     });
@@ -113,13 +111,9 @@ py::object spline_items(const py::object& keys, const py::object& times, const p
 Blended spline(const ArrayLike& any_keys, const ArrayLike& any_times, const ArrayLike& any_at,
                const Method& method) {
     const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
-    return with_method(method, [&]<class Method>(Method) {
-        return with_element(
-            keys, "keys", Item<typename Method::template Transform<double>>::kShape, [&]<class T>(T) {
-                return spline_items<T, typename Method::template Transform<T>>(
-                    keys, times, at,
-                    [](const auto& span, const auto& four) { return spline_blend<Method>(span, four); });
-            });
+    return with_method(method, keys, "keys", [&]<class Method, class T>() {
+        return along_keys<T, typename Method::template Transform<T>>(
+            keys, times, at, [](const auto&... of) { return catmull_rom<Method, T>(of...); });
     });
 }
 
@@ -132,50 +126,32 @@ bool is_of_points(const py::object& keys) {
 
 Blended spline_of_vectors(const ArrayLike& any_keys, const ArrayLike& any_times, const ArrayLike& any_at) {
     const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
+    const auto evaluate = [](const auto&... of) { return catmull_rom_vector(of...); };
     if (is_of_points(keys)) {
-        return with_element(keys, "keys", "", [&]<class T>(T) {
-            return spline_items<T, Vec3<T>>(keys, times, at, [](const auto& span, const auto& four) {
-                return spline_vector(span, four);
-            });
-        });
+        return with_element(keys, "keys", "",
+                            [&]<class T>(T) { return along_keys<T, Vec3<T>>(keys, times, at, evaluate); });
     }
-    return with_representation(keys, "keys", "keys", [&]<class Row>(Row) {
-        return with_element(keys, "keys", "", [&]<class T>(T) {
-            return spline_items<T, typename Row::template Transform<T>>(
-                keys, times, at,
-                [](const auto& span, const auto& four) { return spline_vector(span, four); });
-        });
+    return with_layout(keys, "keys", "keys", [&]<class Transform, class T>() {
+        return along_keys<T, Transform>(keys, times, at, evaluate);
     });
 }
 
 template <class T, class Key, class Tangent>
 py::object hermite_items(const std::array<py::object, 4>& values) {
     const auto keys = checked_input<T, Key>(values[0], "keys");
-    const auto tangents = checked_input<T, Tangent>(values[1], "tangents");
-    if (keys.lead.size() != 1 || keys.lead[0] == 0) {
-        fail("keys", "one axis of keys, at least one", describe(values[0]));
+    const auto input = checked_input<T, Tangent>(values[1], "tangents");
+    const std::vector<Tangent> tangents = items_of<Tangent>(input);
+    if (keys.lead.size() == 1 && input.lead != keys.lead) {
+        fail("tangents", shape_text({keys.lead[0]}) + " of them, one for each key", describe(values[1]));
     }
-    if (tangents.lead != keys.lead) {
-        fail("tangents", text_of({keys.lead[0]}) + " of them, one for each key", describe(values[1]));
-    }
-    const std::vector<Key> of = items_of<Key>(keys);
-    const std::vector<Tangent> leaving = items_of<Tangent>(tangents);
-    const std::vector<T> times = checked_times<T>(values[2], keys.lead[0]);
-    const auto moments = checked_input<T, T>(values[3], "at");
-    Output<Blend<Key>> output(moments.lead);
-    const py::ssize_t count = count_of(moments.lead);
-    without_gil([&] {
-        for (py::ssize_t i = 0; i < count; ++i) {
-            const auto found = hermite<T>(std::span<const Key>(of), std::span<const Tangent>(leaving),
-                                          std::span<const T>(times), moments.data[i]);
-            if constexpr (std::is_same_v<Key, Vec3<T>>) {
-                output.write(i, {found, is_finite(found)});
-            } else {
-                output.write(i, {found.transform, found.is_defined});
-            }
+    return along_keys<T, Key>(values[0], values[2], values[3], [&](auto of, auto times, T time) {
+        const auto found = hermite<T>(of, std::span<const Tangent>(tangents), times, time);
+        if constexpr (std::is_same_v<Key, Vec3<T>>) {
+            return sinew::Blended<Key>{found, is_finite(found)};
+        } else {
+            return found;
         }
     });
-    return output.take();
 }
 
 Blended hermite_spline(const ArrayLike& keys, const ArrayLike& tangents, const ArrayLike& times,

@@ -156,8 +156,7 @@ face is flat or every edge sharp, else "corner" if anything is sharp, else "vert
 
 points: float32 [vertices, 3], deformed.
 domain: "vertex", "corner" or "face": what each normal belongs to; None: the mesh's domain.
-out: None, or float32 of the result's shape, written and returned. Must not overlap the points.
-threads: at most so many; None or 0: as many as useful.
+out: must not overlap the points.
 
 For a face without area the normal is (0, 0, 1); for a vertex without faces, the direction of its point; for a
 vertex whose faces' normals cancel, 0. No result is NaN.)");

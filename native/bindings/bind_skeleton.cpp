@@ -45,13 +45,10 @@ Transform checked_root(const py::object& value) {
 Array relative_to_root(const Skeleton& skeleton, const ArrayLike& any_transforms,
                        const OptionalArrayLike& any_root) {
     const auto [transforms, root] = promoted<2>({"transforms", "root"}, {any_transforms, any_root});
-    return with_representation(transforms, "transforms", "bones", [&]<class Row>(Row) {
-        return with_element(transforms, "transforms", "", [&]<class T>(T) {
-            using Transform = typename Row::template Transform<T>;
-            auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
-            root_relative<Transform>(skeleton, checked_root<Transform, T>(root), bones, bones);
-            return as_array(bones);
-        });
+    return with_layout(transforms, "transforms", "bones", [&]<class Transform, class T>() {
+        auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
+        root_relative<Transform>(skeleton, checked_root<Transform, T>(root), bones, bones);
+        return as_array(bones);
     });
 }
 
@@ -65,15 +62,12 @@ Array branch_updated(const Skeleton& skeleton, const ArrayLike& any_relative, co
         index != std::floor(index)) {
         fail("bone", wanted, std::string(py::str(bone)));
     }
-    return with_representation(transforms, "transforms", "bones", [&]<class Row>(Row) {
-        return with_element(transforms, "transforms", "", [&]<class T>(T) {
-            using Transform = typename Row::template Transform<T>;
-            const auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
-            auto result = checked_bones<Transform, T>(skeleton, relative, "root_relative");
-            update_branch<Transform>(skeleton, checked_root<Transform, T>(root), bones,
-                                     static_cast<std::size_t>(index), result);
-            return as_array(result);
-        });
+    return with_layout(transforms, "transforms", "bones", [&]<class Transform, class T>() {
+        const auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
+        auto result = checked_bones<Transform, T>(skeleton, relative, "root_relative");
+        update_branch<Transform>(skeleton, checked_root<Transform, T>(root), bones,
+                                 static_cast<std::size_t>(index), result);
+        return as_array(result);
     });
 }
 
@@ -106,15 +100,12 @@ py::object at_all(const Skeleton& skeleton, const Input<T>& at, Run run) {
 Frames interpolate(const Skeleton& skeleton, const ArrayLike& any_a, const ArrayLike& any_b,
                    const ArrayLike& any_t, const Method& method) {
     const auto [a, b, t] = promoted<3>({"a", "b", "t"}, {any_a, any_b, any_t});
-    return with_method(method, [&]<class Method>(Method) {
-        const char* shape = Item<typename Method::template Transform<double>>::kShape;
-        return with_element(a, "a", shape, [&]<class T>(T) -> py::object {
-            using Transform = typename Method::template Transform<T>;
-            const auto from = checked_bones<Transform, T>(skeleton, a, "a");
-            const auto onto = checked_bones<Transform, T>(skeleton, b, "b");
-            return at_all<Transform, T>(skeleton, checked_input<T, T>(t, "t"), [&](T part, auto bones) {
-                return interpolate_keyframes<Method, T>(skeleton, from, onto, part, bones);
-            });
+    return with_method(method, a, "a", [&]<class Method, class T>() {
+        using Transform = typename Method::template Transform<T>;
+        const auto from = checked_bones<Transform, T>(skeleton, a, "a");
+        const auto onto = checked_bones<Transform, T>(skeleton, b, "b");
+        return at_all<Transform, T>(skeleton, checked_input<T, T>(t, "t"), [&](T part, auto bones) {
+            return interpolate_keyframes<Method, T>(skeleton, from, onto, part, bones);
         });
     });
 }
@@ -139,14 +130,11 @@ Frames spline(const Skeleton& skeleton, const ArrayLike& any_keyframes, const Ar
               const ArrayLike& any_time, const Method& method) {
     const auto [keyframes, times, time] =
         promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
-    return with_method(method, [&]<class Method>(Method) {
-        const char* shape = Item<typename Method::template Transform<double>>::kShape;
-        return with_element(keyframes, "keyframes", shape, [&]<class T>(T) {
-            return spline_bones<typename Method::template Transform<T>, T>(
-                skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
-                    return spline_keyframes<Method, T>(skeleton, keys, at, now, bones);
-                });
-        });
+    return with_method(method, keyframes, "keyframes", [&]<class Method, class T>() {
+        return spline_bones<typename Method::template Transform<T>, T>(
+            skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
+                return spline_keyframes<Method, T>(skeleton, keys, at, now, bones);
+            });
     });
 }
 
@@ -154,14 +142,11 @@ Frames spline_vector_form(const Skeleton& skeleton, const ArrayLike& any_keyfram
                           const ArrayLike& any_times, const ArrayLike& any_time) {
     const auto [keyframes, times, time] =
         promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
-    return with_representation(keyframes, "keyframes", "keys, bones", [&]<class Row>(Row) {
-        return with_element(keyframes, "keyframes", "", [&]<class T>(T) {
-            using Transform = typename Row::template Transform<T>;
-            return spline_bones<Transform, T>(
-                skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
-                    return spline_keyframes_vector<Transform, T>(skeleton, keys, at, now, bones);
-                });
-        });
+    return with_layout(keyframes, "keyframes", "keys, bones", [&]<class Transform, class T>() {
+        return spline_bones<Transform, T>(
+            skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
+                return spline_keyframes_vector<Transform, T>(skeleton, keys, at, now, bones);
+            });
     });
 }
 

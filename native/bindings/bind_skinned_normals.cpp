@@ -109,7 +109,7 @@ order of a face's vertices. Where the blend collapses the plane of a normal to a
             R"(The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
 
 points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.
-out: None, or float32 [frames, 3], written and returned. Must not overlap the points.
+out: must not overlap the points.
 
 The other arguments are those of deform().)");
 }

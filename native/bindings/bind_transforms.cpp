@@ -32,10 +32,8 @@ void bind_representation(py::module_& m) {
     def<Vec3, Scalar>(
         m, "from_axis_angle", {"axis", "angle"},
         [](const auto& axis, auto angle) { return from_axis_angle<X>(axis, angle); },
-        R"(The rotation by `angle` radians about `axis` through the origin.
-
-axis: [.., 3], of any length; length 0 gives the identity.
-angle: [..].)");
+        R"(The rotation by `angle` radians, [..], about `axis`, [.., 3], through the origin. The axis may have any
+length; 0 gives the identity.)");
     def<Mat3>(
         m, "from_rotation_matrix", {"rotation"},
         []<class T>(const Mat3<T>& rotation) {
@@ -44,9 +42,7 @@ angle: [..].)");
             }
             return from_rotation_matrix<X>(rotation);
         },
-        R"(The rotation by a matrix, [.., 3, 3].
-
-ValueError if it is no rotation to within 2e-3; sinew.affine accepts any matrix.)");
+        "The rotation by a matrix, [.., 3, 3]: a rotation to within 2e-3, or for sinew.affine any matrix.");
     def<Vec3>(
         m, "from_translation", {"translation"},
         [](const auto& translation) { return from_translation<X>(translation); },
@@ -56,12 +52,11 @@ ValueError if it is no rotation to within 2e-3; sinew.affine accepts any matrix.
         []<class T>(const Vec3<T>& axis, const Vec3<T>& moment, T angle, T translation) {
             return to<X>(Screw<T>{axis, moment, angle, translation});
         },
-        R"(The screw with a rotation by `angle` radians about a line and a translation along it; inverse of
-to_screw() (Daniilidis 1999, eq. 13).
+        R"(The rotation by `angle` radians about a line with a translation along it, both [..]; inverse of to_screw()
+(Daniilidis 1999, eq. 13).
 
-axis, moment: [.., 3], Pluecker coordinates of the line. Both are divided by the length of the axis,
-    and a component of the moment along it is ignored. An axis of length 0 gives the identity.
-angle, translation: [..]. For a pitch (translation per radian), use translation = pitch * angle.)");
+axis, moment: [.., 3], Pluecker coordinates of the line. Both are divided by the length of the axis, and a
+    component of the moment along it is ignored. An axis of length 0 gives the identity.)");
     def<Vec3, Vec3, Scalar, Scalar>(
         m, "from_screw_about", {"axis", "point", "angle", "translation"},
         [](const auto& axis, const auto& point, auto angle, auto translation) {
@@ -75,7 +70,7 @@ angle, translation: [..]. For a pitch (translation per radian), use translation 
             const auto screw = to_screw(a);
             return named<"Screw">(screw.axis, screw.moment, screw.angle, screw.translation, screw.pitch());
         },
-        R"(The screw of rigid `a` (Chasles 1830). ValueError if a matrix scales, shears or mirrors.
+        R"(The screw of rigid `a` (Chasles 1830).
 
 The angle is 0 to pi; at pi the axis has one of its two directions. The moment is point x axis. The pitch is
 translation / angle; it is infinite for a pure translation, for which the axis is its direction, angle and
@@ -89,10 +84,8 @@ moment are 0 and translation >= 0. The axis of the identity is z.)");
             check_rigid(a, "a");
             return to_twist(a);
         },
-        R"(The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, with an angle of 0 to pi.
-
-At 180 degrees both directions of the axis are logarithms, and the result has one of them. ValueError if a
-matrix scales, shears or mirrors.)");
+        R"(The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, with an angle of 0 to pi. At 180
+degrees it has one of the two directions of the axis.)");
     const auto def_conversion = [&](const char* name, auto f, const char* doc) {
         def<X>(m, name, {"a"}, f, doc);
     };
@@ -108,9 +101,7 @@ matrix scales, shears or mirrors.)");
                 check_rigid(a, "a");
                 return to<QuatVec>(a);
             },
-            R"(`a` in the layout of sinew.quat_vec, [.., 7]. `a` must be rigid, as normalized() makes it.
-
-ValueError if a matrix scales, shears or mirrors. The length of quaternions is not checked.)");
+            "Rigid `a` in the layout of sinew.quat_vec, [.., 7]. The length of quaternions is not checked.");
     }
     if constexpr (!std::is_same_v<X<double>, DualQuat<double>>) {
         def_conversion(
@@ -119,9 +110,7 @@ ValueError if a matrix scales, shears or mirrors. The length of quaternions is n
                 check_rigid(a, "a");
                 return to<DualQuat>(a);
             },
-            R"(`a` in the layout of sinew.dual_quat, [.., 8]. `a` must be rigid, as normalized() makes it.
-
-ValueError if a matrix scales, shears or mirrors. The length of quaternions is not checked.)");
+            "Rigid `a` in the layout of sinew.dual_quat, [.., 8]. The length of quaternions is not checked.");
     }
     def<X, X>(
         m, "compose", {"a", "b"}, [](const auto& a, const auto& b) { return a * b; },
@@ -136,16 +125,12 @@ model_from_rest.)");
             }
             return inverse(a);
         },
-        R"(The inverse of `a`; for a unit dual quaternion its conjugate.
-
-ValueError if the linear part of a matrix is singular.)");
+        "The inverse of `a`. ValueError if the linear part of a matrix is singular.");
     def<X>(
         m, "normalized", {"a"}, [](const auto& a) { return normalized(a); },
-        R"(The rigid transform nearest to `a`.
-
-A matrix's linear part becomes the nearest rotation (polar decomposition); if several are equally near, as for
-rank 0 or 1, one of them. The quaternion of a quaternion and vector is divided by its length; length 0 gives
-the identity. A dual quaternion is divided by its norm; a real part of 0 gives the identity.)");
+        R"(The rigid transform nearest to `a`. A matrix's linear part becomes the nearest rotation (polar
+decomposition), or one of several, as for rank 0 or 1. A quaternion is divided by its length, a dual quaternion
+by its norm; 0 gives the identity.)");
     def<X, Vec3>(
         m, "transform_point", {"a", "points"},
         [](const auto& a, const auto& point) { return transform_point(a, point); },
@@ -157,10 +142,8 @@ the identity. A dual quaternion is divided by its norm; a real part of 0 gives t
     def<X, Vec3>(
         m, "transform_normal", {"a", "normals"},
         [](const auto& a, const auto& normal) { return transform_normal(a, normal); },
-        R"(The unit normals, [.., 3], of surfaces after `a`; (0, 0, 0) gives (0, 0, 0).
-
-A matrix transforms normals by the inverse transpose of its linear part; if that flattens the surface to a
-line, the result is 0.)");
+        R"(The unit normals, [.., 3], of surfaces after `a`: by the inverse transpose of a matrix. 0 for 0, and for a
+surface that becomes a line.)");
     def<X, X>(
         m, "rigid_distance", {"a", "b"},
         [](const auto& a, const auto& b) {
@@ -169,11 +152,8 @@ line, the result is 0.)");
             const auto apart = rigid_distance(a, b);
             return named<"Distance">(apart.angle, apart.translation);
         },
-        R"(The distance of `b` from `a`, [..]: the angle of the rotation, 0 to pi, and the distance between the
-images of the origin.
-
-It is the same for compose(x, a) and compose(x, b) with rigid x. `a` and `b` must be rigid: ValueError if a
-matrix scales, shears or mirrors.)");
+        R"(The distance of rigid `b` from rigid `a`, [..]: the angle of the rotation, 0 to pi, and the distance
+between the images of the origin. It is the same for compose(x, a) and compose(x, b) with rigid x.)");
 }
 
 void bind_dual_quaternions(py::module_& m) {

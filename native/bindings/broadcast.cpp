@@ -3,14 +3,6 @@
 
 namespace sinew::bindings {
 
-std::string text_of(const Shape& shape) {
-    std::string text = "[";
-    for (std::size_t axis = 0; axis < shape.size(); ++axis) {
-        text += (axis > 0 ? ", " : "") + std::to_string(shape[axis]);
-    }
-    return text + "]";
-}
-
 bool is_double(const py::handle& value, const char* argument, const std::string& wanted) {
     if (py::isinstance<py::array>(value)) {
         const auto dtype = py::reinterpret_borrow<py::array>(value).dtype();
@@ -47,20 +39,6 @@ void promote(std::span<py::object> values, std::span<const char* const> argument
 
 py::object named_tuple(const char* name, const py::tuple& parts) {
     return py::module_::import("sinew._types").attr(name)(*parts);
-}
-
-double checked_number(const py::handle& value, const char* argument, const std::string& wanted) {
-    if (!PyFloat_Check(value.ptr()) && !PyLong_Check(value.ptr())) {
-        // float() would drop its imaginary part with only a warning.
-        const py::array array = as_array(value, argument);
-        if (array && array.dtype().kind() == 'c') fail(argument, wanted, describe(value));
-    }
-    const double number = PyFloat_AsDouble(value.ptr());
-    if (number == -1.0 && PyErr_Occurred() != nullptr) {
-        PyErr_Clear();
-        fail(argument, wanted, describe(value));
-    }
-    return number;
 }
 
 }  // namespace sinew::bindings

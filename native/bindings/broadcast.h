@@ -13,11 +13,6 @@
 
 namespace sinew::bindings {
 
-using Shape = std::vector<py::ssize_t>;
-
-/// The shape as text, such as "[2, 3]".
-std::string text_of(const Shape& shape);
-
 /// An argument as an array of items that consist of adjacent numbers of type T. `lead` are the axes before those
 /// of an item.
 template <class T>
@@ -53,9 +48,6 @@ std::array<py::object, N> promoted(const std::array<const char*, N>& arguments,
     promote(values, arguments);
     return values;
 }
-
-/// A number of Python or numpy. ValueError for anything else.
-double checked_number(const py::handle& value, const char* argument, const std::string& wanted);
 
 /// "float64 " or "float32 ".
 template <class T>
@@ -122,8 +114,8 @@ Shape broadcast(std::span<Input<T>> inputs) {
             const py::ssize_t length = input.lead[axis];
             py::ssize_t& shared = common[missing + axis];
             if (length != shared && length != 1 && shared != 1) {
-                fail(input.argument, "leading axes that broadcast with " + text_of(before),
-                     text_of(input.lead));
+                fail(input.argument, "leading axes that broadcast with " + shape_text(before),
+                     shape_text(input.lead));
             }
             if (shared == 1) shared = length;
         }

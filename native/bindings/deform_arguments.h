@@ -62,6 +62,9 @@ struct DeformArguments {
     DeformArguments(const DeformArguments&) = delete;
 };
 
+/// ValueError for fewer bones.
+void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_t least);
+
 /// The arguments of Deformer.deform, except for `out`.
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
                                const py::object& threads, const py::object& bones_from_model,

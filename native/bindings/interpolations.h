@@ -26,31 +26,39 @@ py::object with_method(const py::object& method, F f) {
     return result;
 }
 
-template <template <class> class X>
-struct Representation {
-    template <class T>
-    using Transform = X<T>;
-};
-
-/// Calls f(Representation{}) for the representation whose items end with the last axis of `value`: 4, 7 or 8.
-template <class F>
-py::object with_representation(const py::object& value, const char* argument, const std::string& axes, F f) {
-    const std::string wanted = "float32 or float64 [" + axes + ", 4, 4], [" + axes + ", 3, 4], [" + axes +
-                               ", 7] or [" + axes + ", 8]";
-    is_double(value, argument, wanted);
-    const auto array = py::reinterpret_borrow<py::array>(value);
-    const py::ssize_t last = array.ndim() > 0 ? array.shape(array.ndim() - 1) : 0;
-    if (last == 4) return f(Representation<Affine>{});
-    if (last == 7) return f(Representation<QuatVec>{});
-    if (last == 8) return f(Representation<DualQuat>{});
-    fail(argument, wanted, describe(value));
-}
-
 /// Calls f(T{}) with the element type of `value`.
 template <class F>
 py::object with_element(const py::object& value, const char* argument, const char* shape, F f) {
     if (is_double(value, argument, std::string("float32 or float64 ") + shape)) return f(double{});
     return f(float{});
+}
+
+/// Calls f.operator()<Method, T>() for an interpolation and the element type of `value`, which is in its layout.
+template <class F>
+py::object with_method(const py::object& method, const py::object& value, const char* argument, F f) {
+    return with_method(method, [&]<class Method>(Method) {
+        const char* const shape = Item<typename Method::template Transform<double>>::kShape;
+        return with_element(value, argument, shape,
+                            [&]<class T>(T) { return f.template operator()<Method, T>(); });
+    });
+}
+
+/// Calls f.operator()<Transform, T>() for the layout whose items end with the last axis of `value`, 4, 7 or 8, and
+/// its element type.
+template <class F>
+py::object with_layout(const py::object& value, const char* argument, const std::string& axes, F f) {
+    const std::string wanted = "float32 or float64 [" + axes + ", 4, 4], [" + axes + ", 3, 4], [" + axes +
+                               ", 7] or [" + axes + ", 8]";
+    const bool is_of_double = is_double(value, argument, wanted);
+    const auto call = [&]<class T>(T) -> py::object {
+        const auto array = py::reinterpret_borrow<py::array>(value);
+        const py::ssize_t last = array.ndim() > 0 ? array.shape(array.ndim() - 1) : 0;
+        if (last == 4) return f.template operator()<Affine<T>, T>();
+        if (last == 7) return f.template operator()<QuatVec<T>, T>();
+        if (last == 8) return f.template operator()<DualQuat<T>, T>();
+        fail(argument, wanted, describe(value));
+    };
+    return is_of_double ? call(double{}) : call(float{});
 }
 
 /// Copies the items of an input, all of whose axes belong to the list.
@@ -68,7 +76,7 @@ std::vector<Value> items_of(const Input<T>& input) {
 template <class T>
 std::vector<T> checked_times(const py::object& value, py::ssize_t keys) {
     const auto input = checked_input<T, T>(value, "times");
-    const std::string wanted = element_name<T>() + text_of({keys}) + ", one for each key";
+    const std::string wanted = element_name<T>() + shape_text({keys}) + ", one for each key";
     if (input.lead.size() != 1 || input.lead[0] != keys) fail("times", wanted, describe(value));
     for (py::ssize_t i = 1; i < keys; ++i) {
         if (input.data[i] < input.data[i - 1]) {

@@ -89,31 +89,23 @@ struct Item<Affine<T>> : Numbers<T, 4, 4> {
 };
 
 template <class T>
-Quat<T> read_quat(const T* from) {
-    return Quat<T>(from[0], from[1], from[2], from[3]);
-}
-
-template <class T>
-void write_quat(const Quat<T>& q, T* to) {
-    to[0] = q.w;
-    to[1] = q.x;
-    to[2] = q.y;
-    to[3] = q.z;
-}
-
-template <class T>
 struct Item<Quat<T>> : Numbers<T, 4> {
     static constexpr const char* kShape = "[.., 4]";
-    static Quat<T> read(const T* from) { return read_quat(from); }
-    static void write(const Quat<T>& q, T* to) { write_quat(q, to); }
+    static Quat<T> read(const T* from) { return Quat<T>(from[0], from[1], from[2], from[3]); }
+    static void write(const Quat<T>& q, T* to) {
+        to[0] = q.w;
+        Item<Vec3<T>>::write(vector_part(q), to + 1);
+    }
 };
 
 template <class T>
 struct Item<QuatVec<T>> : Numbers<T, 7> {
     static constexpr const char* kShape = "[.., 7]";
-    static QuatVec<T> read(const T* from) { return {read_quat(from), Item<Vec3<T>>::read(from + 4)}; }
+    static QuatVec<T> read(const T* from) {
+        return {Item<Quat<T>>::read(from), Item<Vec3<T>>::read(from + 4)};
+    }
     static void write(const QuatVec<T>& a, T* to) {
-        write_quat(a.rotation, to);
+        Item<Quat<T>>::write(a.rotation, to);
         Item<Vec3<T>>::write(a.translation, to + 4);
     }
 };
@@ -121,10 +113,12 @@ struct Item<QuatVec<T>> : Numbers<T, 7> {
 template <class T>
 struct Item<DualQuat<T>> : Numbers<T, 8> {
     static constexpr const char* kShape = "[.., 8]";
-    static DualQuat<T> read(const T* from) { return {read_quat(from), read_quat(from + 4)}; }
+    static DualQuat<T> read(const T* from) {
+        return {Item<Quat<T>>::read(from), Item<Quat<T>>::read(from + 4)};
+    }
     static void write(const DualQuat<T>& a, T* to) {
-        write_quat(a.real, to);
-        write_quat(a.dual, to + 4);
+        Item<Quat<T>>::write(a.real, to);
+        Item<Quat<T>>::write(a.dual, to + 4);
     }
 };
 

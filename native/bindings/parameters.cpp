@@ -11,19 +11,12 @@ namespace sinew::bindings {
 namespace {
 
 std::string wanted_of(const Parameter& parameter) {
+    if (parameter.kind == ParameterKind::choice) return one_of(parameter.choices);
+    if (parameter.kind == ParameterKind::boolean) return "True or False";
     std::ostringstream text;
-    switch (parameter.kind) {
-        case ParameterKind::choice:
-            for (std::size_t i = 0; i < parameter.choices.size(); ++i) {
-                text << (i == 0 ? "one of " : ", ") << parameter.choices[i];
-            }
-            break;
-        case ParameterKind::boolean: text << "True or False"; break;
-        default:
-            text << (parameter.kind == ParameterKind::integer ? "a whole number" : "a finite number");
-            if (std::isfinite(parameter.minimum)) text << " from " << parameter.minimum;
-            if (std::isfinite(parameter.maximum)) text << " to " << parameter.maximum;
-    }
+    text << (parameter.kind == ParameterKind::integer ? "a whole number" : "a finite number");
+    if (std::isfinite(parameter.minimum)) text << " from " << parameter.minimum;
+    if (std::isfinite(parameter.maximum)) text << " to " << parameter.maximum;
     return text.str();
 }
 
@@ -47,13 +40,8 @@ double value_of(const py::handle& value, const Parameter& parameter) {
         PyErr_Clear();
         return none;
     }
-    switch (parameter.kind) {
-        case ParameterKind::boolean: return number == 0.0 || number == 1.0 ? number : none;
-        case ParameterKind::integer:
-            if (std::trunc(number) != number) return none;
-            break;
-        default: break;
-    }
+    if (parameter.kind == ParameterKind::boolean) return number == 0.0 || number == 1.0 ? number : none;
+    if (parameter.kind == ParameterKind::integer && std::trunc(number) != number) return none;
     const bool is_valid = std::isfinite(number) && parameter.minimum <= number && number <= parameter.maximum;
     return is_valid ? number : none;
 }

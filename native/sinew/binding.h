@@ -31,7 +31,7 @@ struct VertexData {
     bool is_linear = false;
 };
 
-/// The data that a Binding is constructed from. No reference is kept.
+/// The data that a Binding is constructed from.
 struct BindData {
     std::span<const Vec3<float>> rest_points;  // [vertices] model space
     // [vertices + 1] first influence of each vertex, then the end
@@ -76,9 +76,8 @@ struct PackedBinding;
 /// it costs next to nothing.
 class SINEW_EXPORT Binding {
 public:
-    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: sizes that
-    /// do not match or exceed the limits above; offsets that do not rise from 0 to the number of influences; a
-    /// negative bone; a negative weight; a value that is not finite; vertex data of a method that keeps none.
+    /// Throws also for sizes that exceed the limits above, offsets that do not rise from 0 to the number of
+    /// influences, a negative bone or weight, and vertex data of a method that keeps none.
     explicit Binding(const BindData& data);
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;

@@ -2,17 +2,17 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <span>
 #include <vector>
 
+#include "sinew/base/owned.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 namespace sinew {
 
-/// What a BulgeLimit is constructed from besides a Binding. No reference is kept.
+/// What a BulgeLimit is constructed from besides a Binding.
 struct BulgeLimitData {
     std::span<const BoneSegment<float>> segments;  // [bones] at rest, in the space of posed_from_rest
     Affine<float> bones_from_model{};              // maps rest points to that space; invertible
@@ -22,25 +22,15 @@ struct BulgeLimitData {
 /// How to limit one frame.
 struct BulgeLimitOptions {
     BulgeForm form = BulgeForm::continuous;
-    float strength = 1.0f;    // clamped to 0 to 1; NaN: 1
-    std::size_t threads = 0;  // at most; 0: as many as useful
+    float strength = 1.0f;  // clamped to 0 to 1; NaN: 1
+    std::size_t threads = 0;
 };
 
-/// The stage `bulge_limit` (stages/bulge_limit/bulge_limit.h) for one mesh, applied after Deformer::deform(). A constructed
-/// object is valid; apply() can not fail and does not allocate. Concurrent calls on one object wait for each
-/// other. A moved-from object can only be assigned to or destroyed.
+/// The stage `bulge_limit` (stages/bulge_limit/bulge_limit.h) for one mesh, applied after Deformer::deform().
 class SINEW_EXPORT BulgeLimit {
 public:
-    /// Shares the memory of `binding`.
-    ///
-    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: fewer segments
-    /// than bones; values that are not finite; a singular transform; weights that are NaN; a number of weights
-    /// other than that of vertices.
+    /// Shares the memory of `binding`. Throws also for fewer segments than bones, and for a singular transform.
     BulgeLimit(const Binding& binding, const BulgeLimitData& data);
-
-    BulgeLimit(BulgeLimit&&) noexcept;
-    BulgeLimit& operator=(BulgeLimit&&) noexcept;
-    ~BulgeLimit();
 
     /// Sets other rest points [vertices], or the same points with another bones_from_model. Takes about as long
     /// as apply(). Throws as the constructor does; the object is then unchanged.
@@ -56,9 +46,7 @@ public:
     /// points           [vertices] deformed, model space
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
     ///
-    /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. The
-    /// result does not depend on the number of threads. Returns false, and writes nothing, if the number of points is
-    /// wrong.
+    /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit.
     [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                              const BulgeLimitOptions& options = {}) const noexcept;
 
@@ -73,7 +61,7 @@ public:
 
 private:
     struct State;
-    std::unique_ptr<State> state_;
+    Owned<State> state_;
 };
 
 }  // namespace sinew

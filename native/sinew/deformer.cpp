@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <string>
 #include <vector>
 
 #include "sinew/lanes/palette_store.h"
@@ -29,15 +27,7 @@ ParameterValues valid_values(const MethodInfo& method, std::span<const double> g
 }
 
 MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, std::size_t vertex_count) {
-    if (weights.size() != vertex_count) {
-        fail("mix", "a weight for each of the " + std::to_string(vertex_count) + " vertices",
-             std::to_string(weights.size()));
-    }
-    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
-        if (std::isnan(weights[vertex])) {
-            fail("mix", "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
-        }
-    }
+    check_weights("mix", weights, vertex_count);
     return pack_mix(mesh, weights);
 }
 
@@ -48,11 +38,11 @@ struct Deformer::State {
           const MethodInfo& method, const std::optional<MixData>& mix);
 
     /// With its own binding, whose rest points it moves out of `packed`, since nothing else reads them.
-    static std::unique_ptr<State> alone(const BindData& data, const MethodInfo& method,
-                                        const std::optional<MixData>& mix) {
+    static Owned<State> alone(const BindData& data, const MethodInfo& method,
+                              const std::optional<MixData>& mix) {
         const auto packed = std::make_shared<PackedBinding>(data);
         std::vector<Lanes<float>> rest_points = std::move(packed->mesh.rest_points);
-        return std::make_unique<State>(packed, std::move(rest_points), method, mix);
+        return make_owned<State>(packed, std::move(rest_points), method, mix);
     }
 
     [[nodiscard]] std::span<const Kernel* const> kernels_in_use() const {
@@ -91,14 +81,10 @@ Deformer::State::State(std::shared_ptr<const PackedBinding> from, std::vector<La
       palettes(kernels_in_use(), packed->mesh.used_bones.size(), sets.bones.size()) {}
 
 Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
-    : state_(std::make_unique<State>(binding.packed(), std::vector<Lanes<float>>{}, method, mix)) {}
+    : state_(make_owned<State>(binding.packed(), std::vector<Lanes<float>>{}, method, mix)) {}
 
 Deformer::Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix)
     : state_(State::alone(data, method, mix)) {}
-
-Deformer::Deformer(Deformer&&) noexcept = default;
-Deformer& Deformer::operator=(Deformer&&) noexcept = default;
-Deformer::~Deformer() = default;
 
 const MethodInfo& Deformer::method() const noexcept { return kMethods[state_->methods[0]]; }
 const MethodInfo* Deformer::mixed_method() const noexcept {
@@ -121,10 +107,7 @@ std::vector<float> Deformer::mix_weights() const {
 
 void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
     const PackedMesh& mesh = state_->packed->mesh;
-    if (rest_points.size() != vertex_count()) {
-        fail("rest_points", std::to_string(vertex_count()) + " points", std::to_string(rest_points.size()));
-    }
-    check_points(rest_points);
+    check_points(rest_points, vertex_count());
     const PaletteStore::Writing writing(state_->palettes);
     state_->own_rest_points.resize(kPointRows * mesh.blocks.size());
     pack_points(mesh, rest_points, state_->own_rest_points);
@@ -141,31 +124,27 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     const std::array<ParameterValues, 2> parameters{
         valid_values(kMethods[state_->methods[0]], options.parameters),
         valid_values(kMethods[state_->methods[1]], options.mix_parameters)};
-    struct Work {
-        const State& state;
-        std::array<Frame, 2> frames;
-    } work{*state_, {}};
+    std::array<Frame, 2> frames;
     for (std::size_t k = 0; k < state_->kernels_in_use().size(); ++k) {
         const Kernel& kernel = *state_->kernels[k];
         Palette& palette = reading.palette(k);
         fill_palette(kernel, packed.mesh.pairs, bones, palette);
-        work.frames[k] = {&packed.mesh,
-                          state_->rest_points().data(),
-                          packed.vertex_data[state_->methods[k]].get(),
-                          kernel.set_rows != nullptr ? state_->sets.entries.data() : packed.mesh.bones.data(),
-                          &palette,
-                          rows.spaces(),
-                          parameters[k].data(),
-                          points.data()};
+        frames[k] = {&packed.mesh,
+                     state_->rest_points().data(),
+                     packed.vertex_data[state_->methods[k]].get(),
+                     kernel.set_rows != nullptr ? state_->sets.entries.data() : packed.mesh.bones.data(),
+                     &palette,
+                     rows.spaces(),
+                     parameters[k].data(),
+                     points.data()};
     }
-    parallel_for_blocks(packed.mesh, points.size(), options.threads,
-                        [&work](std::size_t begin, std::size_t end) {
-                            if (work.state.mix) {
-                                deform_mix(work.state.kernels, work.frames, *work.state.mix, begin, end);
-                            } else {
-                                work.state.kernels[0]->deform[target_in_use()](work.frames[0], begin, end);
-                            }
-                        });
+    parallel_for_blocks(packed.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {
+        if (state_->mix) {
+            deform_mix(state_->kernels, frames, *state_->mix, begin, end);
+        } else {
+            state_->kernels[0]->deform[target_in_use()](frames[0], begin, end);
+        }
+    });
     return true;
 }
 

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "sinew/base/owned.h"
 #include "sinew/binding.h"
 
 namespace sinew {
@@ -16,7 +16,6 @@ struct DeformOptions {
     /// Maps model space to the space of `posed_from_rest` and the rest bones, in which the bones are blended; the
     /// result is mapped back. Invertible.
     Affine<float> bones_from_model{};
-    /// At most; 0: as many as useful. Everything that takes a number of threads takes it so.
     std::size_t threads = 0;
     /// [at most MethodInfo::parameters] values of the method's parameters, made valid by valid_value(). Missing
     /// ones have their defaults.
@@ -31,23 +30,16 @@ struct MixData {
     std::span<const float> weights;  // [vertices] clamped to 0 to 1; not NaN; copied
 };
 
-/// A binding and a method, ready to deform any pose. A constructed object is valid; deform() can not fail, and
-/// allocates only when more threads than ever before deform at once. Any number of threads may use one Deformer at
-/// once; if more than 16 deform at the same time, some wait. A child that is forked meanwhile can use it, too, but must
-/// set rest points again that were being set. A moved-from object can only be assigned to or destroyed.
+/// A binding and a method, ready to deform any pose. Any number of threads may use one Deformer at once; if more than
+/// 16 deform at the same time, some wait. It allocates when more of them than ever before deform at once. A child that
+/// is forked meanwhile can use it, too, but must set rest points again that were being set.
 class SINEW_EXPORT Deformer {
 public:
-    /// Throws std::invalid_argument as Binding does, and for a method that is not in the list of methods, a method
-    /// whose vertex data the binding lacks, a number of mix weights other than that of vertices, and a mix weight
-    /// that is NaN.
+    /// Throws also for a method that is not in the list of methods, and one whose vertex data the binding lacks.
     Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix = {});
 
     /// Constructs its own binding, which no other deformer shares.
     Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix = {});
-
-    Deformer(Deformer&&) noexcept;
-    Deformer& operator=(Deformer&&) noexcept;
-    ~Deformer();
 
     [[nodiscard]] const MethodInfo& method() const noexcept;
     /// The method that the stage `mix` adds, or null.
@@ -63,9 +55,8 @@ public:
     /// The weights of the stage `mix` [vertices], clamped; empty without it.
     [[nodiscard]] std::vector<float> mix_weights() const;
 
-    /// Sets the rest points [vertices] of this deformer alone, such as when shape keys change. Throws
-    /// std::invalid_argument for another number of points or a value that is not finite. Readers and this writer
-    /// wait for each other, so each result of a concurrent deform() has either the old points or the new ones.
+    /// Sets the rest points [vertices] of this deformer alone, such as when shape keys change. Throws as the
+    /// constructor does. Each result of a concurrent deform() has either the old points or the new ones.
     /// The first call on a deformer of a shared binding copies the mesh; later calls do not allocate.
     void set_rest_points(std::span<const Vec3<float>> rest_points);
 
@@ -74,14 +65,13 @@ public:
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
     /// points           [vertices]
     ///
-    /// A vertex without influences, or with only weights of 0, stays at rest. The result does not depend on the
-    /// number of threads. Returns false, and writes nothing, if the number of points is wrong.
+    /// A vertex without influences, or with only weights of 0, stays at rest.
     [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                               std::span<Vec3<float>> points) const noexcept;
 
 private:
     struct State;
-    std::unique_ptr<State> state_;
+    Owned<State> state_;
 };
 
 }  // namespace sinew

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <span>
 #include <vector>
 
+#include "sinew/base/owned.h"
 #include "sinew/export.h"
 #include "sinew/mesh/mesh_topology.h"
 #include "sinew/transform/quat.h"
@@ -44,22 +44,15 @@ struct DeltaMushSettings {
 };
 
 /// The stage `delta_mush` (Mancewicz et al. 2014), as Blender's Corrective Smooth with the rest source Original
-/// Coordinates: see stages/delta_mush/delta_mush.h. Takes any polygons, edges without faces, and edges of many faces. A
-/// constructed object is valid; apply() can not fail and does not allocate. Concurrent calls on one object wait
-/// for each other. A moved-from object can only be assigned to or destroyed.
+/// Coordinates: see stages/delta_mush/delta_mush.h. Takes any polygons, edges without faces, and edges of many faces.
 class SINEW_EXPORT DeltaMush {
 public:
-    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: sizes that
-    /// do not match or exceed the limits; indices of vertices that do not exist; an edge of a face that is not
-    /// among the edges; values that are not finite or out of range. No reference is kept.
+    /// Throws also for sizes that exceed the limits, indices of vertices that do not exist, an edge of a face that is
+    /// not among the edges, and values out of range.
     ///
     /// rest_points  [vertices] the mesh without shape keys
     DeltaMush(const MeshTopology& topology, std::span<const Vec3<float>> rest_points,
               const DeltaMushSettings& settings);
-
-    DeltaMush(DeltaMush&&) noexcept;
-    DeltaMush& operator=(DeltaMush&&) noexcept;
-    ~DeltaMush();
 
     /// Sets other rest points or settings for the same faces and edges. Takes about as long as apply(). Throws as
     /// the constructor does; the object is then unchanged.
@@ -71,12 +64,10 @@ public:
 
     /// Smooths the points in place and adds their details back.
     ///
-    /// points   [vertices] in the space of the rest points
-    /// scale    how much of the details is added back; 1: all
-    /// threads  at most; 0: as many as useful
+    /// points  [vertices] in the space of the rest points
+    /// scale   how much of the details is added back; 1: all
     ///
-    /// A vertex without faces is smoothed and has no details. The result does not depend on the number of
-    /// threads. Returns false, and writes nothing, if the number of points is wrong.
+    /// A vertex without faces is smoothed and has no details.
     [[nodiscard]] bool apply(std::span<Vec3<float>> points, float scale = 1.0f,
                              std::size_t threads = 0) const noexcept;
 
@@ -92,7 +83,7 @@ public:
 
 private:
     struct State;
-    std::unique_ptr<State> state_;
+    Owned<State> state_;
 };
 
 }  // namespace sinew

@@ -3,9 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 
+#include "sinew/base/owned.h"
 #include "sinew/export.h"
 #include "sinew/mesh/mesh_topology.h"
 #include "sinew/transform/quat.h"
@@ -48,19 +48,11 @@ struct Sharpness {
 ///
 /// Any polygons, also with less than three corners. A vertex that a face names twice has both of the corners.
 /// Points that are not finite, and faces beyond the range of floats, give finite normals, which may be 0.
-///
-/// A constructed object is valid; compute() can not fail and does not allocate. Concurrent calls on one object
-/// wait for each other. A moved-from object can only be assigned to or destroyed.
 class SINEW_EXPORT Normals {
 public:
-    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: sizes that
-    /// do not match or exceed the limits; indices of vertices that do not exist. If something is sharp or custom,
-    /// `topology.edges` is read and must contain every edge of each face. No reference is kept.
+    /// Throws also for sizes that exceed the limits, and indices of vertices that do not exist. If something is sharp
+    /// or custom, `topology.edges` is read and must contain every edge of each face.
     Normals(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness = {});
-
-    Normals(Normals&&) noexcept;
-    Normals& operator=(Normals&&) noexcept;
-    ~Normals();
 
     /// The simplest domain that describes the mesh's shading, as Blender's Mesh.normals_domain: `face` if every
     /// face is flat or every edge sharp, else `corner` if anything is sharp, else `vertex`. With custom normals
@@ -76,10 +68,8 @@ public:
     /// domain   of the result; any, independently of domain()
     /// points   [vertices]
     /// normals  [count(domain)] must not overlap `points`
-    /// threads  at most; 0: as many as useful
     ///
-    /// The result depends neither on the number of threads nor on the instruction set. Returns false, and writes
-    /// nothing, if a size is wrong.
+    /// The result does not depend on the instruction set.
     [[nodiscard]] bool compute(NormalDomain domain, std::span<const Vec3<float>> points,
                                std::span<Vec3<float>> normals, std::size_t threads = 0) const noexcept;
 
@@ -93,7 +83,7 @@ public:
 
 private:
     struct State;
-    std::unique_ptr<State> state_;
+    Owned<State> state_;
 };
 
 }  // namespace sinew

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 
@@ -32,20 +31,11 @@ struct RestFrames {
 ///
 /// M is computed from the images of four points, which the deformer's kernels move. It has 22 correct bits where
 /// the mesh moves by its own size.
-///
-/// A constructed object is valid; deforming can not fail and does not allocate. Concurrent calls on one object
-/// wait for each other. A moved-from object can only be assigned to or destroyed.
 class SINEW_EXPORT SkinnedNormals {
 public:
-    /// Throws std::invalid_argument as Deformer does, and, naming the field, for: a number of frames other than
-    /// that of vertices if `vertices` is empty; numbers of tangents or vertices other than that of normals;
-    /// indices of vertices that do not exist; values that are not finite.
+    /// Throws as Deformer does, and for indices of vertices that do not exist.
     SkinnedNormals(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
                    const std::optional<MixData>& mix = {});
-
-    SkinnedNormals(SkinnedNormals&&) noexcept;
-    SkinnedNormals& operator=(SkinnedNormals&&) noexcept;
-    ~SkinnedNormals();
 
     [[nodiscard]] std::size_t frame_count() const noexcept;
     [[nodiscard]] bool has_tangents() const noexcept;
@@ -59,8 +49,7 @@ public:
     /// normals          [frames]
     /// tangents         [frames], or empty; empty if there are none at rest
     ///
-    /// A vertex without influences keeps its normals and tangents. The result does not depend on the number of
-    /// threads. Returns false, and writes nothing, if a size is wrong.
+    /// A vertex without influences keeps its normals and tangents.
     [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                               std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
                               std::span<Vec3<float>> tangents = {}) const noexcept;
@@ -70,15 +59,13 @@ public:
     ///
     /// points   [vertices] as written by deform() or by the Deformer
     /// normals  [frames]
-    ///
-    /// Returns false, and writes nothing, if a size is wrong.
     [[nodiscard]] bool deform_normals(std::span<const Affine<float>> posed_from_rest,
                                       const DeformOptions& options, std::span<const Vec3<float>> points,
                                       std::span<Vec3<float>> normals) const noexcept;
 
 private:
     struct State;
-    std::unique_ptr<State> state_;
+    Owned<State> state_;
 };
 
 }  // namespace sinew

@@ -3,17 +3,17 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
+#include "sinew/base/owned.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
 
 namespace sinew {
 
-/// What a TwistSpread is constructed from besides a Binding. No reference is kept.
+/// What a TwistSpread is constructed from besides a Binding.
 struct TwistSpreadData {
     std::span<const TwistBone> twists;  // each bone at most once, a bone before those that it carries
     // [bones] at rest, Y along the bone, in the space of posed_from_rest
@@ -33,24 +33,16 @@ struct TwistSpreadOptions {
     std::span<const TwistChannels<float>> channels{};
     TwistBlend blend = TwistBlend::linear;      // of the method that made the points
     TwistBlend mix_blend = TwistBlend::linear;  // of the second, where `mix` is above 0
-    std::size_t threads = 0;                    // at most; 0: as many as useful
+    std::size_t threads = 0;
 };
 
 /// The stage `twist_spread` (stages/twist_spread/twist_spread.h) for one mesh, applied after Deformer::deform() and
-/// before all other stages. A constructed object is valid; apply() can not fail and does not allocate. Concurrent
-/// calls on one object wait for each other. A moved-from object can only be assigned to or destroyed.
+/// before all other stages.
 class SINEW_EXPORT TwistSpread {
 public:
-    /// Shares the memory of `binding`.
-    ///
-    /// Throws std::invalid_argument that names the field, what was expected and what was given, for: bones beyond
-    /// rest_bones; a bone that is listed twice; values that are not finite; rest bones without a Y axis; a singular
-    /// transform; weights that are NaN; a number of weights or parents that does not match.
+    /// Shares the memory of `binding`. Throws also for bones beyond rest_bones, a bone that is listed twice, rest bones
+    /// without a Y axis, and a singular transform.
     TwistSpread(const Binding& binding, const TwistSpreadData& data);
-
-    TwistSpread(TwistSpread&&) noexcept;
-    TwistSpread& operator=(TwistSpread&&) noexcept;
-    ~TwistSpread();
 
     /// Sets other rest points [vertices], or the same points with another bones_from_model. Throws as the
     /// constructor does; the object is then unchanged.
@@ -71,8 +63,7 @@ public:
     /// points           [vertices] deformed, model space
     /// posed_from_rest  [bones] finite; missing bones stay at rest
     ///
-    /// Where no bone is twisted, no bit changes. The result does not depend on the number of threads. Returns false,
-    /// and writes nothing, if the number of points, amounts, curves or channels is wrong.
+    /// Where no bone is twisted, no bit changes.
     [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                              const TwistSpreadOptions& options = {}) const noexcept;
 
@@ -90,7 +81,7 @@ public:
 
 private:
     struct State;
-    std::unique_ptr<State> state_;
+    Owned<State> state_;
 };
 
 }  // namespace sinew

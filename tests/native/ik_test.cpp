@@ -11,6 +11,31 @@
 namespace sinew {
 namespace {
 
+/// By how many radians a rotation exceeds the limits of its bone: the largest excess of the three angles. A
+/// locked axis must be at 0. If both x and z are limited, they are bounded by the ellipse through the four
+/// limits, whose semi-axes are sines of half angles; an ellipse without width or height becomes a rectangle.
+double limit_violation(const BoneLimits& limits, const Quat<double>& q) noexcept {
+    const Vec3<double> angles = swing_twist_angles(q);
+    double beyond = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        const AxisLimit& limit = limits[static_cast<std::size_t>(i)];
+        if (limit.is_locked) {
+            beyond = std::max(beyond, std::abs(angles[i]));
+        } else if (limit.is_limited) {
+            beyond = std::max({beyond, limit.min - angles[i], angles[i] - limit.max});
+        }
+    }
+    const AxisLimit& x = limits[0];
+    const AxisLimit& z = limits[2];
+    if (x.is_locked || z.is_locked || !x.is_limited || !z.is_limited) return beyond;
+    const double half_x = std::sin(0.5 * (angles.x < 0.0 ? x.min : x.max));
+    const double half_z = std::sin(0.5 * (angles.z < 0.0 ? z.min : z.max));
+    if (std::abs(half_x) < 1e-9 || std::abs(half_z) < 1e-9) return beyond;
+    const double radius = std::hypot(std::sin(0.5 * angles.x) / half_x, std::sin(0.5 * angles.z) / half_z);
+    if (radius <= 1.0) return beyond;
+    return std::max(beyond, (1.0 - 1.0 / radius) * std::hypot(angles.x, angles.z));
+}
+
 using test::Random;
 
 constexpr IkMethod kDls = IkMethod::damped_least_squares;

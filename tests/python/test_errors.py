@@ -282,7 +282,7 @@ ROWS = [
     ("bind", "factor", 1.1, "a number from 0 to 1", "1.100000"),
     ("bind", "smooth_type", "other", "one of simple, length_weighted", "'other'"),
     ("bind", "pin_boundary", 2, "True or False", "int"),
-    ("bind", "weights", [1.0], "none, or one for each of the 4 vertices", "1"),
+    ("bind", "weights", [1.0], "a weight for each of the 4 vertices", "1"),
     ("mush", "points", SHEET[:-1], "float32 [4, 3]", "float32 [3, 3]"),
     ("mush", "out", np.zeros((4, 3)), "writable C-contiguous float32 [4, 3]", "float64 [4, 3]"),
     ("Normals", "vertex_count", -1, "an integer from 0 to 536870911", "-1"),

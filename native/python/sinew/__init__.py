@@ -7,8 +7,8 @@ inverse kinematics.
 
 An array is described by its type and, in brackets, the length of each axis: float32 [vertices, 3]. An
 argument may be anything that numpy converts to such an array without losing more than digits of fractions:
-lists, float64, int64 whose numbers fit. Constructors copy their arguments. An array `out` is written in
-place: it is C-contiguous, aligned, and never converted.
+lists, float64, int64 whose numbers fit. Constructors copy their arguments. An array `out` has the shape of
+the result, is written in place and returned; it is C-contiguous, aligned, and never converted.
 
 [..] are any number of leading axes, which broadcast as in numpy. A number may be used instead of an array of
 numbers [..]. Functions of such arrays return float32 if all arrays in a call are float32 or smaller, float64

@@ -286,7 +286,7 @@ std::size_t hardware_threads() noexcept {
     return threads;
 }
 
-void parallel_for(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
+void run_chunks(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
     if (count == 0) return;
     chunk = std::clamp<std::size_t>(chunk, 1, count);
     const std::size_t useful =

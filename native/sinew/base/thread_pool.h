@@ -19,6 +19,10 @@ namespace sinew {
     return threads > 0 ? threads : std::min(hardware_threads(), 1 + count / worth_a_thread);
 }
 
+/// parallel_for(), for which this is compiled.
+SINEW_EXPORT void run_chunks(std::size_t count, std::size_t threads,
+                             const std::function<void(std::size_t, std::size_t)>& work, std::size_t chunk);
+
 /// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), on at most `threads` threads
 /// including the caller, and returns when all are done. 0 threads: one for each chunk, as far as the machine has
 /// them. Only one call at a time uses the pool; a call made meanwhile runs on its caller's thread alone.
@@ -28,9 +32,11 @@ namespace sinew {
 ///
 /// The threads are Sinew's own, started at first use and kept. Blender's scheduler is not involved, so a frame
 /// handler can wait here without blocking one of Blender's workers.
-SINEW_EXPORT void parallel_for(std::size_t count, std::size_t threads,
-                               const std::function<void(std::size_t, std::size_t)>& work,
-                               std::size_t chunk = 4096);
+template <class Work>
+void parallel_for(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk = 4096) {
+    // Of a reference, so that it does not allocate.
+    run_chunks(count, threads, std::cref(work), chunk);
+}
 
 /// Ends the threads of parallel_for() and returns when they are gone. The next call of parallel_for() starts new
 /// ones. A host that unloads the library must call this first. Waits for calls in progress. Must not be called

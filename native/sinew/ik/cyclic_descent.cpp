@@ -112,8 +112,8 @@ int IkSolver::State::solve_by_descent(const IkOptions& options) noexcept {
     double error = cost();
     int bends = 0;
     int iteration = 0;
-    keep(best_rotations, best_coordinates);
-    double best = error;
+    keep(best);
+    double least = error;
     while (iteration < options.iterations && !is_reached(options.tolerance)) {
         ++iteration;
         for (std::size_t bone = bones.size(); bone-- > 0;) {
@@ -121,9 +121,9 @@ int IkSolver::State::solve_by_descent(const IkOptions& options) noexcept {
         }
         update();
         const double found = cost();
-        if (found < best) {
-            best = found;
-            keep(best_rotations, best_coordinates);
+        if (found < least) {
+            least = found;
+            keep(best);
         }
         if (!(error - found > kStagnation * found)) {
             if (bends == kMaxBends || is_reached(options.tolerance)) break;
@@ -135,7 +135,7 @@ int IkSolver::State::solve_by_descent(const IkOptions& options) noexcept {
         }
         error = found;
     }
-    if (best < cost()) restore(best_rotations, best_coordinates);
+    if (least < cost()) restore(best);
     return iteration;
 }
 

@@ -281,11 +281,11 @@ void IkSolver::State::bend() noexcept {
 
 int IkSolver::State::solve_by_least_squares(const IkOptions& options) noexcept {
     double error = cost();
-    double best = error;
+    double least = error;
     double damping = 1.0;
     int bends = 0;
     int iteration = 0;
-    keep(best_rotations, best_coordinates);
+    keep(best);
     while (iteration < options.iterations && !is_reached(options.tolerance)) {
         ++iteration;
         update_axes();
@@ -296,15 +296,15 @@ int IkSolver::State::solve_by_least_squares(const IkOptions& options) noexcept {
         for (const double of_axis : gradient) slope += of_axis * of_axis;
         if (bends < kMaxBends && slope < kLevel * error) {
             ++bends;
-            if (error < best) {
-                best = error;
-                keep(best_rotations, best_coordinates);
+            if (error < least) {
+                least = error;
+                keep(best);
             }
             bend();
             error = cost();
             continue;
         }
-        keep(kept_rotations, kept_coordinates);
+        keep(kept);
         double found = error;
         bool is_better = false;
         for (int attempt = 0; attempt < 12 && !is_better; ++attempt) {
@@ -317,7 +317,7 @@ int IkSolver::State::solve_by_least_squares(const IkOptions& options) noexcept {
             is_better = found < error;
             if (!is_better) {
                 damping = 8.0 * std::max(damping, 1e-3);
-                restore(kept_rotations, kept_coordinates);
+                restore(kept);
             }
         }
         if (!is_better) break;
@@ -326,7 +326,7 @@ int IkSolver::State::solve_by_least_squares(const IkOptions& options) noexcept {
         error = found;
         if (gain < kStagnation * found) break;
     }
-    if (bends > 0 && best < error) restore(best_rotations, best_coordinates);
+    if (bends > 0 && least < error) restore(best);
     return iteration;
 }
 

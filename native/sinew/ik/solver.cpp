@@ -179,11 +179,10 @@ IkSolver::State::State(const Skeleton& skeleton, std::span<const BoneLimits> lim
     residual.resize(row_count);
     solution.resize(row_count);
     normal.resize(row_count * row_count);
-    factor.resize(row_count * row_count);
-    for (auto* rotations : {&first_rotations, &kept_rotations, &best_rotations})
-        rotations->resize(bone_count);
-    for (auto* coordinates : {&first_coordinates, &kept_coordinates, &best_coordinates})
-        coordinates->resize(bone_count);
+    for (Pose* pose : {&first, &kept, &best}) {
+        pose->rotations.resize(bone_count);
+        pose->coordinates.resize(bone_count);
+    }
 }
 
 void IkSolver::State::start(const IkProblem& problem, std::span<const Quat<double>> rotations) noexcept {
@@ -354,29 +353,24 @@ bool IkSolver::State::is_reached(double tolerance) const noexcept {
     return true;
 }
 
-void IkSolver::State::keep(std::vector<Quat<double>>& rotations,
-                           std::vector<Vec3<double>>& coordinates) const noexcept {
+void IkSolver::State::keep(Pose& pose) const noexcept {
     for (std::size_t i = 0; i < bones.size(); ++i) {
-        rotations[i] = bones[i].rotation;
-        coordinates[i] = bones[i].coordinates;
+        pose.rotations[i] = bones[i].rotation;
+        pose.coordinates[i] = bones[i].coordinates;
     }
 }
 
-void IkSolver::State::restore(const std::vector<Quat<double>>& rotations,
-                              const std::vector<Vec3<double>>& coordinates) noexcept {
+void IkSolver::State::restore(const Pose& pose) noexcept {
     for (std::size_t i = 0; i < bones.size(); ++i) {
-        bones[i].rotation = rotations[i];
-        bones[i].coordinates = coordinates[i];
+        bones[i].rotation = pose.rotations[i];
+        bones[i].coordinates = pose.coordinates[i];
     }
     update();
 }
 
 IkSolver::IkSolver(const Skeleton& skeleton, std::span<const BoneLimits> limits,
                    std::span<const IkEffector> effectors)
-    : state_(std::make_unique<State>(skeleton, limits, effectors)) {}
-IkSolver::~IkSolver() = default;
-IkSolver::IkSolver(IkSolver&& other) noexcept = default;
-IkSolver& IkSolver::operator=(IkSolver&& other) noexcept = default;
+    : state_(make_owned<State>(skeleton, limits, effectors)) {}
 
 std::size_t IkSolver::bone_count() const noexcept { return state_->bones.size(); }
 std::size_t IkSolver::effector_count() const noexcept { return state_->tips.size(); }
@@ -399,11 +393,11 @@ std::optional<IkResult> IkSolver::solve(const IkProblem& problem, std::span<Quat
     result.iterations = run();
     if (!state.is_reached(options.tolerance) && state.can_rotate_to_goal()) {
         const double error = state.cost();
-        state.keep(state.first_rotations, state.first_coordinates);
+        state.keep(state.first);
         state.start(problem, rotations);
         state.rotate_to_goal();
         result.iterations += run();
-        if (!(state.cost() < error)) state.restore(state.first_rotations, state.first_coordinates);
+        if (!(state.cost() < error)) state.restore(state.first);
     }
     for (std::size_t i = 0; i < rotations.size(); ++i) {
         const Quat<double>& q = state.bones[i].rotation;

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string_view>
 
+#include "sinew/base/owned.h"
 #include "sinew/export.h"
 #include "sinew/ik/rotation_limits.h"
 #include "sinew/skeleton/skeleton.h"
@@ -81,8 +81,7 @@ struct IkResult {
 ///
 /// Each solve starts from the given rotations and depends on nothing else, so the same input gives the same bits.
 /// The signs of quaternions do not matter. A rigid motion of root, goals and poles does not change the result.
-/// Computed in double, with lengths divided by that of the longest chain. Does not allocate after construction.
-/// Concurrent calls on one solver wait for each other.
+/// Computed in double, with lengths divided by that of the longest chain.
 ///
 /// Input without a solution, or with several:
 /// - If a chain with one effector whose rotation does not count can not reach its goal, the goal is first moved
@@ -105,13 +104,10 @@ public:
     /// limits     [bones]; empty: none
     /// effectors  at least one
     ///
-    /// Throws std::invalid_argument for an effector whose bone does not exist, weights that are negative or not
-    /// finite, limits that are not -pi <= min <= 0 <= max <= pi, and stiffness outside of 0 to below 1.
+    /// Throws also for an effector whose bone does not exist, negative weights, limits that are not -pi <= min <= 0 <=
+    /// max <= pi, and stiffness outside of 0 to below 1.
     IkSolver(const Skeleton& skeleton, std::span<const BoneLimits> limits,
              std::span<const IkEffector> effectors);
-    ~IkSolver();
-    IkSolver(IkSolver&& other) noexcept;
-    IkSolver& operator=(IkSolver&& other) noexcept;
 
     [[nodiscard]] std::size_t bone_count() const noexcept;
     [[nodiscard]] std::size_t effector_count() const noexcept;
@@ -125,7 +121,7 @@ public:
 
 private:
     struct State;
-    std::unique_ptr<State> state_;
+    Owned<State> state_;
 };
 
 }  // namespace sinew

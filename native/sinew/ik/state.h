@@ -89,10 +89,15 @@ struct IkSolver::State {
 
     // For damped least squares.
     std::vector<double> columns;  ///< [axes, rows]
-    std::vector<double> residual, solution, normal, factor;
+    std::vector<double> residual, solution, normal;
     std::vector<double> steps, gradient;
-    std::vector<Quat<double>> first_rotations, kept_rotations, best_rotations;
-    std::vector<Vec3<double>> first_coordinates, kept_coordinates, best_coordinates;
+
+    /// Of all bones.
+    struct Pose {
+        std::vector<Quat<double>> rotations;
+        std::vector<Vec3<double>> coordinates;
+    };
+    Pose first, kept, best;
 
     void start(const IkProblem& problem, std::span<const Quat<double>> rotations) noexcept;
     /// Updates the poses of all bones that move, and the tips.
@@ -104,9 +109,8 @@ struct IkSolver::State {
     /// Half the sum of squared errors.
     [[nodiscard]] double cost() const noexcept;
     [[nodiscard]] bool is_reached(double tolerance) const noexcept;
-    void keep(std::vector<Quat<double>>& rotations, std::vector<Vec3<double>>& coordinates) const noexcept;
-    void restore(const std::vector<Quat<double>>& rotations,
-                 const std::vector<Vec3<double>>& coordinates) noexcept;
+    void keep(Pose& pose) const noexcept;
+    void restore(const Pose& pose) noexcept;
 
     int solve_by_least_squares(const IkOptions& options) noexcept;
     int solve_by_descent(const IkOptions& options) noexcept;

@@ -54,28 +54,29 @@ template <class T>
     return {heaviest, *largest, T(1) / sum, true};
 }
 
-template <class T>
-[[nodiscard]] bool is_finite(const Quat<T>& q) noexcept {
-    using std::isfinite;
-    return isfinite(q.w) && is_finite(vector_part(q));
-}
-
-template <class T>
-[[nodiscard]] bool is_finite(const QuatVec<T>& a) noexcept {
-    return is_finite(a.rotation) && is_finite(a.translation);
-}
-
-template <class T>
-[[nodiscard]] bool is_finite(const DualQuat<T>& a) noexcept {
-    return is_finite(a.real) && is_finite(a.dual);
-}
-
 /// `result` if it is finite; `heaviest`, not defined, if it or an intermediate number overflowed.
 template <class Transform>
 [[nodiscard]] Blended<Transform> finite_or(const Blended<Transform>& result,
                                            const Transform& heaviest) noexcept {
     return is_finite(result.transform) ? result : Blended<Transform>{heaviest, false};
 }
+
+/// The quaternion whose sign is free: with the other sign it is the same transform.
+template <class T>
+[[nodiscard]] const Quat<T>& quaternion_of(const QuatVec<T>& a) noexcept {
+    return a.rotation;
+}
+
+template <class T>
+[[nodiscard]] const Quat<T>& quaternion_of(const DualQuat<T>& a) noexcept {
+    return a.real;
+}
+
+/// Not matrices, and not points, which a spline treats as transforms without rotation.
+template <class Transform>
+concept HasQuaternion = requires(const Transform& a) {
+    quaternion_of(a);
+};
 
 /// Whichever of `q` and -q is in the hemisphere of `pivot`.
 template <class T>
@@ -93,36 +94,24 @@ template <class T>
     return glm::dot(a.real, pivot.real) < T(0) ? -a : a;
 }
 
-/// Matrices have no free sign.
-template <class T>
-[[nodiscard]] Affine<T> aligned(const Affine<T>& a, const Affine<T>& /*pivot*/) noexcept {
+template <class Transform>
+[[nodiscard]] Transform aligned(const Transform& a, const Transform& /*pivot*/) noexcept {
     return a;
 }
 
 /// The tolerance for rotations: how far squared lengths may be from 1, and products of axes from 0.
 inline constexpr double kUnitTolerance = 2e-3;
 
-/// Whether the rotation has unit length, up to the rounding of a few operations.
-template <class T>
-[[nodiscard]] bool has_unit_rotation(const Quat<T>& q) noexcept {
-    using std::abs;
-    return abs(glm::dot(q, q) - T(1)) <= T(kUnitTolerance);
-}
-
-template <class T>
-[[nodiscard]] bool has_unit_rotation(const QuatVec<T>& a) noexcept {
-    return has_unit_rotation(a.rotation);
-}
-
-template <class T>
-[[nodiscard]] bool has_unit_rotation(const DualQuat<T>& a) noexcept {
-    return has_unit_rotation(a.real);
-}
-
-/// Matrices are blended as they are.
-template <class T>
-[[nodiscard]] bool has_unit_rotation(const Affine<T>& /*a*/) noexcept {
-    return true;
+/// Whether the quaternion, if there is one, has unit length, up to the rounding of a few operations.
+template <class Transform>
+[[nodiscard]] bool has_unit_rotation(const Transform& a) noexcept {
+    if constexpr (HasQuaternion<Transform>) {
+        using std::abs;
+        using T = decltype(glm::dot(quaternion_of(a), quaternion_of(a)));
+        return abs(glm::dot(quaternion_of(a), quaternion_of(a)) - T(1)) <= T(kUnitTolerance);
+    } else {
+        return true;
+    }
 }
 
 /// Whether the linear part of `a` is a rotation, without scale, shear or mirroring, up to the rounding of a few
@@ -139,28 +128,15 @@ template <class T>
     return is_orthonormal && glm::determinant(a.linear) > T(0);
 }
 
-template <class T>
-[[nodiscard]] T rotation_dot(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
-    return glm::dot(a.rotation, b.rotation);
-}
-
-template <class T>
-[[nodiscard]] T rotation_dot(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
-    return glm::dot(a.real, b.real);
-}
-
-/// Matrices have no hemispheres.
-template <class T>
-[[nodiscard]] T rotation_dot(const Affine<T>& /*a*/, const Affine<T>& /*b*/) noexcept {
-    return T(1);
-}
-
 /// Whether another order of the terms would give other signs and thus another blend: several terms have the
 /// largest weight, and the remaining terms are in different hemispheres relative to them.
-template <class Transform, class T>
+template <HasQuaternion Transform, class T>
 [[nodiscard]] bool order_decides(std::span<const Transform> transforms, std::span<const T> weights,
                                  const Shares<T>& share) noexcept {
     using std::abs;
+    const auto rotation_dot = [](const Transform& a, const Transform& b) {
+        return glm::dot(quaternion_of(a), quaternion_of(b));
+    };
     const Transform& pivot = transforms[share.heaviest];
     // Rotations within 90 degrees of the pivot are within 180 degrees of each other, so all choose the same
     // signs.
@@ -184,77 +160,45 @@ template <class Transform, class T>
 }
 
 /// Whether rounding decides which way from `a` to `b` is the shorter one: they are 180 degrees apart.
-template <class T>
-[[nodiscard]] bool is_half_turn_apart(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
-    return is_half_turn_apart(a.rotation, b.rotation);
+template <class Transform>
+[[nodiscard]] bool is_half_turn_apart(const Transform& a, const Transform& b) noexcept {
+    if constexpr (HasQuaternion<Transform>) {
+        return is_half_turn_apart(quaternion_of(a), quaternion_of(b));
+    } else {
+        return false;
+    }
 }
 
-template <class T>
-[[nodiscard]] bool is_half_turn_apart(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
-    return is_half_turn_apart(a.real, b.real);
+/// Whether `t` decides nothing, or there is one shorter way from `a` to `b`; with rotations of unit length.
+template <class Transform, class T>
+[[nodiscard]] bool has_shorter_way(const Transform& a, const Transform& b, T t) noexcept {
+    return (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && has_unit_rotation(a) &&
+           has_unit_rotation(b);
 }
 
-/// Matrices have no signs to choose.
-template <class T>
-[[nodiscard]] bool is_half_turn_apart(const Affine<T>& /*a*/, const Affine<T>& /*b*/) noexcept {
-    return false;
+/// The product of all components with `factor`.
+template <template <class> class Transform, class T>
+[[nodiscard]] Transform<T> scaled(T factor, const Transform<T>& a) noexcept {
+    const auto& [first, second] = a;
+    return {factor * first, factor * second};
 }
-
-template <class T>
-[[nodiscard]] Affine<T> scaled(T factor, const Affine<T>& a) noexcept {
-    return {factor * a.linear, factor * a.translation};
-}
-
-template <class T>
-[[nodiscard]] QuatVec<T> scaled(T factor, const QuatVec<T>& a) noexcept {
-    return {factor * a.rotation, factor * a.translation};
-}
-
-template <class T>
-[[nodiscard]] DualQuat<T> scaled(T factor, const DualQuat<T>& a) noexcept {
-    return {factor * a.real, factor * a.dual};
-}
-
-template <class T>
-[[nodiscard]] Affine<T> sum(const Affine<T>& a, const Affine<T>& b) noexcept {
-    return {a.linear + b.linear, a.translation + b.translation};
-}
-
-template <class T>
-[[nodiscard]] QuatVec<T> sum(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
-    return {a.rotation + b.rotation, a.translation + b.translation};
-}
-
-template <class T>
-[[nodiscard]] DualQuat<T> sum(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
-    return a + b;
-}
-
-// For splines, a point is treated as a vector without rotation.
 
 template <class T>
 [[nodiscard]] Vec3<T> scaled(T factor, const Vec3<T>& a) noexcept {
     return factor * a;
 }
 
+/// The sums of the components.
+template <template <class> class Transform, class T>
+[[nodiscard]] Transform<T> sum(const Transform<T>& a, const Transform<T>& b) noexcept {
+    const auto& [a1, a2] = a;
+    const auto& [b1, b2] = b;
+    return {a1 + b1, a2 + b2};
+}
+
 template <class T>
 [[nodiscard]] Vec3<T> sum(const Vec3<T>& a, const Vec3<T>& b) noexcept {
     return a + b;
-}
-
-template <class T>
-[[nodiscard]] Vec3<T> aligned(const Vec3<T>& a, const Vec3<T>& /*pivot*/) noexcept {
-    return a;
-}
-
-template <class T>
-[[nodiscard]] bool is_half_turn_apart(const Vec3<T>& /*a*/, const Vec3<T>& /*b*/) noexcept {
-    return false;
-}
-
-template <class T>
-[[nodiscard]] bool has_unit_rotation(const Vec3<T>& /*a*/) noexcept {
-    return true;
 }
 
 /// The componentwise weighted sum (of 12, 7 or 8 components), with weights times `scale`; not a rigid transform
@@ -282,7 +226,7 @@ template <Signs signs, class Transform, class T>
             total.transform = sum(total.transform, scaled(weight, transforms[i]));
         }
     }
-    if constexpr (signs == Signs::kToHeaviest) {
+    if constexpr (signs == Signs::kToHeaviest && HasQuaternion<Transform>) {
         if (order_decides(transforms, weights, share)) total.is_defined = false;
     }
     return total;

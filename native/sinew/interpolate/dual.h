@@ -25,10 +25,9 @@ struct Sclerp {
     template <class T>
     [[nodiscard]] static Blended<DualQuat<T>> between(const DualQuat<T>& a, const DualQuat<T>& b,
                                                       T t) noexcept {
-        const bool is_defined = (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && is_near(t) &&
-                                has_unit_rotation(a) && has_unit_rotation(b);
-        return finite_or<DualQuat<T>>({normalized(a * power(inverse(a) * b, t)), is_defined},
-                                      T(1) - t < t ? b : a);
+        return finite_or<DualQuat<T>>(
+            {normalized(a * power(inverse(a) * b, t)), has_shorter_way(a, b, t) && is_near(t)},
+            T(1) - t < t ? b : a);
     }
 
     template <Signs signs = Signs::kToHeaviest, class T>

@@ -15,51 +15,40 @@ namespace sinew {
 // transform. Of equal weights the first counts as the heaviest; if another order would then give another blend
 // (order_decides()), the result is not defined.
 
-// The linear methods compute their result from a weighted sum with
-//   finished(total, heaviest)    `total` has weights of sum 1, and is defined where its signs are
-
-/// blend() of `a` and `b`, with `b` in the hemisphere of `a`. Has no loops, and takes a quarter of the time.
-template <class Method, class Transform, class T>
-[[nodiscard]] Blended<Transform> blend_of_two(const Transform& a, const Transform& b, T t) noexcept {
-    const T s = T(1) - t;
-    const Transform onto = aligned(b, a);
-    const Transform& heaviest = s < t ? onto : a;
-    // Weights that nearly cancel, as in shares().
-    if (!(T(1) > T(kDegenerateBlend) * (s < t ? t : s))) return {heaviest, false};
-    const bool is_defined =
-        (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && has_unit_rotation(a) && has_unit_rotation(b);
-    return finite_or(Method::template finished<T>({sum(scaled(s, a), scaled(t, onto)), is_defined}, heaviest),
-                     heaviest);
-}
-
-/// blend() for methods that compute their result from a weighted sum.
-template <class Method, Signs signs, class Transform, class T>
-[[nodiscard]] Blended<Transform> blend_of_many(std::span<const Transform> transforms,
-                                               std::span<const T> weights) noexcept {
-    const Shares<T> share = shares(weights);
-    const Transform& heaviest = transforms[share.heaviest];
-    if (!share.is_defined) return {heaviest, false};
-    return finite_or(Method::template finished<T>(weighted_sum<signs>(transforms, weights, share), heaviest),
-                     heaviest);
-}
-
-/// The componentwise sum of the matrices. Not rigid between different rotations, and flat between opposite ones
-/// (Smith 2013, section 3.5.2). Matrices have no sign, so there is no shortest path to choose; always defined.
-struct MatrixLinear {
-    static constexpr std::string_view name = "matrix_linear";
+/// The methods that compute their result from a weighted sum, with
+///   finished(total, heaviest)    `total` has weights of sum 1, and is defined where its signs are
+template <class Method, template <class> class Of>
+struct Linear {
     template <class T>
-    using Transform = Affine<T>;
+    using Transform = Of<T>;
 
+    /// blend() of `a` and `b`, with `b` in the hemisphere of `a`. Has no loops, and takes a quarter of the time.
     template <class T>
-    [[nodiscard]] static Blended<Affine<T>> between(const Affine<T>& a, const Affine<T>& b, T t) noexcept {
-        return blend_of_two<MatrixLinear>(a, b, t);
+    [[nodiscard]] static Blended<Of<T>> between(const Of<T>& a, const Of<T>& b, T t) noexcept {
+        const T s = T(1) - t;
+        const Of<T> onto = aligned(b, a);
+        const Of<T>& heaviest = s < t ? onto : a;
+        // Weights that nearly cancel, as in shares().
+        if (!(T(1) > T(kDegenerateBlend) * (s < t ? t : s))) return {heaviest, false};
+        const Blended<Of<T>> total{sum(scaled(s, a), scaled(t, onto)), has_shorter_way(a, b, t)};
+        return finite_or(Method::finished(total, heaviest), heaviest);
     }
 
     template <Signs signs = Signs::kToHeaviest, class T>
-    [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
-                                                  std::span<const T> weights) noexcept {
-        return blend_of_many<MatrixLinear, signs>(transforms, weights);
+    [[nodiscard]] static Blended<Of<T>> blend(std::span<const Of<T>> transforms,
+                                              std::span<const T> weights) noexcept {
+        const Shares<T> share = shares(weights);
+        const Of<T>& heaviest = transforms[share.heaviest];
+        if (!share.is_defined) return {heaviest, false};
+        return finite_or(Method::finished(weighted_sum<signs>(transforms, weights, share), heaviest),
+                         heaviest);
     }
+};
+
+/// The componentwise sum of the matrices. Not rigid between different rotations, and flat between opposite ones
+/// (Smith 2013, section 3.5.2). Matrices have no sign, so there is no shortest path to choose; always defined.
+struct MatrixLinear : Linear<MatrixLinear, Affine> {
+    static constexpr std::string_view name = "matrix_linear";
 
     template <class T>
     [[nodiscard]] static Blended<Affine<T>> finished(const Blended<Affine<T>>& total,
@@ -74,21 +63,8 @@ struct MatrixLinear {
 ///
 /// Not defined if several rotations are equally near (180 degrees at equal weights): the linear part is then that
 /// of the heaviest transform.
-struct MatrixPolar {
+struct MatrixPolar : Linear<MatrixPolar, Affine> {
     static constexpr std::string_view name = "matrix_polar";
-    template <class T>
-    using Transform = Affine<T>;
-
-    template <class T>
-    [[nodiscard]] static Blended<Affine<T>> between(const Affine<T>& a, const Affine<T>& b, T t) noexcept {
-        return blend_of_two<MatrixPolar>(a, b, t);
-    }
-
-    template <Signs signs = Signs::kToHeaviest, class T>
-    [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
-                                                  std::span<const T> weights) noexcept {
-        return blend_of_many<MatrixPolar, signs>(transforms, weights);
-    }
 
     template <class T>
     [[nodiscard]] static Blended<Affine<T>> finished(const Blended<Affine<T>>& total,
@@ -105,21 +81,8 @@ struct MatrixPolar {
 ///
 /// Not defined if a rotation is 180 degrees from the heaviest (its sign as given then decides), or if the sum
 /// cancels: the rotation is then that of the heaviest.
-struct QvNlerp {
+struct QvNlerp : Linear<QvNlerp, QuatVec> {
     static constexpr std::string_view name = "qv_nlerp";
-    template <class T>
-    using Transform = QuatVec<T>;
-
-    template <class T>
-    [[nodiscard]] static Blended<QuatVec<T>> between(const QuatVec<T>& a, const QuatVec<T>& b, T t) noexcept {
-        return blend_of_two<QvNlerp>(a, b, t);
-    }
-
-    template <Signs signs = Signs::kToHeaviest, class T>
-    [[nodiscard]] static Blended<QuatVec<T>> blend(std::span<const QuatVec<T>> transforms,
-                                                   std::span<const T> weights) noexcept {
-        return blend_of_many<QvNlerp, signs>(transforms, weights);
-    }
 
     template <class T>
     [[nodiscard]] static Blended<QuatVec<T>> finished(const Blended<QuatVec<T>>& total,
@@ -138,22 +101,8 @@ struct QvNlerp {
 ///
 /// Not defined if a rotation is 180 degrees from the heaviest (its sign as given then decides), or if the sum of
 /// the real parts cancels: the result is then the heaviest.
-struct Dlb {
+struct Dlb : Linear<Dlb, DualQuat> {
     static constexpr std::string_view name = "dlb";
-    template <class T>
-    using Transform = DualQuat<T>;
-
-    template <class T>
-    [[nodiscard]] static Blended<DualQuat<T>> between(const DualQuat<T>& a, const DualQuat<T>& b,
-                                                      T t) noexcept {
-        return blend_of_two<Dlb>(a, b, t);
-    }
-
-    template <Signs signs = Signs::kToHeaviest, class T>
-    [[nodiscard]] static Blended<DualQuat<T>> blend(std::span<const DualQuat<T>> transforms,
-                                                    std::span<const T> weights) noexcept {
-        return blend_of_many<Dlb, signs>(transforms, weights);
-    }
 
     template <class T>
     [[nodiscard]] static Blended<DualQuat<T>> finished(const Blended<DualQuat<T>>& total,

@@ -46,7 +46,7 @@ struct MatrixLog {
             if (is_half_turn && weight != T(1)) is_defined = false;
             total = total + weight * to_twist(rigid);
         }
-        return finite_or<Affine<T>>({to_affine(total), is_defined}, transforms[share.heaviest]);
+        return finite_or<Affine<T>>({to_affine(to_quat_vec(total)), is_defined}, transforms[share.heaviest]);
     }
 };
 

@@ -48,11 +48,9 @@ struct QvSlerp {
 
     template <class T>
     [[nodiscard]] static Blended<QuatVec<T>> between(const QuatVec<T>& a, const QuatVec<T>& b, T t) noexcept {
-        const bool is_defined = (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && is_near(t) &&
-                                has_unit_rotation(a) && has_unit_rotation(b);
         return finite_or<QuatVec<T>>({{slerp(a.rotation, aligned(b.rotation, a.rotation), t),
                                        (T(1) - t) * a.translation + t * b.translation},
-                                      is_defined},
+                                      has_shorter_way(a, b, t) && is_near(t)},
                                      T(1) - t < t ? b : a);
     }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Motions of bones, with one bone in each lane. Compiled once for each instruction set.
+// Motions of bones, with one bone in each lane, and their rows in a palette. Compiled once for each instruction set.
 #if defined(SINEW_LANES_BONES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_LANES_BONES_INL_H_
 #undef SINEW_LANES_BONES_INL_H_
@@ -9,12 +9,38 @@
 
 #include <algorithm>
 
-#include "sinew/lanes/blend-inl.h"
+#include "sinew/lanes/lanes-inl.h"
 #include "sinew/transform/split_scale.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
+
+/// Numbers in a bone's row, unless its method has more: two Float4.
+inline constexpr std::size_t kRow = 8;
+
+/// The largest number of them in any method.
+inline constexpr std::size_t kMaxRow = 16;
+
+/// A weighted sum of rows.
+template <class D, std::size_t kNumbers = kRow>
+struct Sum {
+    Vec<D> value[kNumbers];
+};
+
+template <std::size_t kNumbers = kRow>
+HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
+    return palette.bones[kNumbers / 4 * static_cast<std::size_t>(bone)].value.data();
+}
+
+/// Computes the displacement of `rest` by the scale of `bone`. Returns false if the bone has no scale.
+template <class D>
+HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest, Points<D>& by) {
+    const auto index = static_cast<std::size_t>(bone);
+    if (!palette.any_scale || palette.has_scale[index] == 0) return false;
+    by = displacement(d, palette.scales[kDisplacementRows * index].value.data(), rest);
+    return true;
+}
 
 // In double, because digits that a bone loses are lost for each of its vertices.
 using BoneTag = hn::CappedTag<double, 8>;

@@ -24,7 +24,8 @@ template <bool kIsLast, class D4>
 HWY_INLINE Vec<D4> row(D4 d, const Vec3<float>* points, std::int32_t i) {
     const float* const from = &points[i].x;
     if constexpr (kIsLast) {
-        alignas(16) const float numbers[4] = {from[0], from[1], from[2], 0.0f};
+        alignas(16)
+            const float numbers[4] = {from[0], from[1], from[2], 0.0f};  // MaskedLoad asks for alignment
         return hn::Load(d, numbers);
     } else {
         return hn::LoadU(d, from);
@@ -50,7 +51,8 @@ HWY_INLINE Vec<D> rows(D d, const Point* points, const std::int32_t* vertices) {
 
 #endif
 
-/// One point for each lane. Whole points are read and then transposed, as gathering each number takes longer.
+/// One point for each lane. Whole points are read and then transposed: a gather of each number takes several times
+/// as long on some processors.
 template <bool kIsLast, class D, class Point>
 HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* vertices) {
 #if HWY_TARGET != HWY_SCALAR
@@ -69,8 +71,7 @@ HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* ver
                 hn::BitCast(d, hn::InterleaveLower(pairs, z01, z23))};
     }
 #endif
-    const auto* const numbers = reinterpret_cast<const float*>(points + *vertices);
-    return {hn::Set(d, numbers[0]), hn::Set(d, numbers[1]), hn::Set(d, numbers[2])};
+    return load_consecutive(d, reinterpret_cast<const float*>(points + *vertices));
 }
 
 }  // namespace HWY_NAMESPACE

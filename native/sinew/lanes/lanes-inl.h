@@ -179,6 +179,16 @@ HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
 #endif
 }
 
+HWY_INLINE Points<One> load_consecutive(One d, const float* from) {
+    return {hn::Set(d, from[0]), hn::Set(d, from[1]), hn::Set(d, from[2])};
+}
+
+HWY_INLINE void store_consecutive(One, const Points<One>& p, float* to) {
+    to[0] = hn::GetLane(p.x);
+    to[1] = hn::GetLane(p.y);
+    to[2] = hn::GetLane(p.z);
+}
+
 #if HWY_TARGET == HWY_AVX3
 
 /// x y z x y z ... of the points, in three vectors.
@@ -318,7 +328,7 @@ HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::si
     const Block& block = to.blocks[b];
     const std::int32_t* const vertices = to.vertices[b].lane.data() + lane;
     if constexpr (hn::MaxLanes(D()) == 1) {
-        to.points[*vertices] = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
+        store_consecutive(d, p, &to.points[*vertices].x);
     } else {
         if (block.consecutive) return store_consecutive(d, p, &to.points[block.output + lane].x);
 #if HWY_TARGET == HWY_AVX3

@@ -44,17 +44,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace sinew {
-namespace {
-
-using Mark = void(const BonePairs& pairs, Palette& palette);
-
-constexpr std::array<Mark*, kTargetCount> kTargets SINEW_TARGETS(mark_plain);
-
-}  // namespace
 
 void find_plain(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept {
+    static constexpr std::array<void (*)(const BonePairs&, Palette&), kTargetCount> kMark SINEW_TARGETS(
+        mark_plain);
     std::fill_n(palette.may_be_plain, bones, std::uint8_t{0});
-    kTargets[target_in_use()](pairs, palette);
+    kMark[target_in_use()](pairs, palette);
 }
 
 }  // namespace sinew

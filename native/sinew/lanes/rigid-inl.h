@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Deforms blocks with a rigid method. Compiled once for each instruction set.
+// Deforms blocks with a rigid method; agrees with methods/NAME/NAME.h. Compiled once for each instruction set.
+//
+// Rows of bones are summed as described at Palette; `finish` computes points from the sums. Blends can not cancel
+// here: every term is added in the hemisphere of the sum before it, so |sum|^2 >= the sum of squared weights >= 1
+// / influences, which reaches kDegenerateBlend only with 1e12 influences.
 #if defined(SINEW_LANES_RIGID_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_LANES_RIGID_INL_H_
 #undef SINEW_LANES_RIGID_INL_H_
@@ -53,6 +57,43 @@ concept CentreKernel = BlendedRows<Rows> && std::is_base_of_v<CentreRows, Rows> 
 /// What deform_rigid() takes. In an anonymous namespace, such a struct costs up to 21 % more instructions (GCC 12).
 template <class Rows>
 concept RigidKernel = SumKernel<Rows> || CentreKernel<Rows>;
+
+/// A weighted sum of rows, and the weighted sum of only their quaternions, which decides the hemisphere of the
+/// next term.
+template <class D, std::size_t kNumbers>
+struct Blend {
+    Sum<D, kNumbers> sum;
+    Vec<D> quaternion[4];
+};
+
+/// The base of rows that are added plainly.
+inline constexpr float kNoBase[kMaxRow] = {};
+
+/// Adds the weighted difference of `row` from `base`, with `row` in the hemisphere of the blend. `base` is the
+/// first row, or kNoBase. Returns the weight, negative where the row was negated.
+///
+/// The products and sums of the dot product are rounded one by one, in the order of blend_vertex(), because
+/// both must decide ties alike.
+template <class Rigid, class D>
+HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight,
+                               Blend<D, Rigid::kNumbers>& blend) {
+    Vec<D>* const quaternion = blend.quaternion;
+    const Vec<D> dot = hn::Add(
+        hn::Add(hn::Mul(hn::Set(d, row[0]), quaternion[0]), hn::Mul(hn::Set(d, row[2]), quaternion[2])),
+        hn::Add(hn::Mul(hn::Set(d, row[1]), quaternion[1]), hn::Mul(hn::Set(d, row[3]), quaternion[3])));
+    const auto away = hn::Lt(dot, hn::Zero(d));
+    const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
+    for (std::size_t i = 0; i < Rigid::kNumbers; ++i) {
+        const Vec<D> difference = hn::Set(d, row[i] - base[i]);
+        const Vec<D> negated = hn::Set(d, -row[i] - base[i]);
+        const Vec<D> by =
+            i < 4 * Rigid::kSignedFloat4s ? hn::IfThenElse(away, negated, difference) : difference;
+        blend.sum.value[i] = hn::MulAdd(weight, by, blend.sum.value[i]);
+    }
+    for (std::size_t i = 0; i < 4; ++i)
+        quaternion[i] = hn::MulAdd(signed_weight, hn::Set(d, row[i]), quaternion[i]);
+    return signed_weight;
+}
 
 template <class Rigid>
 inline constexpr std::size_t kRowFloat4s = Rigid::kNumbers / 4;
@@ -274,8 +315,14 @@ HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, cons
                                                const float* weights, const Points<D>& rest) {
     constexpr std::size_t kNumbers = Rigid::kNumbers;
     const Vec<D> first = hn::Load(d, first_weight);
-    const float* const base = plain ? kNoBase : row_of<kNumbers>(palette, bones[0]);
-    Blend<D, kNumbers> blend = begin_blend<kNumbers>(d, row_of<kNumbers>(palette, bones[0]), first, plain);
+    const float* const row = row_of<kNumbers>(palette, bones[0]);
+    const float* const base = plain ? kNoBase : row;
+    Blend<D, kNumbers> blend;
+    for (std::size_t i = 0; i < kNumbers; ++i) {
+        const Vec<D> number = hn::Set(d, row[i]);
+        blend.sum.value[i] = plain ? hn::Mul(first, number) : number;
+        if (i < 4) blend.quaternion[i] = hn::Mul(first, number);
+    }
     Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
     for (std::size_t k = 1; k < count; ++k) {
         const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));

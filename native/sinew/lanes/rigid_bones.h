@@ -29,4 +29,14 @@ void scaled_bone_rows(const Bones& bones, Palette& palette) {
     }
 }
 
+/// A bone that does not move, as rows of CentreRows (centre-inl.h).
+inline constexpr Float4 kCentreRestRow[] = {{{1, 0, 0, 0}}, {{0, 0, 0, 0}}, {{0, 0, 0, 0}}, {{0, 0, 0, 0}}};
+
+/// Stores one bone as such rows, and its scale apart.
+inline void write_centre_bone(const ScaledRigid<QuatVec<double>, double>& bone, Float4* row, Float4* scale) {
+    row[0] = float4(bone.rigid.rotation);
+    write_displacement(to_affine(bone.rigid), row + 1);
+    write_displacement(bone.scale, scale);
+}
+
 }  // namespace sinew

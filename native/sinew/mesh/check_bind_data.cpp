@@ -2,7 +2,8 @@
 #include "sinew/mesh/check_bind_data.h"
 
 #include <cmath>
-#include <string>
+
+#include "sinew/transform/convert.h"
 
 namespace sinew {
 namespace {
@@ -16,10 +17,29 @@ void check_limit(const std::string& argument, const std::string& of, std::size_t
 
 }  // namespace
 
-void check_points(std::span<const Vec3<float>> points) {
-    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-        if (!is_finite(points[vertex])) {
-            fail("rest_points", "finite values", "NaN or infinity at vertex " + std::to_string(vertex));
+void check_finite(const std::string& argument, std::span<const Vec3<float>> vectors, const std::string& of) {
+    for (std::size_t i = 0; i < vectors.size(); ++i) {
+        if (!is_finite(vectors[i])) {
+            fail(argument, "finite values", "NaN or infinity at " + of + " " + std::to_string(i));
+        }
+    }
+}
+
+void check_points(std::span<const Vec3<float>> points, std::size_t count) {
+    if (points.size() != count) {
+        fail("rest_points", std::to_string(count) + " points", std::to_string(points.size()));
+    }
+    check_finite("rest_points", points, "vertex");
+}
+
+void check_weights(const std::string& argument, std::span<const float> weights, std::size_t vertex_count) {
+    if (weights.size() != vertex_count) {
+        fail(argument, "a weight for each of the " + std::to_string(vertex_count) + " vertices",
+             std::to_string(weights.size()));
+    }
+    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
+        if (std::isnan(weights[vertex])) {
+            fail(argument, "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
         }
     }
 }
@@ -36,19 +56,6 @@ void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bon
     }
 }
 
-void check_weights(const char* argument, std::span<const float> weights, std::size_t vertex_count) {
-    if (weights.empty()) return;
-    if (weights.size() != vertex_count) {
-        fail(argument, "none, or one for each of the " + std::to_string(vertex_count) + " vertices",
-             std::to_string(weights.size()));
-    }
-    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
-        if (std::isnan(weights[vertex])) {
-            fail(argument, "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
-        }
-    }
-}
-
 void check_space(const Affine<float>& bones_from_model) {
     if (!is_finite(bones_from_model)) fail("bones_from_model", "finite values", "NaN or infinity");
     if (glm::determinant(Mat3<double>(bones_from_model.linear)) == 0.0) {
@@ -61,7 +68,7 @@ void check(const BindData& data) {
     const std::size_t influence_count = data.influence_bones.size();
     check_limit("rest_points", "vertices", kMaxVertices, vertex_count);
     check_limit("influence_bones", "influences", kMaxInfluences, influence_count);
-    check_points(data.rest_points);
+    check_points(data.rest_points, vertex_count);
     if (data.influence_weights.size() != influence_count) {
         fail("influence_weights",
              "one for each of the " + std::to_string(influence_count) + " influence_bones",

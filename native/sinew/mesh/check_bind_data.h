@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sinew/base/fail.h"
@@ -11,16 +12,21 @@
 
 namespace sinew {
 
-/// Throws if a point is not finite.
-void check_points(std::span<const Vec3<float>> points);
+/// Throws if a vector is not finite.
+///
+/// of  what the vectors belong to, such as "vertex"
+void check_finite(const std::string& argument, std::span<const Vec3<float>> vectors, const std::string& of);
+
+/// Throws if the rest points are not `count`, or if one is not finite.
+void check_points(std::span<const Vec3<float>> points, std::size_t count);
+
+/// Throws if the weights are not one for each vertex, or if one is NaN.
+void check_weights(const std::string& argument, std::span<const float> weights, std::size_t vertex_count);
 
 /// Throws if there are some but fewer than `bone_count` rest bones, or if one is not finite.
 ///
 /// bone_count  one more than the highest bone index in the influences
 void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
-
-/// Throws if there are some but not `vertex_count` weights, or if one is NaN.
-void check_weights(const char* argument, std::span<const float> weights, std::size_t vertex_count);
 
 /// Throws if a value is not finite, or if the transform has no inverse.
 void check_space(const Affine<float>& bones_from_model);

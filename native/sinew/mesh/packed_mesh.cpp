@@ -18,12 +18,6 @@ constexpr std::size_t kMinLanes = 6;
 // A run takes three masked stores. With more runs than this, one store for each vertex is as fast.
 constexpr std::size_t kMaxRuns = 5;
 
-// Below this, waking a second thread costs more than it saves.
-constexpr std::size_t kVerticesWorthAThread = 32768;
-
-// 4096 vertices: few enough to balance threads of unequal speed, many enough that fetching a chunk costs nothing.
-constexpr std::size_t kBlocksOfAChunk = 256;
-
 class VertexSets {
 public:
     VertexSets(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences)
@@ -397,12 +391,6 @@ std::vector<Lanes<float>> pack_weights(const PackedMesh& mesh, std::span<const f
         for (float& weight : block.lane) weight = std::clamp(weight, 0.0f, 1.0f);
     }
     return packed;
-}
-
-void parallel_for_blocks(const PackedMesh& mesh, std::size_t vertices, std::size_t threads,
-                         const std::function<void(std::size_t, std::size_t)>& work) {
-    parallel_for(mesh.blocks.size(), useful_threads(threads, vertices, kVerticesWorthAThread), work,
-                 kBlocksOfAChunk);
 }
 
 }  // namespace sinew

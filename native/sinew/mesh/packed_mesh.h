@@ -4,10 +4,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
+#include "sinew/base/thread_pool.h"
 #include "sinew/mesh/influence.h"
 #include "sinew/transform/affine.h"
 
@@ -18,6 +18,12 @@ inline constexpr std::size_t kLanes = 16;
 
 /// Lanes of a block's points: x, y and z.
 inline constexpr std::size_t kPointRows = 3;
+
+/// Below this, waking a second thread to deform a mesh costs more than it saves.
+inline constexpr std::size_t kVerticesWorthAThread = 32768;
+
+/// Of a thread: few enough to balance threads of unequal speed, many enough that fetching a chunk costs nothing.
+inline constexpr std::size_t kBlocksOfAChunk = 256;
 
 /// One number for each vertex of a block.
 template <class T>
@@ -111,8 +117,11 @@ struct UnpackedMesh {
 /// Calls work(begin, end) for all blocks, on `threads` threads as everywhere.
 ///
 /// vertices  of the mesh
-/// work      captures a single reference: with a larger capture std::function would allocate
+template <class Work>
 void parallel_for_blocks(const PackedMesh& mesh, std::size_t vertices, std::size_t threads,
-                         const std::function<void(std::size_t, std::size_t)>& work);
+                         const Work& work) {
+    parallel_for(mesh.blocks.size(), useful_threads(threads, vertices, kVerticesWorthAThread), work,
+                 kBlocksOfAChunk);
+}
 
 }  // namespace sinew

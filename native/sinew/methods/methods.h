@@ -24,6 +24,14 @@ namespace sinew {
 
 /// The only list of methods, group by group, in the order of menus. Dispatch, bindings, tests, benchmarks,
 /// command line and panel are generated from it.
+///
+/// deform_vertex() of each method gives the deformed vertex:
+///
+/// bones       one for each index in `influences`; the signs of their quaternions are free
+/// influences  at least one; weights >= 0 with sum 1
+///
+/// If rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex, unless the
+/// method says otherwise.
 #if SINEW_WITH_DDM
 using Methods = std::tuple<Lbs, Dq, Cor, Ddm, Sdef, Qv, Sbs, Log, IterativeDq>;
 #else

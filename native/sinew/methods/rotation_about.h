@@ -4,9 +4,22 @@
 #include <span>
 
 #include "sinew/mesh/influence.h"
-#include "sinew/transform/quat_vec.h"
+#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
+
+/// The bones of methods that blend quaternions, with the scale of each apart.
+struct BlendsQuatVecs {
+    template <class T>
+    using Bone = ScaledRigid<QuatVec<T>, T>;
+
+    /// rest_bone  orthonormal; only read where the motion has scale
+    template <class T>
+    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
+                                         const Affine<T>& rest_bone) noexcept {
+        return scaled_rigid(posed_from_rest, rest_bone);
+    }
+};
 
 /// The displacement of `v` under the rotation by the unit quaternion `q`.
 template <class T>
@@ -18,10 +31,7 @@ template <class T>
 /// Rotates `rest` by the blended quaternion about `centre`, which is moved by linear blending of the rigid
 /// motions. The displacements by the bones' scales are rotated by each bone and added.
 ///
-/// bones       ScaledRigid<QuatVec<T>, T>, one for each index in `influences`; signs of the quaternions are free
-/// influences  at least one; weights >= 0 with sum 1
-///
-/// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex.
+/// Other arguments and degenerate results as described in methods.h.
 template <class T, class Bone>
 [[nodiscard]] Vec3<T> rotated_about(const Vec3<T>& centre, std::span<const Bone> bones,
                                     std::span<const Influence<T>> influences, const Vec3<T>& rest) noexcept {

@@ -3,7 +3,6 @@
 // Blender's order and without fused multiply-add, so that results equal Blender's and are the same on each
 // instruction set.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
-#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -415,22 +414,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace sinew {
-namespace {
-
-using Compute = void(const NormalFrame& frame, std::size_t begin, std::size_t end);
-
-constexpr std::array<Compute*, kTargetCount> kFaces SINEW_TARGETS(faces);
-constexpr std::array<Compute*, kTargetCount> kCorners SINEW_TARGETS(corners);
-constexpr std::array<Compute*, kTargetCount> kSum SINEW_TARGETS(sum);
-constexpr std::array<Compute*, kTargetCount> kSumGroups SINEW_TARGETS(sum_groups);
-constexpr std::array<Compute*, kTargetCount> kCustomise SINEW_TARGETS(customise);
-
-}  // namespace
-
-NormalKernel normal_kernel() noexcept {
-    const std::size_t target = target_in_use();
-    return {kFaces[target], kCorners[target], kSum[target], kSumGroups[target], kCustomise[target]};
-}
+constinit const NormalKernel kNormalKernel{SINEW_TARGETS(faces), SINEW_TARGETS(corners), SINEW_TARGETS(sum),
+                                           SINEW_TARGETS(sum_groups), SINEW_TARGETS(customise)};
 
 }  // namespace sinew
 

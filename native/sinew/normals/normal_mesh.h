@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
 #include "sinew/normals.h"
@@ -118,19 +120,20 @@ struct NormalFrame {
 
 /// Functions compiled once for each instruction set. All instruction sets give the same results.
 struct NormalKernel {
-    /// The normals of the faces of blocks [begin, end).
-    void (*faces)(const NormalFrame& frame, std::size_t begin, std::size_t end);
-    /// The same, and the corners' angles and the custom normals of lone fans.
-    void (*corners)(const NormalFrame& frame, std::size_t begin, std::size_t end);
-    /// Sums groups [begin, end), to `normals`.
-    void (*sum)(const NormalFrame& frame, std::size_t begin, std::size_t end);
-    /// The same, to `group_normals`; `begin` is a multiple of kLanes.
-    void (*sum_groups)(const NormalFrame& frame, std::size_t begin, std::size_t end);
-    /// Custom normals for fan blocks [begin, end), to `block_normals`.
-    void (*customise)(const NormalFrame& frame, std::size_t begin, std::size_t end);
-};
+    using OfRange =
+        std::array<void (*)(const NormalFrame& frame, std::size_t begin, std::size_t end), kTargetCount>;
 
-/// The kernel for the instruction set in use.
-[[nodiscard]] NormalKernel normal_kernel() noexcept;
+    /// The normals of the faces of blocks [begin, end).
+    OfRange faces;
+    /// The same, and the corners' angles and the custom normals of lone fans.
+    OfRange corners;
+    /// Sums groups [begin, end), to `normals`.
+    OfRange sum;
+    /// The same, to `group_normals`; `begin` is a multiple of kLanes.
+    OfRange sum_groups;
+    /// Custom normals for fan blocks [begin, end), to `block_normals`.
+    OfRange customise;
+};
+extern const NormalKernel kNormalKernel;
 
 }  // namespace sinew

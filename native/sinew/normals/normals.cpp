@@ -65,15 +65,12 @@ NormalDomain domain_of(const MeshTopology& topology, const Sharpness& sharpness)
 }
 
 /// Runs a kernel's function on [0, count).
-void run(decltype(NormalKernel::sum) function, const NormalFrame& frame, std::size_t count,
+void run(const NormalKernel::OfRange& function, const NormalFrame& frame, std::size_t count,
          std::size_t threads, std::size_t chunk) {
-    struct Work {
-        decltype(NormalKernel::sum) function;
-        const NormalFrame& frame;
-    } const work{function, frame};
-    parallel_for(
-        count, threads,
-        [&work](std::size_t begin, std::size_t end) { work.function(work.frame, begin, end); }, chunk);
+    const auto part = [&](std::size_t begin, std::size_t end) {
+        function[target_in_use()](frame, begin, end);
+    };
+    parallel_for(count, threads, part, chunk);
 }
 
 }  // namespace
@@ -121,27 +118,18 @@ struct Normals::State {
 
 void Normals::State::write(std::span<Vec3<float>> to, const std::int32_t* sources, const Float4* from,
                            std::size_t threads) const noexcept {
-    struct Work {
-        Vec3<float>* to;
-        const std::int32_t* sources;
-        const Float4* from;
-    } work{to.data(), sources, from};
-    parallel_for(to.size(), threads, [&work](std::size_t begin, std::size_t end) {
+    const auto part = [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const Float4& normal = work.from[index(work.sources[i])];
-            work.to[i] = {normal.value[0], normal.value[1], normal.value[2]};
+            const Float4& normal = from[index(sources[i])];
+            to[i] = {normal.value[0], normal.value[1], normal.value[2]};
         }
-    });
+    };
+    parallel_for(to.size(), threads, part);
 }
 
-Normals::Normals(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness) {
-    check(topology, vertex_count, sharpness);
-    state_ = std::make_unique<State>(topology, vertex_count, sharpness);
-}
-
-Normals::Normals(Normals&&) noexcept = default;
-Normals& Normals::operator=(Normals&&) noexcept = default;
-Normals::~Normals() = default;
+Normals::Normals(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness)
+    : state_(
+          (check(topology, vertex_count, sharpness), make_owned<State>(topology, vertex_count, sharpness))) {}
 
 NormalDomain Normals::domain() const noexcept { return state_->domain; }
 
@@ -169,7 +157,6 @@ bool Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
     const bool is_of_vertices = domain == NormalDomain::vertex;
-    const NormalKernel kernel = normal_kernel();
     Float4* const all = state.normals.data();
     const NormalFrame frame{&mesh,
                             points.data(),
@@ -182,15 +169,15 @@ bool Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
     // If the whole mesh is flat, corners have the normals of their faces.
     if (domain == NormalDomain::face ||
         (domain == NormalDomain::corner && state.domain == NormalDomain::face)) {
-        run(kernel.faces, frame, mesh.blocks.size(), threads, kBlocksOfChunk);
+        run(kNormalKernel.faces, frame, mesh.blocks.size(), threads, kBlocksOfChunk);
     } else {
-        run(kernel.corners, frame, mesh.blocks.size(), threads, kBlocksOfChunk);
-        run(is_of_vertices ? kernel.sum : kernel.sum_groups, frame, frame.groups->size(), threads,
-            kGroupsOfChunk);
+        run(kNormalKernel.corners, frame, mesh.blocks.size(), threads, kBlocksOfChunk);
+        run(is_of_vertices ? kNormalKernel.sum : kNormalKernel.sum_groups, frame, frame.groups->size(),
+            threads, kGroupsOfChunk);
     }
     if (domain == NormalDomain::face) state.write(normals, mesh.face_sources.data(), all, threads);
     if (domain != NormalDomain::corner) return true;
-    run(kernel.customise, frame, mesh.fan_blocks.size(), threads, kBlocksOfChunk);
+    run(kNormalKernel.customise, frame, mesh.fan_blocks.size(), threads, kBlocksOfChunk);
     if (mesh.corner_sources.empty()) {
         state.write(normals, state.corner_vertices.data(), frame.group_normals, threads);
     } else {

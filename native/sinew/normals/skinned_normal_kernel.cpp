@@ -22,32 +22,12 @@ namespace HWY_NAMESPACE {
 // A vector with a smaller squared length has no direction.
 constexpr float kShortest = 1e-35f;
 
-template <class D>
-HWY_INLINE Points<D> load(D d, const Vec3<float>* from) {
-    if constexpr (hn::MaxLanes(D()) == 1) {
-        return {hn::Set(d, from->x), hn::Set(d, from->y), hn::Set(d, from->z)};
-    } else {
-        return load_consecutive(d, &from->x);
-    }
-}
-
-template <class D>
-HWY_INLINE void store(D d, const Points<D>& p, Vec3<float>* to) {
-    if constexpr (hn::MaxLanes(D()) == 1) {
-        *to = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
-    } else {
-        store_consecutive(d, p, &to->x);
-    }
-}
-
 /// The images of a unit vector along the axis under the blends of the vertices from `i` on.
 template <class D>
 HWY_INLINE Points<D> column(D d, const SkinnedNormalFrame& frame, std::size_t axis, const Points<D>& points,
                             std::size_t i) {
-    const Points<D> moved = load(d, frame.moved[axis] + i);
-    const Vec<D> by = hn::Set(d, frame.inverse_step);
-    return {hn::Mul(by, hn::Sub(moved.x, points.x)), hn::Mul(by, hn::Sub(moved.y, points.y)),
-            hn::Mul(by, hn::Sub(moved.z, points.z))};
+    const Points<D> moved = load_consecutive(d, &frame.moved[axis][i].x);
+    return times<D>(hn::Set(d, frame.inverse_step), subtract<D>(moved, points));
 }
 
 /// The cofactor matrices of the blends, by columns.
@@ -58,7 +38,7 @@ struct Cofactors {
 
 template <class D>
 HWY_INLINE Cofactors<D> cofactors_of(D d, const SkinnedNormalFrame& frame, std::size_t i) {
-    const Points<D> points = load(d, frame.points + i);
+    const Points<D> points = load_consecutive(d, &frame.points[i].x);
     const Points<D> x = column(d, frame, 0, points, i);
     const Points<D> y = column(d, frame, 1, points, i);
     const Points<D> z = column(d, frame, 2, points, i);
@@ -68,9 +48,9 @@ HWY_INLINE Cofactors<D> cofactors_of(D d, const SkinnedNormalFrame& frame, std::
 /// Unit vectors; 0 if a vector has no direction, or a length beyond the range of floats.
 template <class D>
 HWY_INLINE Points<D> moved_normals(D d, const Cofactors<D>& of, const Points<D>& n) {
-    const Points<D> x{hn::Mul(n.x, of.axis[0].x), hn::Mul(n.x, of.axis[0].y), hn::Mul(n.x, of.axis[0].z)};
-    const Points<D> v = add_scaled<D>(add_scaled<D>(x, n.y, of.axis[1]), n.z, of.axis[2]);
-    const Vec<D> squared = hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::Mul(v.z, v.z)));
+    const Points<D> v =
+        add_scaled<D>(add_scaled<D>(times<D>(n.x, of.axis[0]), n.y, of.axis[1]), n.z, of.axis[2]);
+    const Vec<D> squared = dot<D>(v, v);
     const auto has_direction = hn::And(hn::Gt(squared, hn::Set(d, kShortest)),
                                        hn::Le(squared, hn::Set(d, std::numeric_limits<float>::max())));
     const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared));
@@ -92,8 +72,8 @@ HWY_INLINE void in_lanes(std::size_t begin, std::size_t end, const Compute& comp
 void of_vertices(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end) {
     const SkinnedNormalFrame frame = f;
     in_lanes(begin, end, [&frame](auto d, std::size_t i) HWY_ATTR {
-        store(d, moved_normals(d, cofactors_of(d, frame, i), load(d, frame.rest_normals + i)),
-              frame.normals + i);
+        const auto rest = load_consecutive(d, &frame.rest_normals[i].x);
+        store_consecutive(d, moved_normals(d, cofactors_of(d, frame, i), rest), &frame.normals[i].x);
     });
 }
 
@@ -123,7 +103,8 @@ void of_frames(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end) 
             return points_of<false>(d, numbers, frame.vertices + i);
         };
         const Cofactors<decltype(d)> of{{cofactor(0), cofactor(1), cofactor(2)}};
-        store(d, moved_normals(d, of, load(d, frame.rest_normals + i)), frame.normals + i);
+        const auto rest = load_consecutive(d, &frame.rest_normals[i].x);
+        store_consecutive(d, moved_normals(d, of, rest), &frame.normals[i].x);
     });
 }
 
@@ -134,20 +115,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace sinew {
-namespace {
-
-using Compute = SkinnedNormalKernel::Compute;
-
-constexpr std::array<Compute*, kTargetCount> kOfVertices SINEW_TARGETS(of_vertices);
-constexpr std::array<Compute*, kTargetCount> kCofactors SINEW_TARGETS(cofactors);
-constexpr std::array<Compute*, kTargetCount> kOfFrames SINEW_TARGETS(of_frames);
-
-}  // namespace
-
-SkinnedNormalKernel skinned_normal_kernel() noexcept {
-    const std::size_t target = target_in_use();
-    return {kOfVertices[target], kCofactors[target], kOfFrames[target]};
-}
+constinit const SkinnedNormalKernel kSkinnedNormalKernel{SINEW_TARGETS(of_vertices), SINEW_TARGETS(cofactors),
+                                                         SINEW_TARGETS(of_frames)};
 
 }  // namespace sinew
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
 
 namespace sinew {
@@ -21,16 +22,16 @@ struct SkinnedNormalFrame {
     Vec3<float>* normals;              // [normals]
 };
 
-/// Functions for elements [begin, end). Results do not depend on how the elements are divided.
+/// Functions for elements [begin, end), compiled once for each instruction set. Results do not depend on how the
+/// elements are divided.
 struct SkinnedNormalKernel {
-    using Compute = void(const SkinnedNormalFrame& frame, std::size_t begin, std::size_t end);
+    using OfRange = std::array<void (*)(const SkinnedNormalFrame& frame, std::size_t begin, std::size_t end),
+                               kTargetCount>;
 
-    Compute* of_vertices;  // one normal for each vertex
-    Compute* cofactors;    // of the vertices
-    Compute* of_frames;    // normals of frames, from the cofactors of their vertices
+    OfRange of_vertices;  // one normal for each vertex
+    OfRange cofactors;    // of the vertices
+    OfRange of_frames;    // normals of frames, from the cofactors of their vertices
 };
-
-/// The kernel for the processor's best instruction set.
-SkinnedNormalKernel skinned_normal_kernel() noexcept;
+extern const SkinnedNormalKernel kSkinnedNormalKernel;
 
 }  // namespace sinew

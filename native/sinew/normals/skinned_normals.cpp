@@ -21,15 +21,6 @@ constexpr std::size_t kFramesWorthAThread = 8192;
 // A vector with a smaller squared length has no direction.
 constexpr float kShortest = 1e-35f;
 
-void check_finite(const char* argument, std::span<const Vec3<float>> vectors) {
-    for (std::size_t i = 0; i < vectors.size(); ++i) {
-        const Vec3<float>& v = vectors[i];
-        if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) {
-            fail(argument, "finite values", "NaN or infinity at index " + std::to_string(i));
-        }
-    }
-}
-
 void check(const RestFrames& rest, std::size_t vertex_count) {
     const std::size_t count = rest.normals.size();
     if (rest.vertices.empty() && count != vertex_count) {
@@ -50,8 +41,8 @@ void check(const RestFrames& rest, std::size_t vertex_count) {
                  std::to_string(rest.vertices[i]) + " at index " + std::to_string(i));
         }
     }
-    check_finite("normals", rest.normals);
-    check_finite("tangents", rest.tangents);
+    check_finite("normals", rest.normals, "index");
+    check_finite("tangents", rest.tangents, "index");
 }
 
 /// A power of two of about the mesh's size, so that differences of points have as many digits as the points.
@@ -103,26 +94,20 @@ struct SkinnedNormals::State {
 
     void move_normals(std::span<const Vec3<float>> points, std::span<Vec3<float>> to,
                       std::size_t threads) const noexcept {
-        SkinnedNormalFrame frame{};
-        frame.points = points.data();
-        frame.inverse_step = inverse_step;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            frame.moved[axis] = moved[axis].data();
-            frame.cofactors[axis] = cofactors[axis].data();
-        }
-        frame.rest_normals = normals.data();
-        frame.vertices = vertices.data();
-        frame.normals = to.data();
-        const SkinnedNormalKernel kernel = skinned_normal_kernel();
-        const auto compute = [&](SkinnedNormalKernel::Compute* function, std::size_t count) {
-            const auto part = [&frame, function](std::size_t begin, std::size_t end) {
-                function(frame, begin, end);
+        const SkinnedNormalFrame frame{
+            points.data(),  {moved[0].data(), moved[1].data(), moved[2].data()},
+            inverse_step,   {cofactors[0].data(), cofactors[1].data(), cofactors[2].data()},
+            normals.data(), vertices.data(),
+            to.data()};
+        const auto compute = [&](const SkinnedNormalKernel::OfRange& function, std::size_t count) {
+            const auto part = [&](std::size_t begin, std::size_t end) {
+                function[target_in_use()](frame, begin, end);
             };
             parallel_for(count, useful_threads(threads, count, kFramesWorthAThread), part);
         };
-        if (vertices.empty()) return compute(kernel.of_vertices, to.size());
-        compute(kernel.cofactors, points.size());
-        compute(kernel.of_frames, to.size());
+        if (vertices.empty()) return compute(kSkinnedNormalKernel.of_vertices, to.size());
+        compute(kSkinnedNormalKernel.cofactors, points.size());
+        compute(kSkinnedNormalKernel.of_frames, to.size());
     }
 
     /// Moves the tangents of frames [begin, end).
@@ -152,14 +137,8 @@ struct SkinnedNormals::State {
 };
 
 SkinnedNormals::SkinnedNormals(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
-                               const std::optional<MixData>& mix) {
-    check(rest, binding.vertex_count());
-    state_ = std::make_unique<State>(binding, method, rest, mix);
-}
-
-SkinnedNormals::SkinnedNormals(SkinnedNormals&&) noexcept = default;
-SkinnedNormals& SkinnedNormals::operator=(SkinnedNormals&&) noexcept = default;
-SkinnedNormals::~SkinnedNormals() = default;
+                               const std::optional<MixData>& mix)
+    : state_((check(rest, binding.vertex_count()), make_owned<State>(binding, method, rest, mix))) {}
 
 std::size_t SkinnedNormals::frame_count() const noexcept { return state_->normals.size(); }
 bool SkinnedNormals::has_tangents() const noexcept { return !state_->tangents.empty(); }
@@ -177,14 +156,8 @@ bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, cons
     state.move_steps(posed_from_rest, options);
     state.move_normals(points, normals, options.threads);
     if (tangents.empty()) return true;
-    // A single reference: with a larger capture std::function would allocate.
-    struct Work {
-        const State& state;
-        std::span<const Vec3<float>> points;
-        std::span<Vec3<float>> tangents;
-    } const work{state, points, tangents};
-    const auto part = [&work](std::size_t begin, std::size_t end) {
-        work.state.move_tangents(work.points, work.tangents, begin, end);
+    const auto part = [&](std::size_t begin, std::size_t end) {
+        state.move_tangents(points, tangents, begin, end);
     };
     parallel_for(tangents.size(), useful_threads(options.threads, tangents.size(), kFramesWorthAThread),
                  part);

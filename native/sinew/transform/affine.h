@@ -16,18 +16,6 @@ struct Affine {
     Vec3<T> translation{T(0)};
 };
 
-template <class T>
-[[nodiscard]] bool is_finite(const Vec3<T>& v) noexcept {
-    using std::isfinite;
-    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
-}
-
-template <class T>
-[[nodiscard]] bool is_finite(const Affine<T>& a) noexcept {
-    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
-           is_finite(a.translation);
-}
-
 /// Applies `b` first, then `a`: model_from_bone * bone_from_rest = model_from_rest.
 template <class T>
 [[nodiscard]] Affine<T> operator*(const Affine<T>& a, const Affine<T>& b) noexcept {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cmath>
+
 #include "sinew/transform/affine.h"
 #include "sinew/transform/dual_quat.h"
 #include "sinew/transform/quat_vec.h"
@@ -52,6 +54,29 @@ template <class T>
 template <class T>
 [[nodiscard]] Affine<T> to_affine(const DualQuat<T>& a) noexcept {
     return {to_mat3(a.real), translation(a)};
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const Vec3<T>& v) noexcept {
+    using std::isfinite;
+    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const Mat3<T>& m) noexcept {
+    return is_finite(m[0]) && is_finite(m[1]) && is_finite(m[2]);
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const Quat<T>& q) noexcept {
+    using std::isfinite;
+    return isfinite(q.w) && is_finite(vector_part(q));
+}
+
+template <template <class> class Transform, class T>
+[[nodiscard]] bool is_finite(const Transform<T>& a) noexcept {
+    const auto& [first, second] = a;
+    return is_finite(first) && is_finite(second);
 }
 
 /// The same transform with another scalar type.

@@ -13,7 +13,11 @@ namespace sinew {
 /// Converts `source`, a representation, a Screw or a Twist, to the named representation: to<DualQuat>(affine).
 template <template <class> class Target, template <class> class Source, class T>
 [[nodiscard]] Target<T> to(const Source<T>& source) noexcept {
-    if constexpr (requires(Target<T> target) { target.linear; }) {
+    if constexpr (requires { source.moment; }) {
+        return to<Target>(to_dual_quat(source));
+    } else if constexpr (requires { source.angular; }) {
+        return to<Target>(to_quat_vec(source));
+    } else if constexpr (requires(Target<T> target) { target.linear; }) {
         return to_affine(source);
     } else if constexpr (requires(Target<T> target) { target.rotation; }) {
         return to_quat_vec(source);

@@ -21,13 +21,8 @@ template <class T>
     return {angle_between(a.rotation, b.rotation), safe_length(b.translation - a.translation)};
 }
 
-template <class T>
-[[nodiscard]] RigidDistance<T> rigid_distance(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
-    return rigid_distance(to_quat_vec(a), to_quat_vec(b));
-}
-
-template <class T>
-[[nodiscard]] RigidDistance<T> rigid_distance(const Affine<T>& a, const Affine<T>& b) noexcept {
+template <template <class> class Transform, class T>
+[[nodiscard]] RigidDistance<T> rigid_distance(const Transform<T>& a, const Transform<T>& b) noexcept {
     return rigid_distance(to_quat_vec(a), to_quat_vec(b));
 }
 

@@ -58,16 +58,6 @@ template <class T>
             Quat<T>(-along * sin(half), dual.x, dual.y, dual.z)};
 }
 
-template <class T>
-[[nodiscard]] QuatVec<T> to_quat_vec(const Screw<T>& screw) noexcept {
-    return to_quat_vec(to_dual_quat(screw));
-}
-
-template <class T>
-[[nodiscard]] Affine<T> to_affine(const Screw<T>& screw) noexcept {
-    return to_affine(to_dual_quat(screw));
-}
-
 /// The screw of the unit dual quaternion `a`, with an angle of 0 to pi (Kavan et al. 2008, section 3.3).
 ///
 /// A rotation within rounding of the identity counts as none: then the axis is the direction of the translation,
@@ -92,13 +82,8 @@ template <class T>
     return {axis, moment / sine, T(2) * atan2(sine, near.real.w), along};
 }
 
-template <class T>
-[[nodiscard]] Screw<T> to_screw(const QuatVec<T>& a) noexcept {
-    return to_screw(to_dual_quat(a));
-}
-
-template <class T>
-[[nodiscard]] Screw<T> to_screw(const Affine<T>& a) noexcept {
+template <template <class> class Transform, class T>
+[[nodiscard]] Screw<T> to_screw(const Transform<T>& a) noexcept {
     return to_screw(to_dual_quat(a));
 }
 

@@ -39,13 +39,8 @@ template <class T>
     return {angular, a.translation - T(0.5) * sideways + factor * glm::cross(angular, sideways)};
 }
 
-template <class T>
-[[nodiscard]] Twist<T> to_twist(const Affine<T>& a) noexcept {
-    return to_twist(to_quat_vec(a));
-}
-
-template <class T>
-[[nodiscard]] Twist<T> to_twist(const DualQuat<T>& a) noexcept {
+template <template <class> class Transform, class T>
+[[nodiscard]] Twist<T> to_twist(const Transform<T>& a) noexcept {
     return to_twist(to_quat_vec(a));
 }
 
@@ -74,11 +69,6 @@ template <class T>
     return {quat_from_rotation_vector(twist.angular), twist.linear +
                                                           (T(0.5) * half_sinc * half_sinc) * sideways +
                                                           factor * glm::cross(twist.angular, sideways)};
-}
-
-template <class T>
-[[nodiscard]] Affine<T> to_affine(const Twist<T>& twist) noexcept {
-    return to_affine(to_quat_vec(twist));
 }
 
 template <class T>

@@ -294,8 +294,6 @@ class Deformer:
         The deformed points, float32 [vertices, 3], model space.
 
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
-        out: None, or float32 [vertices, 3], written and returned.
-        threads: at most so many; None or 0: as many as useful.
         bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone transforms, in which the
             bones are blended; the result is mapped back. None: the same space.
         rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. If given, bone_transforms are the posed bones, and each
@@ -432,11 +430,10 @@ class BulgeLimit:
 
         points: float32 [vertices, 3], deformed, model space.
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
-        out: None, or float32 [vertices, 3], written and returned. May be `points`.
+        out: may be `points`.
         strength: how much of the bulge is removed, 0 to 1.
         form: "continuous": distances to all bones of a vertex, weighted; "kim_han": only to the heaviest, which tears
             the surface where that changes.
-        threads: at most so many; None or 0: as many as useful.
 
         Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. A scaled
         bone allows a distance larger by the largest factor by which it stretches vectors perpendicular to it.
@@ -487,9 +484,8 @@ class DeltaMush:
         The smoothed points, float32 [vertices, 3].
 
         points: float32 [vertices, 3], deformed, in the space of the rest points.
-        out: None, or float32 [vertices, 3], written and returned. May be `points`.
+        out: may be `points`.
         scale: how much of the details is added back; 1: all.
-        threads: at most so many; None or 0: as many as useful.
 
         A vertex without faces is smoothed and has no details.
         """
@@ -537,8 +533,7 @@ class Normals:
 
         points: float32 [vertices, 3], deformed.
         domain: "vertex", "corner" or "face": what each normal belongs to; None: the mesh's domain.
-        out: None, or float32 of the result's shape, written and returned. Must not overlap the points.
-        threads: at most so many; None or 0: as many as useful.
+        out: must not overlap the points.
 
         For a face without area the normal is (0, 0, 1); for a vertex without faces, the direction of its point; for a
         vertex whose faces' normals cancel, 0. No result is NaN.
@@ -595,7 +590,7 @@ class SkinnedNormals:
         The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
 
         points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.
-        out: None, or float32 [frames, 3], written and returned. Must not overlap the points.
+        out: must not overlap the points.
 
         The other arguments are those of deform().
         """

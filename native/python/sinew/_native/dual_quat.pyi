@@ -27,25 +27,20 @@ def exp(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
 def from_axis_angle(axis: numpy.typing.ArrayLike, angle: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    The rotation by `angle` radians about `axis` through the origin.
-
-    axis: [.., 3], of any length; length 0 gives the identity.
-    angle: [..].
+    The rotation by `angle` radians, [..], about `axis`, [.., 3], through the origin. The axis may have any
+    length; 0 gives the identity.
     """
 def from_rotation_matrix(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    The rotation by a matrix, [.., 3, 3].
-
-    ValueError if it is no rotation to within 2e-3; sinew.affine accepts any matrix.
+    The rotation by a matrix, [.., 3, 3]: a rotation to within 2e-3, or for sinew.affine any matrix.
     """
 def from_screw(axis: numpy.typing.ArrayLike, moment: numpy.typing.ArrayLike, angle: numpy.typing.ArrayLike, translation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    The screw with a rotation by `angle` radians about a line and a translation along it; inverse of
-    to_screw() (Daniilidis 1999, eq. 13).
+    The rotation by `angle` radians about a line with a translation along it, both [..]; inverse of to_screw()
+    (Daniilidis 1999, eq. 13).
 
-    axis, moment: [.., 3], Pluecker coordinates of the line. Both are divided by the length of the axis,
-        and a component of the moment along it is ignored. An axis of length 0 gives the identity.
-    angle, translation: [..]. For a pitch (translation per radian), use translation = pitch * angle.
+    axis, moment: [.., 3], Pluecker coordinates of the line. Both are divided by the length of the axis, and a
+        component of the moment along it is ignored. An axis of length 0 gives the identity.
     """
 def from_screw_about(axis: numpy.typing.ArrayLike, point: numpy.typing.ArrayLike, angle: numpy.typing.ArrayLike, translation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
@@ -65,9 +60,7 @@ def identity(dtype: numpy.typing.DTypeLike = ...) -> numpy.typing.NDArray[typing
     """
 def inverse(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    The inverse of `a`; for a unit dual quaternion its conjugate.
-
-    ValueError if the linear part of a matrix is singular.
+    The inverse of `a`. ValueError if the linear part of a matrix is singular.
     """
 def log(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
@@ -80,11 +73,9 @@ def norm(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
 def normalized(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    The rigid transform nearest to `a`.
-
-    A matrix's linear part becomes the nearest rotation (polar decomposition); if several are equally near, as for
-    rank 0 or 1, one of them. The quaternion of a quaternion and vector is divided by its length; length 0 gives
-    the identity. A dual quaternion is divided by its norm; a real part of 0 gives the identity.
+    The rigid transform nearest to `a`. A matrix's linear part becomes the nearest rotation (polar
+    decomposition), or one of several, as for rank 0 or 1. A quaternion is divided by its length, a dual quaternion
+    by its norm; 0 gives the identity.
     """
 def power(a: numpy.typing.ArrayLike, exponent: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
@@ -95,11 +86,8 @@ def power(a: numpy.typing.ArrayLike, exponent: numpy.typing.ArrayLike) -> numpy.
     """
 def rigid_distance(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike) -> sinew._types.Distance[typing.Any]:
     """
-    The distance of `b` from `a`, [..]: the angle of the rotation, 0 to pi, and the distance between the
-    images of the origin.
-
-    It is the same for compose(x, a) and compose(x, b) with rigid x. `a` and `b` must be rigid: ValueError if a
-    matrix scales, shears or mirrors.
+    The distance of rigid `b` from rigid `a`, [..]: the angle of the rotation, 0 to pi, and the distance
+    between the images of the origin. It is the same for compose(x, a) and compose(x, b) with rigid x.
     """
 def to_affine(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
@@ -107,13 +95,11 @@ def to_affine(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
 def to_quat_vec(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    `a` in the layout of sinew.quat_vec, [.., 7]. `a` must be rigid, as normalized() makes it.
-
-    ValueError if a matrix scales, shears or mirrors. The length of quaternions is not checked.
+    Rigid `a` in the layout of sinew.quat_vec, [.., 7]. The length of quaternions is not checked.
     """
 def to_screw(a: numpy.typing.ArrayLike) -> sinew._types.Screw[typing.Any]:
     """
-    The screw of rigid `a` (Chasles 1830). ValueError if a matrix scales, shears or mirrors.
+    The screw of rigid `a` (Chasles 1830).
 
     The angle is 0 to pi; at pi the axis has one of its two directions. The moment is point x axis. The pitch is
     translation / angle; it is infinite for a pure translation, for which the axis is its direction, angle and
@@ -121,17 +107,13 @@ def to_screw(a: numpy.typing.ArrayLike) -> sinew._types.Screw[typing.Any]:
     """
 def to_twist(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, with an angle of 0 to pi.
-
-    At 180 degrees both directions of the axis are logarithms, and the result has one of them. ValueError if a
-    matrix scales, shears or mirrors.
+    The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, with an angle of 0 to pi. At 180
+    degrees it has one of the two directions of the axis.
     """
 def transform_normal(a: numpy.typing.ArrayLike, normals: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """
-    The unit normals, [.., 3], of surfaces after `a`; (0, 0, 0) gives (0, 0, 0).
-
-    A matrix transforms normals by the inverse transpose of its linear part; if that flattens the surface to a
-    line, the result is 0.
+    The unit normals, [.., 3], of surfaces after `a`: by the inverse transpose of a matrix. 0 for 0, and for a
+    surface that becomes a line.
     """
 def transform_point(a: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
     """

@@ -29,8 +29,7 @@ namespace sinew {
 /// triangles  [3 x triangles] vertices of the corners; triangles may have area 0
 /// exact      compute by the definition itself, which is slow; for tests
 ///
-/// Returns nothing useful if the job was cancelled. The result does not depend on the number of threads. Throws
-/// std::invalid_argument as Binding does, and for a corner that is no vertex.
+/// Returns nothing useful if the job was cancelled. Throws as Binding does, and for a corner that is no vertex.
 [[nodiscard]] SINEW_EXPORT std::vector<Vec3<float>> centres_of_rotation(
     const BindData& data, std::span<const std::int32_t> triangles, Job& job, bool exact = false);
 

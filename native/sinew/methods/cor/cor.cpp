@@ -4,7 +4,7 @@
 #include "sinew/methods/cor/cor.h"
 
 #include "sinew/base/targets.h"
-#include "sinew/methods/centre_rows.h"
+#include "sinew/lanes/rigid_bones.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sinew/methods/cor/cor.cpp"

@@ -6,13 +6,12 @@
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
 #include "sinew/methods/rotation_about.h"
-#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
 
 /// Skinning with optimised centres of rotation (Le, Hodgins 2016): the blended quaternion rotates each vertex
 /// about the vertex's own centre, which linear blending moves. methods/cor/centres_of_rotation.h computes the centres.
-struct Cor {
+struct Cor : BlendsQuatVecs {
     static constexpr MethodInfo info{
         5,
         "cor",
@@ -26,24 +25,7 @@ struct Cor {
         3};
     static const Kernel& kernel() noexcept;
 
-    template <class T>
-    using Bone = ScaledRigid<QuatVec<T>, T>;
-
-    /// rest_bone  orthonormal; only read where the motion has scale
-    template <class T>
-    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
-                                         const Affine<T>& rest_bone) noexcept {
-        return scaled_rigid(posed_from_rest, rest_bone);
-    }
-
-    /// The deformed vertex.
-    ///
-    /// bones       one for each index in `influences`; the signs of their quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1
-    /// centre      of rotation, x, y, z; if empty, the vertex itself, which gives linear blending of the rigid
-    ///             motions
-    ///
-    /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex.
+    /// centre  of rotation, x, y, z; if empty, the vertex itself, which gives linear blending of the rigid motions
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences, const Vec3<T>& rest,

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
+
+#include "sinew/base/targets.h"
 
 namespace sinew {
 
@@ -54,7 +57,7 @@ inline constexpr std::size_t kSolvedColumns = kGroups * kGroupColumns;
 /// is_nonzero  [columns] 0 where the whole row of x is 0, else 1
 using SolveBlocks = void(const BlockFactor& factor, double nothing, double* x, std::uint8_t* is_nonzero);
 
-/// The function for the instruction set in use.
-[[nodiscard]] SolveBlocks* solve_blocks() noexcept;
+/// For each instruction set.
+extern const std::array<SolveBlocks*, kTargetCount> kSolveBlocks;
 
 }  // namespace sinew

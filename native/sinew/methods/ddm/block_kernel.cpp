@@ -2,7 +2,6 @@
 // Solves with a BlockFactor on lanes.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <algorithm>
-#include <array>
 
 #include "sinew/base/targets.h"
 #include "sinew/lanes/kernel.h"
@@ -218,13 +217,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace sinew {
-namespace {
-
-constexpr std::array<SolveBlocks*, kTargetCount> kSolve SINEW_TARGETS(solve);
-
-}  // namespace
-
-SolveBlocks* solve_blocks() noexcept { return kSolve[target_in_use()]; }
+constinit const std::array<SolveBlocks*, kTargetCount> kSolveBlocks SINEW_TARGETS(solve);
 
 }  // namespace sinew
 

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "sinew/base/targets.h"
-#include "sinew/methods/centre_rows.h"
+#include "sinew/lanes/rigid_bones.h"
 #include "sinew/methods/ddm/bone_moments.h"
 
 #undef HWY_TARGET_INCLUDE

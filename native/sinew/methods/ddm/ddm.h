@@ -11,7 +11,6 @@
 #include "sinew/methods/method_info.h"
 #include "sinew/methods/rotation_about.h"
 #include "sinew/transform/nearest_rotation.h"
-#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
 
@@ -28,7 +27,7 @@ inline constexpr double kLeastGap = 1e-6;
 /// Variant 0 rotates a vertex about its neighbourhood's centroid by the rotation that fits the posed
 /// neighbourhood best, variant 2 by the blended quaternion. Variant 4 also rotates by the blended quaternion, and
 /// moves the centroid as if the whole neighbourhood were at the centroid.
-struct Ddm {
+struct Ddm : BlendsQuatVecs {
     static constexpr std::string_view kVariants[] = {"0", "2", "4"};
     static constexpr Parameter kParameters[] = {
         {.id = "variant",
@@ -66,20 +65,8 @@ struct Ddm {
         true};
     static const Kernel& kernel() noexcept;
 
-    template <class T>
-    using Bone = ScaledRigid<QuatVec<T>, T>;
-
-    /// rest_bone  orthonormal; only read where the motion has scale
-    template <class T>
-    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
-                                         const Affine<T>& rest_bone) noexcept {
-        return scaled_rigid(posed_from_rest, rest_bone);
-    }
-
-    /// The deformed vertex.
-    ///
-    /// bones       one for each bone that `influences` or `rows` name; the signs of their quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1; used to blend the bones' scales
+    /// bones       also one for each bone that `rows` name
+    /// influences  only blend the bones' scales
     /// rows        [any number][kMomentFloats] of the vertex, in ascending order of bones, weights >= 0 with sum
     ///             1; if empty, the vertex is blended linearly
     /// parameters  empty, or the index in kVariants and the radius; the radius is not read

@@ -129,12 +129,11 @@ public:
 
     /// Arguments as for SolveBlocks.
     void solve(std::span<Columns> x, std::span<std::uint8_t> is_nonzero) const {
-        solve_(factor_, kNothing, x.front().data(), is_nonzero.data());
+        kSolveBlocks[target_in_use()](factor_, kNothing, x.front().data(), is_nonzero.data());
     }
 
 private:
     BlockFactor factor_;
-    SolveBlocks* solve_ = solve_blocks();
     std::vector<std::size_t> row_numbers_;
 };
 

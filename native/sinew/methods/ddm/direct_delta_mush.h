@@ -32,9 +32,8 @@ namespace sinew {
 /// triangles  [3 x triangles] vertices of the corners; triangles may have area 0
 /// radius     finite, >= 0; in units of the rest points
 ///
-/// Returns nothing useful if the job was cancelled. The result does not depend on the number of threads. Throws
-/// std::invalid_argument as Binding does, for a corner that is no vertex, for an invalid radius, and for more
-/// than kMaxMomentVertices.
+/// Returns nothing useful if the job was cancelled. Throws as Binding does, for a corner that is no vertex, for an
+/// invalid radius, and for more than kMaxMomentVertices.
 [[nodiscard]] SINEW_EXPORT std::vector<float> direct_delta_mush(const BindData& data,
                                                                 std::span<const std::int32_t> triangles,
                                                                 double radius, Job& job, bool exact = false);

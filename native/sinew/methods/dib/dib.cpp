@@ -10,7 +10,6 @@
 
 #include "sinew/base/targets.h"
 #include "sinew/lanes/rigid_bones.h"
-#include "sinew/methods/centre_rows.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sinew/methods/dib/dib.cpp"

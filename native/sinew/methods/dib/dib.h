@@ -45,7 +45,6 @@ struct IterativeDq {
         return {to_dual_quat(bone.rigid), bone.scale, bone.has_scale};
     }
 
-    /// The deformed vertex. Arguments and degenerate results as for Dq::deform_vertex.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,

@@ -11,13 +11,68 @@
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
-#include "sinew/lanes/bones-inl.h"
-#include "sinew/lanes/dual-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
+
+struct DqKernel {
+    static constexpr std::size_t kNumbers = kRow;
+    static constexpr std::size_t kSignedFloat4s = 2;
+
+    /// Adds the displacement by the bone's scale to the dual part: + 1/2 real * displacement.
+    template <class D>
+    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D>,
+                                     Vec<D> signed_weight, const Points<D>& rest, Sum<D>& sum) {
+        Points<D> by;
+        if (!scaled(d, palette, bone, rest, by)) return;
+        const float* const row = row_of(palette, bone);
+        const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
+        const Points<D> rotated = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
+        const Vec<D> half = hn::Mul(signed_weight, hn::Set(d, 0.5f));
+        const Vec<D> along = hn::MulAdd(axis.x, by.x, hn::MulAdd(axis.y, by.y, hn::Mul(axis.z, by.z)));
+        sum.value[4] = hn::NegMulAdd(half, along, sum.value[4]);
+        sum.value[5] = hn::MulAdd(half, rotated.x, sum.value[5]);
+        sum.value[6] = hn::MulAdd(half, rotated.y, sum.value[6]);
+        sum.value[7] = hn::MulAdd(half, rotated.z, sum.value[7]);
+    }
+
+    /// Divides once by the squared norm instead of taking a square root, as in methods/dq/dq.h.
+    template <class D>
+    static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
+        const Vec<D>* const real = sum.value;
+        const Vec<D>* const dual = sum.value + 4;
+        const Vec<D> squared_norm =
+            hn::MulAdd(real[0], real[0],
+                       hn::MulAdd(real[1], real[1], hn::MulAdd(real[2], real[2], hn::Mul(real[3], real[3]))));
+        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+        const Points<D> axis{real[1], real[2], real[3]};
+        const Points<D> translation{dual[1], dual[2], dual[3]};
+        const Points<D> inner = add_cross<D>(add_scaled<D>(translation, real[0], p), axis, p);
+        const Points<D> moved{hn::NegMulAdd(dual[0], axis.x, hn::Mul(real[0], translation.x)),
+                              hn::NegMulAdd(dual[0], axis.y, hn::Mul(real[0], translation.y)),
+                              hn::NegMulAdd(dual[0], axis.z, hn::Mul(real[0], translation.z))};
+        return add_scaled<D>(p, scale, add_cross<D>(moved, axis, inner));
+    }
+
+    static HWY_INLINE void write_row(const Quats& real, const BonePoints& translation, BoneVec* row) {
+        const BoneTag d;
+        const BoneVec half = hn::Set(d, 0.5);
+        const BonePoints by{hn::Mul(half, translation.x), hn::Mul(half, translation.y),
+                            hn::Mul(half, translation.z)};
+        const BonePoints dual = add_scaled<BoneTag>(cross<BoneTag>(by, real.v), real.w, by);
+        row[0] = real.w;
+        row[1] = real.v.x;
+        row[2] = real.v.y;
+        row[3] = real.v.z;
+        row[4] = hn::Neg(dot(by, real.v));
+        row[5] = dual.x;
+        row[6] = dual.y;
+        row[7] = dual.z;
+    }
+};
+
 namespace {
 
 SINEW_RIGID_FUNCTIONS(DqKernel)

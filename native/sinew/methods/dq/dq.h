@@ -33,13 +33,7 @@ struct Dq {
         return {to_dual_quat(bone.rigid), bone.scale, bone.has_scale};
     }
 
-    /// The deformed vertex.
-    ///
-    /// bones       one for each index in `influences`; the signs of the dual quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1. Their order decides the sign of a term that is
-    ///             perpendicular to the sum of the terms before it
-    ///
-    /// If the blend cancels (norm below kDegenerateBlend), the heaviest influence alone moves the vertex.
+    /// The order of influences decides the sign of a term that is perpendicular to the sum of the terms before it.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,

@@ -20,7 +20,7 @@
 
 namespace sinew {
 
-/// Kernel::bone_rows for bones that are posed in another space, in double.
+/// Kernel::bone_rows for bones that are posed in any space, in double.
 void linear_rows_between_spaces(const Bones& bones, Palette& palette);
 
 }  // namespace sinew
@@ -336,20 +336,7 @@ void rows_in_model(const Bones& bones, Palette& palette) {
 
 #else
 
-void rows_in_model(const Bones& bones, Palette& palette) {
-    const std::span<const std::int32_t> used = bones.used;
-    for (std::size_t i = 0; i < used.size(); ++i) {
-        const Affine<float>& motion = bones.posed_from_rest[static_cast<std::size_t>(used[i])];
-        const Mat3<float> m = motion.linear - Mat3<float>(1.0f);
-        Float4* const to = &palette.bones[kLbsColumns * i];
-        for (int c = 0; c < 3; ++c) to[c] = {{m[c].x, m[c].y, m[c].z, 0.0f}};
-        const Vec3<float>& translation = motion.translation;
-        to[3] = {{translation.x, translation.y, translation.z, 0.0f}};
-        const float length = glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]);
-        palette.sizes[i] = length < kLong ? std::max(glm::dot(translation, translation), kMinSize * kMinSize)
-                                          : std::numeric_limits<float>::infinity();
-    }
-}
+void rows_in_model(const Bones& bones, Palette& palette) { linear_rows_between_spaces(bones, palette); }
 
 #endif
 

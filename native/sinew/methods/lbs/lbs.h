@@ -31,10 +31,6 @@ struct Lbs {
         return posed_from_rest;
     }
 
-    /// The deformed vertex.
-    ///
-    /// bones       one for each index in `influences`
-    /// influences  at least one; weights >= 0 with sum 1
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,

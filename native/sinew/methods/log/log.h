@@ -5,7 +5,7 @@
 
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
-#include "sinew/transform/scaled_rigid.h"
+#include "sinew/methods/rotation_about.h"
 #include "sinew/transform/twist.h"
 
 namespace sinew {
@@ -17,7 +17,7 @@ namespace sinew {
 /// from rest, the axis of its logarithm changes sign, and vertices that it shares with other bones jump. Vertices
 /// of one bone never jump. Rotations are measured from the rest pose, so rotating the whole character by its
 /// bones changes the shape where bones meet.
-struct Log {
+struct Log : BlendsQuatVecs {
     static constexpr MethodInfo info{4,
                                      "log",
                                      "Log-Matrix",
@@ -28,20 +28,6 @@ struct Log {
                                      Needs::rest_bones};
     static const Kernel& kernel() noexcept;
 
-    template <class T>
-    using Bone = ScaledRigid<QuatVec<T>, T>;
-
-    /// rest_bone  orthonormal; only read where the motion has scale
-    template <class T>
-    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
-                                         const Affine<T>& rest_bone) noexcept {
-        return scaled_rigid(posed_from_rest, rest_bone);
-    }
-
-    /// The deformed vertex.
-    ///
-    /// bones       one for each index in `influences`
-    /// influences  at least one; weights >= 0 with sum 1
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,

@@ -5,14 +5,14 @@
 
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
-#include "sinew/transform/scaled_rigid.h"
+#include "sinew/methods/rotation_about.h"
 
 namespace sinew {
 
 /// Quaternion-vector blending: rotations by normalised sum, translations by weighted mean (Smith 2013, section
 /// 3.6, "direct quaternion blending"; Hejl 2004). The blend rotates about the origin of the space in which it is
 /// computed, so the result depends on where that origin is.
-struct Qv {
+struct Qv : BlendsQuatVecs {
     static constexpr MethodInfo info{
         2,
         "qv",
@@ -23,22 +23,7 @@ struct Qv {
         Needs::rest_bones};
     static const Kernel& kernel() noexcept;
 
-    template <class T>
-    using Bone = ScaledRigid<QuatVec<T>, T>;
-
-    /// rest_bone  orthonormal; only read where the motion has scale
-    template <class T>
-    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
-                                         const Affine<T>& rest_bone) noexcept {
-        return scaled_rigid(posed_from_rest, rest_bone);
-    }
-
-    /// The deformed vertex.
-    ///
-    /// bones       one for each index in `influences`; the signs of their quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1
-    ///
-    /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence's rotation is used.
+    /// If the rotations cancel, the heaviest influence's is used.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,

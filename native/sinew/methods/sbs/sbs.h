@@ -65,12 +65,6 @@ struct Sbs {
     template <class BoneAt>
     [[nodiscard]] static Vec3<double> rotation_centre(std::size_t count, const BoneAt& bone_at) noexcept;
 
-    /// The deformed vertex.
-    ///
-    /// bones       one for each index in `influences`; the signs of their quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1
-    ///
-    /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,

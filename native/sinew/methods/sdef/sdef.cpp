@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "sinew/base/targets.h"
-#include "sinew/methods/centre_rows.h"
+#include "sinew/lanes/rigid_bones.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sinew/methods/sdef/sdef.cpp"

@@ -9,7 +9,6 @@
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
 #include "sinew/methods/rotation_about.h"
-#include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
 
@@ -18,7 +17,7 @@ namespace sinew {
 /// other vertex is blended linearly.
 ///
 /// Scaled bones follow the rule of all rigid methods (ScaledRigid); MikuMikuDance has no scale.
-struct Sdef {
+struct Sdef : BlendsQuatVecs {
     static constexpr std::string_view kInterpolations[] = {"nlerp", "slerp"};
     static constexpr Parameter kParameters[] = {
         {.id = "interpolation",
@@ -42,20 +41,6 @@ struct Sdef {
         10};
     static const Kernel& kernel() noexcept;
 
-    template <class T>
-    using Bone = ScaledRigid<QuatVec<T>, T>;
-
-    /// rest_bone  orthonormal; only read where the motion has scale
-    template <class T>
-    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
-                                         const Affine<T>& rest_bone) noexcept {
-        return scaled_rigid(posed_from_rest, rest_bone);
-    }
-
-    /// The deformed vertex.
-    ///
-    /// bones       one for each index in `influences`; the signs of their quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1
     /// spheres     C, R0, R1 (x, y, z each), then a flag: 0 means the vertex is blended linearly; if empty, it is
     ///             as well. R0 belongs to the first influence of positive weight, R1 to the second; a vertex that
     ///             does not have exactly two is blended linearly

@@ -3,8 +3,6 @@
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/stages/bulge_limit/bulge_kernel.h"
 
-#include <array>
-
 #include "sinew/base/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -32,11 +30,6 @@ HWY_INLINE Points<D> nearest_of_segment(D d, const BulgeBone& bone, const Points
     return {hn::MulAdd(within, hn::Set(d, along[0]), hn::Set(d, head[0])),
             hn::MulAdd(within, hn::Set(d, along[1]), hn::Set(d, head[1])),
             hn::MulAdd(within, hn::Set(d, along[2]), hn::Set(d, head[2]))};
-}
-
-template <class D>
-HWY_INLINE Vec<D> squared_length(const Points<D>& v) {
-    return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::Mul(v.z, v.z)));
 }
 
 /// Limits the points of some lanes.
@@ -72,7 +65,7 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
     const float* const distances = frame.distances[static_cast<std::size_t>(kForm)][b].lane.data() + lane;
     Vec<D> allowed = hn::Load(d, distances);
     if constexpr (kStretched) allowed = hn::Mul(allowed, stretched);
-    const Vec<D> squared = squared_length(to_nearest);
+    const Vec<D> squared = dot<D>(to_nearest, to_nearest);
     const auto bulges = hn::Gt(squared, hn::Mul(allowed, allowed));
     changes = !hn::AllFalse(d, bulges);
     if (!changes) return point;
@@ -169,7 +162,7 @@ void limit(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-float length_of(const Points<One>& v) { return hn::GetLane(hn::Sqrt(squared_length(v))); }
+float length_of(const Points<One>& v) { return hn::GetLane(hn::Sqrt(dot<One>(v, v))); }
 
 void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
     const One d;
@@ -213,18 +206,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace sinew {
-namespace {
-
-using OfBlocks = void(const BulgeFrame& frame, std::size_t begin, std::size_t end);
-constexpr std::array<OfBlocks*, kTargetCount> kLimit SINEW_TARGETS(limit);
-constexpr std::array<OfBlocks*, kTargetCount> kMeasure SINEW_TARGETS(measure);
-
-}  // namespace
-
-BulgeKernel bulge_kernel() noexcept {
-    const std::size_t target = target_in_use();
-    return {kLimit[target], kMeasure[target]};
-}
+constinit const BulgeKernel kBulgeKernel{SINEW_TARGETS(limit), SINEW_TARGETS(measure)};
 
 BulgeBone bulge_bone(const BoneSegment<double>& segment, double stretch) noexcept {
     const Vec3<double>& head = segment.head;

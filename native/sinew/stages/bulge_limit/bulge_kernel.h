@@ -32,13 +32,11 @@ struct BulgeFrame {
 
 /// Functions for blocks [begin, end), compiled once for each instruction set.
 struct BulgeKernel {
-    void (*limit)(const BulgeFrame& frame, std::size_t begin, std::size_t end);
+    std::array<void (*)(const BulgeFrame& frame, std::size_t begin, std::size_t end), kTargetCount> limit;
     /// Writes the distances of the points, which must be at rest.
-    void (*measure)(const BulgeFrame& frame, std::size_t begin, std::size_t end);
+    decltype(limit) measure;
 };
-
-/// The kernel for the instruction set in use.
-[[nodiscard]] BulgeKernel bulge_kernel() noexcept;
+extern const BulgeKernel kBulgeKernel;
 
 [[nodiscard]] BulgeBone bulge_bone(const BoneSegment<double>& segment, double stretch) noexcept;
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <mutex>
 #include <string>
-#include <utility>
 
 #include "sinew/base/fork_safe.h"
 #include "sinew/mesh/check_bind_data.h"
@@ -60,7 +59,7 @@ struct BulgeLimit::State {
 
 BulgeLimit::State::State(const Binding& binding, const BulgeLimitData& data) : packed(binding.packed()) {
     check_segments(data.segments, packed->bone_count);
-    check_weights("weights", data.weights, packed->vertex_count);
+    if (!data.weights.empty()) check_weights("weights", data.weights, packed->vertex_count);
     check_space(data.bones_from_model);
     for (const std::int32_t bone : mesh.used_bones) {
         segments.push_back(data.segments[static_cast<std::size_t>(bone)]);
@@ -92,24 +91,17 @@ void BulgeLimit::State::measure(std::span<const Vec3<float>> points, const Affin
         bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
     }
     const BulgeFrame all = frame(rest_points);
-    parallel_for_blocks(mesh, points.size(), 0, [&all](std::size_t begin, std::size_t end) {
-        bulge_kernel().measure(all, begin, end);
+    parallel_for_blocks(mesh, points.size(), 0, [&](std::size_t begin, std::size_t end) {
+        kBulgeKernel.measure[target_in_use()](all, begin, end);
     });
 }
 
 BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
-    : state_(std::make_unique<State>(binding, data)) {}
-
-BulgeLimit::BulgeLimit(BulgeLimit&&) noexcept = default;
-BulgeLimit& BulgeLimit::operator=(BulgeLimit&&) noexcept = default;
-BulgeLimit::~BulgeLimit() = default;
+    : state_(make_owned<State>(binding, data)) {}
 
 void BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
                                  const Affine<float>& bones_from_model) {
-    if (rest_points.size() != vertex_count()) {
-        fail("rest_points", std::to_string(vertex_count()) + " points", std::to_string(rest_points.size()));
-    }
-    check_points(rest_points);
+    check_points(rest_points, vertex_count());
     check_space(bones_from_model);
     const std::scoped_lock lock(state_->mutex);
     state_->measure(rest_points, bones_from_model);
@@ -136,16 +128,13 @@ bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
         state.bones[i] =
             bulge_bone({transform_point(motion, rest.head), transform_point(motion, rest.tail)}, stretch);
     }
-    struct Work {
-        BulgeFrame frame;
-        BulgeKernel kernel;
-    } work{state.frame(points), bulge_kernel()};
-    work.frame.form = options.form;
-    work.frame.is_stretched = is_stretched;
-    work.frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);
-    parallel_for_blocks(
-        state.mesh, points.size(), options.threads,
-        [&work](std::size_t begin, std::size_t end) { work.kernel.limit(work.frame, begin, end); });
+    BulgeFrame frame = state.frame(points);
+    frame.form = options.form;
+    frame.is_stretched = is_stretched;
+    frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);
+    parallel_for_blocks(state.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {
+        kBulgeKernel.limit[target_in_use()](frame, begin, end);
+    });
     return true;
 }
 

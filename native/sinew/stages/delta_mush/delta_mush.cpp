@@ -18,7 +18,7 @@ namespace sinew {
 namespace {
 
 // Below this, waking a second thread at each iteration costs more than it saves.
-constexpr std::size_t kVerticesWorthAThread = 16384;
+constexpr std::size_t kMushVerticesWorthAThread = 16384;
 
 // This many iterations run over the mesh closely one behind the other, so that what they read is still in the
 // cache.
@@ -29,10 +29,7 @@ constexpr double kShareOfShortest = 0.1;
 
 void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& settings,
            std::size_t vertices) {
-    if (rest_points.size() != vertices) {
-        fail("rest_points", std::to_string(vertices) + " points", std::to_string(rest_points.size()));
-    }
-    check_points(rest_points);
+    check_points(rest_points, vertices);
     const auto most = static_cast<std::size_t>(DeltaMushStage::kMaxIterations);
     if (settings.iterations > most) {
         fail("iterations", "at most " + std::to_string(most), std::to_string(settings.iterations));
@@ -43,7 +40,7 @@ void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& se
     if (!(settings.factor >= 0.0f && settings.factor <= 1.0f)) {
         fail("factor", "a number from 0 to 1", std::to_string(settings.factor));
     }
-    check_weights("weights", settings.weights, vertices);
+    if (!settings.weights.empty()) check_weights("weights", settings.weights, vertices);
 }
 
 Float4 float4_of(const Vec3<float>& point) { return {{point.x, point.y, point.z, 0.0f}}; }
@@ -124,10 +121,10 @@ struct DeltaMush::State {
     };
 
     /// Smooths smoothed[0]. Returns the index of the result in `smoothed`.
-    std::size_t smooth(const Bound& of, const MushKernel& kernel, std::size_t threads) const noexcept;
+    std::size_t smooth(const Bound& of, std::size_t threads) const noexcept;
 
     [[nodiscard]] std::size_t threads_for(std::size_t threads) const noexcept {
-        return useful_threads(threads, mesh.vertices.size(), kVerticesWorthAThread);
+        return useful_threads(threads, mesh.vertices.size(), kMushVerticesWorthAThread);
     }
 
     // The data given to the constructor.
@@ -137,7 +134,7 @@ struct DeltaMush::State {
 
     MushMesh mesh;
     // One pointer: a child that is forked during bind() has all or nothing of it.
-    std::unique_ptr<const Bound> bound;
+    std::unique_ptr<Bound> bound;
 
     // Scratch for one call at a time. Elements beyond the vertices stay 0.
     mutable ForkSafeMutex mutex;
@@ -173,10 +170,10 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
         kept[i] = smoothed[0][i] = float4_of(made->rest_points[mesh.vertices[i]]);
     }
     // Uses the kernels that smooth each frame, so that the rest pose is reproduced.
-    const MushKernel kernel = mush_kernel();
-    const std::size_t result = smooth(*made, kernel, threads_for(0));
-    const MushFrame frame{&mesh, smoothed[result].data(), nullptr, nullptr, false, nullptr, 0.0f, nullptr};
-    kernel.take_details(frame, kept.data(), made->details.data(), 0, mesh.chunk_count());
+    const std::size_t result = smooth(*made, threads_for(0));
+    const MushFrame frame{
+        .mesh = &mesh, .from = smoothed[result].data(), .details = made->details.data(), .rest = kept.data()};
+    kMushKernel.take_details[target_in_use()](frame, 0, mesh.chunk_count());
     bound = std::move(made);
 }
 
@@ -198,26 +195,15 @@ public:
     /// Calls run(iteration, chunk) for every chunk and each of `count` iterations.
     template <class Run>
     void run(std::size_t count, const Run& run) const {
-        struct Work {
-            const Iterations& self;
-            std::size_t count;
-            const Run& run;
-        } const work{*this, count, run};
-        parallel_for(
-            parts_, parts_,
-            [&work](std::size_t begin, std::size_t end) {
-                for (std::size_t part = begin; part < end; ++part)
-                    work.self.run_part(part, work.count, work.run);
-            },
-            1);
+        const auto parts = [&](std::size_t begin, std::size_t end) {
+            for (std::size_t part = begin; part < end; ++part) run_part(part, count, run);
+        };
+        parallel_for(parts_, parts_, parts, 1);
         if (parts_ < 2 || count < 2) return;
-        parallel_for(
-            parts_ - 1, parts_,
-            [&work](std::size_t begin, std::size_t end) {
-                for (std::size_t part = begin; part < end; ++part)
-                    work.self.run_between(part, work.count, work.run);
-            },
-            1);
+        const auto between = [&](std::size_t begin, std::size_t end) {
+            for (std::size_t part = begin; part < end; ++part) run_between(part, count, run);
+        };
+        parallel_for(parts_ - 1, parts_, between, 1);
     }
 
 private:
@@ -253,23 +239,20 @@ private:
     std::size_t most_;
 };
 
-std::size_t DeltaMush::State::smooth(const Bound& of, const MushKernel& kernel,
-                                     std::size_t threads) const noexcept {
+std::size_t DeltaMush::State::smooth(const Bound& of, std::size_t threads) const noexcept {
     if (mesh.vertices.empty()) return 0;
+    const bool by_length = of.settings.type == SmoothType::length_weighted;
     const auto smooth_chunk =
-        of.settings.type == SmoothType::length_weighted ? kernel.smooth_by_length : kernel.smooth;
+        (by_length ? kMushKernel.smooth_by_length : kMushKernel.smooth)[target_in_use()];
     const Iterations together(mesh, threads);
     for (std::size_t first = 0; first < of.iterations; first += together.most()) {
         together.run(std::min(together.most(), of.iterations - first), [&](std::size_t i, std::size_t chunk) {
             const std::size_t from = (first + i) % 2;
-            const MushFrame frame{&mesh,
-                                  smoothed[from].data(),
-                                  smoothed[1 - from].data(),
-                                  of.factors.data(),
-                                  of.is_uniform,
-                                  nullptr,
-                                  0.0f,
-                                  nullptr};
+            const MushFrame frame{.mesh = &mesh,
+                                  .from = smoothed[from].data(),
+                                  .to = smoothed[1 - from].data(),
+                                  .factors = of.factors.data(),
+                                  .is_uniform = of.is_uniform};
             smooth_chunk(frame, chunk, chunk + 1);
         });
     }
@@ -278,13 +261,9 @@ std::size_t DeltaMush::State::smooth(const Bound& of, const MushKernel& kernel,
 
 DeltaMush::DeltaMush(const MeshTopology& topology, std::span<const Vec3<float>> rest_points,
                      const DeltaMushSettings& settings)
-    : state_(std::make_unique<State>(topology, rest_points.size())) {
+    : state_(make_owned<State>(topology, rest_points.size())) {
     state_->bind(rest_points, settings);
 }
-
-DeltaMush::DeltaMush(DeltaMush&&) noexcept = default;
-DeltaMush& DeltaMush::operator=(DeltaMush&&) noexcept = default;
-DeltaMush::~DeltaMush() = default;
 
 void DeltaMush::bind(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& settings) {
     state_->bind(rest_points, settings);
@@ -311,33 +290,27 @@ bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
     if (points.size() != mesh.vertices.size()) return false;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
-    const MushKernel kernel = mush_kernel();
-    struct Work {
-        const State& state;
-        const MushKernel& kernel;
-        MushFrame frame;
-    } work{state,
-           kernel,
-           {&mesh, nullptr, nullptr, nullptr, false, state.bound->details.data(), scale, points.data()}};
-    parallel_for(
-        mesh.chunk_count(), threads,
-        [&work](std::size_t begin, std::size_t end) {
-            const std::vector<std::uint32_t>& vertices = work.state.mesh.vertices;
-            // Read once, because the compiler assumes that any stored number may change it.
-            const std::uint32_t* const of = vertices.data();
-            const Vec3<float>* const from = work.frame.points;
-            Float4* const to = work.state.smoothed[0].data();
-            end = std::min(end * MushMesh::kChunk, vertices.size());
-            for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
-                // The fourth number is always 0.
-                std::memcpy(&to[i], &from[of[i]], sizeof(Vec3<float>));
-            }
-        },
-        1);
-    work.frame.from = state.smoothed[state.smooth(*state.bound, kernel, threads)].data();
-    parallel_for(
-        mesh.chunk_count(), threads,
-        [&work](std::size_t begin, std::size_t end) { work.kernel.finish(work.frame, begin, end); }, 1);
+    const auto gather = [&](std::size_t begin, std::size_t end) {
+        // Read once, because the compiler assumes that any stored number may change it.
+        const std::uint32_t* const of = mesh.vertices.data();
+        const Vec3<float>* const from = points.data();
+        Float4* const to = state.smoothed[0].data();
+        end = std::min(end * MushMesh::kChunk, mesh.vertices.size());
+        for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
+            // The fourth number is always 0.
+            std::memcpy(&to[i], &from[of[i]], sizeof(Vec3<float>));
+        }
+    };
+    parallel_for(mesh.chunk_count(), threads, gather, 1);
+    const MushFrame frame{.mesh = &mesh,
+                          .from = state.smoothed[state.smooth(*state.bound, threads)].data(),
+                          .details = state.bound->details.data(),
+                          .scale = scale,
+                          .points = points.data()};
+    const auto finish = [&](std::size_t begin, std::size_t end) {
+        kMushKernel.finish[target_in_use()](frame, begin, end);
+    };
+    parallel_for(mesh.chunk_count(), threads, finish, 1);
     return true;
 }
 

@@ -2,7 +2,6 @@
 // The stage `delta_mush` on whole chunks: see stages/delta_mush/delta_mush.h for the definition.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -346,8 +345,7 @@ void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-void take_details(const MushFrame& frame, const Float4* rest, MushDetails* details, std::size_t begin,
-                  std::size_t end) {
+void take_details(const MushFrame& frame, std::size_t begin, std::size_t end) {
     const Full d;
     using D = Full;
     const MushMesh& mesh = *frame.mesh;
@@ -356,14 +354,15 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
         for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
             const Points<D> point = consecutive_points(d, frame.from + block.first_vertex, lane);
             const Points<D> taken =
-                subtract<D>(consecutive_points(d, rest + block.first_vertex, lane), point);
+                subtract<D>(consecutive_points(d, frame.rest + block.first_vertex, lane), point);
             const auto store = [&](Vec<D> detail, Lanes<float>& to)
                                    HWY_ATTR { hn::Store(detail, d, to.lane.data() + lane); };
             for_each_corner(d, frame, block, lane, point,
                             [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
-                                store(hn::Mul(corner.unit_x, dot<D>(corner.x, taken)), details[k].x);
-                                store(hn::Mul(corner.unit_y, dot<D>(corner.y, taken)), details[k].y);
-                                store(hn::Mul(corner.unit_z, dot<D>(corner.z, taken)), details[k].z);
+                                MushDetails& details = frame.details[k];
+                                store(hn::Mul(corner.unit_x, dot<D>(corner.x, taken)), details.x);
+                                store(hn::Mul(corner.unit_y, dot<D>(corner.y, taken)), details.y);
+                                store(hn::Mul(corner.unit_z, dot<D>(corner.z, taken)), details.z);
                             });
         }
     }
@@ -498,23 +497,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace sinew {
-namespace {
-
-using Smooth = void(const MushFrame& frame, std::size_t begin, std::size_t end);
-using Take = void(const MushFrame& frame, const Float4* rest, MushDetails* details, std::size_t begin,
-                  std::size_t end);
-
-constexpr std::array<Smooth*, kTargetCount> kSmooth SINEW_TARGETS(smooth);
-constexpr std::array<Smooth*, kTargetCount> kSmoothByLength SINEW_TARGETS(smooth_by_length);
-constexpr std::array<Smooth*, kTargetCount> kFinish SINEW_TARGETS(finish);
-constexpr std::array<Take*, kTargetCount> kTake SINEW_TARGETS(take_details);
-
-}  // namespace
-
-MushKernel mush_kernel() noexcept {
-    const std::size_t target = target_in_use();
-    return {kSmooth[target], kSmoothByLength[target], kFinish[target], kTake[target]};
-}
+constinit const MushKernel kMushKernel{SINEW_TARGETS(smooth), SINEW_TARGETS(smooth_by_length),
+                                       SINEW_TARGETS(finish), SINEW_TARGETS(take_details)};
 
 }  // namespace sinew
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "sinew/base/targets.h"
 #include "sinew/delta_mush.h"
 #include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
@@ -73,27 +75,28 @@ struct MushMesh {
 struct MushFrame {
     const MushMesh* mesh;
     const Float4* from;
-    Float4* to;  // output of smooth
+    Float4* to = nullptr;  // output of smooth
     // [vertices] factor of one iteration, over the number of neighbours; for smooth_by_length also times 2
-    const float* factors;
-    bool is_uniform;  // factors differ only by the number of neighbours
-    const MushDetails* details;
-    float scale;
-    Vec3<float>* points;  // output of finish: the caller's
+    const float* factors = nullptr;
+    bool is_uniform = false;         // factors differ only by the number of neighbours
+    MushDetails* details = nullptr;  // output of take_details
+    const Float4* rest = nullptr;    // of take_details
+    float scale = 0.0f;
+    Vec3<float>* points = nullptr;  // output of finish: the caller's
 };
 
 /// Functions for chunks [begin, end), compiled once for each instruction set.
 struct MushKernel {
-    void (*smooth)(const MushFrame& frame, std::size_t begin, std::size_t end);
-    void (*smooth_by_length)(const MushFrame& frame, std::size_t begin, std::size_t end);
-    /// Adds the details to `from` and writes the result to the caller's points.
-    void (*finish)(const MushFrame& frame, std::size_t begin, std::size_t end);
-    /// Computes the details of the rest points `rest`, where frame.from has them after smoothing.
-    void (*take_details)(const MushFrame& frame, const Float4* rest, MushDetails* details, std::size_t begin,
-                         std::size_t end);
-};
+    using OfChunks =
+        std::array<void (*)(const MushFrame& frame, std::size_t begin, std::size_t end), kTargetCount>;
 
-/// The kernel for the instruction set in use.
-[[nodiscard]] MushKernel mush_kernel() noexcept;
+    OfChunks smooth;
+    OfChunks smooth_by_length;
+    /// Adds the details to `from` and writes the result to the caller's points.
+    OfChunks finish;
+    /// Computes the details of the points `rest`, where `from` has them after smoothing.
+    OfChunks take_details;
+};
+extern const MushKernel kMushKernel;
 
 }  // namespace sinew

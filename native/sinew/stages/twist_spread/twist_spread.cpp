@@ -122,8 +122,8 @@ TwistSpread::State::State(const Binding& binding, const TwistSpreadData& data)
     check_rest_bones(rest_bones, packed->bone_count);
     check_twists(twists, rest_bones);
     check_parents(parents, rest_bones.size());
-    check_weights("weights", data.weights, packed->vertex_count);
-    check_weights("mix", data.mix, packed->vertex_count);
+    if (!data.weights.empty()) check_weights("weights", data.weights, packed->vertex_count);
+    if (!data.mix.empty()) check_weights("mix", data.mix, packed->vertex_count);
     check_space(bones_from_model);
     space_rows = SpaceRows(bones_from_model);
     weights = pack_weights(mesh, data.weights);
@@ -217,18 +217,11 @@ void TwistSpread::State::prepare(std::span<const Affine<float>> posed,
 }
 
 TwistSpread::TwistSpread(const Binding& binding, const TwistSpreadData& data)
-    : state_(std::make_unique<State>(binding, data)) {}
-
-TwistSpread::TwistSpread(TwistSpread&&) noexcept = default;
-TwistSpread& TwistSpread::operator=(TwistSpread&&) noexcept = default;
-TwistSpread::~TwistSpread() = default;
+    : state_(make_owned<State>(binding, data)) {}
 
 void TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
                                   const Affine<float>& bones_from_model) {
-    if (rest_points.size() != vertex_count()) {
-        fail("rest_points", std::to_string(vertex_count()) + " points", std::to_string(rest_points.size()));
-    }
-    check_points(rest_points);
+    check_points(rest_points, vertex_count());
     check_space(bones_from_model);
     const std::scoped_lock lock(state_->mutex);
     state_->set_rest_points(rest_points, bones_from_model);
@@ -284,7 +277,7 @@ bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<fl
         state.space_rows.spaces(),
         points.data()};
     parallel_for_blocks(state.mesh, points.size(), options.threads,
-                        [&frame](std::size_t begin, std::size_t end) { spread_twists(frame, begin, end); });
+                        [&](std::size_t begin, std::size_t end) { spread_twists(frame, begin, end); });
     return true;
 }
 
