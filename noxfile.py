@@ -36,9 +36,10 @@ WHEEL_SOURCES = ("CMakeLists.txt", "pyproject.toml", "requirements/build.txt", "
 BENCH_PACKAGES, BENCH_PEERS = ("numpy>=2", "matplotlib>=3.8"), ("libigl==2.5.1", "usd-core>=24")
 # What `./dev test --all` runs of the other commands, in a folder: each must work in a fresh checkout.
 SMALL = (
-    "help; lint; site --out {0}/site; stub {0}/stub; package; wheel; lock --out {0}/requirements build; "
-    "release --dry-run minor; demo; golden {0}/golden; pictures --only wrist --out {0}/pictures; "
-    "report --quick --out {0}/report; bench --quick --kernels --name=small"
+    "help; lint; site --out {0}/site; stub --out {0}/stub; package; wheel; "
+    "lock --out {0}/requirements build; release --dry-run minor; demo; golden {0}/golden; "
+    "pictures --only wrist --out {0}/pictures; report --quick --out {0}/report; "
+    "bench --quick --kernels --name=small"
 )
 PROCESSORS = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 LOGS = ROOT / "build/test-logs"
@@ -201,8 +202,11 @@ def package(session: nox.Session) -> None:
         words = "shell", "python3", "-c", "import sys; print('%d.%d' % sys.version_info[:2])"
         version = session.run(full, *words, silent=True, stderr=subprocess.DEVNULL).split()[-1]
         if version not in versions:
-            library = max(ROOT.glob("build/wheel-*/native/sinew/libsinew.so"), key=os.path.getmtime)
-            words = "shell", "env", f"SINEW_BUILT={library.parents[2]}", "./dev", "wheel", "python3"
+            built = ROOT.glob("build/wheel-*/native/sinew/libsinew.so")
+            library = max(built, key=os.path.getmtime, default=None)
+            # Without the folder of a build, it builds the library, too.
+            words = "shell", "env", f"SINEW_BUILT={library.parents[2] if library else ''}"
+            words += "./dev", "wheel", "python3"
             session.run(full, *words, silent=True)
             versions.append(version)
     wheels = [str(wheel_of(version)) for version in versions]

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes the stub of sinew._native, which editors and type checkers read, from the module that is installed.
 
-python tools/make_stub.py [FOLDER]    into native/python/sinew/_native, or FOLDER
+python tools/make_stub.py [--out FOLDER]    into native/python/sinew/_native, or FOLDER
 """
 
 from __future__ import annotations
 
+import argparse
 import re
 import shutil
 import subprocess
@@ -30,4 +31,6 @@ def write_stub(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    write_stub(Path(sys.argv[1]) if len(sys.argv) > 1 else STUB)
+    parser = argparse.ArgumentParser(prog="./dev stub")
+    parser.add_argument("--out", type=Path, default=STUB)
+    write_stub(parser.parse_args().out)

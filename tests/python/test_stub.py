@@ -21,7 +21,8 @@ def contents(folder):
 
 
 def test_the_stub_is_made_of_the_module(tmp_path):
-    subprocess.run([PYTHON, ROOT / "tools" / "make_stub.py", tmp_path / "made"], check=True, timeout=120)
+    words = [PYTHON, ROOT / "tools" / "make_stub.py", "--out", tmp_path / "made"]
+    subprocess.run(words, check=True, timeout=120)
     assert contents(tmp_path / "made") == contents(STUB), "./dev stub writes it anew"
 
 
