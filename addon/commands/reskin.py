@@ -7,9 +7,7 @@ import sinew
 
 from ..core.frames import parse_frames
 from ..core.parameters import as_texts
-from ..jobs.job_file import Settings
-from ..jobs.job_schema import job_schema
-from ..jobs.schema import rows
+from ..jobs.job_file import Settings, keys
 from . import batch
 from .arguments import add_set, method
 from .console import Console
@@ -44,8 +42,8 @@ class _JobHelp(argparse.Action):
     """Prints the keys of a job file and exits, as --help does."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_others: object) -> None:
-        for name, headers, wanted, meaning in rows(job_schema(_methods())):
-            print(f"{name}  ({headers})\n    {meaning}\n    takes {wanted}")
+        for key in keys():
+            print(f"{key.name}  ({key.headers})\n    {key.help}\n    takes {key.wanted}")
         parser.exit()
 
 

@@ -5,14 +5,24 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, TypeAlias
 
+from ..core.bake import IN_FILE, KINDS, check_frames
 from ..core.errors import WrongUse
-from .job_schema import check_bakes, job_schema
-from .schema import Position, SchemaError, read
+from ..core.frames import parse_frames
+from ..core.parameters import parse
+from ..core.scale_rule import SCALE_RULES
+
+Position: TypeAlias = tuple[str | int, ...]
+"""The path to a value in a file: keys from the top, and an index for each entry of a list of tables."""
+
+# The tables of a job file.
+TOP, OBJECTS, FILES = "top", "objects", "files"
+# Their headers, in the order of documents.
+_HEADERS = {"top": TOP, "[[objects]]": OBJECTS, "[[files]]": FILES, "[[files.objects]]": OBJECTS}
 
 
 @dataclass(frozen=True)
@@ -73,7 +83,9 @@ class Settings:
 
     def check_bakes(self) -> None:
         """Raises WrongUse where a bake is not possible for the frames."""
-        check_bakes(self.kinds, self.bake_frames)
+        if self.bake_frames is not None:
+            for kind in self.kinds:
+                check_frames(kind, sorted(set(parse_frames(self.bake_frames))))
 
     def as_task(self) -> dict:
         """Returns the settings as JSON, for tasks and for the journal."""
@@ -126,8 +138,167 @@ class JobFile:
         return settings
 
 
+# --- Keys
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of some tables.
+
+    read    converts and checks a value; raises WrongUse with a sentence that follows the key's name. None for a
+            list of tables of that name
+    wanted  a short description of the value for documents
+    help    one sentence for documents
+    """
+
+    name: str
+    tables: tuple[str, ...]
+    read: Callable[[Any], Any] | None
+    wanted: str
+    help: str
+
+    @property
+    def headers(self) -> str:
+        return ", ".join(header for header, table in _HEADERS.items() if table in self.tables)
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str) or not value:
+        raise WrongUse(f"expected text in quotes, got {value!r}")
+    return value
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    values = value if isinstance(value, list) else [value]
+    if not all(isinstance(one, str) and one for one in values):
+        raise WrongUse(f'expected a list such as ["a*", "b"], got {value!r}')
+    return tuple(values)
+
+
+def _one_of(names: Collection[str]) -> Callable[[object], str]:
+    def read(value: object) -> str:
+        name = _text(value)
+        if name not in names:
+            raise WrongUse(f"expected one of {', '.join(names)}, got {name!r}")
+        return name
+
+    return read
+
+
+def _bakes(value: object) -> tuple[str, ...]:
+    found = _texts(value)
+    for kind in found:
+        if kind not in KINDS:
+            raise WrongUse(f"expected some of {', '.join(KINDS)}, got {kind!r}")
+    in_file = [kind for kind in found if kind in IN_FILE]
+    if len(in_file) > 1:
+        raise WrongUse(f"an object can have one of {', '.join(in_file)}")
+    return found
+
+
+def _parameters(value: object) -> tuple[str, ...]:
+    texts = _texts(value)
+    parse(texts)
+    return texts
+
+
+def _frames(value: object) -> str:
+    text = _text(value)
+    try:
+        parse_frames(text)
+    except WrongUse as error:
+        raise WrongUse(str(error).removeprefix("frames: ")) from None
+    return text
+
+
+def _paths(value: object) -> tuple[str, ...]:
+    patterns = _texts(value)
+    if not all(PurePath(pattern).parts for pattern in patterns):
+        raise WrongUse(f"expected paths such as hero*.blend, got {list(patterns)!r}")
+    return patterns
+
+
+def keys(methods: Collection[str] = ()) -> tuple[Key, ...]:
+    """Returns all keys: the reader, `sinew reskin --job-help` and docs/batch.md are made from this list.
+
+    methods  the allowed values of `method`
+    """
+    of_all, of_files = (TOP, OBJECTS, FILES), (TOP, FILES)
+    scales = [rule.name for rule in SCALE_RULES]
+    text_or_list, below = "text or a list", "relative to the folder of the job file"
+    return (
+        Key("inputs", (TOP,), _texts, text_or_list, f"files, folders and patterns, {below}"),
+        Key("out", (TOP,), _text, "text", f"folder of the copies, {below}"),
+        Key("method", of_all, _one_of(methods), "a method of `sinew methods`", "how the meshes are deformed"),
+        Key(
+            "scale",
+            of_all,
+            _one_of(scales),
+            f"one of {', '.join(scales)}",
+            "the rule for the bones' scale; without it, each object keeps its own rule",
+        ),
+        Key(
+            "set",
+            of_all,
+            _parameters,
+            'NAME=VALUE, or a list such as ["mix=dq", "mix.group=Arms"]',
+            "parameters of methods and stages, as of `sinew methods`",
+        ),
+        Key(
+            "include",
+            of_files,
+            _texts,
+            text_or_list,
+            "only objects, or collections, of these names or patterns",
+        ),
+        Key("exclude", of_files, _texts, text_or_list, "objects, or collections, to leave out"),
+        Key(
+            "bake",
+            of_all,
+            _bakes,
+            f"some of {', '.join(KINDS)}",
+            "bakes to write beside the copies; [] for none",
+        ),
+        Key(
+            "bake_frames",
+            of_files,
+            _frames,
+            "frames such as 1,12,40-48",
+            "frames to bake; without it, those of the file's scene",
+        ),
+        Key(OBJECTS, of_files, None, "tables", "settings of some objects; later ones win"),
+        Key(FILES, (TOP,), None, "tables", "settings of some files; later ones win"),
+        Key("match", (OBJECTS,), _text, "text; required", "name or pattern of objects"),
+        Key(
+            "match",
+            (FILES,),
+            _paths,
+            "paths or patterns such as hero*.blend; required",
+            "files whose path ends with one of these",
+        ),
+    )
+
+
+def markdown() -> str:
+    """Returns the keys as a table for docs/batch.md."""
+    lines = ["| key | where | value | meaning |", "|---|---|---|---|"]
+    lines += [f"| `{key.name}` | {key.headers} | {key.wanted} | {key.help} |" for key in keys()]
+    return "\n".join(lines)
+
+
+# --- Reading
+
+
+class _NotAllowed(Exception):  # noqa: N818
+    """A value that a key does not allow. The sentence says what was expected and what was found."""
+
+    def __init__(self, position: Position, sentence: str) -> None:
+        super().__init__(sentence)
+        self.position = position
+
+
 def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
-    """Reads a job file. Raises WrongUse, with file and line, for anything that the schema does not allow."""
+    """Reads a job file. Raises WrongUse, with file and line, for anything that no key allows."""
     try:
         # Some editors start a file with a byte order mark.
         text = path.read_text(encoding="utf-8-sig")
@@ -141,27 +312,63 @@ def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
     except tomllib.TOMLDecodeError as error:
         raise WrongUse(f"{path}: {error}") from None
     try:
-        values = read(table, job_schema(methods)).values
-    except SchemaError as error:
-        raise WrongUse(f"{path}:{_line_of(text, error.position)}: {error.sentence}") from None
+        values = _Reader(text, keys(methods)).read(TOP, table)
+    except _NotAllowed as wrong:
+        raise WrongUse(f"{path}:{_line_of(text, wrong.position)}: {wrong}") from None
     base = path.resolve().parent
+    inputs, out, files = (values.pop(name, None) for name in ("inputs", "out", FILES))
     return JobFile(
-        inputs=tuple(str(base / name) for name in values.get("inputs", ())),
-        out=str(base / values["out"]) if "out" in values else None,
-        settings=_settings(values),
-        files=tuple(
-            FileRule(entry.values["match"], _settings(entry.values), _line_of(text, entry.position))
-            for entry in values.get("files", ())
-        ),
+        inputs=tuple(str(base / name) for name in inputs or ()),
+        out=str(base / out) if out is not None else None,
+        settings=Settings(**values),
+        files=files or (),
     )
 
 
-def _settings(values: Mapping[str, Any]) -> Settings:
-    """Returns the settings in a table, which can have other keys as well. Keys and fields have the same
-    names."""
-    own = {field.name: values[field.name] for field in fields(Settings) if field.name in values}
-    own["objects"] = tuple(ObjectRule(**entry.values) for entry in values.get("objects", ()))
-    return Settings(**own)
+@dataclass(frozen=True)
+class _Reader:
+    text: str
+    keys: tuple[Key, ...]
+
+    def read(self, name: str, table: dict[str, Any], position: Position = ()) -> dict[str, Any]:
+        """Returns the values of a table. Raises _NotAllowed for the first that is wrong, in the order of the
+        file."""
+        known = {key.name: key for key in self.keys if name in key.tables}
+        for key in table:
+            if key not in known:
+                sentence = f"{key}: no such key; expected one of {', '.join(known)}"
+                raise _NotAllowed((*position, key), sentence)
+        if "match" in known and "match" not in table:
+            raise _NotAllowed(position, "match is missing")
+        values = {key: self._value(known[key], value, (*position, key)) for key, value in table.items()}
+        if name == OBJECTS:
+            if len(values) == 1:
+                sentence = "these objects have no settings; expected method, scale, set or bake"
+                raise _NotAllowed(position, sentence)
+            return values
+        try:
+            bakes = {key: values[key] for key in ("bake", "bake_frames", OBJECTS) if key in values}
+            Settings(**bakes).check_bakes()
+        except WrongUse as error:
+            raise _NotAllowed((*position, "bake_frames"), str(error)) from None
+        return values
+
+    def _value(self, key: Key, value: Any, position: Position) -> Any:
+        if key.read is not None:
+            try:
+                return key.read(value)
+            except WrongUse as error:
+                raise _NotAllowed(position, f"{key.name}: {error}") from None
+        if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
+            header = ".".join(step for step in position if isinstance(step, str))
+            raise _NotAllowed(position, f"{key.name}: expected entries that begin with [[{header}]]")
+        return tuple(self._rule(key.name, entry, (*position, n)) for n, entry in enumerate(value))
+
+    def _rule(self, name: str, entry: dict[str, Any], position: Position) -> ObjectRule | FileRule:
+        values = self.read(name, entry, position)
+        if name == OBJECTS:
+            return ObjectRule(**values)
+        return FileRule(values.pop("match"), Settings(**values), _line_of(self.text, position))
 
 
 def _line_of(text: str, position: Position) -> int:
