@@ -4,8 +4,6 @@ A window that renders calls handlers from the render's thread, too."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -18,17 +16,29 @@ _main_thread = sinew.thread_id()
 _depth = 0
 
 
-@contextmanager
-def updates_suspended() -> Iterator[None]:
-    """Events inside, on this thread, are only noted for the refresh() that has to follow; those of other
-    threads wait until the end."""
-    global _depth
-    with _lock:
+class _Suspension:
+    """A class, as a generator's context takes longer than the work of most frames."""
+
+    def __enter__(self) -> bool:
+        global _depth
+        _lock.__enter__()
         _depth += 1
-        try:
-            yield
-        finally:
-            _depth -= 1
+        return _depth == 1
+
+    def __exit__(self, *error: object) -> None:
+        global _depth
+        _depth -= 1
+        _lock.__exit__(*error)
+
+
+_SUSPENSION = _Suspension()
+
+
+def updates_suspended() -> _Suspension:
+    """Context for all that Sinew changes, and for its reactions to events. Events inside, on this thread, are
+    only noted for the refresh() that has to follow; those of other threads wait until the end. Its value is
+    False inside of another one: whoever is there may only note an event."""
+    return _SUSPENSION
 
 
 @dataclass
@@ -59,33 +69,5 @@ def may_change_file() -> bool:
     return not (phase.is_saving or is_rendering_in_window())
 
 
-def is_playing_in_window() -> bool:
-    """Whether a change of frame is that of a window that plays. Exporters that run beside it have their own
-    thread."""
-    if bpy.app.background or not is_main_thread():
-        return False
-    return any(window.screen.is_animation_playing for window in bpy.context.window_manager.windows)
-
-
 def is_main_thread() -> bool:
     return sinew.thread_id() == _main_thread
-
-
-class _Reaction:
-    """A class, as a generator's context takes longer than the work of most frames."""
-
-    def __enter__(self) -> bool:
-        _lock.__enter__()
-        return _depth == 0
-
-    def __exit__(self, *error: object) -> None:
-        _lock.__exit__(*error)
-
-
-def reaction() -> _Reaction:
-    """Context for a reaction to an event, entered when no other thread reacts. Its value is whether to
-    react."""
-    return _REACTION
-
-
-_REACTION = _Reaction()

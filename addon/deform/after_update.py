@@ -32,12 +32,9 @@ def deform(
                   stored points or normals are not valid
     """
     # Binding is not part of a frame's time: it happens once.
-    started, before = time.perf_counter(), skinned.shown.rest_points
+    started = time.perf_counter()
     differs = shape(obj, skinned, depsgraph)
     shown = skinned.shown
-    if changes.frame:
-        is_reshaped = before is not None and shown.rest_points is not before
-        skinned.dirtied_by_frames = is_reshaped or obj.session_uid in changes.moved
     count = len(shown.rest_points) + skinned.normal_count
     # A view layer that is shown again may have other points.
     is_known = changes.complete and not is_inspected

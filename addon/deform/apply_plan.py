@@ -95,7 +95,7 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         if attach.is_off(obj) or (wanted.state is State.REFUSED and is_same):
             attach.position_modifier(obj)
             return
-        attach.switch(obj, wanted.state is State.ASIDE, wanted.is_alone)
+        attach.switch(obj, wanted.state is State.ASIDE, wanted.after_update)
         if wanted.state is State.ASIDE:
             attach.restore_builtin(obj)
         attach.position_modifier(obj)
@@ -113,7 +113,7 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         return
     given = wanted.normals
     point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
-    attach.switch(obj, on=True, is_alone=wanted.is_alone)
+    attach.switch(obj, on=True, is_alone=wanted.after_update)
     attach.restore_pointers(obj)
 
 

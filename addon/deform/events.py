@@ -56,21 +56,6 @@ def subscribe(event: str, function: Callable) -> None:
         functions.append(function)
 
 
-def call_first(event: str, function: Callable) -> None:
-    """Has Blender call it before all others. Must not be called while Blender iterates over the functions."""
-    functions = getattr(bpy.app.handlers, event)
-    if not functions or functions[0] is not function:
-        unsubscribe(event, function)
-        functions.insert(0, function)
-
-
-def call_last(event: str, function: Callable) -> None:
-    """Has Blender call it after all others. If one of these functions calls this, it applies at once."""
-    if not is_last(event, function):
-        unsubscribe(event, function)
-        subscribe(event, function)
-
-
 def is_last(event: str, function: Callable) -> bool:
     functions = getattr(bpy.app.handlers, event)
     return bool(functions) and functions[-1] is function

@@ -13,11 +13,10 @@ from ..attach import pose_driver, properties, references, stack
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import (
     is_main_thread,
-    is_playing_in_window,
     is_rendering_in_window,
     may_change_file,
     phase,
-    reaction,
+    updates_suspended,
 )
 from . import events, session
 from .changes import Changes, names_of_changed_meshes
@@ -36,7 +35,7 @@ def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> N
 def _take_off_drivers_without_modifier() -> None:
     """Removes drivers where Sinew's modifier was applied or deleted: Blender would print a warning for a
     driver on a missing modifier. The next evaluation is the first without the modifier."""
-    with reaction() as may_react:
+    with updates_suspended() as may_react:
         if not (may_react and may_change_file()):
             return
         for obj, state in current.pairs:
@@ -54,12 +53,12 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
 
 
 def _react_to_update(depsgraph: bpy.types.Depsgraph) -> None:
-    with reaction() as may_react:
+    with updates_suspended() as may_react:
         if current.is_idle:
             return
         original = events.finder("depsgraph_update_post", on_depsgraph_update)
-        _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
-    _end_event()
+        waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
+    _end_event(depsgraph, waiting)
     _note_seen("depsgraph_update_post", depsgraph)
 
 
@@ -69,30 +68,6 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
         return
     _subscribe_behind_others("frame_change_post", on_frame_change)
     _begin_evaluation()
-    if is_rendering_in_window():
-        return
-    if any(state.dirtied_by_frames for state in current.skinned.values()):
-        events.call_last("frame_change_pre", suspend_modifiers)
-        events.call_first("frame_change_post", restore_modifiers)
-    else:
-        events.unsubscribe_all(_GATE)
-
-
-@persistent
-def suspend_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
-    """Called last, and restore_modifiers() first, so that other add-ons never see a suspended modifier."""
-    is_playing = is_playing_in_window() and not phase.is_rendering
-    with reaction() as may_react, contextlib.suppress(ReferenceError):
-        for obj, state in current.pairs if may_react and may_change_file() else ():
-            # Objects that their Armature modifiers deform are not evaluated twice.
-            if state.dirtied_by_frames and properties.of(obj).replaces_modifiers:
-                current.gate.suspend(obj, is_playing)
-
-
-@persistent
-def restore_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
-    with reaction():
-        current.gate.restore()
 
 
 @persistent
@@ -100,14 +75,13 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
     if current.all_use_builtin and Changes.are_motion_only(depsgraph):
         notify(subscribers.frame_shown)
         return
-    with reaction() as may_react:
-        if current.gate.suspended:
-            current.gate.restore()
+    waiting = None
+    with updates_suspended() as may_react:
         if not current.is_idle:
             original = events.finder("frame_change_post", on_frame_change)
             if not session.were_all_deformed(depsgraph, original):
-                _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
-    _end_event()
+                waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
+    _end_event(depsgraph, waiting)
     _note_seen("frame_change_post", depsgraph)
 
 
@@ -126,11 +100,18 @@ def _begin_evaluation() -> None:
         session.name_requests()
 
 
-def _end_event() -> None:
-    """Whatever Blender evaluates from here to the next event is caused by a handler that changed
-    something."""
-    for _obj, state in current.pairs:
+def _end_event(depsgraph: bpy.types.Depsgraph, waiting: Changes | None) -> None:
+    """Whatever Blender evaluates from here to the next event is caused by a handler that changed something.
+
+    waiting  as from _react()
+    """
+    if waiting is not None:
+        _keep_evaluated_shapes(waiting)
+        session.refresh_between_steps(bpy.context)
+    for obj, state in current.pairs:
         state.evaluation.is_event_known = state.evaluation.was_tagged
+        with contextlib.suppress(ReferenceError):
+            state.note_shown(obj, depsgraph)
 
 
 def _read_changes(depsgraph: bpy.types.Depsgraph, original: events.Find, frame: bool) -> Changes:
@@ -141,10 +122,12 @@ def _read_changes(depsgraph: bpy.types.Depsgraph, original: events.Find, frame: 
     return Changes.read(depsgraph, frame, same, original, current.is_after_step)
 
 
-def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) -> None:
+def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) -> Changes | None:
     """Reacts to an evaluation. It is only noted where Sinew itself caused it, where Blender evaluates while
     saving (others' changes may be in the same list), and for the window during a render: points written after
-    the update would then belong to the render's frame."""
+    the update would then belong to the render's frame.
+
+    Returns the changes where an object waits for another evaluation."""
     waits_for_render = is_rendering_in_window() and is_main_thread()
     phase.must_refresh |= waits_for_render
     if not may_react or phase.is_saving or waits_for_render:
@@ -152,15 +135,13 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
             current.missed = changes
         else:
             current.missed.add(changes)
-        return
+        return None
     with references.between_steps():
         session.update_all(depsgraph, changes)
     before, current.waiting = current.waiting, session.waiting()
     # What handlers change, Blender evaluates without an event. Once for each upstream proxy: one in another
     # scene goes on waiting.
-    if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph:
-        _keep_evaluated_shapes(changes)
-        session.refresh_between_steps(bpy.context)
+    return changes if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph else None
 
 
 def _keep_evaluated_shapes(changes: Changes) -> None:
@@ -207,8 +188,8 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
     seen, current.seen = current.seen, None
     if seen is None:
         return
-    names, new = names_of_changed_meshes(depsgraph), Changes(complete=True)
-    with reaction() as may_react:
+    names, new, waiting = names_of_changed_meshes(depsgraph), Changes(complete=True), None
+    with updates_suspended() as may_react:
         unread = []
         for obj, state in current.pairs:
             with contextlib.suppress(ReferenceError):
@@ -225,7 +206,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             new.touched |= new.meshes | new.objects
             # Sinew's own changes came before these handlers.
             current.expected -= new.meshes
-            _react(depsgraph, new, may_react)
+            waiting = _react(depsgraph, new, may_react)
         for obj in unread:
             with contextlib.suppress(ReferenceError):
                 state = session.state_of(obj)
@@ -233,7 +214,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     state.needs_recheck = True
                     # The upstream proxy is evaluated again only now.
                     state.evaluation.changed_unannounced |= obj.data.name_full not in seen
-    _end_event()
+    _end_event(depsgraph, waiting)
 
 
 @persistent
@@ -257,8 +238,6 @@ def check_unannounced() -> float:
 # --- Registration
 
 _LAST = (after_others, after_others_again)
-# Functions that suspend modifiers after all other functions, and restore them before any other.
-_GATE = {"frame_change_pre": suspend_modifiers, "frame_change_post": restore_modifiers}
 _HANDLERS = {
     "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_depsgraph_update,
@@ -283,8 +262,7 @@ def unregister() -> None:
     session.forget()
     if bpy.app.timers.is_registered(check_unannounced):
         bpy.app.timers.unregister(check_unannounced)
-    for handlers in (_HANDLERS, _GATE):
-        events.unsubscribe_all(handlers)
+    events.unsubscribe_all(_HANDLERS)
     for event in ("frame_change_post", "depsgraph_update_post"):
         for function in _LAST:
             events.unsubscribe(event, function)

@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 
 from ..attach import note, overrides, point_store, properties, references
 from ..attach.subscribers import notify, subscribers
-from ..attach.updates import is_rendering_in_window, phase, reaction, updates_suspended
+from ..attach.updates import is_rendering_in_window, phase, updates_suspended
 from ..core.precompute import precomputations
 from ..io.animation_paths import animated_paths
 from . import apply_plan, events, handlers, precompute_watch, precomputing, session
@@ -25,12 +25,13 @@ log = logging.getLogger("sinew")
 
 
 def _handler(function: Callable[[bool], None]) -> Callable[..., None]:
-    """Returns a handler that runs when no other thread reacts. It gets whether to react."""
+    """Returns a handler that runs when no other thread reacts. It gets whether to react, and evaluates
+    nothing."""
 
     @persistent
     @functools.wraps(function)
     def handle(*_args: object) -> None:
-        with reaction() as may_react:
+        with updates_suspended() as may_react:
             function(may_react)
 
     return handle
@@ -66,16 +67,17 @@ def before_loading(_may_react: bool) -> None:
     notify(subscribers.loading)
 
 
-@_handler
-def on_loaded(_may_react: bool) -> None:
-    session.forget()
-    # The file's first undo step comes after this.
-    references.forget()
-    overrides.restore()
-    note.remove()
-    notify(subscribers.loaded)
-    if not session.objects_with_sinew(Changes()):
-        return
+@persistent
+def on_loaded(*_args: object) -> None:
+    with updates_suspended():
+        session.forget()
+        # The file's first undo step comes after this.
+        references.forget()
+        overrides.restore()
+        note.remove()
+        notify(subscribers.loaded)
+        if not session.objects_with_sinew(Changes()):
+            return
     # This is the file's first evaluation. Like the one that Blender would make, it has to be one of time,
     # too, or poses that differ from their keys would stay.
     for obj in bpy.data.objects:
@@ -100,12 +102,13 @@ class _Saving:
 _saving = _Saving()
 
 
-@_handler
-def on_save(may_react: bool) -> None:
+@persistent
+def on_save(*_args: object) -> None:
     """From here to on_saved() Sinew changes nothing in the file, even if Blender evaluates it, as for its
     thumbnail."""
-    if not may_react or session.current.is_idle:
-        return
+    with updates_suspended() as may_react:
+        if not may_react or session.current.is_idle:
+            return
     if is_rendering_in_window():
         # A thread reads the file meanwhile. With Sinew, the saved file is complete, as an autosave is.
         log.warning("Saved during a render: save again after it, for Blenders without Sinew")
@@ -117,18 +120,19 @@ def on_save(may_react: bool) -> None:
     prepare_for_save()
 
 
-@_handler
-def on_saved(may_react: bool) -> None:
-    if may_react and phase.is_saving:
+@persistent
+def on_saved(*_args: object) -> None:
+    with updates_suspended() as may_react:
+        if not (may_react and phase.is_saving):
+            return
         phase.is_saving = False
-        with references.between_steps():
-            resume_after_save(bpy.context)
+    with references.between_steps():
+        resume_after_save(bpy.context)
 
 
 def prepare_for_save() -> None:
     """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has.
     Raises nothing: what fails is reported, and the rest of the file is prepared."""
-    session.current.gate.restore()
     notify(subscribers.saving)
     objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
     # Known before anything can fail, so that resume_after_save() reverses all of it.
@@ -170,7 +174,7 @@ def resume_after_save(context: bpy.types.Context) -> None:
                 continue
             with _logging_failure("Not as before it was saved; press Rebind", obj):
                 was_on, plan = obj.session_uid in _saving.on_before, session.plan_of(obj)
-                apply_plan.apply_resumed(obj, was_on, plan.is_alone)
+                apply_plan.apply_resumed(obj, was_on, plan.after_update)
     session.refresh(context)
 
 
@@ -216,7 +220,6 @@ def on_render_end(_may_react: bool) -> None:
     """Runs in the render's thread, if it has one: what waited for its end is left to the main thread."""
     phase.is_rendering = False
     precomputations.waits = bpy.app.background
-    session.current.gate.restore()
     if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
         bpy.app.timers.register(_after_render, first_interval=0.05)
 

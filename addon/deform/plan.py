@@ -66,9 +66,8 @@ class Plan:
     reason          one clause for the panel; the error of REFUSED; empty for the usual case and for what the
                     user chose
     in_buffer       a separate object stores the points (point_buffer.py), not an attribute of the mesh
-    after_update    Sinew deforms after Blender's evaluation, not within it
-    is_alone        where Sinew deforms, its Armature modifiers are off: only within the evaluation can they
-                    be on and yet be left out
+    after_update    Sinew deforms after Blender's evaluation, not within it. Its Armature modifiers are off
+                    then: only within the evaluation can they be on and yet be left out
     normals         the normals given along with the points
     normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
     viewport        what deforms it in the viewport, or would if Blender did not do it for Sinew
@@ -79,7 +78,6 @@ class Plan:
     reason: str = ""
     in_buffer: bool = False
     after_update: bool = False
-    is_alone: bool = False
     normals: Normals = Normals()
     normals_reason: str = ""
     viewport: Deformer = Deformer.SINEW
@@ -108,6 +106,11 @@ class Plan:
     def is_in_depsgraph(self) -> bool:
         """Whether Sinew deforms within Blender's evaluation."""
         return not (self.uses_builtin or self.after_update)
+
+    @property
+    def is_written(self) -> bool:
+        """Whether Sinew deforms after it."""
+        return self.after_update and not self.uses_builtin
 
 
 # That of an object before its first evaluation.
@@ -193,7 +196,7 @@ def _plan(facts: ObjectFacts) -> Plan:
         return Plan(State.BUILT_IN, reason)
     reason = _why_not_in_depsgraph(facts)
     if Deformer.SINEW not in views and not facts.has_upstream:
-        return Plan(State.ASIDE, is_alone=bool(reason))
+        return Plan(State.ASIDE, after_update=bool(reason))
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
     normals, normals_reason = _normals(facts)
@@ -206,7 +209,6 @@ def _plan(facts: ObjectFacts) -> Plan:
         facts.waits_for or reason,
         in_buffer,
         bool(reason),
-        is_alone=bool(reason),
         normals=normals,
         normals_reason=normals_reason,
     )

@@ -129,4 +129,4 @@ def _show(facts: Facts, known: Known) -> Action:
     if known.plan.is_in_depsgraph:
         is_asked = facts.was_skipped or facts.lacks_points or known.differs
         return Action.TAG if is_asked else Action.NOTHING
-    return Action.WRITE if known.plan.after_update else Action.NOTHING
+    return Action.WRITE if known.plan.is_written else Action.NOTHING

@@ -20,12 +20,11 @@ from ..attach import (
     references,
 )
 from ..attach.subscribers import notify, subscribers
-from ..attach.updates import is_rendering_in_window, may_change_file, phase, reaction, updates_suspended
+from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
 from ..core.errors import SinewError
 from . import after_update, apply_plan, events, precomputing, undo
 from .bound import uid
 from .changes import GONE, Changes
-from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
 from .plan import UNSEEN, Plan, State
 from .skinned_object import SkinnedObject
@@ -67,7 +66,6 @@ class Session:
     depsgraph: int = 0
     view_layers: set[tuple[int, str]] = field(default_factory=set)
     waiting: set[tuple[int, int]] = field(default_factory=set)
-    gate: Gate = field(default_factory=Gate)
     missed: Changes | None = None
     expected: set[int] = field(default_factory=set)
     seen: set[str] | None = None
@@ -94,7 +92,6 @@ requests = DepsgraphRequests()
 
 def forget() -> None:
     """Forgets everything: it is read again at the next event."""
-    current.gate.restore()
     # Others refer to `current` itself.
     vars(current).update(vars(Session(told=current.told)))
     name_requests()
@@ -190,21 +187,22 @@ def refresh(context: bpy.types.Context) -> None:
         # Not waiting for the render's thread, which would go on to its next frame during what follows.
         phase.must_refresh = True
         return
-    with reaction() as may_react:
+    with updates_suspended() as may_react:
         if not (may_react and may_change_file()):
             # Updates are suspended, or a handler switched an object off: whoever did that goes on from here.
             return
         current.objects = None
         for state in current.skinned.values():
             state.needs_apply = True
-        depsgraph = context.evaluated_depsgraph_get()
-        update_all(depsgraph, Changes())
-        # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
-        if bpy.app.background:
-            # If no object waits, this evaluation only shows what was just changed: Sinew need not react to
-            # it.
-            with contextlib.nullcontext() if waiting() else updates_suspended():
-                context.view_layer.update()
+    # Handlers react to this evaluation by themselves, in time for what others' later handlers change. What
+    # these change of objects that are deformed after the update is only there at its end.
+    depsgraph = context.evaluated_depsgraph_get()
+    update_all(depsgraph, Changes())
+    # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
+    if bpy.app.background:
+        # If no object waits, this evaluation only shows what was just changed: Sinew need not react to it.
+        with contextlib.nullcontext() if waiting() else updates_suspended():
+            context.view_layer.update()
 
 
 def refresh_between_steps(context: bpy.types.Context) -> None:
@@ -297,7 +295,7 @@ def needs_first_evaluations() -> bool:
     """Whether an object needs handlers to be deformed in an evaluation, not only the driver."""
     with contextlib.suppress(ReferenceError):
         return any(
-            plan_of(obj).state is State.WAITING_UPSTREAM or plan_of(obj).after_update
+            plan_of(obj).state is State.WAITING_UPSTREAM or plan_of(obj).is_written
             # After undo and redo the objects have to be found again.
             for obj in (bpy.data.objects if current.objects is None else current.objects)
             if properties.has_sinew(obj)

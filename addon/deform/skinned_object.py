@@ -150,14 +150,13 @@ class Noted:
 class SkinnedObject:
     """An object that was read.
 
-    bound, shown       what it is deformed by, and its shape; both change only under the lock, as Blender may
-                       evaluate the object on another thread, or on two for a render
-    plan               who deforms it; already applied to it unless needs_apply
-    noted              the object when the plan was applied
-    group_losses       how often its modifier had lost its node group
-    needs_recheck      the mesh may have changed since it was read: it is read again at the next event, or
-                       when it is measured
-    dirtied_by_frames  the last change of frame moved the object or its rest points
+    bound, shown   what it is deformed by, and its shape; both change only under the lock, as Blender may
+                   evaluate the object on another thread, or on two for a render
+    plan           who deforms it; already applied to it unless needs_apply
+    noted          the object when the plan was applied
+    group_losses   how often its modifier had lost its node group
+    needs_recheck  the mesh may have changed since it was read: it is read again at the next event, or when it
+                   is measured
     """
 
     bound: Bound
@@ -169,7 +168,6 @@ class SkinnedObject:
     needs_apply: bool = False
     group_losses: int = 0
     needs_recheck: bool = False
-    dirtied_by_frames: bool = False
 
     @property
     def has_new_data(self) -> bool:
@@ -182,7 +180,6 @@ class SkinnedObject:
             if bound.is_of_another_stack(self.bound):
                 self.shown = Shown(number=self.shown.number)
                 self.evaluation = self.evaluation.begin_anew()
-                self.dirtied_by_frames = False
             self.bound = bound
 
     @property
@@ -237,11 +234,14 @@ class SkinnedObject:
         if self.plan.uses_builtin:
             return self.noted.builtin_fingerprint == small_meshes.fingerprint(obj)
         given = self.evaluation.mesh
-        if given == 0 or given != obj.data.evaluated_get(depsgraph).as_pointer():
-            return False
-        if depsgraph.mode == "VIEWPORT":
+        return given != 0 and given == obj.data.evaluated_get(depsgraph).as_pointer()
+
+    def note_shown(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+        """Notes the mesh that viewports show, at the end of an event."""
+        given = self.evaluation.mesh
+        is_new = given not in (0, self.evaluation.mesh_shown) and depsgraph.mode == "VIEWPORT"
+        if is_new and given == obj.data.evaluated_get(depsgraph).as_pointer():
             self.evaluation.mesh_shown = given
-        return True
 
     def is_attached(self, obj: bpy.types.Object) -> bool:
         """Whether Sinew's modifier is there, with its node group where that is needed. Another add-on's

@@ -221,11 +221,10 @@ class _Event:
             skinned.noted = replace(skinned.noted, mode=obj.mode, data_versions=versions)
         skinned.plan = new
         if new.is_in_depsgraph:
-            skinned.dirtied_by_frames = False
             if new.in_buffer:
                 rest, count = skinned.bound.source.points, skinned.normal_count
                 point_store.set_rest_points(obj, self.depsgraph, rest, count, anew=is_new_plan)
-        elif not new.after_update:
+        elif not new.is_written:
             skinned.shown = replace(skinned.shown, frames=None)
         self.known = replace(known, plan=new, is_settled=True, differs=not is_same or is_new_plan)
 
@@ -264,7 +263,7 @@ class _Event:
             # originals of hidden objects do not have it.
             obj.update_tag(refresh={"OBJECT", "TIME"} if self.changes.frame else {"OBJECT"})
         else:
-            is_first = self.known.differs or not self.old.after_update
+            is_first = self.known.differs or not self.old.is_written
             with skinned.lock:
                 is_planned = self.known.is_planned
                 after_update.deform(obj, skinned, self.depsgraph, self.changes, is_planned, is_first)
@@ -282,8 +281,6 @@ class _Event:
                 return self.old
             if facts.calls_for_plan:
                 skinned.needs_apply = True
-            elif facts.has_shape:
-                skinned.dirtied_by_frames = False
             return skinned
         if not known.plan.is_read:
             if skinned is None or known.plan.state is not State.OFF:

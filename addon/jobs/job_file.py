@@ -145,8 +145,8 @@ class JobFile:
 class Key:
     """A key of some tables.
 
-    read    converts and checks a value; raises WrongUse with a sentence that follows the key's name. None for a
-            list of tables of that name
+    read    converts and checks a value; raises WrongUse with a sentence that follows the key's name; None for
+            a list of tables of that name
     wanted  a short description of the value for documents
     help    one sentence for documents
     """

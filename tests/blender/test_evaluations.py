@@ -16,7 +16,7 @@ import pytest
 import scenes
 from sinew_addon.attach import attach, properties
 from sinew_addon.attach.updates import updates_suspended
-from sinew_addon.deform import safe_mode, session
+from sinew_addon.deform import session
 from sinew_addon.io import files, mesh_io
 from sinew_addon.jobs.job_file import Settings
 from sinew_addon.jobs.tasks import reskin
@@ -172,31 +172,6 @@ def test_a_rig_that_follows_a_deformed_mesh_uses_the_same_frame(set_up: Setup):
     assert scenes.worst(shapes[0], shapes[1]) > 0.1
     for expected, got in zip(shapes[:3], shapes[3:], strict=True):
         assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.mark.parametrize("set_up", [moving_parent, moving_mesh, moving_keys])
-def test_modifiers_behind_are_evaluated_once_for_a_moving_mesh(set_up: Setup):
-    obj, armature = scenes.make_arm()
-    obj.modifiers.new("Behind", "SUBSURF")
-    set_up(obj, armature)
-    expected = scenes.shapes(obj, [2, 3, 4, 5])
-    safe_mode.set_forced(True)
-    scenes.add_sinew(obj)
-    first_round = []
-
-    def watch(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-        first_round.append(len(obj.evaluated_get(depsgraph).data.vertices))
-
-    with scenes.handler("frame_change_post", watch, first=True):
-        got = scenes.shapes(obj, [2, 3, 4, 5])
-        safe_mode.set_forced(None)
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    # From the second frame on: only then is it known that a mesh moves.
-    assert first_round[1:] == [len(obj.data.vertices)] * 3
-    assert got.shape[1] > len(obj.data.vertices)
-    assert obj.modifiers["Behind"].show_viewport
-    assert obj.modifiers["Behind"].show_render
-    assert not properties.of(obj).error
 
 
 def task(path: Path) -> dict:

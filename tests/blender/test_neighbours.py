@@ -12,7 +12,7 @@ import pytest
 import scenes
 import sinew_addon
 from sinew_addon.attach import attach, properties, stack
-from sinew_addon.attach.updates import reaction, updates_suspended
+from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.deform import in_depsgraph, safe_mode, session
 from sinew_addon.deform.plan import State
 from sinew_addon.features.compare import comparison
@@ -299,75 +299,6 @@ def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
     assert own.object is not None
 
 
-@pytest.fixture
-def gated(monkeypatch) -> bpy.types.Object:
-    """An arm whose modifiers after Sinew's are suspended at each change of frame."""
-    obj, armature = scenes.make_arm()
-    for name in ("Behind", "Further"):
-        obj.modifiers.new(name, "CAST").factor = 0.1
-    obj.parent = armature
-    armature.keyframe_insert("location", frame=1)
-    armature.location.x = 3.0
-    armature.keyframe_insert("location", frame=11)
-    monkeypatch.setattr(safe_mode, "is_on", lambda: True)
-    scenes.add_sinew(obj, "dq")
-    scenes.shapes(obj, [2, 3, 4])
-    assert session.state_of(obj).dirtied_by_frames
-    return obj
-
-
-@pytest.mark.parametrize("what", ["rename", "delete", "add", "delete object", "throw"])
-def test_suspended_modifiers_come_back_whatever_a_neighbour_does(gated, neighbour, what):
-    other, _rig = scenes.make_arm(name="Other")
-    suspended = []
-
-    def interfere() -> None:
-        suspended.append(not gated.modifiers[-1].show_viewport)
-        if what == "rename":
-            gated.modifiers["Behind"].name = "Renamed"
-        elif what == "delete":
-            gated.modifiers.remove(gated.modifiers["Behind"])
-        elif what == "add":
-            gated.modifiers.new("Added", "CAST").factor = 0.0
-        elif what == "delete object":
-            bpy.data.objects.remove(other)
-        else:
-            raise RuntimeError("a neighbour's own fault")
-
-    take_off = []
-    # After the handler that Sinew keeps last.
-    take_off.append(
-        neighbour("frame_change_pre", lambda: take_off.append(neighbour("frame_change_pre", interfere)))
-    )
-    bpy.context.scene.frame_set(5)
-    assert suspended == [True]
-    for each in take_off:
-        each()
-    assert all(m.show_viewport and m.show_render for m in gated.modifiers if m.type == "CAST")
-    assert_equals_modifier(gated)
-
-
-@pytest.mark.parametrize("ahead", [False, True], ids=["behind", "ahead"])
-@pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
-def test_a_neighbour_toggles_modifiers_that_are_suspended_otherwise(gated, neighbour, event, ahead):
-    seen = []
-
-    def toggle() -> None:
-        seen.append(gated.modifiers["Behind"].show_viewport)
-        gated.modifiers["Behind"].show_viewport = not seen[-1]
-
-    take_off = neighbour(event, toggle)
-    functions = getattr(bpy.app.handlers, event)
-    if ahead:
-        functions.insert(0, functions.pop())
-    for frame in (5, 6, 7):
-        bpy.context.scene.frame_set(frame)
-    assert seen == [True, False, True]
-    assert gated.modifiers["Behind"].show_render
-    take_off()
-    assert_equals_modifier(gated)
-
-
 @pytest.mark.parametrize("keyed", ["viewport", "render"])
 def test_keys_of_one_visibility_leave_the_other(arm, rendered_points, keyed):
     modifier = arm.modifiers["Armature"]
@@ -450,12 +381,12 @@ def test_suspended_by_two_threads_at_once():
         thread.start()
         entered.wait(10)
         thread.join(0.2)
-        with reaction() as may_react:
+        with updates_suspended() as may_react:
             assert not may_react
         order.append("this")
     thread.join(10)
     assert order == ["this", "other"]
-    with reaction() as may_react:
+    with updates_suspended() as may_react:
         assert may_react
 
 

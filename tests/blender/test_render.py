@@ -165,8 +165,6 @@ def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
 
 
 def test_renders_animate_modifiers_behind_and_other_users_of_the_mesh(tmp_path):
-    """Sinew suspends modifiers between Blender's two evaluations, for which Blender copies the objects
-    again."""
     obj, armature = scenes.make_arm()
     scene = bpy.context.scene
     prepare(scene, motion_blur=False)
