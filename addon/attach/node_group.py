@@ -49,6 +49,8 @@ _MARK_SOCKETS = {
     ),
     MARK_TO_REMOVE: ("NodeSocketString", "Attribute of rest positions that is not needed behind"),
 }
+# What a node reads: a socket, or the first output of a node.
+_Source = bpy.types.NodeSocket | bpy.types.Node
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
 IN_RENDERS_SOCKET = (
     "NodeSocketBool",
@@ -192,15 +194,11 @@ def add_warnings() -> None:
         # An artist may have taken the group apart.
         if last is None:
             continue
-        warning, user = add_nodes(group, "GeometryNodeWarning", "GeometryNodeSwitch")
-        warning.name, user.name, user.input_type = _WARNING, _WARNING_USER, "GEOMETRY"
-        warning.inputs["Message"].default_value = NEEDS_SINEW
-        warning.inputs["Show"].default_value = True
         geometry, output = last.from_socket, last.to_socket
+        warning = add(group, "GeometryNodeWarning", {"Message": NEEDS_SINEW, "Show": True})
         # Blender does not evaluate a warning whose output is not used.
-        group.links.new(warning.outputs["Show"], user.inputs["Switch"])
-        group.links.new(geometry, user.inputs["False"])
-        group.links.new(geometry, user.inputs["True"])
+        user = _switch(group, warning, geometry, geometry)
+        warning.name, user.name = _WARNING, _WARNING_USER
         group.links.new(user.outputs["Output"], output)
 
 
@@ -247,11 +245,52 @@ def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.t
     return group
 
 
-def add_nodes(group: bpy.types.NodeTree, *kinds: str) -> list[bpy.types.Node]:
-    nodes = [group.nodes.new(kind) for kind in kinds]
-    for column, node in enumerate(nodes):
-        node.location = (220 * column, 0)
-    return nodes
+def add(
+    group: bpy.types.NodeTree, kind: str, inputs: dict | None = None, **settings: object
+) -> bpy.types.Node:
+    """Adds a node.
+
+    inputs    by the input's name or number: a value, a socket, or a node, whose first output is meant
+    settings  the node's own, in the order in which they are to be set
+    """
+    node = group.nodes.new(kind)
+    node.location = (220 * len(group.nodes), 0)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    for name, value in (inputs or {}).items():
+        socket = node.inputs[name] if isinstance(name, int) else enabled_socket(node.inputs, name)
+        if isinstance(value, bpy.types.Node):
+            value = next(output for output in value.outputs if output.enabled)
+        if isinstance(value, bpy.types.NodeSocket):
+            group.links.new(value, socket)
+        else:
+            socket.default_value = value
+    return node
+
+
+def named_attribute(group: bpy.types.NodeTree, name: _Source | str) -> bpy.types.Node:
+    return add(group, "GeometryNodeInputNamedAttribute", {"Name": name}, data_type="FLOAT_VECTOR")
+
+
+def sample(
+    group: bpy.types.NodeTree, geometry: _Source, value: _Source, index: _Source | int, domain: str = "POINT"
+) -> bpy.types.Node:
+    """Returns a node with a vector of another or the same geometry at an index."""
+    inputs = {"Geometry": geometry, "Value": value, "Index": index}
+    return add(group, "GeometryNodeSampleIndex", inputs, data_type="FLOAT_VECTOR", domain=domain)
+
+
+def _logic(group: bpy.types.NodeTree, operation: str, first: _Source, second: _Source) -> bpy.types.Node:
+    return add(group, "FunctionNodeBooleanMath", {0: first, 1: second}, operation=operation)
+
+
+def _switch(group: bpy.types.NodeTree, which: _Source | bool, off: _Source, on: _Source) -> bpy.types.Node:
+    inputs = {"Switch": which, "False": off, "True": on}
+    return add(group, "GeometryNodeSwitch", inputs, input_type="GEOMETRY")
+
+
+def _without(group: bpy.types.NodeTree, geometry: _Source, attribute: _Source) -> bpy.types.Node:
+    return add(group, "GeometryNodeRemoveAttribute", {"Geometry": geometry, "Name": attribute})
 
 
 def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
@@ -266,142 +305,56 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
             POSE: POSE_SOCKET,
         },
     )
+    source = add(group, "NodeGroupInput")
+    given = source.outputs
+    named = named_attribute(group, given["Points"])
     # Not Set Position, which would compute an offset for each point.
-    source, named, place, remove, result = add_nodes(
+    place = add(
         group,
-        "NodeGroupInput",
-        "GeometryNodeInputNamedAttribute",
         "GeometryNodeStoreNamedAttribute",
-        "GeometryNodeRemoveAttribute",
-        "NodeGroupOutput",
-    )
-    named.data_type = place.data_type = "FLOAT_VECTOR"
-    place.inputs["Name"].default_value = mesh_io.POSITION
-    group.links.new(source.outputs["Points"], named.inputs["Name"])
-    group.links.new(source.outputs["Geometry"], place.inputs["Geometry"])
-    group.links.new(named.outputs["Attribute"], enabled_socket(place.inputs, "Value"))
-    # A mesh without the attribute keeps its shape instead of collapsing to the origin.
-    group.links.new(
-        _both(group, named.outputs["Exists"], _is_deformed(group, source)), place.inputs["Selection"]
+        {
+            "Geometry": given["Geometry"],
+            # A mesh without the attribute keeps its shape instead of collapsing to the origin.
+            "Selection": _logic(group, "AND", named.outputs["Exists"], _is_deformed(group, source)),
+            "Name": mesh_io.POSITION,
+            "Value": named,
+        },
+        data_type="FLOAT_VECTOR",
     )
     # Removed, as a subdivision behind would interpolate it for each of its vertices, and exports would
     # contain it.
-    group.links.new(source.outputs["Points"], remove.inputs["Name"])
-    group.links.new(place.outputs["Geometry"], remove.inputs["Geometry"])
-    moved = _without_mark(group, source, remove.outputs["Geometry"])
+    moved = _without(group, _without(group, place, given["Points"]), given[MARK_TO_REMOVE])
     if normals:
-        moved = _take_normals_of_attribute(group, source, moved, normals)
-    group.links.new(moved, result.inputs["Geometry"])
+        named = named_attribute(group, given[NORMALS])
+        first = sample(group, moved, named, 0, normals)
+        moved = _without(group, _with_normals(group, source, moved, named, first, normals), given[NORMALS])
+    add(group, "NodeGroupOutput", {"Geometry": moved})
     return group
 
 
-def _is_deformed(group: bpy.types.NodeTree, source: bpy.types.Node) -> bpy.types.NodeSocket:
+def _is_deformed(group: bpy.types.NodeTree, source: bpy.types.Node) -> bpy.types.Node:
     """Returns a field that says whether the mesh is the deformed one, or may be (undeformed.py)."""
-    named, view, implied, either = add_nodes(
-        group,
-        "GeometryNodeInputNamedAttribute",
-        "GeometryNodeIsViewport",
-        "FunctionNodeBooleanMath",
-        "FunctionNodeBooleanMath",
-    )
-    named.data_type, named.inputs["Name"].default_value = "FLOAT_VECTOR", REST_POSITION
-    implied.operation, either.operation = "IMPLY", "OR"
-    link = group.links.new
-    link(source.outputs[IS_MARKED], implied.inputs[0])
-    link(named.outputs["Exists"], implied.inputs[1])
-    link(view.outputs[0], either.inputs[0])
-    link(implied.outputs[0], either.inputs[1])
-    return either.outputs[0]
-
-
-def _both(
-    group: bpy.types.NodeTree, first: bpy.types.NodeSocket, second: bpy.types.NodeSocket
-) -> bpy.types.NodeSocket:
-    (both,) = add_nodes(group, "FunctionNodeBooleanMath")
-    both.operation = "AND"
-    group.links.new(first, both.inputs[0])
-    group.links.new(second, both.inputs[1])
-    return both.outputs[0]
-
-
-def _without_mark(
-    group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket
-) -> bpy.types.NodeSocket:
-    (remove,) = add_nodes(group, "GeometryNodeRemoveAttribute")
-    group.links.new(source.outputs[MARK_TO_REMOVE], remove.inputs["Name"])
-    group.links.new(geometry, remove.inputs["Geometry"])
-    return remove.outputs["Geometry"]
-
-
-def _take_normals_of_attribute(
-    group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket, domain: str
-) -> bpy.types.NodeSocket:
-    named, remove = add_nodes(group, "GeometryNodeInputNamedAttribute", "GeometryNodeRemoveAttribute")
-    named.data_type = "FLOAT_VECTOR"
-    link = group.links.new
-    link(source.outputs[NORMALS], named.inputs["Name"])
-    normal = named.outputs["Attribute"]
-    first = _sample(group, geometry, normal, domain)
-    link(source.outputs[NORMALS], remove.inputs["Name"])
-    given = _with_normals(group, geometry, normal, first, source.outputs[IN_RENDERS], domain)
-    link(given, remove.inputs["Geometry"])
-    return remove.outputs["Geometry"]
+    has_mark = named_attribute(group, REST_POSITION).outputs["Exists"]
+    implied = _logic(group, "IMPLY", source.outputs[IS_MARKED], has_mark)
+    return _logic(group, "OR", add(group, "GeometryNodeIsViewport"), implied)
 
 
 def _with_normals(
     group: bpy.types.NodeTree,
-    geometry: bpy.types.NodeSocket,
-    normal: bpy.types.NodeSocket,
-    first: bpy.types.NodeSocket,
-    in_renders: bpy.types.NodeSocket,
+    source: bpy.types.Node,
+    geometry: _Source,
+    normal: _Source,
+    first: _Source,
     domain: str,
-) -> bpy.types.NodeSocket:
+) -> bpy.types.Node:
     """Returns the geometry with these normals; unchanged where the first normal is 0, which means that Sinew
     gave none, and in renders where the normals are for the viewport only."""
-    length, is_given, view, is_here, both, give, choice = add_nodes(
-        group,
-        "ShaderNodeVectorMath",
-        "FunctionNodeCompare",
-        "GeometryNodeIsViewport",
-        "FunctionNodeBooleanMath",
-        "FunctionNodeBooleanMath",
-        "GeometryNodeSetMeshNormal",
-        "GeometryNodeSwitch",
-    )
-    is_here.operation, both.operation = "OR", "AND"
-    length.operation, is_given.data_type, is_given.operation = "LENGTH", "FLOAT", "GREATER_THAN"
-    give.mode, give.domain, choice.input_type = "FREE", domain, "GEOMETRY"
-    enabled_socket(is_given.inputs, "B").default_value = 0.5
-    link = group.links.new
-    link(first, length.inputs[0])
-    link(length.outputs["Value"], enabled_socket(is_given.inputs, "A"))
-    link(geometry, give.inputs["Mesh"])
-    link(normal, enabled_socket(give.inputs, "Custom Normal"))
-    link(in_renders, is_here.inputs[0])
-    link(view.outputs[0], is_here.inputs[1])
-    link(is_given.outputs["Result"], both.inputs[0])
-    link(is_here.outputs[0], both.inputs[1])
-    link(both.outputs[0], choice.inputs["Switch"])
-    link(geometry, choice.inputs["False"])
-    link(give.outputs["Mesh"], choice.inputs["True"])
-    return choice.outputs["Output"]
-
-
-def _sample(
-    group: bpy.types.NodeTree,
-    geometry: bpy.types.NodeSocket,
-    value: bpy.types.NodeSocket,
-    domain: str,
-    index: bpy.types.NodeSocket | None = None,
-) -> bpy.types.NodeSocket:
-    """Returns a vector of another or the same geometry at an index; the first one where the index is None."""
-    (sample,) = add_nodes(group, "GeometryNodeSampleIndex")
-    sample.data_type, sample.domain = "FLOAT_VECTOR", domain
-    group.links.new(geometry, sample.inputs["Geometry"])
-    group.links.new(value, enabled_socket(sample.inputs, "Value"))
-    if index is not None:
-        group.links.new(index, sample.inputs["Index"])
-    return enabled_socket(sample.outputs, "Value")
+    length = add(group, "ShaderNodeVectorMath", {0: first}, operation="LENGTH").outputs["Value"]
+    is_given = add(group, "FunctionNodeCompare", {"A": length, "B": 0.5}, operation="GREATER_THAN")
+    is_here = _logic(group, "OR", source.outputs[IN_RENDERS], add(group, "GeometryNodeIsViewport"))
+    inputs = {"Mesh": geometry, "Custom Normal": normal}
+    give = add(group, "GeometryNodeSetMeshNormal", inputs, mode="FREE", domain=domain)
+    return _switch(group, _logic(group, "AND", is_given, is_here), geometry, give)
 
 
 def _name(name: str, normals: str) -> str:
@@ -423,90 +376,53 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
             POSE: POSE_SOCKET,
         },
     )
-    source, info, index, position, place, result = add_nodes(
-        group,
-        "NodeGroupInput",
-        "GeometryNodeObjectInfo",
-        "GeometryNodeInputIndex",
-        "GeometryNodeInputPosition",
-        "GeometryNodeSetPosition",
-        "NodeGroupOutput",
-    )
-    link = group.links.new
-    link(source.outputs["Points"], info.inputs["Object"])
-    buffer, stored = info.outputs["Geometry"], position.outputs["Position"]
-    link(_sample(group, buffer, stored, "POINT", index.outputs["Index"]), place.inputs["Position"])
-    link(source.outputs["Geometry"], place.inputs["Geometry"])
+    source = add(group, "NodeGroupInput")
+    given = source.outputs
+    buffer = add(group, "GeometryNodeObjectInfo", {"Object": given["Points"]}).outputs["Geometry"]
+    index, stored = add(group, "GeometryNodeInputIndex"), add(group, "GeometryNodeInputPosition")
     # Where the number of vertices differs, as before the first points are written, the shape is unchanged.
-    fits = same_count(group, source.outputs["Geometry"], buffer, normals)
-    link(_both(group, fits, _is_deformed(group, source)), place.inputs["Selection"])
-    moved = _without_mark(group, source, place.outputs["Geometry"])
+    fits = same_count(group, given["Geometry"], buffer, normals)
+    place = add(
+        group,
+        "GeometryNodeSetPosition",
+        {
+            "Geometry": given["Geometry"],
+            "Selection": _logic(group, "AND", fits, _is_deformed(group, source)),
+            "Position": sample(group, buffer, stored, index),
+        },
+    )
+    moved = _without(group, place, given[MARK_TO_REMOVE])
     if normals:
-        moved = _take_normals_of_buffer(
-            group, source, moved, buffer, stored, index.outputs["Index"], fits, normals
-        )
+        # They are those of the buffer's vertices behind the points.
+        size = add(group, "GeometryNodeAttributeDomainSize", {"Geometry": moved}, component="MESH")
+        count = size.outputs["Point Count"]
+        normal = sample(group, buffer, stored, add(group, "FunctionNodeIntegerMath", {0: index, 1: count}))
+        first = sample(group, buffer, stored, count)
+        moved = _switch(group, fits, moved, _with_normals(group, source, moved, normal, first, normals))
     # This switch is never on: a node that names the object makes Blender evaluate it.
-    upstream_proxy, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
-    choice.input_type = "GEOMETRY"
-    link(source.outputs["Upstream"], upstream_proxy.inputs["Object"])
-    link(moved, choice.inputs["False"])
-    link(upstream_proxy.outputs["Geometry"], choice.inputs["True"])
-    link(choice.outputs["Output"], result.inputs["Geometry"])
+    upstream_proxy = add(group, "GeometryNodeObjectInfo", {"Object": given["Upstream"]})
+    result = _switch(group, False, moved, upstream_proxy.outputs["Geometry"])
+    add(group, "NodeGroupOutput", {"Geometry": result})
     return group
 
 
-def _take_normals_of_buffer(
-    group: bpy.types.NodeTree,
-    source: bpy.types.Node,
-    geometry: bpy.types.NodeSocket,
-    buffer: bpy.types.NodeSocket,
-    stored: bpy.types.NodeSocket,
-    index: bpy.types.NodeSocket,
-    fits: bpy.types.NodeSocket,
-    domain: str,
-) -> bpy.types.NodeSocket:
-    """Takes the normals from the buffer's vertices behind the points."""
-    size, behind, choice = add_nodes(
-        group, "GeometryNodeAttributeDomainSize", "FunctionNodeIntegerMath", "GeometryNodeSwitch"
-    )
-    size.component, choice.input_type = "MESH", "GEOMETRY"
-    link = group.links.new
-    link(geometry, size.inputs["Geometry"])
-    link(index, behind.inputs[0])
-    link(size.outputs["Point Count"], behind.inputs[1])
-    normal = _sample(group, buffer, stored, "POINT", behind.outputs["Value"])
-    first = _sample(group, buffer, stored, "POINT", size.outputs["Point Count"])
-    link(fits, choice.inputs["Switch"])
-    link(geometry, choice.inputs["False"])
-    given = _with_normals(group, geometry, normal, first, source.outputs[IN_RENDERS], domain)
-    link(given, choice.inputs["True"])
-    return choice.outputs["Output"]
-
-
 def same_count(
-    group: bpy.types.NodeTree, mesh: bpy.types.NodeSocket, buffer: bpy.types.NodeSocket, normals: str = ""
-) -> bpy.types.NodeSocket:
-    """Returns a socket that says whether a buffer has as many vertices as a mesh.
+    group: bpy.types.NodeTree, mesh: _Source, buffer: _Source, normals: str = ""
+) -> bpy.types.Node:
+    """Returns a node that says whether a buffer has as many vertices as a mesh.
 
     normals  the domain whose number of elements in the mesh is added; empty for none
     """
-    of_mesh, of_buffer, equal = add_nodes(
-        group, "GeometryNodeAttributeDomainSize", "GeometryNodeAttributeDomainSize", "FunctionNodeCompare"
+    of_mesh, of_buffer = (
+        add(group, "GeometryNodeAttributeDomainSize", {"Geometry": geometry}, component="MESH").outputs
+        for geometry in (mesh, buffer)
     )
-    equal.data_type, equal.operation = "INT", "EQUAL"
-    link = group.links.new
-    for size, geometry in ((of_mesh, mesh), (of_buffer, buffer)):
-        size.component = "MESH"
-        link(geometry, size.inputs["Geometry"])
-    count = of_mesh.outputs["Point Count"]
+    count = of_mesh["Point Count"]
     if normals:
-        (both,) = add_nodes(group, "FunctionNodeIntegerMath")
-        link(count, both.inputs[0])
-        link(of_mesh.outputs["Face Corner Count" if normals == "CORNER" else "Point Count"], both.inputs[1])
-        count = both.outputs["Value"]
-    link(count, enabled_socket(equal.inputs, "A"))
-    link(of_buffer.outputs["Point Count"], enabled_socket(equal.inputs, "B"))
-    return equal.outputs["Result"]
+        more = of_mesh["Face Corner Count" if normals == "CORNER" else "Point Count"]
+        count = add(group, "FunctionNodeIntegerMath", {0: count, 1: more})
+    inputs = {"A": count, "B": of_buffer["Point Count"]}
+    return add(group, "FunctionNodeCompare", inputs, data_type="INT", operation="EQUAL")
 
 
 def enabled_socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:

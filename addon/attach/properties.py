@@ -100,6 +100,13 @@ def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
 # On a library override, Blender saves only properties with this flag.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 SAME_METHOD = "SAME"
+
+
+def _hidden(kind: Callable, description: str = "", **settings: object) -> object:
+    """Returns a property that only Sinew uses; overridable, too."""
+    return kind(description=description, options={"HIDDEN"}, override=OVERRIDABLE, **settings)
+
+
 # Who computes normals.
 AS_BLENDER, SKINNED_NORMALS, LEAVE_NORMALS = "AS_BLENDER", "SKINNED", "LEAVE"
 
@@ -123,35 +130,28 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         poll=lambda _self, obj: obj.type == "ARMATURE",
         override=OVERRIDABLE,
     )
-    uid: bpy.props.IntProperty(
-        description="By which the Armature modifier is known however it is moved and renamed; 0 where it is "
+    uid: _hidden(
+        bpy.props.IntProperty,
+        "By which the Armature modifier is known however it is moved and renamed; 0 where it is "
         "known by its name",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
     )
     # The Armature modifier's own icons, restored on removal.
-    show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
-    show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    show_viewport: _hidden(bpy.props.BoolProperty, default=True)
+    show_render: _hidden(bpy.props.BoolProperty, default=True)
     # Its icons were off before Sinew, which deforms by it nevertheless; removal switches them off again.
-    was_off_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    was_off_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    was_off_viewport: _hidden(bpy.props.BoolProperty)
+    was_off_render: _hidden(bpy.props.BoolProperty)
     # The artist switched its icon while Sinew is on, or after Sinew's icon was switched off.
-    switched_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    switched_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    visibility_is_keyed: bpy.props.BoolProperty(
-        description="An animation has set the Armature modifier's flags, and not Sinew",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
+    switched_viewport: _hidden(bpy.props.BoolProperty)
+    switched_render: _hidden(bpy.props.BoolProperty)
+    visibility_is_keyed: _hidden(
+        bpy.props.BoolProperty, "An animation has set the Armature modifier's flags, and not Sinew"
     )
-    preserve_volume: bpy.props.BoolProperty(
-        description="The Armature modifier's own choice, while it has the one nearest to Sinew's",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
+    preserve_volume: _hidden(
+        bpy.props.BoolProperty, "The Armature modifier's own choice, while it has the one nearest to Sinew's"
     )
-    was_nearest: bpy.props.BoolProperty(
-        description="The artist's choice was the nearest one, so that it is not restored",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
+    was_nearest: _hidden(
+        bpy.props.BoolProperty, "The artist's choice was the nearest one, so that it is not restored"
     )
     method: bpy.props.EnumProperty(
         name="Method",
@@ -171,10 +171,10 @@ class SinewSwitchedOff(bpy.types.PropertyGroup):
     """What Sinew stores about another modifier that it switched off, called `name`: the Corrective Smooth
     that the stage delta_mush replaces, or a cache of baked shapes. An empty name means none."""
 
-    uid: bpy.props.IntProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    uid: _hidden(bpy.props.IntProperty)
     # The modifier's own flags, restored on removal.
-    show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
-    show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    show_viewport: _hidden(bpy.props.BoolProperty, default=True)
+    show_render: _hidden(bpy.props.BoolProperty, default=True)
 
 
 def _twist_changed(_bone: bpy.types.PoseBone, context: bpy.types.Context) -> None:
@@ -258,71 +258,50 @@ class SinewSettings(bpy.types.PropertyGroup):
     replaced_modifiers: bpy.props.CollectionProperty(
         type=SinewReplacedModifier, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
-    situation: bpy.props.StringProperty(
-        description="Who deformed it when the modifiers' icons were last set (core/icons.py)",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
+    situation: _hidden(
+        bpy.props.StringProperty, "Who deformed it when the modifiers' icons were last set (core/icons.py)"
     )
     # The artist switched the icon of Sinew's modifier off.
-    hidden_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    hidden_render: bpy.props.BoolProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    has_nearest_volume: bpy.props.BoolProperty(
-        description="The Armature modifiers have the Preserve Volume nearest to Sinew's method, not the "
+    hidden_viewport: _hidden(bpy.props.BoolProperty)
+    hidden_render: _hidden(bpy.props.BoolProperty)
+    has_nearest_volume: _hidden(
+        bpy.props.BoolProperty,
+        "The Armature modifiers have the Preserve Volume nearest to Sinew's method, not the "
         "artist's own: in saved files, and in modes of tools that need them",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
     )
-    replaced_smooth: bpy.props.PointerProperty(
-        type=SinewSwitchedOff, options={"HIDDEN"}, override=OVERRIDABLE
-    )
+    replaced_smooth: _hidden(bpy.props.PointerProperty, type=SinewSwitchedOff)
     baked: bpy.props.CollectionProperty(
         type=SinewSwitchedOff, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
-    neutral_uid: bpy.props.IntProperty(
-        description="The modifier of undeformed.py", options={"HIDDEN"}, override=OVERRIDABLE
+    neutral_uid: _hidden(bpy.props.IntProperty, "The modifier of undeformed.py")
+    marks_rest: _hidden(bpy.props.BoolProperty, "Sinew has Blender add rest positions")
+    adds_rest_position: _hidden(
+        bpy.props.BoolProperty, "The artist's own choice of Add Rest Position while Sinew sets it"
     )
-    marks_rest: bpy.props.BoolProperty(
-        description="Sinew has Blender add rest positions", options={"HIDDEN"}, override=OVERRIDABLE
+    parent_type: _hidden(
+        bpy.props.StringProperty, "The object's parent type before Sinew made an Armature modifier of it"
     )
-    adds_rest_position: bpy.props.BoolProperty(
-        description="The artist's own choice of Add Rest Position while Sinew sets it",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
+    attribute: _hidden(
+        bpy.props.StringProperty, "Attribute that holds the points; empty where the point buffer does"
     )
-    parent_type: bpy.props.StringProperty(
-        description="The object's parent type before Sinew made an Armature modifier of it",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
+    normals_attribute: _hidden(
+        bpy.props.StringProperty, "Attribute that holds the normals; empty where none does"
     )
-    attribute: bpy.props.StringProperty(
-        description="Attribute that holds the points; empty where the point buffer does",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
-    )
-    normals_attribute: bpy.props.StringProperty(
-        description="Attribute that holds the normals; empty where none does",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
-    )
-    point_buffer: bpy.props.PointerProperty(
-        description="The object whose vertices are the deformed points (point_buffer.py)",
+    point_buffer: _hidden(
+        bpy.props.PointerProperty,
+        "The object whose vertices are the deformed points (point_buffer.py)",
         type=bpy.types.Object,
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
     )
-    upstream_proxy: bpy.props.PointerProperty(
-        description="The copy that has only the upstream modifiers (upstream_proxy.py)",
+    upstream_proxy: _hidden(
+        bpy.props.PointerProperty,
+        "The copy that has only the upstream modifiers (upstream_proxy.py)",
         type=bpy.types.Object,
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
     )
     upstream_signature: bpy.props.StringProperty(
         description="What the proxy was made from, as upstream_proxy.signature() returns it",
         options={"HIDDEN"},
     )
-    helper: bpy.props.BoolProperty(
-        description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
-    )
+    helper: _hidden(bpy.props.BoolProperty, "Made by Sinew for another object")
     token: bpy.props.StringProperty(description="Tells an upstream proxy from all others", options={"HIDDEN"})
     copied: bpy.props.PointerProperty(
         description="The object that this one is a comparison's copy of",
@@ -332,11 +311,7 @@ class SinewSettings(bpy.types.PropertyGroup):
     copied_for: bpy.props.StringProperty(
         description="The method that this copy is there to show; empty for all but copies", options={"HIDDEN"}
     )
-    had_animation: bpy.props.BoolProperty(
-        description="The object had animation data, be it empty, before Sinew",
-        options={"HIDDEN"},
-        override=OVERRIDABLE,
-    )
+    had_animation: _hidden(bpy.props.BoolProperty, "The object had animation data, be it empty, before Sinew")
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )

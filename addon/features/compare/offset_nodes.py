@@ -2,6 +2,8 @@
 """The Geometry Nodes group "Sinew Offset": moves an object's evaluated geometry, in world axes, and does not
 move the object, as the bones' motions are relative to it."""
 
+import functools
+
 import bpy
 import numpy as np
 
@@ -64,26 +66,13 @@ def _make() -> bpy.types.NodeTree:
     offset.subtype = "TRANSLATION"
     offset.description = "In the world's axes"
     socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    kinds = (
-        "NodeGroupInput",
-        "GeometryNodeSelfObject",
-        "GeometryNodeObjectInfo",
-        "FunctionNodeInvertMatrix",
-        "FunctionNodeTransformDirection",
-        "GeometryNodeTransform",
-        "NodeGroupOutput",
-    )
-    nodes = [group.nodes.new(kind) for kind in kinds]
-    for column, node in enumerate(nodes):
-        node.location = (220 * column, 0)
-    source, own, info, inverse, turn, move, result = nodes
-    info.transform_space = "ORIGINAL"
-    link = group.links.new
-    link(own.outputs["Self Object"], info.inputs["Object"])
-    link(info.outputs["Transform"], inverse.inputs["Matrix"])
-    link(source.outputs["Offset"], turn.inputs["Direction"])
-    link(inverse.outputs["Matrix"], turn.inputs["Transform"])
-    link(source.outputs["Geometry"], move.inputs["Geometry"])
-    link(turn.outputs["Direction"], move.inputs["Translation"])
-    link(move.outputs["Geometry"], result.inputs["Geometry"])
+    add = functools.partial(node_group.add, group)
+    source = add("NodeGroupInput").outputs
+    own = add("GeometryNodeSelfObject")
+    info = add("GeometryNodeObjectInfo", {"Object": own}, transform_space="ORIGINAL")
+    inverse = add("FunctionNodeInvertMatrix", {"Matrix": info.outputs["Transform"]})
+    turned = {"Direction": source["Offset"], "Transform": inverse}
+    turn = add("FunctionNodeTransformDirection", turned)
+    moved = {"Geometry": source["Geometry"], "Translation": turn}
+    add("NodeGroupOutput", {"Geometry": add("GeometryNodeTransform", moved)})
     return group

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...attach import node_group, properties
-from ...attach.node_group import POINT_BUFFER, add_nodes, enabled_socket
+from ...attach.node_group import POINT_BUFFER, add
 from ...io import mesh_io
 
 # The colour attribute of evaluated meshes.
@@ -84,41 +84,19 @@ def _make() -> bpy.types.NodeTree:
         if item.in_out == "INPUT" and item.name != "Geometry"
     }
     group = node_group.new_group(f"{points.name} Heat", _KIND, inputs)
-    source, place, info, index, named, sample, store, paint, result = add_nodes(
-        group,
-        "NodeGroupInput",
-        "GeometryNodeGroup",
-        "GeometryNodeObjectInfo",
-        "GeometryNodeInputIndex",
-        "GeometryNodeInputNamedAttribute",
-        "GeometryNodeSampleIndex",
-        "GeometryNodeStoreNamedAttribute",
-        "GeometryNodeSetMaterial",
-        "NodeGroupOutput",
-    )
-    place.node_tree = points
-    named.data_type = "FLOAT_VECTOR"
-    named.inputs["Name"].default_value = COLOURS
-    sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
-    store.data_type, store.domain = "FLOAT_COLOR", "POINT"
-    store.inputs["Name"].default_value = NAME
-    paint.inputs["Material"].default_value = _material()
-    link = group.links.new
-    for name in ("Geometry", *inputs):
-        link(source.outputs[name], place.inputs[name])
+    source = add(group, "NodeGroupInput").outputs
+    given = {name: source[name] for name in ("Geometry", *inputs)}
+    place = add(group, "GeometryNodeGroup", given, node_tree=points)
+    buffer = add(group, "GeometryNodeObjectInfo", {"Object": source["Points"]}).outputs["Geometry"]
     # Each vertex takes the colour of the point buffer's vertex with the same index.
-    link(source.outputs["Points"], info.inputs["Object"])
-    link(info.outputs["Geometry"], sample.inputs["Geometry"])
-    link(named.outputs["Attribute"], enabled_socket(sample.inputs, "Value"))
-    link(index.outputs["Index"], sample.inputs["Index"])
-    link(enabled_socket(sample.outputs, "Value"), enabled_socket(store.inputs, "Value"))
+    index = add(group, "GeometryNodeInputIndex")
+    colour = node_group.sample(group, buffer, node_group.named_attribute(group, COLOURS), index)
     # Without colours, as before the first ones are written, the material is not changed either.
-    same = node_group.same_count(group, source.outputs["Geometry"], info.outputs["Geometry"])
-    link(same, store.inputs["Selection"])
-    link(same, paint.inputs["Selection"])
-    link(place.outputs["Geometry"], store.inputs["Geometry"])
-    link(store.outputs["Geometry"], paint.inputs["Geometry"])
-    link(paint.outputs["Geometry"], result.inputs["Geometry"])
+    same = node_group.same_count(group, source["Geometry"], buffer)
+    stored = {"Geometry": place, "Selection": same, "Name": NAME, "Value": colour}
+    store = add(group, "GeometryNodeStoreNamedAttribute", stored, data_type="FLOAT_COLOR", domain="POINT")
+    painted = {"Geometry": store, "Selection": same, "Material": _material()}
+    add(group, "NodeGroupOutput", {"Geometry": add(group, "GeometryNodeSetMaterial", painted)})
     node_group.note_structure(group)
     return group
 
@@ -132,14 +110,9 @@ def _material() -> bpy.types.Material:
     material[MARK] = True
     if bpy.app.version < (5, 0):  # newer ones always have nodes
         material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
-    colour, light, out = (
-        nodes.new(kind) for kind in ("ShaderNodeAttribute", "ShaderNodeEmission", "ShaderNodeOutputMaterial")
-    )
-    colour.attribute_name = NAME
-    for column, node in enumerate((colour, light, out)):
-        node.location = (220 * column, 0)
-    links.new(colour.outputs["Color"], light.inputs["Color"])
-    links.new(light.outputs["Emission"], out.inputs["Surface"])
+    tree = material.node_tree
+    tree.nodes.clear()
+    colour = add(tree, "ShaderNodeAttribute", attribute_name=NAME)
+    light = add(tree, "ShaderNodeEmission", {"Color": colour})
+    add(tree, "ShaderNodeOutputMaterial", {"Surface": light})
     return material
