@@ -13,7 +13,6 @@ import inspect
 import exact_fits
 import exact_interpolation
 import exact_transforms
-import numpy as np
 import pytest
 import sinew
 
@@ -57,15 +56,3 @@ def test_agrees_with_50_digits(name):
     assert name in CHECKS, f"{name} has no oracle: add its check to CHECKS of one of exact_*.py"
     module, function = name.split(".")[:2]
     CHECKS[name](module, FUNCTIONS[f"{module}.{function}"])
-
-
-def test_a_result_that_is_off_is_found():
-    cases = exact_transforms.motions(5)
-    off = cases.quat_vec.copy()
-    off[1234, 2] += 1e-13
-    check = exact_transforms.REPRESENTATIONS["to_quat_vec"]
-    check("affine", lambda a: cases.quat_vec.astype(a.dtype))
-    with pytest.raises(AssertionError, match="float64, case 1234"):
-        check("affine", lambda a: off.astype(a.dtype))
-    with pytest.raises(AssertionError, match="float32"):
-        check("affine", lambda a: (cases.quat_vec * (1 + 1e-5 * (a.dtype == np.float32))).astype(a.dtype))

@@ -18,7 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 import cross_build  # noqa: E402
 import package  # noqa: E402
-import platform_tests  # noqa: E402
 from platforms import PLATFORMS  # noqa: E402
 
 HEADERS = Path(sysconfig.get_path("include"))
@@ -80,16 +79,3 @@ def test_a_wheel_is_whole_and_always_the_same(tmp_path):
     compiled = re.compile(r".*(\.so|\.pyd|\.dll|\.dylib|\.pyc)")
     ours = {name for name in files if name.startswith("sinew/")}
     assert {n for n in installed if not compiled.fullmatch(n)} == ours - {f"sinew/{module.name}"}
-
-
-def test_tests_left_out_on_other_platforms_exist():
-    """A renamed test would otherwise run there unnoticed, or not at all."""
-    for name in platform_tests.CHECKOUT_TESTS:
-        assert (ROOT / f"tests/python/{name}.py").is_file()
-    for name in platform_tests.BLENDER_TESTS:
-        assert (ROOT / f"tests/blender/{name}.py").is_file()
-    for tests in platform_tests.LEFT_OUT.values():
-        for test, reason in tests.items():
-            file, _, function = test.partition("[")[0].partition("::")
-            assert f"\ndef {function}(" in (ROOT / file).read_text(encoding="utf-8"), test
-            assert reason

@@ -56,7 +56,7 @@ def test_keys_of_equal_time_are_a_cut(method):
 
 
 @pytest.mark.parametrize("method", ["qv_nlerp", "dlb"])
-def test_no_jump_within_the_spline(method):
+def test_signs_along_a_spline_go_from_key_to_key(method):
     """Keys that are two steps apart differ by more than 180 degrees. If signs followed the heaviest key, they
     would change in the middle of an interval."""
     name, steps = LAYOUT_OF[method], np.arange(5.0)
@@ -64,6 +64,9 @@ def test_no_jump_within_the_spline(method):
     motions = RigidTransform.from_components(steps[:, None] * [1.0, 0, 0], turns)
     path = matrix(catmull_rom(layout(motions, name), TIMES, np.arange(0, 5, 0.001), method).transforms, name)
     assert np.abs(np.diff(path, axis=0)).max() < 0.05
+    # As each step is equal, the middle of the middle one is known.
+    middle = catmull_rom(layout(motions[:4], name), steps[:4], 1.5, method).transforms
+    close(matrix(middle, name)[:3, :3], Rotation.from_rotvec(turns[1].as_rotvec() * 1.5).as_matrix())
 
 
 PARENTS = np.int32([-1, 0, 1, 1])
