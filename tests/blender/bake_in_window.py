@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import window
 
 ZIP, HERE = window.arguments()
-PICTURE, FOLDER = HERE / "bake.png", HERE / "baked"
+FOLDER = HERE / "baked"
 # Blender's folder for the user's files.
 USER = HERE / "user"
 FRAME = 16
@@ -34,8 +34,7 @@ PATIENCE = 120.0
 
 def press(key: str, **held: bool) -> None:
     main = bpy.context.window_manager.windows[0]
-    for value in ("PRESS", "RELEASE"):
-        main.event_simulate(type=key, value=value, x=main.width // 2, y=main.height // 2, **held)
+    window.press(key, (main.width // 2, main.height // 2), **held)
 
 
 def is_baking() -> bool:
@@ -80,7 +79,7 @@ def state() -> dict[str, object]:
         "method": obj.sinew.method,
         "points": hashlib.sha256(window.final_points(obj)).hexdigest(),
         "files": sorted(str(p.relative_to(HERE)) for p in FOLDER.rglob("*")),
-        "folder": sorted(p.name for p in HERE.iterdir() if p not in (PICTURE, USER)),
+        "folder": sorted(p.name for p in HERE.iterdir() if p != USER),
         "blenders": blenders(),
     }
 
@@ -115,8 +114,6 @@ def steps() -> Iterator[None]:
         for _tick in range(20 if kind in ("alembic", "usd", "gltf") else 1):
             yield
         middle = state()
-        if kind == "gltf":
-            window.photograph(PICTURE)
         assert is_baking(), kind
         press("ESC")
         yield from window.until(lambda: not is_baking(), "the end", PATIENCE)

@@ -58,23 +58,9 @@ def steps() -> Generator[None, None, dict]:
     other = strain.copy()
     other.name = "LATE"
     other.use_frame_range, other.frame_start, other.frame_end = True, 9, 40
-    window.open_sidebar()
-    yield
-    yield
-    window.choose_tab()
     bpy.context.scene.frame_set(16)
-    with window.in_view3d("WINDOW"):
-        view = bpy.context.space_data.region_3d
-        view.view_location, view.view_distance = (0.35, 0.0, 0.1), 2.6
-    for _tick in range(10):
-        yield
-    blend()
     yield
-    yield
-    window.photograph(FOLDER / "blend.png")
     middle = bpy.context.window_manager.windows[0]
-    window.press("ESC", (middle.width // 2, middle.height // 2))
-    yield
     other.frame_end = LONG
     bpy.ops.ed.undo_push(message="Before")
     before = state()

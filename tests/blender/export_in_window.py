@@ -28,7 +28,6 @@ def export(path: Path, clicked: tuple[tuple[int, int], ...]) -> Iterator[None]:
     yield from window.wait()
     for place in clicked:
         yield from window.click(place)
-    window.photograph(path.with_suffix(".png"))
     yield from window.click(EXPORT)
     for _tick in range(20):
         if any(area.type == "VIEW_3D" for area in bpy.context.window_manager.windows[0].screen.areas):

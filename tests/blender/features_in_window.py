@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """In the window of one Blender, with Sinew's zip: the steps of features, one after another. Prints "FACTS" and a
-line of JSON with what each has found, and leaves pictures in the folder.
+line of JSON with what each has found.
 
     blender --factory-startup --enable-event-simulate --python features_in_window.py -- sinew.zip FOLDER
 """  # noqa: E501

@@ -48,7 +48,6 @@ def steps() -> Generator[None, None, dict]:
     window.choose_tab()
     yield from window.wait()
     facts = {"german": texts()}
-    window.photograph(FOLDER / "german.png")
     view.language = "en_US"
     yield
     facts["english"] = texts()

@@ -33,7 +33,6 @@ def steps() -> Generator[None, None, dict]:
     # Blender asks; Esc keeps the open file.
     open_lesson()
     yield from window.wait()
-    window.photograph(FOLDER / "asked.png")
     facts["asks first"] = is_own()
     window.press("ESC", VIEW)
     yield from window.wait()
@@ -50,5 +49,4 @@ def steps() -> Generator[None, None, dict]:
     yield from window.wait()
     facts["opened"] = ["Lesson" in bpy.data.texts, bpy.data.filepath, hasattr(bpy.types.Object, "sinew")]
     facts["reading"] = [area.type for area in bpy.context.window_manager.windows[0].screen.areas]
-    window.photograph(FOLDER / "lesson.png")
     return facts

@@ -14,7 +14,7 @@ import window
 import window_scene
 
 _ZIP, FOLDER = window.arguments()
-VERTICES, PATIENCE = 120_000, 300.0
+VERTICES, PATIENCE = 80_000, 300.0
 facts: dict[str, object] = {}
 
 
@@ -30,14 +30,6 @@ def hero() -> bpy.types.Object:
 def plan() -> str:
     state = sinew("deform.session").state_of(hero())
     return "none" if state is None else state.plan.state.value
-
-
-def press(key: str) -> None:
-    main = bpy.context.window_manager.windows[0]
-    area = window.area_of("VIEW_3D")
-    x, y = area.x + area.width // 2, area.y + area.height // 2
-    for value in ("PRESS", "RELEASE"):
-        main.event_simulate(type=key, value=value, x=x, y=y)
 
 
 def off_modifier(method: str = "lbs") -> float:
@@ -115,7 +107,6 @@ def see_it_found() -> Generator[None, None, np.ndarray]:
         if ticks == 3:
             facts["off_modifier_meanwhile"] = off_modifier()
             facts["watched"] = [op.bl_idname for op in bpy.context.window_manager.windows[0].modal_operators]
-            window.photograph(FOLDER / "waiting.png")
         yield
     facts["ticks_meanwhile"] = ticks
     facts["plan_then"] = plan()
@@ -129,12 +120,12 @@ def stop_and_go_on() -> Iterator[None]:
     yield from window.until(
         lambda: any(bpy.context.window_manager.windows[0].modal_operators), "the precomputation"
     )
-    press("ESC")
+    area = window.area_of("VIEW_3D")
+    window.press("ESC", (area.width // 2, area.height // 2))
     yield from window.until(lambda: not sinew("core.precompute").precomputations.running, "its end")
     yield from window.wait()
     facts["plan_stopped"] = plan()
     facts["reason_stopped"] = sinew("deform.session").state_of(hero()).plan.reason
-    window.photograph(FOLDER / "stopped.png")
     with window.in_view3d():
         bpy.ops.sinew.precompute("INVOKE_DEFAULT")
     yield from window.until(lambda: plan() == "in depsgraph", "its shape", PATIENCE)

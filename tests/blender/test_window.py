@@ -23,11 +23,11 @@ pytestmark = pytest.mark.window
 SCRIPTS = (REPOSITORY / "docs" / "window.py", *Path(__file__).parent.glob("window_*.py"))
 OPTIONS = ("--enable-event-simulate", "--python-exit-code", "3", "--python")
 # Two Blenders at a time. The second one is restarted with what it saved last.
-FIRST = ("files", "undo", "windows", "modes", "modifiers")
+FIRST = ("files", "undo", "windows", "modes")
 SECOND = ("objects", "renders", "addon", "quit")
 AGAIN = ("again",)
 # What `./dev test` runs; `./dev test --all` runs every group.
-QUICK = ("files", "undo", "modes", "modifiers")
+QUICK = ("files", "undo", "modes")
 
 
 @dataclass
@@ -120,8 +120,8 @@ def _of(group: str, faults: dict[str, list[str]]) -> dict[str, list[str]]:
     return {step: texts for step, texts in faults.items() if step.partition(":")[0] == group}
 
 
-# Errors of another add-on, and of Blender itself.
-PRINTING = ("renders: others_throw", "files: save_where_it_can_not_be")
+# Errors of another add-on.
+PRINTING = ("renders: others_throw",)
 
 
 def _groups(*left_out: str) -> pytest.MarkDecorator:

@@ -6,11 +6,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import window
-import window_scene
 from bpy_extras import view3d_utils
 from mathutils import Vector
 from window_hand import (
-    FOLDER,
     Run,
     Steps,
     choose,
@@ -20,11 +18,10 @@ from window_hand import (
     playing,
     press,
     rig,
-    set_frame,
     step,
     wait,
 )
-from window_scene import LARGE, shown_points, worst
+from window_scene import shown_points
 
 
 @step("modes")
@@ -185,56 +182,6 @@ def sculpt(run: Run) -> Steps:
 
 
 @step("modes")
-def edit_the_mesh(run: Run) -> Steps:
-    execute("object.mode_set", "Hero", mode="EDIT")
-    yield from wait()
-    execute("mesh.select_all", action="SELECT")
-    execute("transform.translate", value=(0.0, 0.0, 0.2))
-    yield from wait()
-    execute("object.mode_set", mode="OBJECT")
-    yield from run.see("its vertices moved")
-    execute("object.mode_set", "Hero", mode="EDIT")
-    execute("mesh.subdivide")
-    execute("object.mode_set", mode="OBJECT")
-    yield from wait()
-    run.check(len(hero().data.vertices) > 2 * LARGE, "it was not subdivided")
-    run.check_shapes("subdivided")
-    # Leaves edit mode, and removes the subdivision.
-    for _time in range(2):
-        press("Z", ctrl=True)
-        yield from wait(4)
-    # To its position in edit mode.
-    execute("object.mode_set", "Hero", mode="OBJECT")
-    yield from run.see("subdivided and undone")
-    yield from run.check_frames()
-
-
-@step("modes")
-def edit_the_armature(run: Run) -> Steps:
-    execute("object.mode_set", "Hero Rig", mode="EDIT")
-    rig().data.edit_bones["bone.2"].tail.z += 0.5
-    rig().data.edit_bones["bone.1"].roll += 0.4
-    yield from wait()
-    execute("object.mode_set", mode="OBJECT")
-    yield from run.see("its bones edited")
-    rig().data.bones["bone.1"].name = "elbow"
-    yield from wait()
-    run.check("elbow" in hero().vertex_groups, "the group was not renamed with its bone")
-    run.check_shapes("a bone renamed")
-    execute("object.mode_set", "Hero Rig", mode="EDIT")
-    rig().data.edit_bones["bone.2"].name = "hand"
-    execute("object.mode_set", mode="OBJECT")
-    yield from wait()
-    run.check("hand" in hero().vertex_groups, "the group was not renamed with its bone in edit mode")
-    run.check_shapes("a bone renamed in edit mode")
-    press("Z", ctrl=True)
-    yield from wait(4)
-    execute("object.mode_set", "Hero Rig", mode="OBJECT")
-    yield from run.see("renamed and undone")
-    yield from run.check_frames()
-
-
-@step("modes")
 def methods_while_it_plays(run: Run) -> Steps:
     with playing():
         for method in ("lbs", "dq", "qv", "dq", "lbs", "dq"):
@@ -246,86 +193,4 @@ def methods_while_it_plays(run: Run) -> Steps:
         click("sinew.rebind", "Hero")
         yield from wait(4)
     yield from run.see("after playback")
-    yield from run.check_frames()
-
-
-@step("modifiers")
-def remove_sinews_modifier(run: Run) -> Steps:
-    """With the cross in its header: the Armature modifier deforms again."""
-    execute("object.modifier_remove", "Hero", modifier="Sinew")
-    run.wanted["Hero"] = ""
-    yield from wait()
-    modifier = hero().modifiers["Armature"]
-    run.check(modifier.show_viewport and modifier.show_render, "its Armature modifier stays off")
-    run.check(modifier.object == rig(), "its Armature modifier has no armature")
-    run.check_shapes("without Sinew's modifier")
-    yield from run.check_frames()
-    yield from run.undo("undone", "dq")
-    yield from run.check_frames()
-
-
-@step("modifiers")
-def duplicate(run: Run) -> Steps:
-    for linked in (False, True):
-        execute("object.duplicate", "Hero", linked=linked)
-        copy = bpy.context.window_manager.windows[0].view_layer.objects.active
-        yield from wait()
-        run.check_copy(copy, f"duplicated {'linked' if linked else ''}")
-        set_frame(9)
-        yield from wait()
-        run.check_copy(copy, f"duplicated {'linked' if linked else ''} at frame 9")
-        execute("object.delete", copy.name, confirm=False)
-        yield from wait()
-        yield from run.check_frames()
-
-
-@step("modifiers")
-def apply_and_convert(run: Run) -> Steps:
-    """Both freeze the shape, and Sinew is removed."""
-    for name, arguments in (
-        ("object.modifier_apply", {"modifier": "Sinew"}),
-        ("object.convert", {"target": "MESH"}),
-    ):
-        set_frame(12)
-        yield from wait()
-        main = bpy.context.window_manager.windows[0]
-        before = shown_points(hero(), main.view_layer.depsgraph)
-        execute(name, "Hero", **arguments)
-        del run.wanted["Hero"]
-        yield from wait()
-        set_frame(3)
-        yield from wait()
-        off = worst(shown_points(hero(), main.view_layer.depsgraph), before)
-        run.check(off <= window_scene.TOLERANCE, f"after {name} the shape moves by {off:.4f}")
-        _check_forgotten(run, hero(), f"after {name}")
-        yield from run.undo("undone", "dq")
-        yield from run.check_frames()
-
-
-def _check_forgotten(run: Run, obj: bpy.types.Object, when: str) -> None:
-    run.check(
-        not (obj.is_property_set("sinew") and len(obj.sinew.replaced_modifiers)),
-        f"Sinew's settings stay {when}",
-    )
-    run.check(not any(m.type == "NODES" for m in obj.modifiers), f"a modifier of Sinew's stays {when}")
-    ours = [a.name for a in obj.data.attributes if a.name.lstrip(".").startswith("sinew")]
-    run.check(not ours, f"attributes stay {when}: {ours}")
-    drivers = obj.animation_data.drivers if obj.animation_data is not None else []
-    run.check(not len(drivers), f"drivers stay {when}")
-
-
-@step("modifiers")
-def delete_the_armature(run: Run) -> Steps:
-    """Sinew reports it, and the saved file opens; after undo, everything is as before."""
-    execute("object.delete", "Hero Rig", confirm=False)
-    wanted = run.wanted
-    run.wanted = {name: method for name, method in wanted.items() if name != "Hero"}
-    yield from wait(4)
-    set_frame(4)
-    yield from run.see("without Hero's armature")
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "no-armature.blend"), copy=True)
-    press("Z", ctrl=True)
-    yield from wait(4)
-    run.wanted = wanted
-    run.check_shapes("the armature undone")
     yield from run.check_frames()

@@ -74,14 +74,6 @@ class Run:
         if method and hasattr(obj, "sinew"):
             self.check(not obj.sinew.error, f"{obj.name} {when}: {obj.sinew.error}")
 
-    def check_copy(self, twin: bpy.types.Object, when: str) -> None:
-        """It shows the same as Hero, or as an Armature modifier."""
-        depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
-        shown = shown_points(twin, depsgraph)
-        off = min(worst(shown, blender_points(twin, rig(), method, depsgraph)) for method in ("dq", "lbs"))
-        self.check(off <= window_scene.TOLERANCE, f"{twin.name} {when} is off by {off:.4f}")
-        self.check_shapes(when)
-
     def check_frames(self) -> Steps:
         """Compares the shapes at other frames, and again here."""
         scene = bpy.context.window_manager.windows[0].scene

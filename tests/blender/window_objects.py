@@ -11,8 +11,6 @@ from window_hand import (
     Run,
     Steps,
     choose,
-    click,
-    fresh,
     hero,
     rig,
     set_frame,
@@ -57,18 +55,3 @@ def written_as_a_library(run: Run) -> Steps:
     run.note_saved(path, in_memory=True)
     run.wanted = wanted
     yield from run.check_frames()
-
-
-@step("objects")
-def new_file(run: Run) -> Steps:
-    """Ctrl+N with Sinew on, and a character of the new file."""
-    bpy.ops.wm.read_homefile(app_template="")
-    run.wanted = {}
-    yield from wait()
-    obj = window_scene.make_character("Newcomer", window_scene.LARGE, (0.0, 0.0, 0.0))
-    click("sinew.add", obj.name)
-    bpy.data.objects["Newcomer"].sinew.method = "dq"
-    run.wanted = {"Newcomer": "dq"}
-    yield from wait()
-    yield from run.check_frames()
-    yield from fresh(run)

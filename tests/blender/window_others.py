@@ -80,25 +80,25 @@ def _check_rendered(run: Run, frames: int) -> None:
     run.check(not wrong, f"rendered frames are off: {wrong[:6]}, {len(wrong)} of {len(seen)}")
 
 
-@step("renders")
-def render_locked(run: Run) -> Steps:
-    bpy.utils.register_class(ComparingEngine)
-    bpy.context.preferences.view.render_display_type = "NONE"
-    _start_render(run, True, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
+def _render(run: Run, locked: bool) -> Steps:
+    _start_render(run, locked, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
     yield from _end_of_render()
     _check_rendered(run, 20)
     run.check_shapes("after the render")
     yield from run.check_frames()
+
+
+@step("renders")
+def render_locked(run: Run) -> Steps:
+    bpy.utils.register_class(ComparingEngine)
+    bpy.context.preferences.view.render_display_type = "NONE"
+    yield from _render(run, True)
 
 
 @step("renders")
 def render_unlocked(run: Run) -> Steps:
     """Without using the panel."""
-    _start_render(run, False, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
-    yield from _end_of_render()
-    _check_rendered(run, 20)
-    run.check_shapes("after the render")
-    yield from run.check_frames()
+    yield from _render(run, False)
 
 
 @step("renders")

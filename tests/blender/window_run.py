@@ -57,7 +57,6 @@ def run_all() -> Steps:
             if run.faults > before and group not in ("again", "quit"):
                 # A fault must not be counted again.
                 yield from guarded(run, fresh, quiet=True)
-        window.photograph(FOLDER / f"{group}.png")
         print(f"GROUP {group} {time.monotonic() - started:.1f} s", flush=True)
     (FOLDER / f"saved-{GROUPS[-1]}.json").write_text(json.dumps(run.saved))
     print("ENDED", flush=True)

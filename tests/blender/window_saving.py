@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from window_hand import (
     Run,
     Steps,
     click,
-    execute,
     hero,
     playing,
     push,
@@ -63,22 +61,6 @@ def save_incremental(run: Run) -> Steps:
 
 
 @step("files")
-def save_a_copy(run: Run) -> Steps:
-    hero().location.x += 0.01
-    run.save("copy.blend", copy=True)
-    yield from wait()
-
-
-@step("files")
-def save_where_it_can_not_be(run: Run) -> Steps:
-    """Blender fails to save; Sinew continues."""
-    with contextlib.suppress(RuntimeError):
-        bpy.ops.wm.save_as_mainfile(filepath="/proc/no/such/folder.blend", copy=True)
-    run.check_shapes("after a failure")
-    yield from run.check_frames()
-
-
-@step("files")
 def save_while_it_plays(run: Run) -> Steps:
     with playing():
         yield from wait(10)
@@ -86,16 +68,6 @@ def save_while_it_plays(run: Run) -> Steps:
             run.save(f"playing{number}.blend", copy=True)
             yield from wait(3)
     yield from wait()
-
-
-@step("files")
-def save_in_modes(run: Run) -> Steps:
-    for mode in ("WEIGHT_PAINT", "EDIT", "SCULPT", "OBJECT"):
-        execute("object.mode_set", "Hero", mode=mode)
-        yield from wait()
-        run.save(f"mode-{mode}.blend", copy=True)
-        yield
-    yield from run.check_frames()
 
 
 @step("files")

@@ -8,13 +8,11 @@ from collections.abc import Callable
 import bpy
 import window
 from window_hand import (
-    SCENE,
     SECOND,
     Run,
     Steps,
     choose,
     click,
-    execute,
     hero,
     playing,
     press,
@@ -125,36 +123,15 @@ def undo_while_it_plays(run: Run) -> Steps:
     yield from run.check_frames()
 
 
-def _undo_and_redo_twice(run: Run, ticks_after_redo: int = 4) -> Steps:
+@step("undo")
+def scene_that_redo_brings_back(run: Run) -> Steps:
+    """Blender sends no notification of its first evaluation: Sinew looks four times a second."""
+    click("scene.new", type="LINK_COPY")
+    yield from run.see("in a copy of the scene")
     for turn in range(2):
         yield from run.undo(f"undone, turn {turn}")
         press("Z", ctrl=True, shift=True)
-        yield from wait(ticks_after_redo)
-        run.check_shapes(f"redone, turn {turn}")
-
-
-@step("undo")
-def mesh_that_another_object_gets(run: Run) -> Steps:
-    """From then on Sinew stores Hero's points elsewhere, which it starts after the undo step."""
-    with window.in_view3d("WINDOW"):
-        bpy.ops.mesh.primitive_cube_add("EXEC_DEFAULT", True, size=0.1, location=(0.0, 0.0, 1.0))
-    choose("Hero", bpy.context.window_manager.windows[0].view_layer.objects.active.name)
-    push("Selected")
-    push("The same again")
-    execute("object.make_links_data", type="OBDATA")
-    yield from run.see("its mesh is another's too")
-    yield from _undo_and_redo_twice(run)
-    for _time in range(4):
-        yield from run.undo("undone to the beginning")
-
-
-@step("undo")
-def scene_that_redo_brings_back(run: Run) -> Steps:
-    """Blender sends no notification of its first evaluation."""
-    click("scene.new", type="LINK_COPY")
-    yield from run.see("in a copy of the scene")
-    # Sinew checks four times a second.
-    yield from _undo_and_redo_twice(run, ticks_after_redo=20)
+        yield from run.see(f"redone, turn {turn}", 20)
     press("Z", ctrl=True)
     yield from wait(4)
 
@@ -203,20 +180,6 @@ def same_scene_in_two_windows(run: Run) -> Steps:
     first.scene.view_layers.remove(layer)
     yield from wait(4)
     yield from run.check_frames()
-
-
-@step("windows")
-def switch_scenes(run: Run) -> Steps:
-    main = bpy.context.window_manager.windows[0]
-    for _turn in range(2):
-        for name in (SECOND, SCENE):
-            main.scene = bpy.data.scenes[name]
-            yield from run.see(f"in {name}")
-            main.scene.frame_set(main.scene.frame_current % 20 + 1)
-            yield from run.see(f"in {name} at another frame")
-    main.scene = bpy.data.scenes[SCENE]
-    run.save("scenes.blend")
-    yield from wait()
 
 
 @step("windows")
