@@ -51,6 +51,9 @@ def evaluate(act, change):
     getattr(events, EVENT).remove(once)
     assert called
 """
+ADD = """
+scenes.add_sinew(obj, "dq")
+"""
 DELETE = """
 for turn in range(5):
     others = make(40)
@@ -87,12 +90,8 @@ print("at its end")
 @pytest.mark.parametrize("event", ["depsgraph_update_post", "frame_change_post"])
 @pytest.mark.parametrize(
     "parts",
-    [
-        (DELETE,),
-        ('scenes.add_sinew(obj, "dq")', DELETE, COMPARE),
-        ('scenes.add_sinew(obj, "dq")', RENAME, COMPARE),
-    ],
-    ids=["nothing of Sinew", "beside a skinned mesh", "a skinned mesh renamed"],
+    [(DELETE, ADD, DELETE, COMPARE), (ADD, RENAME, COMPARE)],
+    ids=["beside nothing of Sinew, and beside a skinned mesh", "a skinned mesh renamed"],
 )
 def test_others_delete_before_sinew_is_called(parts, event, tmp_path):
     script = tmp_path / "script.py"

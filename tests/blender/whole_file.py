@@ -25,6 +25,7 @@ VOLATILE = {
     "id_data",
     "is_evaluated",
     "is_runtime_data",
+    "keyconfigs",
     "loop_triangle_polygons",
     "loop_triangles",
     "original",
@@ -73,20 +74,23 @@ class Column:
         ]
 
 
-def of_open_file() -> dict[str, object]:
-    """Path of each value -> the value."""
+def of_open_file(only: str = "") -> dict[str, object]:
+    """Path of each value -> the value.
+
+    only  the name of the one kind of datablocks to read
+    """
     found: dict[str, object] = {}
-    for collection in bpy.data.bl_rna.properties:
+    collections = [p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
         # 5.0 lists all of them twice.
-        if collection.type != "COLLECTION" or collection.identifier == "all_ids":
-            continue
-        for item in getattr(bpy.data, collection.identifier):
-            # The last render belongs to this process.
-            is_render = isinstance(item, bpy.types.Image) and item.source == "VIEWER"
-            if isinstance(item, bpy.types.ID) and not is_render:
-                path = f"{collection.identifier}[{item.name_full}]"
-                found[path] = item.users
-                _Walk(found, item).struct(item, path)
+        for kind in [only] if only else [each for each in collections if each != "all_ids"]:
+            for item in getattr(bpy.data, kind):
+                # The last render belongs to this process.
+                is_render = isinstance(item, bpy.types.Image) and item.source == "VIEWER"
+                if isinstance(item, bpy.types.ID) and not is_render:
+                    path = f"{kind}[{item.name_full}]"
+                    found[path] = item.users
+                    _Walk(found, item).struct(item, path)
     return found
 
 
@@ -94,7 +98,7 @@ def content() -> dict[str, object]:
     """The open file once it is evaluated, which fills in bounds and caches, and read, which makes Blender 5.2
     expand attributes with a single value."""
     bpy.context.scene.frame_set(bpy.context.scene.frame_current)
-    of_open_file()
+    of_open_file("meshes")
     return of_open_file()
 
 
@@ -154,8 +158,7 @@ class _Walk:
             self.found[path] = "not set"
             return
         try:
-            with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-                value = getattr(data, prop.identifier)
+            value = getattr(data, prop.identifier)
         except (AttributeError, RuntimeError, ValueError, UnicodeDecodeError) as error:
             self.found[path] = type(error).__name__
             return
