@@ -56,25 +56,6 @@ def test_far_from_the_origin():
     assert_equal_to_modifier(obj, [1, 6, 11])
 
 
-def test_shape_keys_with_values_groups_mutes_and_relative_keys():
-    obj, _armature = scenes.make_arm()
-    obj.shape_key_add(name="Basis")
-    generator = np.random.default_rng(7)
-    for name in ("a", "b", "c", "d"):
-        key = obj.shape_key_add(name=name)
-        moved = scenes.rest_points(obj) + generator.normal(0.0, 0.05, (len(obj.data.vertices), 3))
-        key.data.foreach_set("co", moved.astype(np.float32).ravel())
-    keys = obj.data.shape_keys.key_blocks
-    keys["a"].value = 0.7
-    keys["b"].value, keys["b"].vertex_group = 1.0, "bone.1"
-    keys["c"].value, keys["c"].mute = 1.0, True
-    keys["d"].value, keys["d"].relative_key = 0.4, keys["a"]
-    keys["a"].keyframe_insert("value", frame=1)
-    keys["a"].value = -0.0
-    keys["a"].keyframe_insert("value", frame=11)
-    assert_equal_to_modifier(obj, [1, 4.5, 11])
-
-
 @pytest.mark.parametrize("method", ["lbs", "qv", "dq"])
 def test_every_method_follows_rigid_motion(method):
     """A whole armature rotated by its root bone rotates the mesh rigidly."""
@@ -109,39 +90,6 @@ def test_an_armature_modifier_apart_stays_blenders():
     assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     assert obj.modifiers["Second"].object is not None
     assert any("Second" in warning for warning in session.state_of(obj).bound.facts.warnings)
-
-
-def test_a_switched_off_armature_modifier_in_front_is_passed_over():
-    obj, _armature = scenes.make_arm()
-    _unused, other = scenes.make_arm(name="Other")
-    first = obj.modifiers.new("First", "ARMATURE")
-    first.object = other
-    first.show_viewport = first.show_render = False
-    obj.modifiers.move(1, 0)
-    assert_equal_to_modifier(obj, [1, 6, 11])
-    assert attach.armature_modifier(obj).name == "Armature"
-
-
-def with_envelopes(armature: bpy.types.Object) -> None:
-    for index, bone in enumerate(armature.data.bones):
-        bone.head_radius, bone.tail_radius = 0.2 + 0.05 * index, 0.1
-        bone.envelope_distance, bone.envelope_weight = 0.3, 1.0 - 0.2 * index
-
-
-def test_envelopes_with_moving_shape_keys():
-    """Which envelopes contain a vertex depends on its shape key."""
-    obj, armature = scenes.make_arm(bones=3)
-    with_envelopes(armature)
-    obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="lifted")
-    moved = scenes.rest_points(obj) + np.float32((0.4, 0.0, 0.3))
-    key.data.foreach_set("co", moved.ravel())
-    key.keyframe_insert("value", frame=1)
-    key.value = 1.0
-    key.keyframe_insert("value", frame=11)
-    modifier = obj.modifiers["Armature"]
-    modifier.use_bone_envelopes, modifier.use_vertex_groups = True, False
-    assert_equal_to_modifier(obj, [1, 6, 11])
 
 
 def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 import scenes
 import whole_file
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import safe_mode, session
+from sinew_addon.deform import session
 from sinew_addon.deform.plan import State
 from sinew_addon.features.heat import live
 
@@ -123,56 +123,6 @@ def test_it_is_corrective_smooth_behind_the_armature_modifier(method, settings):
     mush(obj, method, **as_stage(settings))
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
-
-
-def with_lattice_in_front(obj: bpy.types.Object) -> None:
-    """Deforms without changing the number of vertices."""
-    scenes.put_in_front(obj, "SIMPLE_DEFORM").angle = 0.7
-
-
-def with_two_armatures(obj: bpy.types.Object) -> None:
-    second = obj.modifiers.new("Second", "ARMATURE")
-    second.object, second.vertex_group = obj.modifiers["Armature"].object, GROUP
-    second.use_multi_modifier = second.use_deform_preserve_volume = True
-
-
-@pytest.mark.parametrize("set_up", [scenes.key_shape, with_lattice_in_front, with_two_armatures])
-@pytest.mark.parametrize("is_safe", [False, True])
-def test_on_both_routes_with_keys_and_modifiers_in_front(monkeypatch, set_up, is_safe):
-    obj = make_rough_arm()
-    set_up(obj)
-    expected = by_corrective_smooth(obj)
-    monkeypatch.setattr(safe_mode, "is_on", lambda: is_safe)
-    mush(obj, None)
-    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert session.state_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
-
-
-def applied_in_front(obj: bpy.types.Object) -> bpy.types.Object:
-    """A copy whose own mesh is the result of the first modifier."""
-    front = scenes.copied(obj, linked=True)
-    for modifier in list(front.modifiers)[1:]:
-        front.modifiers.remove(modifier)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    mesh = bpy.data.meshes.new_from_object(
-        front.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
-    )
-    bpy.data.objects.remove(front)
-    copy = obj.copy()
-    copy.data = mesh
-    copy.modifiers.remove(copy.modifiers[0])
-    bpy.context.scene.collection.objects.link(copy)
-    return copy
-
-
-def test_vertices_made_in_front_rest_where_they_are_made():
-    """Blender refuses to smooth these, because it does not know their original coordinates: the upstream
-    modifier is applied for it."""
-    obj = make_rough_arm()
-    scenes.put_in_front(obj)
-    expected = by_corrective_smooth(applied_in_front(obj))
-    mush(obj)
-    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_keys_change_it_from_frame_to_frame():

@@ -30,19 +30,6 @@ def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-def test_add_on_the_armature_takes_all_its_meshes():
-    first, armature = scenes.make_arm(name="First")
-    second = scenes.copied(first)
-    for obj in bpy.context.scene.objects:
-        obj.select_set(obj == armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.sinew.add()
-    assert properties.has_sinew(first)
-    assert properties.has_sinew(second)
-    assert_follows(first)
-    assert_follows(second)
-
-
 def test_a_grey_add_says_why():
     obj, armature = scenes.skinned_arm()
     with pytest.raises(RuntimeError, match="The meshes of the armature have Sinew already"):
@@ -52,14 +39,6 @@ def test_a_grey_add_says_why():
     bpy.context.view_layer.objects.active = None
     with pytest.raises(RuntimeError, match="Select a mesh with an Armature modifier"):
         bpy.ops.sinew.add()
-
-
-def test_the_rest_mesh_is_never_written():
-    obj, _armature = scenes.make_arm()
-    before = scenes.rest_points(obj)
-    scenes.add_sinew(obj, "dq")
-    scenes.shapes(obj, [1, 6, 11])
-    assert np.array_equal(scenes.rest_points(obj), before)
 
 
 @pytest.mark.parametrize("method", ["lbs", "qv", "dq"])
@@ -77,30 +56,6 @@ def test_remove_restores_all(method):
     assert whole_file.differences(before, whole_file.content())
     bpy.ops.sinew.remove()
     whole_file.assert_same(before)
-
-
-@pytest.mark.parametrize("has_other_keys", [False, True])
-def test_remove_deletes_keys_of_the_method_and_no_others(has_other_keys):
-    obj, _armature = scenes.make_arm()
-    if has_other_keys:
-        obj.keyframe_insert("location", frame=1)
-    before = whole_file.content()
-    scenes.add_sinew(obj)
-    obj.keyframe_insert("sinew.method", frame=1)
-    attach.remove(obj)
-    whole_file.assert_same(before)
-
-
-def test_renamed_modifiers_are_still_known():
-    obj, _armature = scenes.make_arm()
-    before = [m.name for m in obj.modifiers]
-    scenes.add_sinew(obj)
-    obj.modifiers["Sinew"].name = "deform"
-    obj.modifiers["Armature"].name = "old"
-    assert_follows(obj)
-    attach.remove(obj)
-    assert [m.name for m in obj.modifiers] == ["old"] != before
-    assert obj.modifiers["old"].object is not None
 
 
 def shared_mesh(obj):
@@ -171,21 +126,6 @@ def test_an_unchanged_object_is_not_written(monkeypatch):
     bpy.context.scene.frame_set(6)
     session.refresh(bpy.context)
     assert not written
-
-
-def test_unregister_gives_the_modifiers_their_armatures():
-    import sinew_addon
-
-    obj, armature = scenes.skinned_arm("dq")
-    bpy.context.scene.frame_set(11)
-    sinew_addon.unregister()
-    try:
-        assert obj.modifiers["Armature"].object == armature
-        assert not hasattr(bpy.types.Object, "sinew")
-    finally:
-        sinew_addon.register()
-    bpy.context.scene.frame_set(10)
-    assert_follows(obj)
 
 
 def test_what_is_missing_in_the_rig_is_warned_of():

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.attach import attach, node_group, normals, properties, stack
+from sinew_addon.attach import normals, properties, stack
 from sinew_addon.core import opengl
 from sinew_addon.core.shading import Shading, SurfaceNormals
 from sinew_addon.core.stage_mesh import Topology
@@ -147,66 +147,6 @@ def test_smooth_meshes_have_the_normals_of_vertices_too():
     obj, _armature = make(smooth)
     given, left = both(obj, lambda obj: vectors(evaluated(obj), "vertex_normals"))
     np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-
-
-def test_they_are_near_those_of_the_armature_modifier():
-    obj, _armature = make(smooth)
-    given = corners(obj)
-    properties.of(obj).enabled = False
-    bpy.context.scene.frame_set(7)
-    obj.modifiers["Armature"].use_deform_preserve_volume = True
-    bpy.context.view_layer.update()
-    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=1e-4)
-
-
-@needs_support
-def test_edges_that_are_marked_between_frames_are_followed_at_once():
-    obj, _armature = make(smooth)
-    assert evaluated(obj).normals_domain == "POINT"
-    for shading in (sharp, custom, partly_flat, smooth, flat, sharp):
-        if "custom_normal" in obj.data.attributes:
-            obj.data.attributes.remove(obj.data.attributes["custom_normal"])
-        if "sharp_edge" in obj.data.attributes:
-            obj.data.attributes.remove(obj.data.attributes["sharp_edge"])
-        shading(obj)
-        bpy.context.view_layer.update()
-        assert has_given(obj) == bool(DOMAINS[shading]), shading.__name__
-        given, left = both(obj)
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-    # The same domain, but other edges.
-    obj.data.edges[40].use_edge_sharp = not obj.data.edges[40].use_edge_sharp
-    obj.data.update()
-    bpy.context.view_layer.update()
-    given = corners(obj)
-    choose(obj, LEAVE)
-    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
-
-
-@needs_support
-def test_shape_keys_and_scaled_or_mirrored_objects():
-    obj, armature = make(custom)
-    scenes.key_shape(obj)
-    for scale in ((1, 1, 1), (1, 2, 0.5), (-1, 1, 1)):
-        obj.scale = scale
-        armature.scale = (1, 1, -1) if scale[0] < 0 else (1, 1, 1)
-        for frame in (3, 11):
-            bpy.context.scene.frame_set(frame)
-            check_given(obj)
-
-
-@needs_support
-def test_meshes_without_faces_or_vertices():
-    obj, _armature = scenes.make_arm()
-    obj.data.clear_geometry()
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(3)
-    obj.data.vertices.add(3)
-    obj.data.vertices.foreach_set("co", [1, 0, 0, 0, 2, 0, 0, 0, 3])
-    obj.data.update()
-    for frame in (5, 7):
-        bpy.context.scene.frame_set(frame)
-        given, left = both(obj, lambda obj: vectors(evaluated(obj), "vertex_normals"))
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
 
 
 def add_nodes_that_read(obj):
@@ -382,41 +322,6 @@ def test_modifiers_behind_that_are_off_allow_given_normals():
         assert has_given(obj) == (levels == 0)
 
 
-BEHIND = {
-    "cast": lambda obj: obj.modifiers.new("Cast", "CAST"),
-    "switched on": lambda obj: setattr(obj.modifiers["Off"], "show_viewport", True),
-    "instances": instance_faces,
-}
-
-
-@needs_support
-@pytest.mark.parametrize("act", BEHIND.values(), ids=BEHIND)
-@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
-def test_modifiers_that_a_handler_adds_behind_end_given_normals_at_once(event, act):
-    """Blender evaluates it without notification."""
-    obj, _armature = make(smooth)
-    off = obj.modifiers.new("Off", "CAST")
-    off.show_viewport = off.show_render = False
-    bpy.context.scene.frame_set(4)
-    assert has_given(obj)
-    handlers = getattr(bpy.app.handlers, event)
-
-    def call(*_args):
-        handlers.remove(call)
-        act(obj)
-
-    handlers.append(call)
-    obj.update_tag()
-    if event == "frame_change_post":
-        bpy.context.scene.frame_set(5)
-    else:
-        bpy.context.view_layer.update()
-    assert call not in handlers
-    assert not has_given(obj)
-    given, left = both(obj)
-    np.testing.assert_array_equal(given, left)
-
-
 @needs_support
 def test_free_normals_of_the_mesh_stay():
     obj, _armature = scenes.make_arm()
@@ -450,20 +355,6 @@ def test_applying_adds_no_normals(how, shading):
     assert found[0][0] == found[1][0]
     for left, given in zip(found[0][1:], found[1][1:], strict=True):
         np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-
-
-@needs_support
-def test_removal_leaves_no_trace():
-    obj, _armature = scenes.make_arm()
-    sharp(obj)
-    before = {each.name for each in obj.data.attributes}
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(7)
-    assert has_given(obj)
-    attach.remove(obj)
-    bpy.context.view_layer.update()
-    assert {each.name for each in obj.data.attributes} == before
-    assert not any(group.get(node_group.MARK) for group in bpy.data.node_groups)
 
 
 @needs_support
@@ -647,33 +538,6 @@ def test_before_4_5_blender_computes_them():
     assert not any("normals" in each.name for each in obj.data.attributes)
 
 
-@needs_support
-def test_objects_with_one_mesh_and_painted_ones():
-    obj, _armature = make(custom)
-    other = scenes.copied(obj, linked=True)
-    for frame in (4, 9):
-        bpy.context.scene.frame_set(frame)
-        for each in (obj, other):
-            assert session.state_of(each).plan.in_buffer
-            assert has_given(each)
-            given, left = both(each)
-            np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-    bpy.data.objects.remove(other)
-    bpy.context.view_layer.update()
-    bpy.context.view_layer.objects.active = obj
-    for mode in ("WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT"):
-        bpy.ops.object.mode_set(mode=mode)
-        bpy.context.scene.frame_set(6)
-        check_given(obj)
-        bpy.ops.object.mode_set(mode="OBJECT")
-    for mode in ("EDIT", "SCULPT"):
-        bpy.ops.object.mode_set(mode=mode)
-        bpy.context.scene.frame_set(8)
-        assert session.state_of(obj) is None
-        bpy.ops.object.mode_set(mode="OBJECT")
-        check_given(obj)
-
-
 def test_a_mesh_that_is_not_valid_has_none():
     # Two triangles and no edges.
     topology = Topology(np.int32([0, 3, 6]), np.int32([0, 1, 2, 2, 1, 3]), np.empty((0, 2), np.int32))
@@ -741,15 +605,3 @@ def test_skinned_normals_with_a_stage_are_blenders():
     given = corners(obj)
     choose(obj, LEAVE)
     np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
-
-
-@needs_support
-@pytest.mark.parametrize("method", [each for each in properties.METHODS if each != "ddm"])
-def test_every_method_and_stage(method):
-    obj, _armature = make(custom)
-    settings = properties.of(obj)
-    settings.method = method
-    settings.delta_mush.enabled = True
-    for frame in (4, 9):
-        bpy.context.scene.frame_set(frame)
-        check_given(obj)

@@ -244,54 +244,6 @@ def test_while_sinew_is_off_views_are_as_they_were():
     np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
 
 
-def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
-    path = str(tmp_path / "heat.blend")
-
-    def saved_and_opened() -> bpy.types.Object:
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
-        return bpy.data.objects["Arm"]
-
-    painted_arm()
-    obj = saved_and_opened()
-    types = test_shown_colours.color_types()
-    before = whole_file.content()
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(6)
-    bpy.ops.sinew.heat_map()
-    colours = shown_colours(obj)
-    obj = saved_and_opened()
-    np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
-    assert set(test_shown_colours.color_types()) == {"VERTEX"}
-    bpy.context.scene.frame_set(1)
-    bpy.ops.sinew.remove()
-    assert test_shown_colours.color_types() == types
-    whole_file.assert_same(before)
-    assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
-
-
-def test_undo_and_redo():
-    obj, _armature = scenes.skinned_arm("dq")
-    bpy.context.scene.frame_set(8)
-    types = test_shown_colours.color_types()
-    bpy.ops.ed.undo_push(message="before")
-    bpy.ops.sinew.heat_map()
-    bpy.ops.ed.undo_push(message="heat map")
-    colours = shown_colours(obj)
-    bpy.ops.ed.undo()
-    session.refresh(bpy.context)
-    obj = bpy.data.objects["Arm"]
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    assert heat_nodes.NAME not in mesh.attributes
-    assert test_shown_colours.color_types() == types
-    assert mesh.attributes.active_color_name == ""
-    bpy.ops.ed.redo()
-    session.refresh(bpy.context)
-    obj = bpy.data.objects["Arm"]
-    np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
-    assert set(test_shown_colours.color_types()) == {"VERTEX"}
-
-
 def test_converted_to_a_mesh_it_leaves_nothing_of_itself():
     obj, _armature = scenes.make_arm()
     obj.data.materials.append(bpy.data.materials.new("Skin"))

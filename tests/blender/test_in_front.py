@@ -29,22 +29,6 @@ def arm_with(kind: str, **options: object) -> bpy.types.Object:
     return obj
 
 
-@pytest.mark.parametrize(
-    ("kind", "options"),
-    [
-        ("SUBSURF", {"levels": 2}),
-        ("MIRROR", {"use_axis": (False, True, False)}),
-        ("CAST", {"factor": 0.7}),
-        ("DECIMATE", {"ratio": 0.5}),
-        ("SOLIDIFY", {"thickness": 0.1}),
-    ],
-)
-def test_modifiers_in_front(kind, options):
-    obj = arm_with(kind, **options)
-    assert_equal_to_modifier(obj, FRAMES)
-    assert properties.of(obj).upstream_proxy is not None
-
-
 def deforming_parent(obj, armature):
     obj.parent, obj.parent_type = armature, "ARMATURE"
 
@@ -118,16 +102,6 @@ def test_a_lattice_in_front_follows_both_objects():
     assert_equal_to_modifier(obj, FRAMES)
 
 
-def test_weights_that_change_in_front():
-    obj = arm_with("VERTEX_WEIGHT_EDIT", vertex_group="bone.1")
-    modifier = obj.modifiers["Front"]
-    modifier.use_remove, modifier.remove_threshold = True, 0.0
-    modifier.keyframe_insert("remove_threshold", frame=1)
-    modifier.remove_threshold = 0.9
-    modifier.keyframe_insert("remove_threshold", frame=11)
-    assert_equal_to_modifier(obj, FRAMES)
-
-
 def test_number_of_vertices_that_changes_in_front():
     obj = arm_with("BUILD", frame_start=1, frame_duration=12)
     expected = [scenes.shapes(obj, [frame])[0] for frame in (2, 5, 8)]
@@ -136,32 +110,6 @@ def test_number_of_vertices_that_changes_in_front():
         got = scenes.shapes(obj, [frame])[0]
         assert got.shape == shape.shape
         assert scenes.worst(got, shape) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def absolute_keys(obj):
-    obj.shape_key_add(name="Basis")
-    for point in obj.shape_key_add(name="Key").data:
-        point.co.z += 0.2
-    obj.data.shape_keys.use_relative = False
-    obj.data.shape_keys.eval_time = 7.0
-
-
-@pytest.mark.parametrize("set_up", [absolute_keys, scenes.put_in_front])
-def test_weights_are_painted_where_visibility_is_animated(set_up):
-    """In that mode the Armature modifier deforms, and upstream modifiers are not evaluated separately."""
-    obj, _armature = scenes.make_arm()
-    set_up(obj)
-    modifier = obj.modifiers["Armature"]
-    scenes.key(modifier, "show_viewport", ((1, False), (4, True)))
-    expected = scenes.shapes(obj, FRAMES)
-    scenes.add_sinew(obj, "lbs")
-    for mode in ("WEIGHT_PAINT", "OBJECT"):
-        bpy.ops.object.mode_set(mode=mode)
-        bpy.context.view_layer.update()
-        assert not properties.of(obj).error
-        got = scenes.shapes(obj, FRAMES)
-        assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert scenes.states_of(obj)
 
 
 @pytest.mark.parametrize("mode", ["WEIGHT_PAINT", "VERTEX_PAINT"])
@@ -190,26 +138,6 @@ def test_what_blender_leaves_out_while_painting(kinds, mode, route):
     bpy.ops.object.mode_set(mode="OBJECT")
     got = scenes.shapes(obj, FRAMES)
     assert scenes.worst(got, expected_after) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def test_parent_that_deforms_is_a_modifier_while_sinew_is_on():
-    obj, armature = scenes.make_arm()
-    obj.modifiers.clear()
-    obj.parent, obj.parent_type = armature, "ARMATURE"
-    bpy.context.view_layer.update()
-    before = whole_file.content()
-    expected = scenes.shapes(obj, FRAMES)
-    scenes.add_sinew(obj)
-    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    properties.of(obj).enabled = False
-    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    attach.remove(obj)
-    bpy.context.scene.frame_set(1)
-    whole_file.assert_same(before)
-    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-
-
-MODES = ["EDIT", "SCULPT"]
 
 
 @pytest.mark.parametrize("event", ["shown", "shown and changed"])
@@ -261,17 +189,6 @@ def test_a_proxy_at_the_address_of_a_deleted_object(route):
     expected = scenes.final_points(obj)
     assert shown.shape == expected.shape
     assert scenes.worst(shown, expected) <= 1e-5
-
-
-def test_removing_leaves_the_file_as_it_was():
-    obj = arm_with("SUBSURF")
-    bpy.context.view_layer.update()
-    before = whole_file.content()
-    scenes.add_sinew(obj)
-    bpy.context.scene.frame_set(5)
-    attach.remove(obj)
-    bpy.context.scene.frame_set(1)
-    whole_file.assert_same(before)
 
 
 def test_a_simulation_in_front_is_refused_with_a_sentence():

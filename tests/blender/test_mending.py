@@ -146,18 +146,6 @@ def test_it_is_checked_again_over_the_same_frames():
     assert "near_half_turn" in found(obj)
 
 
-def test_undo_takes_it_back():
-    obj, _armature = faulty_arm()
-    name = obj.name
-    bpy.ops.sinew.check()
-    before = dense(obj)
-    bpy.ops.ed.undo_push(message="checked")
-    mend(obj, "many_influences", "limit")
-    bpy.ops.ed.undo_push(message="mended")
-    bpy.ops.ed.undo()
-    np.testing.assert_array_equal(dense(bpy.data.objects[name]), before)
-
-
 def test_it_says_why_it_can_not():
     obj, _armature = faulty_arm()
     bpy.ops.sinew.check()
@@ -168,10 +156,3 @@ def test_it_says_why_it_can_not():
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match="press Check again"):
         mend(obj, "many_influences", "limit")
-
-
-def test_every_finding_has_its_buttons():
-    assert set(mending.MENDS) == {
-        *("no_weights", "small_sums", "many_influences", "boneless_groups"),
-        *("order_of_groups", "near_half_turn", "jumps"),
-    }

@@ -68,28 +68,6 @@ def assert_equal_to_reference(
     assert scenes.worst(found[decided], expected[decided]) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("name", "frame"), [("wrist", 20), ("shoulder", 25), ("tentacle", 30)])
-def test_own_rigs(method, name, frame, route):
-    files.open_file(REPOSITORY / "blend_files" / f"{name}.blend")
-    (obj,) = attach.deformed_meshes(list(bpy.context.scene.objects))
-    scenes.add_sinew(obj, method)
-    bpy.context.scene.frame_set(frame)
-    assert_equal_to_reference(obj, method, centres_of(obj))
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_mesh_that_lies_elsewhere(method, route):
-    obj, armature = scenes.make_arm(bones=3)
-    obj.location, obj.rotation_euler = (0.4, -1.0, 0.3), (0.2, 0.5, 0.1)
-    armature.location = (1.0, 2.0, -0.5)
-    bpy.context.view_layer.update()
-    scenes.add_sinew(obj, method)
-    bpy.context.scene.frame_set(8)
-    assert_equal_to_reference(obj, method, centres_of(obj))
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_a_real_rig(method, real_rig):
     files.open_file(real_rig("human.blend"))

@@ -240,39 +240,29 @@ def test_standard_output_on_a_full_disk(arguments, inputs):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("info", "FOLDER"),
-        ("info", "FILE/x.blend"),
-        ("points", "FILE/x.blend", "--method", "dq", "--frames", "1", "--out", "OUT.npz"),
-        ("compare", "FOLDER", "--out", "OUT"),
-        ("render", "FILE", "--against", "FILE", "--out", "OUT"),
-        ("render", "FILE", "--against", "FILE/x", "--out", "OUT"),
-        ("reskin", "FILE/x.blend", "--method", "dq", "--out", "OUT"),
-        ("bake", "FILE/x.blend", "--method", "dq", "--to", "mdd", "--out", "OUT"),
-        ("inbetween", "FILE/x", "--method", "dlb", "--out", "OUT"),
-        ("blend", "FILE/x", "--actions", "A", "B", "--out", "OUT.blend"),
         ("info", "LONG"),
         ("reskin", "LONG", "--method", "dq", "--out", "OUT"),
         ("points", "FILE", "--method", "dq", "--frames", "1", "--out", "LONG.npz"),
         ("reskin", "FILE", "--method", "dq", "--out", "LONG"),
+        ("render", "FILE", "--against", "FILE/x", "--out", "OUT"),
+        ("inbetween", "FILE/x", "--method", "dlb", "--out", "OUT"),
     ],
 )
-def test_what_can_not_be_read(arguments, inputs, tmp_path):
+def test_names_that_are_too_long_or_below_a_file(arguments, inputs, tmp_path):
+    """What else can not be read is in test_command_line.py."""
     places = {
         "FILE": str(inputs["FILE"]),
-        "FOLDER": str(tmp_path),
         "OUT": str(tmp_path / "out"),
         "LONG": str(tmp_path / ("a" * 300)),
     }
-    words = [re.sub(r"\b(FILE|FOLDER|OUT|LONG)\b", lambda found: places[found[0]], a) for a in arguments]
-    failed = run_sinew(*words, status=1)
-    assert complaint(failed.stderr)
+    words = [re.sub(r"\b(FILE|OUT|LONG)\b", lambda found: places[found[0]], a) for a in arguments]
+    assert complaint(run_sinew(*words, status=1).stderr)
     assert not [path for path in tmp_path.rglob("*") if "unfinished" in path.name]
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("option", ["--job"])
-def test_a_job_file_that_is_a_folder(option, tmp_path):
-    refused = run_sinew("reskin", option, tmp_path, "--out", tmp_path / "out", status=2)
+def test_a_job_file_that_is_a_folder(tmp_path):
+    refused = run_sinew("reskin", "--job", tmp_path, "--out", tmp_path / "out", status=2)
     assert "can not be read" in complaint(refused.stderr)
 
 

@@ -18,7 +18,6 @@ from program import run_sinew
 from sinew_addon.attach import attach, stored_vertex_data
 from sinew_addon.core import interrupt, vertex_data
 from sinew_addon.core.precompute import precomputations
-from sinew_addon.core.vertex_data import VertexData
 from sinew_addon.deform import characters, precompute_watch, precomputing, session
 from sinew_addon.deform.plan import State
 
@@ -319,29 +318,6 @@ def test_a_keyed_method_is_asked_for_when_it_comes(gate, route):
     precomputations.waits = True
     obj.sinew.method = "cor"
     assert scenes.worst(scenes.final_points(obj), found) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def test_triangles_are_read_where_a_method_needs_them():
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "dq")
-    assert session.state_of(obj).bound.source.triangles is None
-    obj.sinew.method = "cor"
-    assert session.state_of(obj).bound.source.triangles is not None
-    bpy.context.scene.frame_set(FRAME)
-    assert not obj.sinew.error
-
-
-def test_outdated_centres_need_triangles():
-    """The last evaluation still has the method that needs them, so the modifier's shape is shown first."""
-    obj, _armature = scenes.make_arm()
-    bpy.context.scene.frame_set(11)
-    scenes.add_sinew(obj, "cor")
-    before = session.state_of(obj).bound.first_deformer.vertex_data
-    assert before.is_current("cor")
-    after = VertexData(before.weighting, before.points + 0.1, before=before)
-    assert not after.is_ready("cor")
-    after.add_triangles(before.triangles)
-    assert after.is_ready("cor")
 
 
 def test_an_object_that_is_off_has_nothing_to_wait_for(gate):

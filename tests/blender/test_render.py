@@ -86,27 +86,6 @@ def test_background_animation_equals_the_modifier(tmp_path, method, preserve_vol
     assert np.abs(got - expected).mean() < 2e-4
 
 
-def test_hidden_rig_renders_like_the_modifier(tmp_path):
-    obj, armature = scenes.make_arm()
-    scene = bpy.context.scene
-    prepare(scene, motion_blur=False)
-    armature.hide_render = armature.hide_viewport = True
-    got, expected = with_and_without(tmp_path, obj, "lbs", (9, 9), lambda: scene.frame_set(1))
-    assert np.abs(got - expected).mean() < 2e-4
-
-
-def test_after_a_render_the_current_frame_is_shown(tmp_path):
-    obj, _armature = scenes.make_arm()
-    scene = bpy.context.scene
-    prepare(scene, motion_blur=True)
-    scenes.add_sinew(obj, "dq")
-    scene.frame_set(11)
-    before = scenes.final_points(obj)
-    render_animation(scene, tmp_path, (2, 3))
-    assert scene.frame_current == 11
-    assert np.array_equal(scenes.final_points(obj), before)
-
-
 def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     obj.parent = armature
     scenes.key(armature, "location", ((1, (0.0, 0.0, 0.0)), (11, (0.5, 0.5, 0.0))))

@@ -260,22 +260,6 @@ def test_an_error_is_not_saved_as_the_artists_choice(tmp_path, monkeypatch):
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
 
-@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
-def test_saved_in_a_mode_of_the_modifier(tmp_path, mode):
-    obj, _armature = scenes.make_arm()
-    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
-    scenes.add_sinew(obj, "dq")
-    ours = scenes.shapes(obj, FRAMES)
-    bpy.ops.object.mode_set(mode=mode)
-    bpy.context.view_layer.update()
-    save(tmp_path / "saved.blend")
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
-    assert not obj.modifiers["Armature"].use_deform_preserve_volume
-    shapes, _facts = played_without_sinew(tmp_path / "saved.blend")
-    assert scenes.worst(shapes, expected) <= 1e-6
-
-
 @pytest.mark.parametrize("what", ["small", "throws", "off"])
 def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
     small, armature = scenes.make_arm(name="A First")
@@ -356,22 +340,6 @@ def test_the_menu_of_modifiers_offers_nothing_of_sinews():
     groups = [group for group in bpy.data.node_groups if group.get(node_group.MARK)]
     assert groups
     assert not any(group.is_modifier for group in groups)
-
-
-def test_fbx_has_the_skin(tmp_path):
-    obj, _armature = scenes.skinned_arm("dq")
-    ours, at_rest = scenes.shapes(obj, FRAMES), np.ptp(scenes.rest_points(obj), axis=0)
-    path = tmp_path / "arm.fbx"
-    bpy.ops.export_scene.fbx(filepath=str(path))
-    # The exporter sets poses and restores them from their matrices.
-    assert scenes.worst(scenes.shapes(obj, FRAMES), ours) <= 1e-6
-    assert stack.sinew_modifier(obj).show_viewport
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.ops.import_scene.fbx(filepath=str(path))
-    imported = next(o for o in bpy.data.objects if o.type == "MESH")
-    assert imported.find_armature() is not None
-    assert len(imported.vertex_groups) == 2
-    np.testing.assert_allclose(np.ptp(scenes.rest_points(imported), axis=0), at_rest, rtol=1e-3)
 
 
 def test_an_fbx_export_that_fails_ends_as_one_that_does_not(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import routes
 import scenes
 from conftest import REPOSITORY
-from sinew_addon.attach import attach, properties
+from sinew_addon.attach import attach
 from sinew_addon.core import sdef
 from sinew_addon.deform import session
 
@@ -147,23 +147,6 @@ def test_keys_that_change_or_come_are_read_again(route):
     bpy.context.scene.frame_set(9)
     assert_as_expected(obj)
     assert session.state_of(obj).bound.lacks(["sdef"]) == [sdef.LACKS_KEYS]
-
-
-def test_it_is_mixed_with_another_method(route):
-    obj, _armature = make_model()
-    group = obj.vertex_groups.new(name="mixed")
-    group.add(range(len(obj.data.vertices)), 0.25, "REPLACE")
-    scenes.add_sinew(obj, "lbs")
-    bpy.context.scene.frame_set(8)
-    linear = scenes.final_points(obj)
-    mix = properties.of(obj).mix
-    mix.method, mix.group = "sdef", "mixed"
-    bpy.context.scene.frame_set(9)
-    bpy.context.scene.frame_set(8)
-    mixed = scenes.final_points(obj)
-    obj.vertex_groups.remove(group)
-    expected = linear + 0.25 * (expected_points(obj) - linear)
-    assert scenes.worst(mixed, expected) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_that_mmd_tools_deforms_it_too_is_said():

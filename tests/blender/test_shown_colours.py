@@ -12,6 +12,7 @@ import test_heat_map
 import whole_file
 from sinew_addon import registration
 from sinew_addon.attach import attach
+from sinew_addon.deform import session
 from sinew_addon.features.heat import bake_error, measures
 from sinew_addon.features.heat.heat_nodes import NAME
 
@@ -54,6 +55,15 @@ def shown_arm(what: str) -> bpy.types.Object:
         shading.color_type = ("MATERIAL", "RANDOM", "SINGLE", "OBJECT")[number % 4]
     bpy.context.scene.frame_set(6)
     return obj
+
+
+def attribute_colours(obj: bpy.types.Object) -> np.ndarray:
+    """As they are drawn, float32 [values]."""
+    bpy.context.view_layer.update()
+    attribute = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes[NAME]
+    colours = np.empty(4 * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("color", colours)
+    return colours
 
 
 def show(what: str) -> None:
@@ -122,43 +132,50 @@ def test_another_bake_hides_the_errors_of_the_last_one():
     assert [mesh.name for mesh in bpy.data.meshes if NAME in mesh.attributes] == []
 
 
-def test_undo_and_redo_of_the_errors():
-    types = baked_arm() and color_types()
-    bpy.ops.ed.undo_push(message="baked")
-    bpy.ops.sinew.heat_map(quantity="bake_error_before")
-    bpy.ops.ed.undo_push(message="errors")
+@pytest.mark.parametrize("what", ["heat", "error"])
+def test_undo_and_redo(what):
+    obj = shown_arm(what)
+    types, name = color_types(), obj.name
+    bpy.ops.ed.undo_push(message="before")
+    show(what)
+    colours = attribute_colours(obj)
+    bpy.ops.ed.undo_push(message="shown")
     bpy.ops.ed.undo()
-    bpy.context.view_layer.update()
+    session.refresh(bpy.context)
     assert color_types() == types
-    assert colours_of(bpy.data.objects["Baked"].data) == ("Second", "First")
+    assert colours_of(bpy.data.objects[name].data) == ("Second", "First")
     bpy.ops.ed.redo()
-    bpy.context.view_layer.update()
-    obj = bpy.data.objects["Baked"]
+    session.refresh(bpy.context)
+    obj = bpy.data.objects[name]
     assert set(color_types()) == {"VERTEX"}
-    assert bake_error.shown(bpy.context.scene) == [obj]
-    bpy.ops.sinew.heat_map()
+    np.testing.assert_allclose(attribute_colours(obj), colours, atol=1e-6)
+    show(what)
     assert color_types() == types
     assert colours_of(obj.data) == ("Second", "First")
 
 
-def test_a_saved_file_shows_the_errors_and_gives_all_back(tmp_path):
-    types = baked_arm() and color_types()
-    bpy.ops.sinew.heat_map(quantity="bake_error")
-    path = str(tmp_path / "errors.blend")
+@pytest.mark.parametrize("what", ["heat", "error"])
+def test_a_saved_file_shows_it_and_gives_all_back(what, tmp_path):
+    obj = shown_arm(what)
+    types, name, path = color_types(), obj.name, str(tmp_path / "shown.blend")
+    show(what)
+    colours = attribute_colours(obj)
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
-    obj = bpy.data.objects["Baked"]
+    obj = bpy.data.objects[name]
     assert set(color_types()) == {"VERTEX"}
-    assert bake_error.shown(bpy.context.scene) == [obj]
-    bpy.ops.sinew.heat_map()
+    np.testing.assert_allclose(attribute_colours(obj), colours, atol=1e-6)
+    assert what == "heat" or bake_error.shown(bpy.context.scene) == [obj]
+    show(what)
     assert color_types() == types
     assert colours_of(obj.data) == ("Second", "First")
 
 
-def test_a_deleted_mesh_gives_the_views_back():
-    obj = baked_arm()
+@pytest.mark.parametrize("what", ["heat", "error"])
+def test_a_deleted_mesh_gives_the_views_back(what):
+    obj = shown_arm(what)
     types = color_types()
-    bpy.ops.sinew.heat_map(quantity="bake_error")
+    show(what)
     bpy.data.objects.remove(obj)
     bpy.context.view_layer.update()
     assert color_types() == types

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 import numpy as np
 import pytest
 import scenes
 import whole_file
-from program import run_sinew
 from sinew_addon.attach import attach, normals, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
 from sinew_addon.deform import session, small_meshes
@@ -57,38 +58,84 @@ def test_left_where_the_modifier_blends_alike(preserve_volume, method):
     scenes.add_sinew(obj, method)
     assert deformer(obj) == "blender"
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-    properties.of(obj).method = "qv"
-    assert deformer(obj) == "sinew"
-    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) > 1e-3
-    properties.of(obj).method = "lbs" if preserve_volume else "dq"
-    assert deformer(obj) == "sinew"
-    properties.of(obj).method = method
-    assert deformer(obj) == "blender"
+    for other, who in (("qv", "sinew"), ("lbs" if preserve_volume else "dq", "sinew"), (method, "blender")):
+        properties.of(obj).method = other
+        assert deformer(obj) == who
+        assert (scenes.worst(scenes.shapes(obj, FRAMES), expected) > 1e-3) == (who == "sinew")
 
 
-def test_taken_up_and_left_by_what_the_artist_does(arm, monkeypatch):
-    obj, _armature = arm
-    settings = properties.of(obj)
-    for name, value in (("leave_small", False), ("scale_rule", IGNORED.name), ("heat", True)):
-        before = getattr(settings, name)
-        assert deformer(obj) == "blender"
-        setattr(settings, name, value)
-        assert deformer(obj) == "sinew", name
-        setattr(settings, name, before)
-    assert deformer(obj) == "blender"
-    obj.modifiers["Armature"].use_deform_preserve_volume = True
-    bpy.context.view_layer.update()
-    assert deformer(obj) == "sinew"
-    obj.modifiers["Armature"].use_deform_preserve_volume = False
-    bpy.context.view_layer.update()
-    assert deformer(obj) == "blender"
-    settings.keyframe_insert("method", frame=1)
-    bpy.context.view_layer.update()
-    assert deformer(obj) == "sinew"
-    settings.keyframe_delete("method", frame=1)
+def set_to(name: str, value: object) -> Callable[[bpy.types.Object], None]:
+    return lambda obj: setattr(properties.of(obj), name, value)
+
+
+def keep_volume(obj: bpy.types.Object) -> None:
+    own = obj.modifiers["Armature"]
+    own.use_deform_preserve_volume = not own.use_deform_preserve_volume
+
+
+def key_the_method(obj: bpy.types.Object) -> None:
+    properties.of(obj).keyframe_insert("method", frame=1)
+
+
+def unkey(obj: bpy.types.Object) -> None:
+    properties.of(obj).keyframe_delete("method", frame=1)
     obj.update_tag()
-    bpy.context.view_layer.update()
+
+
+def reweigh_at_a_frame(obj: bpy.types.Object) -> None:
+    bpy.context.scene.frame_set(11)
+    obj.vertex_groups["bone.0"].add(list(range(100, 200)), 1.0, "REPLACE")
+    obj.vertex_groups["bone.1"].add(list(range(100, 200)), 0.0, "REPLACE")
+    bpy.context.scene.frame_set(6)
+
+
+def subdivide(_obj: bpy.types.Object) -> None:
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def take_another_armature(obj: bpy.types.Object) -> None:
+    other = scenes.copied(properties.of(obj).armature)
+    scenes.bend(other, 30.0)
+    obj.modifiers["Armature"].object = other
+
+
+def rename_a_bone(obj: bpy.types.Object) -> None:
+    armature = obj.modifiers["Armature"].object
+    scenes.enter(armature, "EDIT")
+    armature.data.edit_bones["bone.0"].name = "new"
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+# What the artist does, and who deforms then.
+CHANGES = {
+    "never": [(set_to("leave_small", False), "sinew"), (set_to("leave_small", True), "blender")],
+    "a scale rule": [(set_to("scale_rule", IGNORED.name), "sinew"), (set_to("scale_rule", "4.0"), "blender")],
+    "a heat map": [(set_to("heat", True), "sinew"), (set_to("heat", False), "blender")],
+    "Preserve Volume": [(keep_volume, "sinew"), (keep_volume, "blender")],
+    "keys": [(key_the_method, "sinew"), (unkey, "blender")],
+    "in front": [
+        (lambda obj: scenes.put_in_front(obj, "MIRROR", "Mirror"), "sinew"),
+        (lambda obj: obj.modifiers.remove(obj.modifiers["Mirror"]), "blender"),
+    ],
+    "edits": [(reweigh_at_a_frame, "blender"), (subdivide, "blender")],
+    "armatures": [(take_another_armature, "blender"), (rename_a_bone, "blender")],
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_taken_up_and_left_by_what_the_artist_does(arm, name):
+    obj, _armature = arm
     assert deformer(obj) == "blender"
+    for act, who in CHANGES[name]:
+        act(obj)
+        bpy.context.view_layer.update()
+        assert deformer(obj) == who
+
+
+def test_larger_ones_are_taken_up(arm, monkeypatch):
+    obj, _armature = arm
     monkeypatch.setitem(small_meshes.VERTICES, "lbs", len(obj.data.vertices))
     bpy.ops.sinew.rebind()
     assert deformer(obj) == "sinew"
@@ -117,46 +164,14 @@ def test_a_method_keyed_between_frames(arm):
     assert scenes.worst(scenes.shapes(obj, FRAMES)[1:], expected[1:]) <= 1e-5 * scenes.diagonal(obj)
 
 
-def test_something_in_front_is_taken_up(arm):
-    obj, _armature = arm
-    mirror = scenes.put_in_front(obj, "MIRROR", "Mirror")
-    bpy.context.view_layer.update()
-    assert not session.plan_of(obj).uses_builtin
-    expected = scenes.final_points(obj)
-    properties.of(obj).enabled = False
-    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5 * scenes.diagonal(obj)
-    properties.of(obj).enabled = True
-    obj.modifiers.remove(mirror)
-    bpy.context.view_layer.update()
-    assert deformer(obj) == "blender"
-
-
-def test_edits_are_followed(arm):
-    obj, armature = arm
-    obj.vertex_groups[0].add(list(range(100, 140)), 1.0, "REPLACE")
-    bpy.context.view_layer.update()
-    assert deformer(obj) == "blender"
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.subdivide()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert deformer(obj) == "blender"
-    other = scenes.copied(armature)
-    scenes.bend(other, 30.0)
-    obj.modifiers["Armature"].object = other
-    assert deformer(obj) == "blender"
-    assert properties.of(obj).armature == other
-    scenes.enter(other, "EDIT")
-    other.data.edit_bones["bone.0"].name = "new"
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert [group.name for group in obj.vertex_groups] == ["new", "bone.1"]
-    assert deformer(obj) == "blender"
-
-
-def test_a_file_saved_and_opened(arm, tmp_path):
-    expected = scenes.shapes(arm[0], FRAMES)
-    path = str(tmp_path / "arm.blend")
-    obj = scenes.reopened(path)
-    assert deformer(obj) == "blender"
+@pytest.mark.parametrize(("method", "who"), [("lbs", "blender"), ("dq", "sinew")])
+def test_a_file_saved_and_opened(method, who, tmp_path):
+    """It has Preserve Volume for dq, which is not the artist's choice."""
+    obj, _armature = scenes.skinned_arm(method)
+    assert deformer(obj) == who
+    expected = scenes.shapes(obj, FRAMES)
+    obj = scenes.reopened(tmp_path / "arm.blend")
+    assert deformer(obj) == who
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
 
@@ -177,14 +192,6 @@ def test_on_and_off_and_removed(tmp_path):
     whole_file.assert_same(before)
 
 
-def test_frames_cost_nothing_of_sinews(arm, monkeypatch):
-    scenes.shapes(arm[0], FRAMES)
-    looked_at = []
-    monkeypatch.setattr(session, "update", lambda *arguments: looked_at.append(arguments))
-    scenes.shapes(arm[0], FRAMES)
-    assert looked_at == []
-
-
 def add_keyed_mesh():
     """Another mesh of the scene, which its shape keys change in every frame."""
     mesh = bpy.data.meshes.new("Keyed")
@@ -195,14 +202,14 @@ def add_keyed_mesh():
 
 
 @pytest.mark.parametrize("leave", [True, False])
-@pytest.mark.parametrize("beside", ["keyed mesh", "own keys", "one that is off"])
+@pytest.mark.parametrize("beside", ["nothing", "keyed mesh", "own keys", "one that is off"])
 def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, beside):
     obj, _armature = scenes.make_arm()
     if beside == "keyed mesh":
         add_keyed_mesh()
     elif beside == "own keys":
         scenes.key_shape(obj)
-    else:
+    elif beside == "one that is off":
         other, _rig = scenes.skinned_arm(name="Other")
         properties.of(other).enabled = False
     expected = scenes.shapes(obj, FRAMES)
@@ -234,15 +241,6 @@ def test_what_a_script_appends_between_two_frames_is_deformed(arm, tmp_path, bes
         bpy.context.scene.collection.objects.link(appended)
     obj = to.objects[0]
     assert scenes.worst(scenes.shapes(obj, FRAMES), of_qv) <= 1e-5 * scenes.diagonal(obj)
-
-
-def test_weights_that_a_script_changed_between_frames_are_in_the_numbers(arm):
-    obj, _armature = arm
-    bpy.context.scene.frame_set(11)
-    obj.vertex_groups["bone.0"].add(list(range(100, 200)), 1.0, "REPLACE")
-    obj.vertex_groups["bone.1"].add(list(range(100, 200)), 0.0, "REPLACE")
-    bpy.context.scene.frame_set(6)
-    assert deformer(obj) == "blender"
 
 
 def test_chained_modifiers_each_by_its_own():
@@ -300,26 +298,6 @@ def test_baked(arm, tmp_path, kind):
     assert not properties.has_sinew(obj)
     assert not any(m.show_viewport for m in obj.modifiers if m.type == "ARMATURE")
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
-
-
-def test_preserve_volume_of_a_saved_file_is_not_the_artists(tmp_path):
-    """A saved file has this flag under dq: that is no reason to leave the mesh to the modifier."""
-    obj, _armature = scenes.skinned_arm("dq")
-    assert deformer(obj) == "sinew"
-    expected = scenes.shapes(obj, FRAMES)
-    obj = scenes.reopened(tmp_path / "arm.blend")
-    assert deformer(obj) == "sinew"
-    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-
-
-def test_commands_save_sinew_at_work(arm, tmp_path):
-    path, out = tmp_path / "arm.blend", tmp_path / "out"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    run_sinew("reskin", path, "--method", "lbs", "--out", out, "--no-pictures")
-    bpy.ops.wm.open_mainfile(filepath=str(out / "arm.blend"))
-    assert properties.of(bpy.data.objects["Arm"]).enabled
-    bpy.context.view_layer.update()
-    assert deformer(bpy.data.objects["Arm"]) == "blender"
 
 
 @pytest.mark.skipif(not normals.ARE_SUPPORTED, reason="Blender takes no normals that are given")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every stage in all features that measure, show and write shapes: each uses the final mesh of an object
-with that stage, whose own oracle is in test_mix, test_twist_spread, test_bulge_limit and test_delta_mush."""
+"""Stages in all features that measure, show and write shapes, the mix and the three after the blend together:
+each uses the final mesh. The oracles of stages are in test_mix, test_twist_spread, test_bulge_limit and
+test_delta_mush."""
 
 from __future__ import annotations
 
@@ -26,11 +27,14 @@ from sinew_addon.features.pages import measure
 
 FRAMES = [1, 6, 11]
 GROUP = "painted"
+AFTER = "after the blend"
 STAGES = {
     "mix": ("mix=lbs", f"mix.group={GROUP}"),
-    "twist_spread": ("twist_spread=on", "twist_spread.amount=0.9", f"twist_spread.group={GROUP}"),
-    "bulge_limit": ("bulge_limit=on", "bulge_limit.strength=0.8", f"bulge_limit.group={GROUP}"),
-    "delta_mush": ("delta_mush=on", "delta_mush.iterations=12", "delta_mush.pin_boundary=on"),
+    AFTER: (
+        *("twist_spread=on", "twist_spread.amount=0.9", f"twist_spread.group={GROUP}"),
+        *("bulge_limit=on", "bulge_limit.strength=0.8", f"bulge_limit.group={GROUP}"),
+        *("delta_mush=on", "delta_mush.iterations=12", "delta_mush.pin_boundary=on"),
+    ),
 }
 
 
@@ -41,15 +45,14 @@ def options(stage: str) -> list[str]:
 
 def set_on(obj: bpy.types.Object, stage: str) -> None:
     """Sets them like the panel."""
-    own = getattr(properties.of(obj), stage)
+    own = properties.of(obj)
     if stage == "mix":
-        own.method, own.group = "lbs", GROUP
-    elif stage == "twist_spread":
-        own.amount, own.group, own.enabled = 0.9, GROUP, True
-    elif stage == "bulge_limit":
-        own.strength, own.group, own.enabled = 0.8, GROUP, True
-    else:
-        own.iterations, own.pin_boundary, own.enabled = 12, True, True
+        own.mix.method, own.mix.group = "lbs", GROUP
+        return
+    spread, limit, mush = own.twist_spread, own.bulge_limit, own.delta_mush
+    spread.amount, spread.group, spread.enabled = 0.9, GROUP, True
+    limit.strength, limit.group, limit.enabled = 0.8, GROUP, True
+    mush.iterations, mush.pin_boundary, mush.enabled = 12, True, True
 
 
 @pytest.fixture
@@ -232,5 +235,5 @@ def test_pictures_differ_where_it_does(arm, stage, tmp_path):
     run_sinew(*render, *options(stage), "--out", tmp_path / "golden")
     again = ("--against", tmp_path / "golden", "--out")
     run_sinew("render", path, "--frames", "11", *again, tmp_path / "same")
-    off = f"{stage}=off"
+    off = "mix=off" if stage == "mix" else "delta_mush=off"
     run_sinew("render", path, "--set", off, *again, tmp_path / "other", status=1)

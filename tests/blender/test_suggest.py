@@ -10,7 +10,7 @@ import scenes
 from sinew_addon.attach import properties
 from sinew_addon.core.suggestion import CRITERIA, Suggestion
 from sinew_addon.features.heat import live
-from sinew_addon.features.suggest import feature, suggest
+from sinew_addon.features.suggest import suggest
 from sinew_addon.features.suggest.suggest import crossing_triangles
 
 
@@ -66,19 +66,6 @@ def test_stopped_it_leaves_all_as_it_was():
     assert not suggest.suggestions
 
 
-def test_a_click_uses_a_method_and_undo_takes_it_back():
-    obj, _armature = scenes.skinned_arm("dq")
-    bpy.context.scene.frame_set(9)
-    bpy.ops.ed.undo_push(message="before")
-    assert bpy.ops.sinew.use_method(method="cor") == {"FINISHED"}
-    assert properties.of(obj).method == "cor"
-    bpy.ops.ed.undo_push(message="Use Method")
-    bpy.ops.ed.undo()
-    assert properties.of(bpy.data.objects["Arm"]).method == "dq"
-    with pytest.raises(RuntimeError, match="choose one of"):
-        bpy.ops.sinew.use_method(method="none")
-
-
 def test_what_is_off_is_named():
     obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).enabled = False
@@ -96,15 +83,3 @@ def test_crossings_are_pairs_without_a_common_vertex():
     # Adjacent faces share vertices.
     assert crossing_triangles(points, triangles[[0, 2]]) == set()
     assert crossing_triangles(points, triangles[[0, 3]]) == set()
-
-
-def test_values_are_texts_of_their_units():
-    _obj, _armature = scenes.skinned_arm("dq")
-    bpy.ops.sinew.suggest()
-    scene, texts = bpy.context.scene, {}
-    for criterion in CRITERIA:
-        texts[criterion.name] = feature.value_text(scene, criterion, found().worst["lbs", criterion.name])
-    assert texts["stretch"].endswith("%")
-    assert texts["volume"].startswith("-")
-    assert texts["crossings"].isdigit()
-    assert feature.value_text(scene, CRITERIA[0], None) == "none"

