@@ -51,8 +51,8 @@ def main() -> None:
     parser.add_argument("--name", help="writes bench/results/NAME.json")
     parser.add_argument("--runs", type=int, default=5)
     arguments = parser.parse_args()
-    facts = common.machine() | {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
-    common.heading("playback beside a precomputation", facts)
+    versions = {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
+    facts = common.begin("playback beside a precomputation", **versions)
     points, triangles = precompute.plate()
     mesh = points, *precompute.influences(points, 10), triangles
     starts = {
@@ -75,10 +75,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    import sinew_addon
-
-    sinew_addon.register()
-    try:
+    with common.registered():
         main()
-    finally:
-        sinew_addon.unregister()

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shared by all benchmarks: the machine's description, alternating candidates, JSON and tables."""
+"""Shared by all benchmarks: options, the machine's description, alternating candidates, JSON and tables."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
 import re
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 
@@ -71,5 +73,31 @@ def write(name: str, **content) -> None:
     print(f"\n{path}\n")
 
 
-def heading(text: str, facts: dict) -> None:
-    print(f"== {text} ==\n" + ", ".join(f"{key}: {value}" for key, value in facts.items()) + "\n", flush=True)
+def options(about: str | None, name: str, quick: str = "") -> argparse.ArgumentParser:
+    """A parser with --name, and with --quick where a text says what that does."""
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--name", default=name, help="of the file in bench/results")
+    if quick:
+        parser.add_argument("--quick", action="store_true", help=quick)
+    return parser
+
+
+def begin(title: str, **facts) -> dict:
+    """Prints what is measured, and returns where: the machine and these facts."""
+    facts = machine() | facts
+    print(
+        f"== {title} ==\n" + ", ".join(f"{key}: {value}" for key, value in facts.items()) + "\n", flush=True
+    )
+    return facts
+
+
+@contextmanager
+def registered() -> Iterator[None]:
+    """With Sinew in Blender. Blender's own cleanup crashes 4.2 and hangs 4.5 while it is registered."""
+    import sinew_addon
+
+    sinew_addon.register()
+    try:
+        yield
+    finally:
+        sinew_addon.unregister()

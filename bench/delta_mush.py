@@ -11,17 +11,14 @@ thread. In Blender, Sinew uses as many threads as useful.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import time
 from collections.abc import Callable
 
 import bpy
+import common
 import numpy as np
 import sinew
-import sinew_addon
-from common import RESULTS, machine
 from limb import least_frame, make_limb
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
@@ -124,9 +121,7 @@ def measure(order: str) -> dict[str, dict[str, float]]:
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--name", help="writes bench/results/NAME.json")
-    arguments = options.parse_args()
+    arguments = common.options(__doc__, "").parse_args()
     tables = {order: measure(order) for order in ORDERS}
     print(f"{SIDE * SIDE:,} vertices, Blender {bpy.app.version_string}; ns a vertex")
     for order, table in tables.items():
@@ -135,19 +130,9 @@ def main() -> None:
             numbers = "  ".join(f"{part} {of_part[case]:7.1f}" for part, of_part in table.items())
             print(f"{order:7} {case:18} {numbers}  {ratio:.1f} times")
     if arguments.name:
-        facts = {
-            "command": "bench/delta_mush.py",
-            "machine": machine(),
-            "blender": bpy.app.version_string,
-            "vertices": SIDE * SIDE,
-            "ns_a_vertex": tables,
-        }
-        (RESULTS / f"{arguments.name}.json").write_text(json.dumps(facts, indent=1) + "\n")
+        facts = {"blender": bpy.app.version_string, "vertices": SIDE * SIDE, "ns_a_vertex": tables}
+        common.write(arguments.name, command="bench/delta_mush.py", machine=common.machine(), **facts)
 
 
-sinew_addon.register()
-try:
+with common.registered():
     main()
-finally:
-    # Handlers still registered at the end of the process crash Blender 4.2 and hang 4.5.
-    sinew_addon.unregister()

@@ -4,7 +4,6 @@ docs/fits.svg."""
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import common
@@ -158,14 +157,10 @@ def draw(spreads: dict, eyes: dict, averages: dict) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="fewer trials, shorter runs, no picture")
-    parser.add_argument("--name", default="fits", help="of the file in bench/results")
-    arguments = parser.parse_args()
+    arguments = common.options(__doc__, "fits", "fewer trials, shorter runs, no picture").parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
     trials, seconds = (20, 0.05) if arguments.quick else (400, 0.5)
-    facts = common.machine() | {"scipy": common.version_of("scipy"), "numpy": np.__version__}
-    common.heading("rigid fits", facts)
+    facts = common.begin("rigid fits", scipy=common.version_of("scipy"), numpy=np.__version__)
     spreads, eyes, averages = times(seconds), hand_eye(trials), outliers(trials)
     print("Microseconds a fit, the least of many runs")
     for name, spread in spreads.items():

@@ -439,10 +439,8 @@ def say_methods(arguments: argparse.Namespace, say: Callable[[str], None]) -> di
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="two seconds a case, not four")
+    parser = common.options(__doc__, "frames", "two seconds a case, not four")
     parser.add_argument("--million", action="store_true", help="a million vertices, too")
-    parser.add_argument("--name", default="frames", help="of the file in bench/results")
     parser.add_argument(
         "--all-by-sinew",
         action="store_true",
@@ -450,8 +448,8 @@ def main() -> None:
     )
     parser.add_argument("-k", default="", help="only cases whose line has this in it")
     arguments = parser.parse_args()
-    facts = common.machine() | {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
-    common.heading("frames in Blender", facts)
+    versions = {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
+    facts = common.begin("frames in Blender", **versions)
     print("Milliseconds from Scene.frame_set() to the evaluated mesh, medians; microseconds of Sinew's")
     print("handler for each object after the evaluation, where it moves and where it stays; how far the")
     print("points are from the modifier's, as a part of the mesh's size.\n")
@@ -464,11 +462,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    import sinew_addon
-
-    sinew_addon.register()
-    try:
+    with common.registered():
         main()
-    finally:
-        # Blender's own cleanup crashes 4.2 and hangs 4.5.
-        sinew_addon.unregister()

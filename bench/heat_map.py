@@ -11,8 +11,8 @@ import math
 import sys
 
 import bpy
+import common
 import numpy as np
-import sinew_addon
 from limb import least_frame, make_limb
 from sinew_addon.attach import attach
 from sinew_addon.core.metrics import METRICS
@@ -58,9 +58,5 @@ def main() -> None:
         print(f"{name:10} {least[name] - least['off']:6.2f} ms more")
 
 
-sinew_addon.register()
-try:
+with common.registered():
     main()
-finally:
-    # Handlers still registered at the end of the process crash Blender 4.2 and hang 4.5.
-    sinew_addon.unregister()

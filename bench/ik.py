@@ -4,7 +4,6 @@ remaining errors, how smoothly bones move; docs/ik.svg."""
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -222,27 +221,13 @@ def draw(spreads: dict, motions: dict) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="shorter runs, no picture")
-    parser.add_argument("--name", default="ik", help="of the file in bench/results")
-    arguments = parser.parse_args()
+    arguments = common.options(__doc__, "ik", "shorter runs, no picture").parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
     sinew_addon.register()
-    facts = common.machine() | {"blender": bpy.app.version_string}
-    common.heading("inverse kinematics", facts)
+    facts = common.begin("inverse kinematics", blender=bpy.app.version_string)
     spreads, motions = {}, {}
-    columns = (
-        "bones",
-        "solver",
-        "us, least",
-        "median",
-        "quartiles",
-        "",
-        "median left",
-        "most left",
-        "to 1e-3",
-        "steps",
-    )
+    columns = ("bones", "solver", "us, least", "median", "quartiles", "", "median left", "most left")
+    columns += ("to 1e-3", "steps")
     print("".join(f"{column:>12}" for column in columns))
     for bones in BONES:
         for kind in KINDS:

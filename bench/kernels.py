@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import subprocess
@@ -63,16 +62,13 @@ def rows(kind: str, size: int, times: dict) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = common.options(__doc__, "kernels", "100,000 vertices only")
     parser.add_argument("program", type=Path)
-    parser.add_argument("--quick", action="store_true", help="100,000 vertices only")
-    parser.add_argument("--name", default="kernels", help="of the file in bench/results")
     parser.add_argument("--simd", help="another instruction set than the best")
     arguments = parser.parse_args()
     options = [f"--simd={arguments.simd}"] if arguments.simd else []
     context, times = run(arguments.program, "^pool", 5, options)
-    facts = common.machine() | {key: context[key] for key in ("simd", "compiler", "flags", "plain_flags")}
-    common.heading("kernels", facts)
+    facts = common.begin("kernels", **{k: context[k] for k in ("simd", "compiler", "flags", "plain_flags")})
     print("Nanoseconds a vertex, the least of many runs. The loops are one's first with GLM and with Eigen,")
     print("of four influences always, with plain_flags; ours is built as it is shipped. The last column is")
     print("ours on one thread over GLM's loop for lbs.\n")

@@ -7,7 +7,6 @@ Processor times: everything runs on one thread, and longer runs share it with ot
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -174,19 +173,11 @@ def _in_blender(pair: tuple) -> tuple:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="shorter runs")
-    parser.add_argument("--name", default="motion", help="of the file in bench/results")
-    arguments = parser.parse_args()
+    arguments = common.options(__doc__, "motion", "shorter runs").parse_args()
     seconds = 0.1 if arguments.quick else 1.5
     sinew_addon.register()
-    facts = common.machine() | {
-        "bpy": bpy.app.version_string,
-        "scipy": common.version_of("scipy"),
-        "numpy": np.__version__,
-        "sinew": sinew.__version__,
-    }
-    common.heading("motion blending", facts)
+    versions = {"numpy": np.__version__, "sinew": sinew.__version__, "scipy": common.version_of("scipy")}
+    facts = common.begin("motion blending", bpy=bpy.app.version_string, **versions)
     spreads, parts = times(seconds), whole(seconds)
     count = BONES * FRAMES
     print(f"Two clips of {BONES} bones and {FRAMES} frames: milliseconds, nanoseconds a bone and frame")

@@ -175,9 +175,9 @@ def candidates_of(points: np.ndarray, faces: np.ndarray, case: str) -> dict:
 
 
 def main() -> None:
-    facts = common.machine() | {"blender": bpy.app.version_string, "threads": ARGUMENTS.threads}
+    facts = {"blender": bpy.app.version_string, "threads": ARGUMENTS.threads}
     facts |= {name: common.version_of(name) for name in ("numpy", "libigl", "trimesh")}
-    common.heading(f"normals, {SIDE * SIDE:,} vertices", facts)
+    facts = common.begin(f"normals, {SIDE * SIDE:,} vertices", **facts)
     print("Nanoseconds a vertex, the least of many runs; how many times Sinew's; how far from Sinew's.\n")
     results = {}
     for order in ORDERS:

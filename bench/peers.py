@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import platform
 from importlib import metadata
@@ -208,15 +207,12 @@ def collect(scene: Scene) -> tuple[dict, dict, dict]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="10,000 vertices")
-    parser.add_argument("--name", default="peers", help="of the file in bench/results")
-    arguments = parser.parse_args()
+    arguments = common.options(__doc__, "peers", "10,000 vertices").parse_args()
     vertices = 10_000 if arguments.quick else 100_000
     scene = Scene(vertices)
     candidates, versions, missing = collect(scene)
-    facts = common.machine() | {"python": platform.python_version(), **versions}
-    common.heading(f"peers, {vertices:,} vertices of {INFLUENCES} influences", facts)
+    title = f"peers, {vertices:,} vertices of {INFLUENCES} influences"
+    facts = common.begin(title, python=platform.python_version(), **versions)
     for distribution, reason in missing.items():
         print(f"without {distribution}: {reason}")
     print("Nanoseconds a vertex, the least of many runs; how far the points are from Sinew's, as a part")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import common
@@ -90,17 +89,16 @@ def table(found: dict) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = common.options(__doc__, "costs")
     parser.add_argument("program", type=Path)
-    parser.add_argument("--name", default="costs", help="of the file in bench/results")
     arguments = parser.parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
     context, best = costs(arguments.program, None)
     found = {context["simd"]: best}
     if context["simd"] == "AVX3":
         found["AVX2"] = costs(arguments.program, "AVX2")[1]
-    facts = common.machine() | {key: context[key] for key in ("compiler", "flags")}
-    common.heading(f"nanoseconds a vertex, {VERTICES:,} vertices, one thread", facts)
+    title = f"nanoseconds a vertex, {VERTICES:,} vertices, one thread"
+    facts = common.begin(title, compiler=context["compiler"], flags=context["flags"])
     print(*table(found), sep="\n")
     print()
     draw(

@@ -50,8 +50,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--runs", type=int, default=3)
     arguments = parser.parse_args()
-    facts = common.machine() | {"threads": arguments.threads}
-    common.heading("precomputations", facts)
+    facts = common.begin("precomputations", threads=arguments.threads)
     points, triangles = plate()
     seconds = {}
     for along, radius in CASES:

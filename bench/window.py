@@ -164,9 +164,9 @@ class Bench:
 
     def report(self) -> None:
         what = self.arguments.file.name if self.arguments.file else self.case.name
-        facts = common.machine() | {"blender": bpy.app.version_string, "case": f"{what} {self.case.method}"}
+        facts = {"blender": bpy.app.version_string, "case": f"{what} {self.case.method}"}
         facts["vertices"] = sum(len(obj.data.vertices) for obj in self.meshes)
-        common.heading("window", facts)
+        facts = common.begin("window", **facts)
         print(f"{'':14}{'modifier':>10}{'sinew':>10}{'ratio':>10}")
         for name, unit in (("play", "frames/s"), ("step", "ms"), ("draw", "ms"), ("pose", "ms")):
             modifier, sinew = (statistics.median(of[name]) for of in self.found.values())

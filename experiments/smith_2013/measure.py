@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import platform
-import re
 import statistics
 import subprocess
 import sys
@@ -15,6 +14,9 @@ from pathlib import Path
 
 import numpy as np
 from sinew_addon.core.errors import SinewError
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "bench"))
+import common
 
 PROGRAMS = ("operation_counts", "timings_optimised", "timings_unoptimised")
 # The extension of programs.
@@ -59,15 +61,8 @@ class Measurements:
 
 def machine() -> dict[str, str]:
     """Returns processor, system and Python."""
-    try:
-        found = re.search(r"^model name\s*:\s*(.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
-    except OSError:
-        found = None
-    return {
-        "processor": found.group(1) if found else platform.processor() or platform.machine(),
-        "system": platform.platform(),
-        "Python": platform.python_version(),
-    }
+    found = common.machine()
+    return {**{name: found[name] for name in ("processor", "system")}, "Python": platform.python_version()}
 
 
 def measure(programs: Path, quick: bool, step: Callable[[str], None]) -> Measurements:
