@@ -10,7 +10,6 @@ import sinew
 
 from .rig import Weighting
 from .scale_rule import IGNORED
-from .spaces import transformed
 from .stage_mesh import StageMesh
 
 
@@ -88,11 +87,7 @@ class BoneStage(ABC):
             or modifier != self._modifier
             or (weighting.depends_on_points and not is_same)
         ):
-            points = rest_points
-            if weighting.depends_on_points:
-                points = transformed(points, bones_from_model)
-            influences = weighting.influences_over_joints(points)
-            binding = sinew.Binding(rest_points, influences.offsets, influences.bones, influences.weights)
+            binding = self._mesh.binding(modifier, rest_points, bones_from_model)
             self._native = self._make(binding, weighting, space, self._weights(modifier))
         elif not is_same:
             self._native.set_rest_points(rest_points, space)

@@ -2,12 +2,14 @@
 """What stages know about the mesh that they are bound to."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
+import sinew
 
 from .rig import Weighting
+from .spaces import transformed
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,22 @@ class StageMesh:
     weightings: Sequence[Weighting]
     modifier_masks: Sequence[np.ndarray | None] = ()
     mix_weights: np.ndarray | None = None
+    # By the number of the Armature modifier: what the last binding was made for, and the binding.
+    _bound: dict[int, tuple[np.ndarray, np.ndarray, sinew.Binding]] = field(default_factory=dict, repr=False)
+
+    def binding(self, modifier: int, rest_points: np.ndarray, bones_from_model: np.ndarray) -> sinew.Binding:
+        """Returns the mesh bound to an Armature modifier's bones: one for all stages that follow them."""
+        if modifier in self._bound:
+            points, space, binding = self._bound[modifier]
+            if points is rest_points and np.array_equal(space, bones_from_model):
+                return binding
+        weighting, at = self.weightings[modifier], rest_points
+        if weighting.depends_on_points:
+            at = transformed(at, bones_from_model)
+        influences = weighting.influences_over_joints(at)
+        binding = sinew.Binding(rest_points, influences.offsets, influences.bones, influences.weights)
+        self._bound[modifier] = rest_points, bones_from_model.copy(), binding
+        return binding
 
     def equals(self, other: Self) -> bool:
         """Whether both have the same points and faces; both belong to the same Armature modifiers."""

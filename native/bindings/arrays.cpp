@@ -156,9 +156,7 @@ py::tuple names_in_python(std::span<const std::string_view> names) {
 }
 
 py::array_t<float> checked_points(const py::handle& value, const char* argument) {
-    auto points = checked<float>(value, argument, 2, "float32 [n, 3]", kMaxVertices);
-    if (points.shape(1) != 3) fail(argument, "float32 [n, 3]", describe(value));
-    return points;
+    return checked_rows<float>(value, argument, 3, "float32 [n, 3]", kMaxVertices);
 }
 
 py::array_t<float> checked_points(const py::handle& value, const char* argument, std::size_t count) {

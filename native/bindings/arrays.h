@@ -90,6 +90,15 @@ py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_
     return has_type<T>(array) ? in_order<T>(array) : as_type<T>(array, argument, wanted);
 }
 
+/// The same with two dimensions, the second of this length.
+template <class T>
+py::array_t<T> checked_rows(const py::handle& value, const char* argument, py::ssize_t columns,
+                            const std::string& wanted, std::size_t most = kAnyLength) {
+    auto rows = checked<T>(value, argument, 2, wanted, most);
+    if (rows.shape(1) != columns) fail(argument, wanted, describe(value));
+    return rows;
+}
+
 /// None, or an array of numbers, one for each of `count`: empty for None.
 ///
 /// type  its name in messages, such as float32

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/numpy.h>
 
-#include <cstring>
 #include <string>
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "gil.h"
 #include "module.h"
 #include "parameters.h"
 #include "sinew/bulge_limit.h"
+#include "stages.h"
 
 namespace sinew::bindings {
 namespace {
@@ -31,14 +30,6 @@ Timed<BulgeLimit> make(const Binding& binding, const ArrayLike& heads, const Arr
                       {segments, checked_affine(bones_from_model, "bones_from_model"), as_span(mask)});
 }
 
-void set_rest_points(Timed<BulgeLimit>& limit, const ArrayLike& rest_points,
-                     const OptionalArrayLike& bones_from_model) {
-    const auto points = checked_points(rest_points, "rest_points");
-    const Affine<float> space = checked_affine(bones_from_model, "bones_from_model");
-    // May have to wait for another thread that applies it.
-    without_gil([&] { limit.set_rest_points(as_points(points), space); });
-}
-
 py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points,
                          const ArrayLike& bone_transforms, const Out& out, const Number& strength,
                          const Typed<"typing.Literal['continuous', 'kim_han']">& form,
@@ -54,37 +45,7 @@ py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points
     options.strength = static_cast<float>(checked_option(strength, "strength"));
     options.form = static_cast<BulgeForm>(static_cast<int>(checked_option(form, "form")));
     options.threads = checked_threads(threads);
-    py::array_t<float> result = checked_out(out, limit.vertex_count());
-    const auto to = as_points_to_write(result);
-    limit.call([&] {
-        std::memmove(to.data(), given.data(), static_cast<std::size_t>(given.nbytes()));
-        static_cast<void>(limit.apply(to, bones, options));
-    });
-    return result;
-}
-
-// --- Pickles: the constructor's arguments, with normalised weights.
-
-py::tuple state_of(const Timed<BulgeLimit>& limit) {
-    const BulgeLimit::Parts parts = limit.parts();
-    std::vector<Vec3<float>> heads;
-    std::vector<Vec3<float>> tails;
-    for (const BoneSegment<float>& segment : parts.segments) {
-        heads.push_back(segment.head);
-        tails.push_back(segment.tail);
-    }
-    Output<Affine<float>> space(Shape{});
-    space.write(0, parts.bones_from_model);
-    py::object weights = py::none();
-    if (!parts.weights.empty()) weights = array_of(std::span(parts.weights));
-    return py::make_tuple(mesh_state(parts.mesh), array_of(std::span<const Vec3<float>>(heads)),
-                          array_of(std::span<const Vec3<float>>(tails)), space.take(), weights);
-}
-
-Timed<BulgeLimit> of_state(const py::object& state) {
-    return from_state<5>(state, [](const py::object& mesh, const auto&... parts) {
-        return make(binding_of_state(mesh), parts...);
-    });
+    return applied(limit, given, out, [&](auto to) { return limit.apply(to, bones, options); });
 }
 
 }  // namespace
@@ -93,7 +54,7 @@ void bind_bulge_limit(py::module_& m) {
     py::class_<Timed<BulgeLimit>>(
         m, "BulgeLimit",
         R"(The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
-them farther away than they are at rest (Kim, Han 2014, and a continuous form). Can be pickled.)")
+them farther away than they are at rest (Kim, Han 2014, and a continuous form).)")
         .def(py::init(&make), "binding"_a, "heads"_a, "tails"_a, py::kw_only(),
              "bones_from_model"_a = py::none(), "weights"_a = py::none(),
              R"(binding: the mesh. Its memory is shared.
@@ -107,9 +68,9 @@ weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; c
                  return "<sinew.BulgeLimit: " + std::to_string(limit.vertex_count()) + " vertices, " +
                         std::to_string(limit.bone_count()) + " bones>";
              })
-        .def(py::pickle(&state_of, &of_state))
         .def(
-            "set_rest_points", &set_rest_points, "rest_points"_a, "bones_from_model"_a = py::none(),
+            "set_rest_points", &set_rest_points<BulgeLimit>, "rest_points"_a,
+            "bones_from_model"_a = py::none(),
             R"(Sets other rest points, float32 [vertices, 3], or another space of the bones. Measures distances at
 rest again, which takes about as long as apply().)")
         .def("apply", &apply, "points"_a, "bone_transforms"_a, "out"_a = py::none(), py::kw_only(),

@@ -63,9 +63,8 @@ void add_vertex_data(const py::object& vertex_data, BindArguments& arrays) {
         const std::string wanted = "of " + std::string(method.name) +
                                    (method.rows_by_bone ? " float32 [rows, " : " float32 [vertices, ") +
                                    std::to_string(floats) + "]";
-        const auto array = checked<float>(values, "vertex_data", 2, wanted, kMaxVertices);
-        if (array.shape(1) != floats) fail("vertex_data", wanted, describe(values));
-        arrays.vertex_arrays.push_back(array);
+        arrays.vertex_arrays.push_back(
+            checked_rows<float>(values, "vertex_data", floats, wanted, kMaxVertices));
         arrays.vertex_data.push_back({method, as_span(arrays.vertex_arrays.back())});
     }
 }

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/numpy.h>
 
-#include <cstring>
 #include <string>
 
 #include "arrays.h"
-#include "gil.h"
 #include "module.h"
 #include "sinew/delta_mush.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
+#include "stages.h"
 
 namespace sinew::bindings {
 namespace {
@@ -58,8 +57,7 @@ Timed<DeltaMush> make(const ArrayLike& rest_points, const ArrayLike& face_offset
     const auto points = checked_points(rest_points, "rest_points");
     const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
     const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
-    const auto ends = checked<std::int32_t>(edges, "edges", 2, "int32 [edges, 2]");
-    if (ends.shape(1) != 2) fail("edges", "int32 [edges, 2]", describe(edges));
+    const auto ends = checked_rows<std::int32_t>(edges, "edges", 2, "int32 [edges, 2]");
     const SettingArguments with =
         checked_settings(iterations, radius, factor, smooth_type, pin_boundary, weights);
     return DeltaMush({as_span(offsets), as_span(corners), as_span(ends)}, as_points(points), with.settings);
@@ -80,30 +78,8 @@ py::array_t<float> apply(const Timed<DeltaMush>& mush, const ArrayLike& points, 
     const auto given = checked_points(points, "points", mush.vertex_count());
     const float details = checked_float(scale, "scale");
     const std::size_t most = checked_threads(threads);
-    py::array_t<float> result = checked_out(out, mush.vertex_count());
-    const auto to = as_points_to_write(result);
-    mush.call([&] {
-        std::memmove(to.data(), given.data(), static_cast<std::size_t>(given.nbytes()));
-        static_cast<void>(mush.apply(to, details, most));
-    });
-    return result;
+    return applied(mush, given, out, [&](auto to) { return mush.apply(to, details, most); });
 }
-
-// --- Pickles: the constructor's arguments.
-
-py::tuple state_of(const Timed<DeltaMush>& mush) {
-    const auto [topology, rest_points, settings, of_vertices] = mush.parts();
-    const auto edges = static_cast<py::ssize_t>(topology.edges.size() / 2);
-    py::object weights = py::none();
-    if (!of_vertices.empty()) weights = array_of(std::span(of_vertices));
-    return py::make_tuple(
-        array_of(std::span(rest_points)), array_of(topology.face_offsets), array_of(topology.corner_vertices),
-        array_of(topology.edges).reshape({edges, py::ssize_t{2}}), settings.iterations, settings.radius,
-        settings.factor, std::string(DeltaMushStage::kSmoothTypes[static_cast<std::size_t>(settings.type)]),
-        settings.pin_boundary, weights);
-}
-
-Timed<DeltaMush> of_state(const py::object& state) { return from_state<10>(state, &make); }
 
 std::string text_of(const Timed<DeltaMush>& mush) {
     return "<sinew.DeltaMush: " + std::to_string(mush.vertex_count()) + " vertices, " +
@@ -118,7 +94,7 @@ void bind_delta_mush(py::module_& m) {
     py::class_<Timed<DeltaMush>>(
         m, "DeltaMush",
         R"(The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
-(Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.)")
+(Mancewicz et al. 2014), as Blender's Corrective Smooth does.)")
         .def(py::init(&make), "rest_points"_a, "face_offsets"_a, "corner_vertices"_a, "edges"_a,
              py::kw_only(), "iterations"_a = initial.iterations, "radius"_a = initial.radius,
              "factor"_a = initial.factor, "smooth_type"_a = type, "pin_boundary"_a = initial.pin_boundary,
@@ -139,7 +115,6 @@ weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; 
         .def_property_readonly("iterations", &DeltaMush::iterations,
                                "Number of smoothing iterations, also if a radius determines it.")
         .def("__repr__", &text_of)
-        .def(py::pickle(&state_of, &of_state))
         .def(
             "bind", &bind, "rest_points"_a, py::kw_only(), "iterations"_a = initial.iterations,
             "radius"_a = initial.radius, "factor"_a = initial.factor, "smooth_type"_a = type,

@@ -17,36 +17,26 @@ struct Rows {
     py::ssize_t count;
 };
 
-// The rows of one item. Does not copy the input, because that counts Python's references and this runs without
-// the GIL.
 template <class Value, class T>
 std::vector<Value> rows_of(const Input<T>& input, py::ssize_t count, py::ssize_t index, const Shape& common) {
-    const auto size = input.item_size / std::max<py::ssize_t>(count, 1);
-    const T* from = input.at(index, common);
-    std::vector<Value> values;
-    values.reserve(static_cast<std::size_t>(count));
-    for (py::ssize_t i = 0; i < count; ++i) values.push_back(Item<Value>::read(from + i * size));
+    std::vector<Value> values(static_cast<std::size_t>(count));
+    read_rows(input, index, common, values);
     return values;
 }
 
 // `like` is the number of rows of another argument; this one must have as many.
 template <class T, class Value>
-Rows<T, Value> checked_rows(const py::object& value, const char* argument, py::ssize_t like = -1) {
+Rows<T, Value> rows_in(const py::object& value, const char* argument, py::ssize_t like = -1) {
     Rows<T, Value> rows{checked_input<T, Value>(value, argument), 0};
-    auto& lead = rows.input.lead;
-    const std::string wanted =
-        "an axis of " + (like < 0 ? std::string("them") : std::to_string(like)) + " before the last axes";
-    if (lead.empty() || (like >= 0 && lead.back() != like)) fail(argument, wanted, describe(value));
-    rows.count = lead.back();
-    rows.input.item_size *= rows.count;
-    lead.pop_back();
+    const std::string number = like < 0 ? "them" : std::to_string(like);
+    rows.count = take_last_axis(rows.input, value, "an axis of " + number + " before the last axes", like);
     return rows;
 }
 
 // None stands for no rows.
 template <class T, class Value>
 Rows<T, Value> optional_rows(const py::object& value, const char* argument, py::ssize_t like = -1) {
-    if (!value.is_none()) return checked_rows<T, Value>(value, argument, like);
+    if (!value.is_none()) return rows_in<T, Value>(value, argument, like);
     const py::array_t<T> nothing(Shape{0});
     return {Input<T>{argument, nothing, nothing.data(), {}, 0}, 0};
 }
@@ -64,8 +54,8 @@ Rows<T, T> checked_weights(const py::object& value, const char* argument, py::ss
 
 template <class T>
 py::object fit_items(const std::array<py::object, 6>& values) {
-    const auto source = checked_rows<T, Vec3<T>>(values[0], "source");
-    const auto target = checked_rows<T, Vec3<T>>(values[1], "target", source.count);
+    const auto source = rows_in<T, Vec3<T>>(values[0], "source");
+    const auto target = rows_in<T, Vec3<T>>(values[1], "target", source.count);
     const auto weights = checked_weights<T>(values[2], "weights", source.count);
     const auto source_directions = optional_rows<T, Vec3<T>>(values[3], "source_directions");
     const auto target_directions =
@@ -132,8 +122,8 @@ Transform in_layout(const DualQuat<T>& a) {
 
 template <class Transform, class T>
 py::object hand_eye_items(const std::array<py::object, 3>& values) {
-    const auto a = checked_rows<T, Transform>(values[0], "a");
-    const auto b = checked_rows<T, Transform>(values[1], "b", a.count);
+    const auto a = rows_in<T, Transform>(values[0], "a");
+    const auto b = rows_in<T, Transform>(values[1], "b", a.count);
     const auto weights = checked_weights<T>(values[2], "weights", a.count);
     std::array inputs{a.input, b.input, weights.input};
     const Shape common = broadcast(std::span<Input<T>>(inputs));
@@ -161,7 +151,7 @@ NamedTuple<"HandEye"> solve_hand_eye(const ArrayLike& a, const ArrayLike& b,
 
 template <class Transform, class T>
 py::object average_items(const std::array<py::object, 2>& values, bool is_robust) {
-    const auto poses = checked_rows<T, Transform>(values[0], "poses");
+    const auto poses = rows_in<T, Transform>(values[0], "poses");
     if (poses.count == 0) fail("poses", "at least one pose", "none");
     const auto weights = checked_weights<T>(values[1], "weights", poses.count);
     std::array inputs{poses.input, weights.input};

@@ -104,14 +104,10 @@ std::unique_ptr<Solver> make(const ArrayLike& any_parents, const Effectors& any_
 template <class Value>
 Input<double> of_each(const py::array_t<double>& array, const char* argument, std::size_t count,
                       const std::string& of_what) {
-    const auto wanted = static_cast<py::ssize_t>(count);
-    const auto input = checked_input<double, Value>(array, argument);
-    Shape lead = input.lead;
-    if (lead.empty() || lead.back() != wanted) {
-        fail(argument, std::to_string(wanted) + " " + of_what + " before the last axes", describe(array));
-    }
-    lead.pop_back();
-    return {argument, input.array, input.data, lead, input.item_size * wanted};
+    auto input = checked_input<double, Value>(array, argument);
+    take_last_axis(input, array, std::to_string(count) + " " + of_what + " before the last axes",
+                   static_cast<py::ssize_t>(count));
+    return input;
 }
 
 py::array_t<double> as_double(const py::object& value, const char* argument, const std::string& wanted) {
@@ -196,12 +192,7 @@ Solution solve(Solver& self, const ArrayLike& rest, const ArrayLike& tips, const
         std::vector<Vec3<double>> points(effectors);
         std::vector<Quat<double>> own(bones);
         const auto read = [&](std::size_t input, py::ssize_t item, auto& values) {
-            using Value = typename std::remove_reference_t<decltype(values)>::value_type;
-            const double* from = inputs[input].at(item, common);
-            for (Value& value : values) {
-                value = Item<Value>::read(from);
-                from += Item<Value>::kSize;
-            }
+            read_rows(inputs[input], item, common, values);
         };
         for (py::ssize_t i = 0; i < count; ++i) {
             read(0, i, parent_from_rest);

@@ -24,16 +24,6 @@ Blended between(const ArrayLike& a, const ArrayLike& b, const ArrayLike& t, cons
     });
 }
 
-// Makes the last leading axis part of the item. Returns its length.
-template <class T>
-py::ssize_t take_last_axis(Input<T>& input, const std::string& wanted, const py::object& value) {
-    if (input.lead.empty()) fail(input.argument, wanted, describe(value));
-    const py::ssize_t count = input.lead.back();
-    input.lead.pop_back();
-    input.item_size *= count;
-    return count;
-}
-
 // Calls f(std::integral_constant<Signs, ..>) for the choice with the name `signs`.
 template <class F>
 py::object with_signs(const py::object& signs, F f) {
@@ -50,23 +40,17 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
     using Transform = typename Method::template Transform<T>;
     std::array inputs{checked_input<T, Transform>(transforms, "transforms"),
                       checked_input<T, T>(weights, "weights")};
-    const py::ssize_t step = inputs[0].item_size;
-    const py::ssize_t terms = take_last_axis(inputs[0], "at least one transform", transforms);
+    const py::ssize_t terms = take_last_axis(inputs[0], transforms, "at least one transform");
     if (terms == 0) fail("transforms", "at least one transform", "none");
-    const std::string wanted =
-        element_name<T>() + "[.., " + std::to_string(terms) + "], one for each transform";
-    if (take_last_axis(inputs[1], wanted, weights) != terms) fail("weights", wanted, describe(weights));
+    take_last_axis(inputs[1], weights,
+                   element_name<T>() + "[.., " + std::to_string(terms) + "], one for each transform", terms);
     const Shape common = broadcast(std::span<Input<T>>(inputs));
     Output<Blend<Transform>> output(common);
     const py::ssize_t count = count_of(common);
     without_gil([&] {
         std::vector<Transform> items(static_cast<std::size_t>(terms));
         for (py::ssize_t i = 0; i < count; ++i) {
-            const T* from = inputs[0].at(i, common);
-            for (Transform& item : items) {
-                item = Item<Transform>::read(from);
-                from += step;
-            }
+            read_rows(inputs[0], i, common, items);
             const std::span<const T> shares(inputs[1].at(i, common), items.size());
             const auto result = Method::template blend<signs, T>(items, shares);
             output.write(i, {result.transform, result.is_defined});

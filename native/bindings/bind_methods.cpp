@@ -88,7 +88,7 @@ void bind_methods(py::module_& m) {
     parameter
         .def_property_readonly(
             "kind", [](const Parameter& row) -> Kind { return py::str(text(name_of(row.kind))); },
-            R"("enum" is one of `choices`, "vertex_group" a weight for each vertex, "method" the name of a method.)")
+            R"(A value of "enum" is one of `choices`, of "vertex_group" a weight for each vertex, of "method" a name.)")
         .def_property_readonly("default", &initial_value,
                                "The default; None for a vertex group and a method.")
         .def_property_readonly(

@@ -36,9 +36,7 @@ std::vector<std::uint8_t> checked_flags(const py::object& value, const char* arg
 /// Custom normals. None gives an empty array.
 std::vector<std::int16_t> checked_custom(const py::object& value) {
     if (value.is_none()) return {};
-    const std::string wanted = "None or int16 [corners, 2]";
-    const auto numbers = checked<std::int32_t>(value, "custom_normals", 2, wanted);
-    if (numbers.shape(1) != 2) fail("custom_normals", wanted, describe(value));
+    const auto numbers = checked_rows<std::int32_t>(value, "custom_normals", 2, "None or int16 [corners, 2]");
     std::vector<std::int16_t> result;
     result.reserve(static_cast<std::size_t>(numbers.size()));
     for (const std::int32_t number : as_span(numbers)) {
@@ -67,10 +65,7 @@ Timed<Normals> make(const Index& vertex_count, const ArrayLike& face_offsets,
     const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
     const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
     py::array_t<std::int32_t> ends;
-    if (!edges.is_none()) {
-        ends = checked<std::int32_t>(edges, "edges", 2, "int32 [edges, 2]");
-        if (ends.shape(1) != 2) fail("edges", "int32 [edges, 2]", describe(edges));
-    }
+    if (!edges.is_none()) ends = checked_rows<std::int32_t>(edges, "edges", 2, "int32 [edges, 2]");
     const auto of_edges = checked_flags(sharp_edges, "sharp_edges", "None or bool [edges]");
     const auto of_faces = checked_flags(sharp_faces, "sharp_faces", "None or bool [faces]");
     const auto custom = checked_custom(custom_normals);
@@ -90,28 +85,6 @@ py::array_t<float> compute(const Timed<Normals>& normals, const ArrayLike& point
     return result;
 }
 
-// --- Pickles: the constructor's arguments.
-
-py::object flags_of(std::span<const std::uint8_t> flags) {
-    if (flags.empty()) return py::none();
-    return array_of(flags);
-}
-
-py::object custom_of(std::span<const std::int16_t> numbers) {
-    if (numbers.empty()) return py::none();
-    return array_of(numbers).reshape({static_cast<py::ssize_t>(numbers.size() / 2), py::ssize_t{2}});
-}
-
-py::tuple state_of(const Timed<Normals>& normals) {
-    const auto [topology, vertex_count, sharpness] = normals.parts();
-    const auto edges = static_cast<py::ssize_t>(topology.edges.size() / 2);
-    return py::make_tuple(vertex_count, array_of(topology.face_offsets), array_of(topology.corner_vertices),
-                          array_of(topology.edges).reshape({edges, py::ssize_t{2}}),
-                          flags_of(sharpness.edges), flags_of(sharpness.faces), custom_of(sharpness.custom));
-}
-
-Timed<Normals> of_state(const py::object& state) { return from_state<7>(state, &make); }
-
 std::string text_of(const Timed<Normals>& normals) {
     return "<sinew.Normals: " + std::to_string(normals.count(NormalDomain::vertex)) + " vertices, " +
            std::to_string(normals.count(NormalDomain::face)) + " faces, domain " + name_of(normals.domain()) +
@@ -127,7 +100,7 @@ void bind_normals(py::module_& m) {
     py::class_<Timed<Normals>>(
         m, "Normals",
         R"(Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices weighted
-by the angles of corners, of corners by fans between sharp edges. Can be pickled.)")
+by the angles of corners, of corners by fans between sharp edges.)")
         .def(py::init(&make), "vertex_count"_a, "face_offsets"_a, "corner_vertices"_a, "edges"_a = py::none(),
              py::kw_only(), "sharp_edges"_a = py::none(), "sharp_faces"_a = py::none(),
              "custom_normals"_a = py::none(),
@@ -149,7 +122,6 @@ face is flat or every edge sharp, else "corner" if anything is sharp, else "vert
         .def_property_readonly("corner_count", count_of(NormalDomain::corner), "Number of corners of faces.")
         .def_property_readonly("face_count", count_of(NormalDomain::face), "Number of faces.")
         .def("__repr__", &text_of)
-        .def(py::pickle(&state_of, &of_state))
         .def("compute", &compute, "points"_a, "domain"_a = py::none(), "out"_a = py::none(),
              "threads"_a = py::none(),
              R"(Unit vectors, float32 [vertices, corners or faces, 3].

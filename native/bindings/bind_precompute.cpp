@@ -30,9 +30,8 @@ struct Mesh {
           offsets(copied(as_span(mesh.offsets))),
           bones(copied(as_span(mesh.bones))),
           weights(copied(as_span(mesh.weights))) {
-        const auto given = checked<std::int32_t>(triangles, "triangles", 2, "int32 [triangles, 3]");
-        if (given.shape(1) != 3) fail("triangles", "int32 [triangles, 3]", describe(triangles));
-        corners = copied(as_span(given));
+        corners =
+            copied(as_span(checked_rows<std::int32_t>(triangles, "triangles", 3, "int32 [triangles, 3]")));
     }
 
     [[nodiscard]] BindData data() const { return {points, offsets, bones, weights}; }

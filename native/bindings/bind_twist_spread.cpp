@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/numpy.h>
 
-#include <cstring>
 #include <string>
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "gil.h"
 #include "module.h"
 #include "parameters.h"
 #include "sinew/twist_spread.h"
+#include "stages.h"
 
 namespace sinew::bindings {
 namespace {
@@ -21,9 +20,8 @@ Timed<TwistSpread> make(const Binding& binding, const ArrayLike& twists, const A
                         const ArrayLike& tails, const ArrayLike& rest_bones, const OptionalArrayLike& parents,
                         const OptionalArrayLike& bones_from_model, const OptionalArrayLike& weights,
                         const OptionalArrayLike& mix) {
-    const char* const wanted = "int32 [twists, 4]";
-    const auto rows = checked<std::int32_t>(twists, "twists", 2, wanted, kMaxBones);
-    if (rows.shape(1) != kTwistColumns) fail("twists", wanted, describe(twists));
+    const auto rows =
+        checked_rows<std::int32_t>(twists, "twists", kTwistColumns, "int32 [twists, 4]", kMaxBones);
     const auto count = static_cast<std::size_t>(rows.shape(0));
     const auto first = checked_points(heads, "heads", count);
     const auto last = checked_points(tails, "tails", count);
@@ -41,22 +39,13 @@ Timed<TwistSpread> make(const Binding& binding, const ArrayLike& twists, const A
                   as_span(mask), as_span(mixed)});
 }
 
-void set_rest_points(Timed<TwistSpread>& spread, const ArrayLike& rest_points,
-                     const OptionalArrayLike& bones_from_model) {
-    const auto points = checked_points(rest_points, "rest_points");
-    const Affine<float> space = checked_affine(bones_from_model, "bones_from_model");
-    // May have to wait for another thread that applies it.
-    without_gil([&] { spread.set_rest_points(as_points(points), space); });
-}
-
 std::vector<TwistChannels<float>> checked_channels(const OptionalArrayLike& channels, std::size_t count) {
     std::vector<TwistChannels<float>> result;
     if (channels.is_none()) return result;
     const std::string wanted = "None or float32 [" + std::to_string(count) + ", 7]";
-    const auto rows = checked<float>(channels, "channels", 2, wanted, std::max(count, std::size_t{1}));
-    if (static_cast<std::size_t>(rows.shape(0)) != count || rows.shape(1) != kChannelColumns) {
-        fail("channels", wanted, describe(channels));
-    }
+    const auto rows =
+        checked_rows<float>(channels, "channels", kChannelColumns, wanted, std::max(count, std::size_t{1}));
+    if (static_cast<std::size_t>(rows.shape(0)) != count) fail("channels", wanted, describe(channels));
     for (std::size_t i = 0; i < count; ++i) {
         const float* const row = rows.data() + kChannelColumns * static_cast<py::ssize_t>(i);
         check_finite(row, kChannelColumns, "channels", static_cast<py::ssize_t>(i));
@@ -85,10 +74,7 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
                          const Threads& threads) {
     const auto given = checked_points(points, "points", spread.vertex_count());
     const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
-    if (bones.size() < spread.bone_count()) {
-        fail("bone_transforms", "at least " + std::to_string(spread.bone_count()) + " bones",
-             std::to_string(bones.size()));
-    }
+    check_bone_count(bones, spread.bone_count());
     const auto of_bones = one_for_each<float>(amounts, "amounts", spread.twist_count(), "float32");
     const auto curved = one_for_each<float>(curves, "curves", spread.twist_count(), "float32");
     const auto told = checked_channels(channels, spread.twist_count());
@@ -102,49 +88,7 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
     options.blend = checked_blend(blend, "blend");
     options.mix_blend = checked_blend(mix_blend, "mix_blend");
     options.threads = checked_threads(threads);
-    py::array_t<float> result = checked_out(out, spread.vertex_count());
-    const auto to = as_points_to_write(result);
-    spread.call([&] {
-        std::memmove(to.data(), given.data(), static_cast<std::size_t>(given.nbytes()));
-        static_cast<void>(spread.apply(to, bones, options));
-    });
-    return result;
-}
-
-// --- Pickles: the constructor's arguments, with normalised weights.
-
-py::tuple state_of(const Timed<TwistSpread>& spread) {
-    const TwistSpread::Parts parts = spread.parts();
-    py::array_t<std::int32_t> twists({static_cast<py::ssize_t>(parts.twists.size()), kTwistColumns});
-    std::int32_t* row = twists.mutable_data();
-    std::vector<Vec3<float>> heads;
-    std::vector<Vec3<float>> tails;
-    for (const TwistBone& twist : parts.twists) {
-        for (const std::int32_t number : {twist.bone, twist.base, twist.tip, twist.is_from_parent ? 1 : 0}) {
-            *row++ = number;
-        }
-        heads.push_back(twist.head);
-        tails.push_back(twist.tail);
-    }
-    Output<Affine<float>> bones(Shape{static_cast<py::ssize_t>(parts.rest_bones.size())});
-    for (std::size_t i = 0; i < parts.rest_bones.size(); ++i) {
-        bones.write(static_cast<py::ssize_t>(i), parts.rest_bones[i]);
-    }
-    Output<Affine<float>> space(Shape{});
-    space.write(0, parts.bones_from_model);
-    const auto optional = [](const auto& values) -> py::object {
-        return values.empty() ? py::none() : py::object(array_of(std::span(values)));
-    };
-    return py::make_tuple(mesh_state(parts.mesh), twists, array_of(std::span<const Vec3<float>>(heads)),
-                          array_of(std::span<const Vec3<float>>(tails)), bones.take(),
-                          optional(parts.parents), space.take(), optional(parts.weights),
-                          optional(parts.mix));
-}
-
-Timed<TwistSpread> of_state(const py::object& state) {
-    return from_state<9>(state, [](const py::object& mesh, const auto&... parts) {
-        return make(binding_of_state(mesh), parts...);
-    });
+    return applied(spread, given, out, [&](auto to) { return spread.apply(to, bones, options); });
 }
 
 }  // namespace
@@ -153,7 +97,7 @@ void bind_twist_spread(py::module_& m) {
     py::class_<Timed<TwistSpread>>(
         m, "TwistSpread",
         R"(The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist
-bones do. Applied after Deformer.deform() and before all other stages. Can be pickled.)")
+bones do. Applied after Deformer.deform() and before all other stages.)")
         .def(py::init(&make), "binding"_a, "twists"_a, "heads"_a, "tails"_a, "rest_bones"_a, py::kw_only(),
              "parents"_a = py::none(), "bones_from_model"_a = py::none(), "weights"_a = py::none(),
              "mix"_a = py::none(),
@@ -176,8 +120,8 @@ mix: None, or float32 [vertices], the weights of Deformer's `mix`.)")
                  return "<sinew.TwistSpread: " + std::to_string(spread.vertex_count()) + " vertices, " +
                         std::to_string(spread.twist_count()) + " twists>";
              })
-        .def(py::pickle(&state_of, &of_state))
-        .def("set_rest_points", &set_rest_points, "rest_points"_a, "bones_from_model"_a = py::none(),
+        .def("set_rest_points", &set_rest_points<TwistSpread>, "rest_points"_a,
+             "bones_from_model"_a = py::none(),
              "Sets other rest points, float32 [vertices, 3], or another space of the bones.")
         .def(
             "angles", &angles, "bone_transforms"_a, "channels"_a = py::none(),

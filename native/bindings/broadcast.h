@@ -131,6 +131,33 @@ Shape broadcast(std::span<Input<T>> inputs) {
     return common;
 }
 
+/// Makes the last leading axis, such as the points of a set, part of the item. Returns its length. ValueError, naming
+/// `wanted`, if there is no such axis, or if `like` is not negative and not its length.
+template <class T>
+py::ssize_t take_last_axis(Input<T>& input, const py::handle& value, const std::string& wanted,
+                           py::ssize_t like = -1) {
+    if (input.lead.empty() || (like >= 0 && input.lead.back() != like)) {
+        fail(input.argument, wanted, describe(value));
+    }
+    const py::ssize_t count = input.lead.back();
+    input.lead.pop_back();
+    input.item_size *= count;
+    return count;
+}
+
+/// Reads the rows of one item after take_last_axis(). Does not copy the input, because that counts Python's references
+/// and this runs without the GIL.
+template <class Value, class T>
+void read_rows(const Input<T>& input, py::ssize_t index, const Shape& common, std::vector<Value>& rows) {
+    const T* from = input.at(index, common);
+    const std::size_t size =
+        static_cast<std::size_t>(input.item_size) / std::max(rows.size(), std::size_t{1});
+    for (Value& row : rows) {
+        row = Item<Value>::read(from);
+        from += size;
+    }
+}
+
 /// A result that is being written: an array of items, or a tuple of such arrays.
 template <class Value>
 struct Output {

@@ -98,48 +98,38 @@ struct Item<Quat<T>> : Numbers<T, 4> {
     }
 };
 
+/// Two items, one behind the other.
+template <class Pair, class First, class Second>
+struct PairItem : Numbers<typename Item<First>::Element, Item<First>::kSize + Item<Second>::kSize> {
+    using T = typename Item<First>::Element;
+    static Pair read(const T* from) {
+        return {Item<First>::read(from), Item<Second>::read(from + Item<First>::kSize)};
+    }
+    static void write(const Pair& a, T* to) {
+        const auto& [first, second] = a;
+        Item<First>::write(first, to);
+        Item<Second>::write(second, to + Item<First>::kSize);
+    }
+};
+
 template <class T>
-struct Item<QuatVec<T>> : Numbers<T, 7> {
+struct Item<QuatVec<T>> : PairItem<QuatVec<T>, Quat<T>, Vec3<T>> {
     static constexpr const char* kShape = "[.., 7]";
-    static QuatVec<T> read(const T* from) {
-        return {Item<Quat<T>>::read(from), Item<Vec3<T>>::read(from + 4)};
-    }
-    static void write(const QuatVec<T>& a, T* to) {
-        Item<Quat<T>>::write(a.rotation, to);
-        Item<Vec3<T>>::write(a.translation, to + 4);
-    }
 };
 
 template <class T>
-struct Item<DualQuat<T>> : Numbers<T, 8> {
+struct Item<DualQuat<T>> : PairItem<DualQuat<T>, Quat<T>, Quat<T>> {
     static constexpr const char* kShape = "[.., 8]";
-    static DualQuat<T> read(const T* from) {
-        return {Item<Quat<T>>::read(from), Item<Quat<T>>::read(from + 4)};
-    }
-    static void write(const DualQuat<T>& a, T* to) {
-        Item<Quat<T>>::write(a.real, to);
-        Item<Quat<T>>::write(a.dual, to + 4);
-    }
 };
 
 template <class T>
-struct Item<Twist<T>> : Numbers<T, 6> {
+struct Item<Twist<T>> : PairItem<Twist<T>, Vec3<T>, Vec3<T>> {
     static constexpr const char* kShape = "[.., 6]";
-    static Twist<T> read(const T* from) { return {Item<Vec3<T>>::read(from), Item<Vec3<T>>::read(from + 3)}; }
-    static void write(const Twist<T>& a, T* to) {
-        Item<Vec3<T>>::write(a.angular, to);
-        Item<Vec3<T>>::write(a.linear, to + 3);
-    }
 };
 
 template <class T>
-struct Item<Dual<T>> : Numbers<T, 2> {
+struct Item<Dual<T>> : PairItem<Dual<T>, T, T> {
     static constexpr const char* kShape = "[.., 2]";
-    static Dual<T> read(const T* from) { return {from[0], from[1]}; }
-    static void write(const Dual<T>& a, T* to) {
-        to[0] = a.real;
-        to[1] = a.dual;
-    }
 };
 
 }  // namespace sinew::bindings

@@ -50,15 +50,6 @@ public:
     [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                              const BulgeLimitOptions& options = {}) const noexcept;
 
-    /// The data that the object was constructed from. An object made of it gives the same bits.
-    struct Parts {
-        BoundMesh mesh;  // with the current rest points, without rest bones and vertex data
-        std::vector<BoneSegment<float>> segments;
-        Affine<float> bones_from_model;
-        std::vector<float> weights;
-    };
-    [[nodiscard]] Parts parts() const;
-
 private:
     struct State;
     Owned<State> state_;

@@ -71,16 +71,6 @@ public:
     [[nodiscard]] bool apply(std::span<Vec3<float>> points, float scale = 1.0f,
                              std::size_t threads = 0) const noexcept;
 
-    /// The data that the object was constructed from, or that bind() set. The topology is valid until the object is
-    /// destroyed.
-    struct Parts {
-        MeshTopology topology;
-        std::vector<Vec3<float>> rest_points;
-        DeltaMushSettings settings;  // without weights
-        std::vector<float> weights;
-    };
-    [[nodiscard]] Parts parts() const;
-
 private:
     struct State;
     Owned<State> state_;

@@ -73,14 +73,6 @@ public:
     [[nodiscard]] bool compute(NormalDomain domain, std::span<const Vec3<float>> points,
                                std::span<Vec3<float>> normals, std::size_t threads = 0) const noexcept;
 
-    /// The data that the object was constructed from. Spans are valid until the object is destroyed.
-    struct Parts {
-        MeshTopology topology;
-        std::size_t vertex_count;
-        Sharpness sharpness;
-    };
-    [[nodiscard]] Parts parts() const noexcept;
-
 private:
     struct State;
     Owned<State> state_;

@@ -67,18 +67,6 @@ public:
     [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                              const TwistSpreadOptions& options = {}) const noexcept;
 
-    /// The data that the object was constructed from. An object made of it gives the same bits.
-    struct Parts {
-        BoundMesh mesh;  // with the current rest points, without rest bones and vertex data
-        std::vector<TwistBone> twists;
-        std::vector<Affine<float>> rest_bones;
-        std::vector<std::int32_t> parents;
-        Affine<float> bones_from_model;
-        std::vector<float> weights;
-        std::vector<float> mix;
-    };
-    [[nodiscard]] Parts parts() const;
-
 private:
     struct State;
     Owned<State> state_;

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Protects sinew.Normals: compared with float64 numpy."""
 
-import pickle
-
 import normals_reference as reference
 import numpy as np
 import pytest
@@ -125,6 +123,8 @@ def test_writes_in_place_and_on_any_number_of_threads():
     mesh = mesh_of(2, size=140)
     normals = normals_of(mesh, **sharp_of(mesh))
     points = bent(mesh[0])
+    faces = len(mesh[1])
+    assert repr(normals) == f"<sinew.Normals: {len(points)} vertices, {faces} faces, domain corner>"
     for domain in DOMAINS:
         expected = normals.compute(points, domain, threads=1)
         for threads in (None, 0, 2, np.int8(3), 10**30):
@@ -132,15 +132,3 @@ def test_writes_in_place_and_on_any_number_of_threads():
         out = np.zeros_like(expected)
         assert normals.compute(points.astype(np.float64).tolist(), domain, out) is out
         np.testing.assert_array_equal(out, expected)
-
-
-@pytest.mark.parametrize("is_sharp", [False, True])
-def test_can_be_pickled(is_sharp):
-    mesh = mesh_of(4)
-    normals = normals_of(mesh, **(sharp_of(mesh) | {"custom_normals": custom_of(mesh)} if is_sharp else {}))
-    copy = pickle.loads(pickle.dumps(normals))
-    for domain in DOMAINS:
-        np.testing.assert_array_equal(copy.compute(mesh[0], domain), normals.compute(mesh[0], domain))
-    domain = "corner" if is_sharp else "vertex"
-    faces = len(mesh[1])
-    assert repr(copy) == repr(normals) == f"<sinew.Normals: 148 vertices, {faces} faces, domain {domain}>"

@@ -2,6 +2,7 @@
 // The instruction sets that kernels are compiled for. Include before Highway.
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 // Disabled: targets that only add integer instructions to the vectors of another target (AVX3_DL and later);
@@ -33,6 +34,10 @@ namespace sinew {
 
 /// Number of instruction sets.
 inline constexpr std::size_t kTargetCount = 4;
+
+/// The versions of a function, as SINEW_TARGETS lists them.
+template <class Function>
+using OfTargets = std::array<Function*, kTargetCount>;
 
 /// The index of the instruction set in use, in the order of SINEW_TARGETS.
 [[nodiscard]] std::size_t target_in_use() noexcept;

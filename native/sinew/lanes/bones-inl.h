@@ -55,10 +55,6 @@ struct Motions {
     BonePoints translation;
 };
 
-HWY_INLINE BoneVec dot(const BonePoints& a, const BonePoints& b) {
-    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-
 /// The motions of the bones `used`, at most as many as there are lanes. Further lanes repeat the last bone.
 HWY_INLINE Motions load_motions(std::span<const Affine<float>> posed_from_rest,
                                 std::span<const std::int32_t> used) {
@@ -81,12 +77,12 @@ HWY_INLINE hn::Mask<BoneTag> is_rotation(const Motions& m) {
     const BoneTag d;
     const BoneVec one = hn::Set(d, 1.0);
     const auto is_small = [d](BoneVec v) HWY_ATTR { return hn::Lt(hn::Abs(v), hn::Set(d, kOrthonormal)); };
-    const auto unit =
-        hn::And(is_small(hn::Sub(dot(m.x, m.x), one)),
-                hn::And(is_small(hn::Sub(dot(m.y, m.y), one)), is_small(hn::Sub(dot(m.z, m.z), one))));
-    const auto square =
-        hn::And(is_small(dot(m.x, m.y)), hn::And(is_small(dot(m.y, m.z)), is_small(dot(m.z, m.x))));
-    const auto unmirrored = hn::Ge(dot(m.x, cross<BoneTag>(m.y, m.z)), hn::Zero(d));
+    const auto unit = hn::And(is_small(hn::Sub(dot<BoneTag>(m.x, m.x), one)),
+                              hn::And(is_small(hn::Sub(dot<BoneTag>(m.y, m.y), one)),
+                                      is_small(hn::Sub(dot<BoneTag>(m.z, m.z), one))));
+    const auto square = hn::And(is_small(dot<BoneTag>(m.x, m.y)),
+                                hn::And(is_small(dot<BoneTag>(m.y, m.z)), is_small(dot<BoneTag>(m.z, m.x))));
+    const auto unmirrored = hn::Ge(dot<BoneTag>(m.x, cross<BoneTag>(m.y, m.z)), hn::Zero(d));
     return hn::And(unmirrored, hn::And(unit, square));
 }
 
@@ -121,9 +117,9 @@ HWY_INLINE Quats rotations(const Motions& m) {
         q.v.y = hn::IfThenElse(larger, multiples[i].v.y, q.v.y);
         q.v.z = hn::IfThenElse(larger, multiples[i].v.z, q.v.z);
     }
-    BoneVec scale = hn::Div(one, hn::Sqrt(hn::MulAdd(q.w, q.w, dot(q.v, q.v))));
+    BoneVec scale = hn::Div(one, hn::Sqrt(hn::MulAdd(q.w, q.w, dot<BoneTag>(q.v, q.v))));
     scale = hn::IfThenElse(hn::Lt(q.w, hn::Zero(d)), hn::Neg(scale), scale);
-    return {hn::Mul(scale, q.w), {hn::Mul(scale, q.v.x), hn::Mul(scale, q.v.y), hn::Mul(scale, q.v.z)}};
+    return {hn::Mul(scale, q.w), times<BoneTag>(scale, q.v)};
 }
 
 /// Kernel::bone_rows for a method that blends rotations.
@@ -144,7 +140,7 @@ void rigid_bone_rows(const Bones& of, Palette& palette) {
         alignas(64) double rigid[kMax];
         for (std::size_t k = 0; k < kNumbers; ++k) hn::Store(row[k], d, numbers[k]);
         const BoneVec sizes =
-            hn::Max(dot(motions.translation, motions.translation), hn::Set(d, kMinSize * kMinSize));
+            hn::Max(dot<BoneTag>(motions.translation, motions.translation), hn::Set(d, kMinSize * kMinSize));
         const hn::Rebind<float, BoneTag> floats;
         hn::StoreU(hn::DemoteTo(floats, sizes), floats, palette.sizes + i);
         hn::Store(hn::IfThenElseZero(is_rotation(motions), hn::Set(d, 1.0)), d, rigid);

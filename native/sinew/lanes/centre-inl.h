@@ -33,7 +33,7 @@ struct CentreRows {
     static HWY_INLINE void write_row(const Quats& q, const BonePoints& translation, BoneVec* row) {
         const BoneTag d;
         const BoneVec two = hn::Set(d, 2.0);
-        const BonePoints v{hn::Mul(two, q.v.x), hn::Mul(two, q.v.y), hn::Mul(two, q.v.z)};
+        const BonePoints v = times<BoneTag>(two, q.v);
         // The rotation minus the identity: 2 v v^T - 2 |v|^2 + 2 w [v]x.
         const BoneVec xx = hn::Mul(v.x, q.v.x);
         const BoneVec yy = hn::Mul(v.y, q.v.y);

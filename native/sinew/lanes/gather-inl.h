@@ -24,9 +24,13 @@ template <bool kIsLast, class D4>
 HWY_INLINE Vec<D4> row(D4 d, const Vec3<float>* points, std::int32_t i) {
     const float* const from = &points[i].x;
     if constexpr (kIsLast) {
-        alignas(16)
-            const float numbers[4] = {from[0], from[1], from[2], 0.0f};  // MaskedLoad asks for alignment
-        return hn::Load(d, numbers);
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+        return hn::MaskedLoad(hn::FirstN(d, 3), d, from);  // x86 does not need its alignment
+#else
+        const hn::Half<D4> two;
+        const hn::Half<decltype(two)> one;
+        return hn::Combine(d, hn::ZeroExtendVector(two, hn::LoadU(one, from + 2)), hn::LoadU(two, from));
+#endif
     } else {
         return hn::LoadU(d, from);
     }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -65,14 +64,14 @@ struct Kernel {
     /// A vertex's result depends only on its own rest point and influences and on the pose, not on its lane, its
     /// block or other vertices (for a method whose vertex data is rows by bone, up to rounding). Instruction sets
     /// may differ by rounding, since only some of them have a fused multiply-add.
-    std::array<Deform*, kTargetCount> deform;
+    OfTargets<Deform> deform;
 
     /// The rows in Palette::bones of a bone that does not move. Every bone there has as many.
     std::span<const Float4> rest_row;
 
     /// Writes the rows of bones.used, all of which are posed, and their sizes. A method that blends rotations
     /// treats every bone as rigid, and adds the indices of those that are not to palette.scaled.
-    std::array<OfBones*, kTargetCount> bone_rows{};
+    OfTargets<OfBones> bone_rows{};
 
     /// Writes the rows and scales of the bones in palette.scaled. Null for a method that has no use for them: it
     /// changes the space in the rows of bones.

@@ -79,6 +79,12 @@ HWY_INLINE const float* weights_of(const MeshPointers& pointers, std::size_t b) 
     return pointers.weights[pointers.blocks[b].first_weight].lane.data();
 }
 
+/// One point, x, y and z, in all lanes.
+template <class D>
+HWY_INLINE Points<D> in_all_lanes(D d, const float* point) {
+    return {hn::Set(d, point[0]), hn::Set(d, point[1]), hn::Set(d, point[2])};
+}
+
 template <class D>
 HWY_INLINE Points<D> add(const Points<D>& a, const Points<D>& b) {
     return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
@@ -148,17 +154,21 @@ HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D
 /// Rotates `v` by the unit quaternion `q` (w, x, y, z).
 template <class D>
 HWY_INLINE Points<D> rotated_by(D d, const float* q, const Points<D>& v) {
-    const Points<D> axis{hn::Set(d, q[1]), hn::Set(d, q[2]), hn::Set(d, q[3])};
+    const Points<D> axis = in_all_lanes(d, q + 1);
     const Points<D> inner = add_scaled<D>(cross<D>(axis, v), hn::Set(d, q[0]), v);
     return add_scaled<D>(v, hn::Set(d, 2.0f), cross<D>(axis, inner));
+}
+
+/// The squared length of a quaternion [4].
+template <class D>
+HWY_INLINE Vec<D> squared_norm(const Vec<D>* q) {
+    return hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
 }
 
 /// `start` plus the displacement of `v` under the rotation by the quaternion `q` [4], which may have any length.
 template <class D>
 HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, const Points<D>& v) {
-    const Vec<D> squared_norm =
-        hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
-    const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+    const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm<D>(q));
     const Points<D> axis{q[1], q[2], q[3]};
     const Points<D> inner = add_scaled<D>(cross<D>(axis, v), q[0], v);
     return add_scaled<D>(start, scale, cross<D>(axis, inner));
@@ -179,9 +189,7 @@ HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
 #endif
 }
 
-HWY_INLINE Points<One> load_consecutive(One d, const float* from) {
-    return {hn::Set(d, from[0]), hn::Set(d, from[1]), hn::Set(d, from[2])};
-}
+HWY_INLINE Points<One> load_consecutive(One d, const float* from) { return in_all_lanes(d, from); }
 
 HWY_INLINE void store_consecutive(One, const Points<One>& p, float* to) {
     to[0] = hn::GetLane(p.x);
@@ -344,13 +352,9 @@ HWY_INLINE std::size_t lanes_end(D d, const Block& block) {
     return hn::MaxLanes(D()) == kLanes ? hn::Lanes(d) : block.vertices;
 }
 
-/// Whether these bones of a vertex are added plainly, see Palette.
-HWY_INLINE bool is_plain(const Palette& palette, const std::int32_t* bones, std::size_t count) {
-    if (HWY_LIKELY(palette.may_be_plain[bones[0]] == 0)) return false;
-    const float first = palette.sizes[bones[0]];
-    float least = first;
-    for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette.sizes[bones[k]]);
-    return sinew::is_plain(first, least);
+/// Whether these influences of a vertex are added plainly, see Palette.
+HWY_INLINE bool is_added_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count) {
+    return HWY_UNLIKELY(palette.may_be_plain[bones[0]] != 0) && sinew::is_plain(palette, bones, count);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -90,8 +91,12 @@ void write_displacement(const Affine<double>& a, Float4* rows) noexcept;
 /// identity.
 [[nodiscard]] float size_of(const Vec3<double>& translation, double length_squared = 0.0) noexcept;
 
-/// Whether bones are added plainly, given Palette::sizes of the first and of the smallest.
-[[nodiscard]] inline bool is_plain(float first, float least) noexcept {
+/// Whether these bones of a vertex are added plainly.
+[[nodiscard]] inline bool is_plain(const Palette& palette, const std::int32_t* bones,
+                                   std::size_t count) noexcept {
+    const float first = palette.sizes[bones[0]];
+    float least = first;
+    for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette.sizes[bones[k]]);
     return !(first < kAlike * kAlike * least);
 }
 

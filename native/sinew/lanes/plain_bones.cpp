@@ -46,8 +46,7 @@ HWY_AFTER_NAMESPACE();
 namespace sinew {
 
 void find_plain(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept {
-    static constexpr std::array<void (*)(const BonePairs&, Palette&), kTargetCount> kMark SINEW_TARGETS(
-        mark_plain);
+    static constexpr OfTargets<void(const BonePairs&, Palette&)> kMark SINEW_TARGETS(mark_plain);
     std::fill_n(palette.may_be_plain, bones, std::uint8_t{0});
     kMark[target_in_use()](pairs, palette);
 }

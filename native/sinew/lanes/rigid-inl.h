@@ -69,19 +69,21 @@ struct Blend {
 /// The base of rows that are added plainly.
 inline constexpr float kNoBase[kMaxRow] = {};
 
+/// The dot product of a quaternion [4] with those of the lanes. Products and sums are rounded one by one, in the order
+/// of blend_vertex(), because both must decide ties alike.
+template <class D>
+HWY_INLINE Vec<D> dot(D d, const float* a, const Vec<D>* b) {
+    return hn::Add(hn::Add(hn::Mul(hn::Set(d, a[0]), b[0]), hn::Mul(hn::Set(d, a[2]), b[2])),
+                   hn::Add(hn::Mul(hn::Set(d, a[1]), b[1]), hn::Mul(hn::Set(d, a[3]), b[3])));
+}
+
 /// Adds the weighted difference of `row` from `base`, with `row` in the hemisphere of the blend. `base` is the
 /// first row, or kNoBase. Returns the weight, negative where the row was negated.
-///
-/// The products and sums of the dot product are rounded one by one, in the order of blend_vertex(), because
-/// both must decide ties alike.
 template <class Rigid, class D>
 HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight,
                                Blend<D, Rigid::kNumbers>& blend) {
     Vec<D>* const quaternion = blend.quaternion;
-    const Vec<D> dot = hn::Add(
-        hn::Add(hn::Mul(hn::Set(d, row[0]), quaternion[0]), hn::Mul(hn::Set(d, row[2]), quaternion[2])),
-        hn::Add(hn::Mul(hn::Set(d, row[1]), quaternion[1]), hn::Mul(hn::Set(d, row[3]), quaternion[3])));
-    const auto away = hn::Lt(dot, hn::Zero(d));
+    const auto away = hn::Lt(dot(d, row, quaternion), hn::Zero(d));
     const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
     for (std::size_t i = 0; i < Rigid::kNumbers; ++i) {
         const Vec<D> difference = hn::Set(d, row[i] - base[i]);
@@ -446,7 +448,8 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
     const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = frame.bones + block.first_bone;
-    if (is_plain(*frame.palette, bones, block.influences)) return deform_plain_set<Rigid>(frame, begin, end);
+    if (is_added_plainly(*frame.palette, bones, block.influences))
+        return deform_plain_set<Rigid>(frame, begin, end);
     if (!resolve_signs<Rigid, false>(*frame.palette, bones, block.influences, rows)) {
         return deform_unresolved<Rigid>(frame, begin, end, false);
     }
@@ -471,7 +474,7 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const Points<One> rest = load_rest(d, pointers, spaces, b, lane);
         const std::int32_t* const of_vertex = bones + block.influences * lane;
-        const bool plain = is_plain(*frame.palette, of_vertex, block.influences);
+        const bool plain = is_added_plainly(*frame.palette, of_vertex, block.influences);
         const float* const weights = weights_of_block + lane;
         const auto sum = blend_bones<Rigid>(d, *frame.palette, of_vertex, block.influences, plain, weights,
                                             weights + kLanes, rest);
@@ -537,7 +540,7 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
         const float* const weights = weights_of_block + lane;
         float* const to = sums[0] + 4 * lane;
-        if (is_plain(palette, bones, block.influences)) {
+        if (is_added_plainly(palette, bones, block.influences)) {
             blend_vertex_plainly<Rigid>(palette, bones, block.influences, weights, to);
         } else {
             blend_vertex<Rigid, false>(palette, bones, block.influences, weights, to);

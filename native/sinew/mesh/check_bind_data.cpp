@@ -119,27 +119,6 @@ void check(const BindData& data) {
     }
 }
 
-BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points,
-                     std::size_t vertex_count, std::size_t bone_count) {
-    const UnpackedMesh unpacked = unpack(mesh, rest_points, vertex_count);
-    BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}, {}};
-    bound.influence_offsets.assign(unpacked.offsets.begin(), unpacked.offsets.end());
-    for (const auto& [bone, weight] : unpacked.influences) {
-        bound.influence_bones.push_back(bone);
-        bound.influence_weights.push_back(weight);
-    }
-    const std::size_t named =
-        mesh.used_bones.empty() ? 0 : static_cast<std::size_t>(mesh.used_bones.back()) + 1;
-    if (named < bone_count) {
-        // The highest bone was named by an influence without weight, which was dropped: give it back to the last
-        // vertex.
-        bound.influence_bones.push_back(static_cast<std::int32_t>(bone_count) - 1);
-        bound.influence_weights.push_back(0.0f);
-        ++bound.influence_offsets.back();
-    }
-    return bound;
-}
-
 NormalisedInfluences normalised_influences(const BindData& data) {
     NormalisedInfluences result;
     result.offsets.reserve(data.rest_points.size() + 1);

@@ -43,14 +43,6 @@ struct NormalisedInfluences {
 /// Throws if `triangles` [3 x any number] has a corner that is no vertex.
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);
 
-/// The points and influences that `mesh` was packed from.
-///
-/// rest_points  mesh.rest_points, or others
-/// bone_count   one more than the highest bone index; if only an influence without weight named that bone, the
-///              result has such an influence too
-[[nodiscard]] BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points,
-                                   std::size_t vertex_count, std::size_t bone_count);
-
 /// data  checked
 [[nodiscard]] NormalisedInfluences normalised_influences(const BindData& data);
 

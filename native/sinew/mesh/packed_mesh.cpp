@@ -327,22 +327,14 @@ UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rest_p
     // Calls call(vertex, influence) for each influence of each vertex.
     const auto for_each_influence = [&](const auto& call) {
         for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
-            const Block& block = mesh.blocks[b];
             const Lanes<float>* const xyz = &rest_points[kPointRows * b];
-            const Lanes<float>* const weights = &mesh.weights[block.first_weight];
-            for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-                const auto weight_of = [&](std::size_t k) {
-                    if (block.own_bones) return weights[k].lane[lane];
-                    return k == 0 ? mesh.first_weights[b].lane[lane] : weights[k - 1].lane[lane];
-                };
-                const std::size_t first = block.first_bone + (block.own_bones ? lane * block.influences : 0);
+            for (std::size_t lane = 0; lane < mesh.blocks[b].vertices; ++lane) {
                 const auto vertex = static_cast<std::size_t>(mesh.vertices[b].lane[lane]);
                 result.rest_points[vertex] = {xyz[0].lane[lane], xyz[1].lane[lane], xyz[2].lane[lane]};
-                for (std::size_t k = 0; k < block.influences; ++k) {
-                    // Influences of weight 0 are padding in a block with own bones.
-                    if (weight_of(k) == 0.0f) continue;
-                    const auto bone = static_cast<std::size_t>(mesh.bones[first + k]);
-                    call(vertex, Influence<float>{mesh.used_bones[bone], weight_of(k)});
+                for (std::size_t k = 0; k < mesh.blocks[b].influences; ++k) {
+                    const auto [bone, weight] = influence_at(mesh, b, lane, k);
+                    if (weight == 0.0f) continue;
+                    call(vertex, Influence<float>{mesh.used_bones[static_cast<std::size_t>(bone)], weight});
                 }
             }
         }

@@ -74,6 +74,18 @@ struct PackedMesh {
     BonePairs pairs;
 };
 
+/// Influence k of the vertex in a lane of block `b`, by the index of its bone in used_bones. One of weight 0 is padding in
+/// a block with own bones.
+[[nodiscard]] inline Influence<float> influence_at(const PackedMesh& mesh, std::size_t b, std::size_t lane,
+                                                   std::size_t k) noexcept {
+    const Block& block = mesh.blocks[b];
+    const Lanes<float>* const weights = &mesh.weights[block.first_weight];
+    if (block.own_bones) {
+        return {mesh.bones[block.first_bone + lane * block.influences + k], weights[k].lane[lane]};
+    }
+    return {mesh.bones[block.first_bone + k], (k == 0 ? mesh.first_weights[b] : weights[k - 1]).lane[lane]};
+}
+
 /// Packs a mesh.
 ///
 /// rest_points  [vertices]

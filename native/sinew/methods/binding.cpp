@@ -145,7 +145,21 @@ PackedBinding::PackedBinding(const BindData& data) {
 }
 
 BoundMesh PackedBinding::unpack(std::span<const Lanes<float>> rest_points) const {
-    BoundMesh bound = bound_mesh(mesh, rest_points, vertex_count, bone_count);
+    const auto last_bone = static_cast<std::int32_t>(bone_count) - 1;
+    const UnpackedMesh unpacked = sinew::unpack(mesh, rest_points, vertex_count);
+    BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}, {}};
+    bound.influence_offsets.assign(unpacked.offsets.begin(), unpacked.offsets.end());
+    for (const auto& [bone, weight] : unpacked.influences) {
+        bound.influence_bones.push_back(bone);
+        bound.influence_weights.push_back(weight);
+    }
+    if (bone_count > 0 && (mesh.used_bones.empty() || mesh.used_bones.back() < last_bone)) {
+        // The highest bone was named by an influence without weight, which was dropped: give it back to the last
+        // vertex.
+        bound.influence_bones.push_back(last_bone);
+        bound.influence_weights.push_back(0.0f);
+        ++bound.influence_offsets.back();
+    }
     for (std::size_t i = 0; i < kMethodCount; ++i) {
         if (is_linear[i]) bound.vertex_data.push_back({kMethods[i], {}, true});
         if (vertex_data[i] == nullptr) continue;

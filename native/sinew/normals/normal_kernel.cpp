@@ -145,8 +145,7 @@ HWY_INLINE Points<D> rounded_cross(const Points<D>& a, const Points<D>& b) {
 /// The direction of the component of `v` perpendicular to `n`; `along` is their cosine.
 template <class D>
 HWY_INLINE Points<D> perpendicular(D d, const Points<D>& v, const Points<D>& n, Vec<D> along) {
-    const Points<D> of_n{hn::Mul(n.x, along), hn::Mul(n.y, along), hn::Mul(n.z, along)};
-    return direction(d, subtract<D>(v, of_n));
+    return direction(d, subtract<D>(v, times<D>(along, n)));
 }
 
 /// The edges of fans that define the space of their custom normals.

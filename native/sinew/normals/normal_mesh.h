@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -120,8 +119,7 @@ struct NormalFrame {
 
 /// Functions compiled once for each instruction set. All instruction sets give the same results.
 struct NormalKernel {
-    using OfRange =
-        std::array<void (*)(const NormalFrame& frame, std::size_t begin, std::size_t end), kTargetCount>;
+    using OfRange = OfTargets<void(const NormalFrame& frame, std::size_t begin, std::size_t end)>;
 
     /// The normals of the faces of blocks [begin, end).
     OfRange faces;

@@ -77,12 +77,7 @@ void run(const NormalKernel::OfRange& function, const NormalFrame& frame, std::s
 
 struct Normals::State {
     State(const MeshTopology& topology, std::size_t vertices, const Sharpness& sharpness)
-        : face_offsets(topology.face_offsets.begin(), topology.face_offsets.end()),
-          corner_vertices(topology.corner_vertices.begin(), topology.corner_vertices.end()),
-          edges(topology.edges.begin(), topology.edges.end()),
-          sharp_edges(sharpness.edges.begin(), sharpness.edges.end()),
-          sharp_faces(sharpness.faces.begin(), sharpness.faces.end()),
-          custom(sharpness.custom.begin(), sharpness.custom.end()),
+        : corner_vertices(topology.corner_vertices.begin(), topology.corner_vertices.end()),
           domain(domain_of(topology, sharpness)),
           mesh(make_normal_mesh(topology, vertices, sharpness, domain)),
           normals(mesh.normal_count()) {}
@@ -100,14 +95,7 @@ struct Normals::State {
     void write(std::span<Vec3<float>> to, const std::int32_t* sources, const Float4* from,
                std::size_t threads) const noexcept;
 
-    // The data given to the constructor.
-    std::vector<std::int32_t> face_offsets;
-    std::vector<std::int32_t> corner_vertices;
-    std::vector<std::int32_t> edges;
-    std::vector<std::uint8_t> sharp_edges;
-    std::vector<std::uint8_t> sharp_faces;
-    std::vector<std::int16_t> custom;
-
+    std::vector<std::int32_t> corner_vertices;  // as given to the constructor
     NormalDomain domain;
     NormalMesh mesh;
 
@@ -140,13 +128,6 @@ std::size_t Normals::count(NormalDomain domain) const noexcept {
         case NormalDomain::face: return state_->mesh.face_sources.size();
     }
     return 0;
-}
-
-Normals::Parts Normals::parts() const noexcept {
-    const State& state = *state_;
-    return {{state.face_offsets, state.corner_vertices, state.edges},
-            state.mesh.vertices.size(),
-            {state.sharp_edges, state.sharp_faces, state.custom}};
 }
 
 bool Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,

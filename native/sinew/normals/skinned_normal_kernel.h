@@ -25,8 +25,7 @@ struct SkinnedNormalFrame {
 /// Functions for elements [begin, end), compiled once for each instruction set. Results do not depend on how the
 /// elements are divided.
 struct SkinnedNormalKernel {
-    using OfRange = std::array<void (*)(const SkinnedNormalFrame& frame, std::size_t begin, std::size_t end),
-                               kTargetCount>;
+    using OfRange = OfTargets<void(const SkinnedNormalFrame& frame, std::size_t begin, std::size_t end)>;
 
     OfRange of_vertices;  // one normal for each vertex
     OfRange cofactors;    // of the vertices

@@ -1,6 +1,4 @@
-"""
-Sinew's C++ library. Use it through the package `sinew`.
-"""
+"""Sinew's C++ library. Use it through the package `sinew`."""
 from __future__ import annotations
 import collections.abc
 import numpy
@@ -18,166 +16,104 @@ from . import interpolate
 from . import spline
 __all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'fit', 'ik', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id']
 class Parameter:
-    """
-    A setting of a method or of a stage.
-    """
-    def __repr__(self) -> str:
-        ...
+    """A setting of a method or of a stage."""
+    def __repr__(self) -> str: ...
     @property
     def choices(self) -> tuple[str, ...]:
-        """
-        The values of an enum.
-        """
+        """The values of an enum."""
     @property
     def default(self) -> float | int | bool | str | None:
-        """
-        The default; None for a vertex group and a method.
-        """
+        """The default; None for a vertex group and a method."""
     @property
     def description(self) -> str:
-        """
-        One sentence.
-        """
+        """One sentence."""
     @property
     def id(self) -> str:
-        """
-        The name in programs.
-        """
+        """The name in programs."""
     @property
     def kind(self) -> typing.Literal['float', 'int', 'bool', 'enum', 'vertex_group', 'method']:
-        """
-        "enum" is one of `choices`, "vertex_group" a weight for each vertex, "method" the name of a method.
-        """
+        """A value of "enum" is one of `choices`, of "vertex_group" a weight for each vertex, of "method" a name."""
     @property
     def label(self) -> str:
-        """
-        The name in the interface.
-        """
+        """The name in the interface."""
     @property
     def max(self) -> float | None:
-        """
-        The largest value of a number, inf if there is no limit; None for other kinds.
-        """
+        """The largest value of a number, inf if there is no limit; None for other kinds."""
     @property
     def min(self) -> float | None:
-        """
-        The smallest value of a number, -inf if there is no limit; None for other kinds.
-        """
+        """The smallest value of a number, -inf if there is no limit; None for other kinds."""
     @property
     def unit(self) -> str:
-        """
-        One of "length", "angle" (radians) and "factor", or empty.
-        """
+        """One of "length", "angle" (radians) and "factor", or empty."""
 class Method:
-    """
-    The facts about a skinning method.
-    """
-    def __repr__(self) -> str:
-        ...
+    """The facts about a skinning method."""
+    def __repr__(self) -> str: ...
     @property
     def description(self) -> str:
-        """
-        One sentence: when to use it.
-        """
+        """One sentence: when to use it."""
     @property
     def group(self) -> str:
-        """
-        The heading of its group in menus.
-        """
+        """The heading of its group in menus."""
     @property
     def label(self) -> str:
-        """
-        The name in the interface.
-        """
+        """The name in the interface."""
     @property
     def name(self) -> str:
-        """
-        The name in programs.
-        """
+        """The name in programs."""
     @property
     def needs(self) -> tuple[str, ...]:
-        """
-        What it needs besides points, influences and bone transforms: "rest_bones", the bones' axes, where bones are
+        """What it needs besides points, influences and bone transforms: "rest_bones", the bones' axes, where bones are
         scaled; "vertex_data", numbers for each vertex, an argument of Binding; "topology", triangles from which these
         are computed; "precomputation", a function that computes them.
         """
     @property
     def number(self) -> int:
-        """
-        The number that .blend files store. It never changes.
-        """
+        """The number that .blend files store. It never changes."""
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """
-        Its settings.
-        """
+        """Its settings."""
     @property
     def rows_by_bone(self) -> bool:
-        """
-        Whether its vertex data is rows, any number for each vertex: see direct_delta_mush.
-        """
+        """Whether its vertex data is rows, any number for each vertex: see direct_delta_mush."""
     @property
     def source(self) -> str:
-        """
-        The papers.
-        """
+        """The papers."""
     @property
     def vertex_floats(self) -> int:
-        """
-        How many numbers its vertex data has for each vertex, or in each row; 0 if it has none.
-        """
+        """How many numbers its vertex data has for each vertex, or in each row; 0 if it has none."""
 class Stage:
-    """
-    The facts about a stage. Stages run after a method.
-    """
-    def __repr__(self) -> str:
-        ...
+    """The facts about a stage. Stages run after a method."""
+    def __repr__(self) -> str: ...
     @property
     def description(self) -> str:
-        """
-        One sentence: when to use it.
-        """
+        """One sentence: when to use it."""
     @property
     def label(self) -> str:
-        """
-        The name in the interface.
-        """
+        """The name in the interface."""
     @property
     def name(self) -> str:
-        """
-        The name in programs.
-        """
+        """The name in programs."""
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """
-        Its settings.
-        """
+        """Its settings."""
     @property
     def source(self) -> str:
-        """
-        The papers.
-        """
+        """The papers."""
 class Skeleton:
-    """
-    A hierarchy of bones in which parents precede their children.
+    """A hierarchy of bones in which parents precede their children.
 
     Its methods take each bone relative to its parent, in any layout of sinew.affine, sinew.quat_vec and
     sinew.dual_quat. Can be pickled.
     """
-    def __getstate__(self) -> tuple[numpy.typing.NDArray[numpy.int32]]:
-        ...
+    def __getstate__(self) -> tuple[numpy.typing.NDArray[numpy.int32]]: ...
     def __init__(self, parents: numpy.typing.ArrayLike) -> None:
-        """
-        parents: int32 [bones], the index of each bone's parent, -1 for a root. ValueError if a parent does not
+        """parents: int32 [bones], the index of each bone's parent, -1 for a root. ValueError if a parent does not
             precede its child.
         """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: typing.Any) -> None:
-        ...
+    def __repr__(self) -> str: ...
+    def __setstate__(self, arg0: typing.Any) -> None: ...
     def interpolate(self, a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, t: numpy.typing.ArrayLike, method: sinew.interpolate.Method = 'dlb') -> tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]:
-        """
-        (transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
+        """(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
 
         a, b: [bones, ..] in the layout of the method, at t = 0 and t = 1.
         t: a number, or [..], for which the results are [.., bones, ..] and [..]; extrapolates outside 0 to 1.
@@ -187,15 +123,13 @@ class Skeleton:
         sinew.interpolate specifies.
         """
     def root_relative(self, transforms: numpy.typing.ArrayLike, root: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[typing.Any]:
-        """
-        Each bone relative to the root, in the layout of `transforms` (Smith 2013, algorithm 1).
+        """Each bone relative to the root, in the layout of `transforms` (Smith 2013, algorithm 1).
 
         transforms: [bones, 4, 4] or [bones, 3, 4], for which the result is [bones, 4, 4]; [bones, 7]; [bones, 8].
         root: None, or a transform that is applied after that of every bone without a parent.
         """
     def spline(self, keyframes: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, time: numpy.typing.ArrayLike, method: sinew.interpolate.Method = 'dlb') -> tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]:
-        """
-        (transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend form (Smith
+        """(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend form (Smith
         2013, algorithm 3 and section 3.2.2).
 
         keyframes: [keys, bones, ..] in the layout of the method, at least one key.
@@ -205,14 +139,12 @@ class Skeleton:
         method: one of sinew.interpolate.METHODS.
         """
     def spline_vector(self, keyframes: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, time: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]:
-        """
-        As spline(), in vector form (Smith 2013, algorithm 3): not rigid between keys.
+        """As spline(), in vector form (Smith 2013, algorithm 3): not rigid between keys.
 
         keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].
         """
     def update_branch(self, root_relative: numpy.typing.ArrayLike, transforms: numpy.typing.ArrayLike, bone: typing.SupportsIndex, root: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[typing.Any]:
-        """
-        The result of root_relative() after a change of one bone: computes only that bone and its descendants.
+        """The result of root_relative() after a change of one bone: computes only that bone and its descendants.
 
         root_relative: the result before the change, in the layout of `transforms`.
         transforms, root: as for root_relative().
@@ -220,20 +152,15 @@ class Skeleton:
         """
     @property
     def bone_count(self) -> int:
-        """
-        Number of bones.
-        """
+        """Number of bones."""
 class Binding:
-    """
-    A mesh bound to bones. Immutable; the deformers made from it share its memory.
+    """A mesh bound to bones. Immutable; the deformers made from it share its memory.
 
     Can be pickled: the bound mesh, with normalised weights.
     """
-    def __getstate__(self) -> tuple:
-        ...
+    def __getstate__(self) -> tuple: ...
     def __init__(self, rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike | None = None, vertex_data: collections.abc.Mapping[str, numpy.typing.ArrayLike | None] | None = None) -> None:
-        """
-        rest_points: float32 [vertices, 3], model space.
+        """rest_points: float32 [vertices, 3], model space.
         influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.
         influence_bones: int32 [influences].
         influence_weights: float32 [influences], >= 0, any sum (they are normalised).
@@ -245,53 +172,37 @@ class Binding:
 
         At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,576 bones.
         """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: typing.Any) -> None:
-        ...
+    def __repr__(self) -> str: ...
+    def __setstate__(self, arg0: typing.Any) -> None: ...
     @property
     def bone_count(self) -> int:
-        """
-        How many bones a pose must have: one more than the highest bone index in the influences.
-        """
+        """How many bones a pose must have: one more than the highest bone index in the influences."""
     @property
     def influence_count(self) -> int:
-        """
-        Number of influences of positive weight.
-        """
+        """Number of influences of positive weight."""
     @property
     def vertex_count(self) -> int:
-        """
-        Number of vertices.
-        """
+        """Number of vertices."""
 class Deformer:
-    """
-    A binding and a method, ready to deform any pose.
+    """A binding and a method, ready to deform any pose.
 
     Can be pickled, with its current rest points and its own binding.
     """
-    def __getstate__(self) -> tuple:
-        ...
+    def __getstate__(self) -> tuple: ...
     @typing.overload
     def __init__(self, binding: Binding, method: str = 'lbs', mix: tuple[str, numpy.typing.ArrayLike] | None = None) -> None:
-        """
-        binding: a Binding; not copied.
+        """binding: a Binding; not copied.
         method: the name of one of sinew.methods().
         mix: None, or (name of another method, weights): weights float32 [vertices] are the share of the other method
             at each vertex, from 0 (none) to 1 (all); clamped. This is the stage `mix`.
         """
     @typing.overload
     def __init__(self, rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, method: str = 'lbs', rest_bones: numpy.typing.ArrayLike | None = None, vertex_data: collections.abc.Mapping[str, numpy.typing.ArrayLike | None] | None = None) -> None:
-        """
-        Constructs its own binding, from the arguments of Binding.
-        """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: typing.Any) -> None:
-        ...
+        """Constructs its own binding, from the arguments of Binding."""
+    def __repr__(self) -> str: ...
+    def __setstate__(self, arg0: typing.Any) -> None: ...
     def deform(self, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """
-        The deformed points, float32 [vertices, 3], model space.
+        """The deformed points, float32 [vertices, 3], model space.
 
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
         bones_from_model: float32 [4, 4] or [3, 4], maps model space to the space of the bone transforms, in which the
@@ -305,45 +216,30 @@ class Deformer:
         A vertex without influences is not moved.
         """
     def set_rest_points(self, rest_points: numpy.typing.ArrayLike) -> None:
-        """
-        Sets the rest points of this deformer alone, float32 [vertices, 3], such as when shape keys change.
+        """Sets the rest points of this deformer alone, float32 [vertices, 3], such as when shape keys change.
         Other threads may deform meanwhile: each of their results has either the old points or the new ones.
         """
     @property
     def bone_count(self) -> int:
-        """
-        How many bones a pose must have: one more than the highest bone index in the influences.
-        """
+        """How many bones a pose must have: one more than the highest bone index in the influences."""
     @property
     def influence_count(self) -> int:
-        """
-        Number of influences of positive weight.
-        """
+        """Number of influences of positive weight."""
     @property
     def method(self) -> str:
-        """
-        The name of the method.
-        """
+        """The name of the method."""
     @property
     def mixed_method(self) -> str | None:
-        """
-        The name of the method that `mix` adds, or None.
-        """
+        """The name of the method that `mix` adds, or None."""
     @property
     def vertex_count(self) -> int:
-        """
-        Number of vertices.
-        """
+        """Number of vertices."""
 class TwistSpread:
+    """The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist
+    bones do. Applied after Deformer.deform() and before all other stages.
     """
-    The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist
-    bones do. Applied after Deformer.deform() and before all other stages. Can be pickled.
-    """
-    def __getstate__(self) -> tuple:
-        ...
     def __init__(self, binding: Binding, twists: numpy.typing.ArrayLike, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike, *, parents: numpy.typing.ArrayLike | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None, mix: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        binding: the mesh. Its memory is shared.
+        """binding: the mesh. Its memory is shared.
         twists: int32 [twists, 4], a bone before those that it carries. The first bone's vertices share, about its Y axis,
             the twist of the third bone relative to the second. The fourth number is 0 where it is added towards the tail
             (the hand's twist to the forearm), 1 where it is taken back towards the head (an upper arm's own).
@@ -355,20 +251,15 @@ class TwistSpread:
         weights: None, or float32 [vertices], how much each vertex takes part, 0 to 1; clamped.
         mix: None, or float32 [vertices], the weights of Deformer's `mix`.
         """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: typing.Any) -> None:
-        ...
+    def __repr__(self) -> str: ...
     def angles(self, bone_transforms: numpy.typing.ArrayLike, channels: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """
-        The twists in a pose, float32 [twists], radians, as apply() spreads them by an amount of 1: faded from 150
+        """The twists in a pose, float32 [twists], radians, as apply() spreads them by an amount of 1: faded from 150
         degrees to 180, where a matrix does not tell them.
 
         bone_transforms, channels: as for apply().
         """
     def apply(self, points: numpy.typing.ArrayLike, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, *, amount: float = 1.0, amounts: numpy.typing.ArrayLike | None = None, curves: numpy.typing.ArrayLike | None = None, channels: numpy.typing.ArrayLike | None = None, blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', mix_blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """
-        The twisted points, float32 [vertices, 3], model space.
+        """The twisted points, float32 [vertices, 3], model space.
 
         points: float32 [vertices, 3], deformed, model space.
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
@@ -388,45 +279,29 @@ class TwistSpread:
         Where no bone is twisted, no bit changes.
         """
     def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        Sets other rest points, float32 [vertices, 3], or another space of the bones.
-        """
+        """Sets other rest points, float32 [vertices, 3], or another space of the bones."""
     @property
     def bone_count(self) -> int:
-        """
-        How many bones a pose must have.
-        """
+        """How many bones a pose must have."""
     @property
     def twist_count(self) -> int:
-        """
-        Number of twists.
-        """
+        """Number of twists."""
     @property
     def vertex_count(self) -> int:
-        """
-        Number of vertices.
-        """
+        """Number of vertices."""
 class BulgeLimit:
+    """The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
+    them farther away than they are at rest (Kim, Han 2014, and a continuous form).
     """
-    The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
-    them farther away than they are at rest (Kim, Han 2014, and a continuous form). Can be pickled.
-    """
-    def __getstate__(self) -> tuple:
-        ...
     def __init__(self, binding: Binding, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, *, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        binding: the mesh. Its memory is shared.
+        """binding: the mesh. Its memory is shared.
         heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
         bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
         weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.
         """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: typing.Any) -> None:
-        ...
+    def __repr__(self) -> str: ...
     def apply(self, points: numpy.typing.ArrayLike, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, *, strength: float = 1.0, form: typing.Literal['continuous', 'kim_han'] = 'continuous', threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """
-        The limited points, float32 [vertices, 3], model space.
+        """The limited points, float32 [vertices, 3], model space.
 
         points: float32 [vertices, 3], deformed, model space.
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
@@ -439,30 +314,21 @@ class BulgeLimit:
         bone allows a distance larger by the largest factor by which it stretches vectors perpendicular to it.
         """
     def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        Sets other rest points, float32 [vertices, 3], or another space of the bones. Measures distances at
+        """Sets other rest points, float32 [vertices, 3], or another space of the bones. Measures distances at
         rest again, which takes about as long as apply().
         """
     @property
     def bone_count(self) -> int:
-        """
-        How many bones a pose must have: one more than the highest bone index in the influences.
-        """
+        """How many bones a pose must have: one more than the highest bone index in the influences."""
     @property
     def vertex_count(self) -> int:
-        """
-        Number of vertices.
-        """
+        """Number of vertices."""
 class DeltaMush:
+    """The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
+    (Mancewicz et al. 2014), as Blender's Corrective Smooth does.
     """
-    The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
-    (Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.
-    """
-    def __getstate__(self) -> tuple:
-        ...
     def __init__(self, rest_points: numpy.typing.ArrayLike, face_offsets: numpy.typing.ArrayLike, corner_vertices: numpy.typing.ArrayLike, edges: numpy.typing.ArrayLike, *, iterations: typing.SupportsIndex = 5, radius: float = 0.0, factor: float = 0.5, smooth_type: typing.Literal['simple', 'length_weighted'] = 'simple', pin_boundary: bool = False, weights: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        rest_points: float32 [vertices, 3], without shape keys; at most 2^29 - 1 vertices.
+        """rest_points: float32 [vertices, 3], without shape keys; at most 2^29 - 1 vertices.
         face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
         corner_vertices: int32 [corners], the vertex of each corner.
         edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces.
@@ -475,13 +341,9 @@ class DeltaMush:
         pin_boundary: whether vertices on edges with a single face are not moved.
         weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.
         """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: typing.Any) -> None:
-        ...
+    def __repr__(self) -> str: ...
     def apply(self, points: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, scale: float = 1.0, threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """
-        The smoothed points, float32 [vertices, 3].
+        """The smoothed points, float32 [vertices, 3].
 
         points: float32 [vertices, 3], deformed, in the space of the rest points.
         out: may be `points`.
@@ -490,31 +352,22 @@ class DeltaMush:
         A vertex without faces is smoothed and has no details.
         """
     def bind(self, rest_points: numpy.typing.ArrayLike, *, iterations: typing.SupportsIndex = 5, radius: float = 0.0, factor: float = 0.5, smooth_type: typing.Literal['simple', 'length_weighted'] = 'simple', pin_boundary: bool = False, weights: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        Sets other rest points and settings for the same faces and edges, which takes about as long as apply().
+        """Sets other rest points and settings for the same faces and edges, which takes about as long as apply().
 
         The arguments and errors are those of the constructor; after an error the object is unchanged.
         """
     @property
     def iterations(self) -> int:
-        """
-        Number of smoothing iterations, also if a radius determines it.
-        """
+        """Number of smoothing iterations, also if a radius determines it."""
     @property
     def vertex_count(self) -> int:
-        """
-        Number of vertices.
-        """
+        """Number of vertices."""
 class Normals:
+    """Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices weighted
+    by the angles of corners, of corners by fans between sharp edges.
     """
-    Normals of a mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices weighted
-    by the angles of corners, of corners by fans between sharp edges. Can be pickled.
-    """
-    def __getstate__(self) -> tuple:
-        ...
     def __init__(self, vertex_count: typing.SupportsIndex, face_offsets: numpy.typing.ArrayLike, corner_vertices: numpy.typing.ArrayLike, edges: numpy.typing.ArrayLike | None = None, *, sharp_edges: numpy.typing.ArrayLike | None = None, sharp_faces: numpy.typing.ArrayLike | None = None, custom_normals: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        vertex_count: number of vertices, at most 2^29 - 1.
+        """vertex_count: number of vertices, at most 2^29 - 1.
         face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
         corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.
         edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces; None if nothing is
@@ -523,13 +376,9 @@ class Normals:
         sharp_faces: None, or bool [faces], which are flat.
         custom_normals: None, or int16 [corners, 2], as in Blender's attribute custom_normal.
         """
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: typing.Any) -> None:
-        ...
+    def __repr__(self) -> str: ...
     def compute(self, points: numpy.typing.ArrayLike, domain: typing.Literal['vertex', 'corner', 'face'] | None = None, out: numpy.typing.NDArray[numpy.float32] | None = None, threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """
-        Unit vectors, float32 [vertices, corners or faces, 3].
+        """Unit vectors, float32 [vertices, corners or faces, 3].
 
         points: float32 [vertices, 3], deformed.
         domain: "vertex", "corner" or "face": what each normal belongs to; None: the mesh's domain.
@@ -540,54 +389,42 @@ class Normals:
         """
     @property
     def corner_count(self) -> int:
-        """
-        Number of corners of faces.
-        """
+        """Number of corners of faces."""
     @property
     def domain(self) -> typing.Literal['vertex', 'corner', 'face']:
-        """
-        The simplest domain that describes the mesh's shading, as Blender's Mesh.normals_domain: "face" if every
+        """The simplest domain that describes the mesh's shading, as Blender's Mesh.normals_domain: "face" if every
         face is flat or every edge sharp, else "corner" if anything is sharp, else "vertex". With custom normals always
         "corner".
         """
     @property
     def face_count(self) -> int:
-        """
-        Number of faces.
-        """
+        """Number of faces."""
     @property
     def vertex_count(self) -> int:
-        """
-        Number of vertices.
-        """
+        """Number of vertices."""
 class SkinnedNormals:
-    """
-    Normals and tangents that move with the skin, as in engines: each is transformed by the blend of its
+    """Normals and tangents that move with the skin, as in engines: each is transformed by the blend of its
     vertex, normals by the inverse transpose. The effect of weights that change from vertex to vertex is not
     included. A frame is a normal and, if there are tangents, its tangent.
     """
     def __init__(self, binding: Binding, normals: numpy.typing.ArrayLike, tangents: numpy.typing.ArrayLike | None = None, vertices: numpy.typing.ArrayLike | None = None, method: str = 'lbs', mix: tuple[str, numpy.typing.ArrayLike] | None = None) -> None:
-        """
-        binding: a Binding; not copied.
+        """binding: a Binding; not copied.
         normals: float32 [frames, 3], at rest, of any length.
         tangents: None, or float32 [frames, 3], at rest, of any length.
         vertices: int32 [frames], the vertex of each, such as for the corners of faces; None: one frame for each
             vertex.
         method, mix: as for Deformer.
         """
-    def __repr__(self) -> str:
-        ...
+    def __repr__(self) -> str: ...
     def deform(self, bone_transforms: numpy.typing.ArrayLike, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32] | None]:
-        """
-        (points, normals, tangents): the deformed points, float32 [vertices, 3]; normals of unit length, float32
+        """(points, normals, tangents): the deformed points, float32 [vertices, 3]; normals of unit length, float32
         [frames, 3]; the same for tangents, or None.
 
         The arguments are those of Deformer.deform(). Where the blend mirrors, a normal points to the side given by the
         order of a face's vertices. Where the blend collapses the plane of a normal to a line, that normal is 0.
         """
     def deform_normals(self, bone_transforms: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """
-        The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
+        """The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
 
         points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.
         out: must not overlap the points.
@@ -596,53 +433,34 @@ class SkinnedNormals:
         """
     @property
     def frame_count(self) -> int:
-        """
-        Number of frames: as many as normals at rest.
-        """
+        """Number of frames: as many as normals at rest."""
 class Precomputation:
-    """
-    A computation of a method's vertex data. It runs on threads of its own, and on copies of its arguments. It is
+    """A computation of a method's vertex data. It runs on threads of its own, and on copies of its arguments. It is
     cancelled when nobody refers to it any more, and when Python ends.
     """
     def cancel(self) -> None:
-        """
-        Returns at once. The result is then None, unless there already was one.
-        """
+        """Returns at once. The result is then None, unless there already was one."""
     def result(self) -> numpy.typing.NDArray[numpy.float32] | None:
-        """
-        Waits until it has ended, and returns the array, the same one each time; None if it was cancelled, or if
+        """Waits until it has ended, and returns the array, the same one each time; None if it was cancelled, or if
         this is a process that was forked meanwhile. Raises what the work raised: ValueError for data that Binding
         refuses, too.
         """
     def wait(self, seconds: float | None = None) -> bool:
-        """
-        Waits until it has ended, at most this long. Returns whether it has. Ctrl-C raises KeyboardInterrupt.
-        """
+        """Waits until it has ended, at most this long. Returns whether it has. Ctrl-C raises KeyboardInterrupt."""
     @property
     def has_ended(self) -> bool:
-        """
-        Whether it is done, has failed or was cancelled.
-        """
+        """Whether it is done, has failed or was cancelled."""
     @property
     def progress(self) -> float:
-        """
-        The completed share, 0 to 1.
-        """
+        """The completed share, 0 to 1."""
 class Lock:
-    """
-    For `with`: one thread at a time is inside.
-    """
-    def __enter__(self) -> None:
-        ...
-    def __exit__(self, arg0: typing.Any, arg1: typing.Any, arg2: typing.Any) -> None:
-        ...
+    """For `with`: one thread at a time is inside."""
+    def __enter__(self) -> None: ...
+    def __exit__(self, arg0: typing.Any, arg1: typing.Any, arg2: typing.Any) -> None: ...
     def __init__(self) -> None:
-        """
-        A thread that is inside may enter again. A forked child finds nobody inside.
-        """
+        """A thread that is inside may enter again. A forked child finds nobody inside."""
 def centres_of_rotation(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, *, exact: bool = False, threads: typing.SupportsIndex | None = None, gives_way: bool = False) -> Precomputation:
-    """
-    Starts to compute the vertex data of the method "cor": the optimised centre of rotation of each vertex,
+    """Starts to compute the vertex data of the method "cor": the optimised centre of rotation of each vertex,
     float32 [vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest
     points.
 
@@ -653,8 +471,7 @@ def centres_of_rotation(rest_points: numpy.typing.ArrayLike, influence_offsets: 
         takes much longer.
     """
 def direct_delta_mush(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, exact: bool = False, threads: typing.SupportsIndex | None = None, gives_way: bool = False) -> Precomputation:
-    """
-    Starts to compute the vertex data of the method "ddm": the moments of each bone's smoothed weights around
+    """Starts to compute the vertex data of the method "ddm": the moments of each bone's smoothed weights around
     each vertex (Le, Lewis 2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight,
     first moment (x, y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the
     vertex's first moments). Rows are in ascending order of vertices and, for each vertex, of bones. They belong to
@@ -670,21 +487,14 @@ def direct_delta_mush(rest_points: numpy.typing.ArrayLike, influence_offsets: nu
     RuntimeError if Sinew was built without this method.
     """
 def keep_thread_state() -> None:
-    """
-    Keeps Python's state of the calling thread until the thread ends. If Python did not start that thread, each
+    """Keeps Python's state of the calling thread until the thread ends. If Python did not start that thread, each
     later call from it takes 50 to 100 us less. May be called again, and on any thread.
     """
 def methods() -> tuple[Method, ...]:
-    """
-    All skinning methods.
-    """
+    """All skinning methods."""
 def stages() -> tuple[Stage, ...]:
-    """
-    All stages. `mix` is an argument of Deformer, `twist_spread` is TwistSpread, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush.
-    """
+    """All stages. `mix` is an argument of Deformer, `twist_spread` is TwistSpread, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush."""
 def thread_id() -> int:
-    """
-    A number that no other thread has as long as this one runs.
-    """
+    """A number that no other thread has as long as this one runs."""
 __compiled_in__: str
 __version__: str

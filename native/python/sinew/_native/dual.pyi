@@ -3,34 +3,18 @@ import numpy.typing
 import typing
 __all__: list[str] = ['conjugate', 'cos', 'divide', 'exp', 'log', 'multiply', 'sin', 'sqrt']
 def conjugate(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The conjugate: real - e dual.
-    """
+    """The conjugate: real - e dual."""
 def cos(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The cosine, radians.
-    """
+    """The cosine, radians."""
 def divide(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    a / b. ValueError if a real part of `b` is 0: such a number has no inverse.
-    """
+    """a / b. ValueError if a real part of `b` is 0: such a number has no inverse."""
 def exp(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The exponential.
-    """
+    """The exponential."""
 def log(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The natural logarithm. ValueError if the real part of `a` is not positive.
-    """
+    """The natural logarithm. ValueError if the real part of `a` is not positive."""
 def multiply(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    a b: (real a real b, real a dual b + dual a real b).
-    """
+    """a b: (real a real b, real a dual b + dual a real b)."""
 def sin(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The sine, radians: for example of a screw's angle and length.
-    """
+    """The sine, radians: for example of a screw's angle and length."""
 def sqrt(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The square root with a positive real part. ValueError if the real part of `a` is not positive.
-    """
+    """The square root with a positive real part. ValueError if the real part of `a` is not positive."""

@@ -4,122 +4,83 @@ import sinew._types
 import typing
 __all__: list[str] = ['combined_conjugate', 'compose', 'conjugate', 'dual_conjugate', 'exp', 'from_axis_angle', 'from_rotation_matrix', 'from_screw', 'from_screw_about', 'from_translation', 'from_twist', 'identity', 'inverse', 'log', 'norm', 'normalized', 'power', 'rigid_distance', 'to_affine', 'to_quat_vec', 'to_screw', 'to_twist', 'transform_normal', 'transform_point', 'transform_vector']
 def combined_conjugate(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    Both conjugates, real* - e dual*: a (1 + e p) combined_conjugate(a) = 1 + e p', with p' the image
+    """Both conjugates, real* - e dual*: a (1 + e p) combined_conjugate(a) = 1 + e p', with p' the image
     of p.
     """
 def compose(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The product a b, which applies `b` first: compose(model_from_bone, bone_from_rest) is
+    """The product a b, which applies `b` first: compose(model_from_bone, bone_from_rest) is
     model_from_rest.
     """
 def conjugate(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The quaternion conjugate, real* + e dual*: conjugate(a b) = conjugate(b) conjugate(a).
-    """
+    """The quaternion conjugate, real* + e dual*: conjugate(a b) = conjugate(b) conjugate(a)."""
 def dual_conjugate(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The dual conjugate, real - e dual.
-    """
+    """The dual conjugate, real - e dual."""
 def exp(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The unit dual quaternion whose logarithm is `a`, of any angle. Scalar parts are ignored.
-    """
+    """The unit dual quaternion whose logarithm is `a`, of any angle. Scalar parts are ignored."""
 def from_axis_angle(axis: numpy.typing.ArrayLike, angle: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The rotation by `angle` radians, [..], about `axis`, [.., 3], through the origin. The axis may have any
+    """The rotation by `angle` radians, [..], about `axis`, [.., 3], through the origin. The axis may have any
     length; 0 gives the identity.
     """
 def from_rotation_matrix(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The rotation by a matrix, [.., 3, 3]: a rotation to within 2e-3, or for sinew.affine any matrix.
-    """
+    """The rotation by a matrix, [.., 3, 3]: a rotation to within 2e-3, or for sinew.affine any matrix."""
 def from_screw(axis: numpy.typing.ArrayLike, moment: numpy.typing.ArrayLike, angle: numpy.typing.ArrayLike, translation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The rotation by `angle` radians about a line with a translation along it, both [..]; inverse of to_screw()
+    """The rotation by `angle` radians about a line with a translation along it, both [..]; inverse of to_screw()
     (Daniilidis 1999, eq. 13).
 
     axis, moment: [.., 3], Pluecker coordinates of the line. Both are divided by the length of the axis, and a
         component of the moment along it is ignored. An axis of length 0 gives the identity.
     """
 def from_screw_about(axis: numpy.typing.ArrayLike, point: numpy.typing.ArrayLike, angle: numpy.typing.ArrayLike, translation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    As from_screw(), with the line given by any of its points, `point`, [.., 3].
-    """
+    """As from_screw(), with the line given by any of its points, `point`, [.., 3]."""
 def from_translation(translation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The translation by `translation`, [.., 3].
-    """
+    """The translation by `translation`, [.., 3]."""
 def from_twist(twist: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The exponential of `twist`, [.., 6]: angular velocity, then linear velocity, of any angle.
-    """
+    """The exponential of `twist`, [.., 6]: angular velocity, then linear velocity, of any angle."""
 def identity(dtype: numpy.typing.DTypeLike = ...) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The identity, one transform.
-    """
+    """The identity, one transform."""
 def inverse(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The inverse of `a`. ValueError if the linear part of a matrix is singular.
-    """
+    """The inverse of `a`. ValueError if the linear part of a matrix is singular."""
 def log(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The logarithm of unit `a`: half the twist, with scalar parts of 0 (Kavan et al. 2008, section 3.4). Of
+    """The logarithm of unit `a`: half the twist, with scalar parts of 0 (Kavan et al. 2008, section 3.4). Of
     a and -a, the one with w >= 0 is used.
     """
 def norm(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    sqrt(a conjugate(a)), a dual number, [.., 2]: (1, 0) for a unit `a`; (0, 0) if the real part is 0.
-    """
+    """sqrt(a conjugate(a)), a dual number, [.., 2]: (1, 0) for a unit `a`; (0, 0) if the real part is 0."""
 def normalized(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The rigid transform nearest to `a`. A matrix's linear part becomes the nearest rotation (polar
+    """The rigid transform nearest to `a`. A matrix's linear part becomes the nearest rotation (polar
     decomposition), or one of several, as for rank 0 or 1. A quaternion is divided by its length, a dual quaternion
     by its norm; 0 gives the identity.
     """
 def power(a: numpy.typing.ArrayLike, exponent: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The power of unit `a`: its screw with angle and translation multiplied by `exponent`, [..] (Kavan et
+    """The power of unit `a`: its screw with angle and translation multiplied by `exponent`, [..] (Kavan et
     al. 2008, section 3.4).
 
     It takes the shorter way: of a and -a, the one with w >= 0 is used.
     """
 def rigid_distance(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike) -> sinew._types.Distance[typing.Any]:
-    """
-    The distance of rigid `b` from rigid `a`, [..]: the angle of the rotation, 0 to pi, and the distance
+    """The distance of rigid `b` from rigid `a`, [..]: the angle of the rotation, 0 to pi, and the distance
     between the images of the origin. It is the same for compose(x, a) and compose(x, b) with rigid x.
     """
 def to_affine(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    `a` in the layout of sinew.affine, [.., 4, 4].
-    """
+    """`a` in the layout of sinew.affine, [.., 4, 4]."""
 def to_quat_vec(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    Rigid `a` in the layout of sinew.quat_vec, [.., 7]. The length of quaternions is not checked.
-    """
+    """Rigid `a` in the layout of sinew.quat_vec, [.., 7]. The length of quaternions is not checked."""
 def to_screw(a: numpy.typing.ArrayLike) -> sinew._types.Screw[typing.Any]:
-    """
-    The screw of rigid `a` (Chasles 1830).
+    """The screw of rigid `a` (Chasles 1830).
 
     The angle is 0 to pi; at pi the axis has one of its two directions. The moment is point x axis. The pitch is
     translation / angle; it is infinite for a pure translation, for which the axis is its direction, angle and
     moment are 0 and translation >= 0. The axis of the identity is z.
     """
 def to_twist(a: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, with an angle of 0 to pi. At 180
+    """The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, with an angle of 0 to pi. At 180
     degrees it has one of the two directions of the axis.
     """
 def transform_normal(a: numpy.typing.ArrayLike, normals: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The unit normals, [.., 3], of surfaces after `a`: by the inverse transpose of a matrix. 0 for 0, and for a
+    """The unit normals, [.., 3], of surfaces after `a`: by the inverse transpose of a matrix. 0 for 0, and for a
     surface that becomes a line.
     """
 def transform_point(a: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The images of `points`, [.., 3], under `a`. For n transforms of m points each, use a[:, None].
-    """
+    """The images of `points`, [.., 3], under `a`. For n transforms of m points each, use a[:, None]."""
 def transform_vector(a: numpy.typing.ArrayLike, vectors: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The images of `vectors`, [.., 3], under `a` without its translation.
-    """
+    """The images of `vectors`, [.., 3], under `a` without its translation."""

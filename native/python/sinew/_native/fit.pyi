@@ -4,8 +4,7 @@ import sinew._types
 import typing
 __all__: list[str] = ['average', 'hand_eye', 'rigid']
 def average(poses: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike | None = None, *, robust: bool = False) -> sinew._types.Averaged[typing.Any]:
-    """
-    The mean of n poses, in their layout. Signs of quaternions and the order do not matter.
+    """The mean of n poses, in their layout. Signs of quaternions and the order do not matter.
 
     poses: [.., n, 4, 4], [.., n, 3, 4], [.., n, 7] or [.., n, 8], n >= 1. A matrix's linear part is replaced by
         the nearest rotation.
@@ -23,8 +22,7 @@ def average(poses: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike | Non
     have more than half of the weight, or are not all within 90 degrees of the result.
     """
 def hand_eye(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike | None = None) -> sinew._types.HandEye[typing.Any]:
-    """
-    Solves a x = x b for x: the pose of one of two bodies that are fixed to each other, seen from the
+    """Solves a x = x b for x: the pose of one of two bodies that are fixed to each other, seen from the
     other.
 
     a, b: [.., n, 4, 4], [.., n, 3, 4], [.., n, 7] or [.., n, 8], in one layout, which the result has as well: n
@@ -39,8 +37,7 @@ def hand_eye(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, weights: nump
     positive weight.
     """
 def rigid(source: numpy.typing.ArrayLike, target: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike | None = None, *, source_directions: numpy.typing.ArrayLike | None = None, target_directions: numpy.typing.ArrayLike | None = None, direction_weights: numpy.typing.ArrayLike | None = None) -> sinew._types.RigidFit[typing.Any]:
-    """
-    The rigid transform that maps `source` to `target` with the smallest weighted sum of squared
+    """The rigid transform that maps `source` to `target` with the smallest weighted sum of squared
     distances.
 
     source, target: [.., n, 3], points. n may be 0 if there are directions; the translation is then 0.

@@ -6,12 +6,9 @@ import sinew.ik
 import typing
 __all__: list[str] = ['METHODS', 'Solver', 'swing_twist_angles']
 class Solver:
-    """
-    A solver for one tree of bones with its limits and effectors. solve() allocates only its result.
-    """
+    """A solver for one tree of bones with its limits and effectors. solve() allocates only its result."""
     def __init__(self, parents: numpy.typing.ArrayLike, effectors: collections.abc.Sequence[sinew.ik.Effector], *, locked: numpy.typing.ArrayLike | None = None, limits: numpy.typing.ArrayLike | None = None, stiffness: numpy.typing.ArrayLike | None = None) -> None:
-        """
-        parents: int32 [bones], the index of each bone's parent, -1 for a root; parents precede their
+        """parents: int32 [bones], the index of each bone's parent, -1 for a root; parents precede their
             children.
         effectors: at least one.
         locked: bool [bones, 3], axes x, y (along the bone) and z about which a bone does not rotate.
@@ -22,8 +19,7 @@ class Solver:
         stiffness: [bones, 3], 0 to below 1: how much less the bone rotates about an axis than about others.
         """
     def solve(self, rest: numpy.typing.ArrayLike, tips: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, poles: numpy.typing.ArrayLike | None = None, *, rotations: numpy.typing.ArrayLike | None = None, root: numpy.typing.ArrayLike | None = None, method: sinew.ik.Method = 'dls', tolerance: float = 1e-06, iterations: typing.SupportsIndex = 100) -> sinew._types.Solution:
-        """
-        Finds rotations that bring the tips to the goals.
+        """Finds rotations that bring the tips to the goals.
 
         rest: [.., bones, 4, 4], [.., bones, 3, 4], [.., bones, 7] or [.., bones, 8]: each bone relative to its
             parent, not rotated. A matrix's linear part is replaced by the nearest rotation.
@@ -49,8 +45,7 @@ class Solver:
         is solved a second time, starting with a rotation to the goal, and the better result is used.
         """
 def swing_twist_angles(rotations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[typing.Any]:
-    """
-    The angles that limits bound, [.., 3], radians. A rotation is decomposed into a twist about y, by the
+    """The angles that limits bound, [.., 3], radians. A rotation is decomposed into a twist about y, by the
     angle y, followed by a swing without twist; x and z are twice the arcsines of the x and z of its quaternion,
     so that for a swing about x alone x is its angle.
 

@@ -5,15 +5,13 @@ import sinew.interpolate
 import typing
 __all__: list[str] = ['METHODS', 'between', 'blend']
 def between(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, t: numpy.typing.ArrayLike, method: sinew.interpolate.Method = 'dlb') -> sinew._types.Blended[typing.Any]:
-    """
-    Interpolates from `a` at t = 0 to `b` at t = 1; other t extrapolate.
+    """Interpolates from `a` at t = 0 to `b` at t = 1; other t extrapolate.
 
     a, b: in the layout of the method, with rotations of unit length.
     t: [..] or a number.
     """
 def blend(transforms: numpy.typing.ArrayLike, weights: numpy.typing.ArrayLike, method: sinew.interpolate.Method = 'dlb', signs: sinew.interpolate.Signs = 'heaviest') -> sinew._types.Blended[typing.Any]:
-    """
-    The blend of the n transforms along the last leading axis; the axes before it broadcast.
+    """The blend of the n transforms along the last leading axis; the axes before it broadcast.
 
     transforms: [.., n, 7] and so on, in the layout of the method, n >= 1, with rotations of unit length.
     weights: [.., n], of any sign, normalised to sum 1. Of two equal ones the first counts as the heavier.

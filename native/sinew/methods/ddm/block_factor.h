@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -58,6 +57,6 @@ inline constexpr std::size_t kSolvedColumns = kGroups * kGroupColumns;
 using SolveBlocks = void(const BlockFactor& factor, double nothing, double* x, std::uint8_t* is_nonzero);
 
 /// For each instruction set.
-extern const std::array<SolveBlocks*, kTargetCount> kSolveBlocks;
+extern const OfTargets<SolveBlocks> kSolveBlocks;
 
 }  // namespace sinew

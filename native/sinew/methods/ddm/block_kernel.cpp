@@ -217,7 +217,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace sinew {
-constinit const std::array<SolveBlocks*, kTargetCount> kSolveBlocks SINEW_TARGETS(solve);
+constinit const OfTargets<SolveBlocks> kSolveBlocks SINEW_TARGETS(solve);
 
 }  // namespace sinew
 

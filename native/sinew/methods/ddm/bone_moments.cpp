@@ -65,20 +65,15 @@ private:
     /// The vertex's rest point as its neighbourhood, with the weights of its influences.
     void add_point(std::size_t b, std::size_t lane, std::vector<BoneRow>& found) const {
         found.clear();
-        const Block& block = mesh_.blocks[b];
         const Lanes<float>* const xyz = &mesh_.rest_points[kPointRows * b];
-        const Lanes<float>* const weights = &mesh_.weights[block.first_weight];
-        for (std::size_t k = 0; k < block.influences; ++k) {
-            const float weight = block.own_bones ? weights[k].lane[lane]
-                                 : k == 0        ? mesh_.first_weights[b].lane[lane]
-                                                 : weights[k - 1].lane[lane];
+        for (std::size_t k = 0; k < mesh_.blocks[b].influences; ++k) {
+            const auto [bone, weight] = influence_at(mesh_, b, lane, k);
             if (weight == 0.0f) continue;
-            const std::size_t bone = block.first_bone + (block.own_bones ? lane * block.influences : 0) + k;
             const Row row{weight, weight * xyz[0].lane[lane], weight * xyz[1].lane[lane],
                           weight * xyz[2].lane[lane]};
-            const auto same = std::ranges::find(found, mesh_.bones[bone], &BoneRow::bone);
+            const auto same = std::ranges::find(found, bone, &BoneRow::bone);
             if (same == found.end()) {
-                found.push_back({mesh_.bones[bone], row});
+                found.push_back({bone, row});
             } else {
                 for (std::size_t i = 0; i < 4; ++i) same->numbers[i] += row[i];
             }

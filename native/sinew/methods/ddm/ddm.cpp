@@ -45,7 +45,7 @@ struct SignedRows : CentreRows {
     static constexpr std::size_t kSignedFloat4s = 1;
 };
 
-/// The bones of a range of blocks, with rows in the form in which they are added.
+/// The bones of a range of blocks, at least one, with rows in the form in which they are added.
 ///
 /// The last 12 numbers of a row apply to points in model space. Unless bones are added plainly, these are
 /// differences from the first bone for all but the first; if signs are resolved, so are the quaternions.
@@ -56,10 +56,8 @@ public:
           bones_(bones),
           from_model_(frame.spaces.bones_from_model),
           count(bone_count) {
-        if (count == 0) return;
-        float least = palette_.sizes[bones[0]];
-        for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette_.sizes[bones[k]]);
-        is_plain = sinew::is_plain(palette_.sizes[bones[0]], least);
+        // Palette::may_be_plain does not know the bones of moments.
+        is_plain = sinew::is_plain(palette_, bones, count);
         // Within 45 degrees of the first, all are within 90 degrees of each other.
         is_resolved = !is_plain && count <= kMaxPrepared &&
                       copy_aligned<SignedRows, true>(palette_, bones, count, rows_) > kCosine45;
@@ -68,7 +66,8 @@ public:
             return;
         }
         const std::size_t prepared = std::min(count, kMaxPrepared);
-        for (std::size_t k = 0; k < prepared; ++k) load(k, rows_ + kDdmNumbers * k);
+        load(0, rows_);
+        for (std::size_t k = 1; k < prepared; ++k) load(k, rows_ + kDdmNumbers * k);
         resolve_signs();
         for (std::size_t k = 1; k < prepared && !is_plain; ++k) {
             subtract_first(rows_ + kDdmNumbers * k, is_resolved ? 0 : 4);
@@ -211,13 +210,10 @@ HWY_INLINE void add_moved(D d, const float* row, const Points<D>* p, const Vec<D
     along(row + 12, &Points<D>::z);
 }
 
-/// Adds a quaternion in the hemisphere of the sum before it. Rounded as by dot().
+/// Adds a quaternion in the hemisphere of the sum before it.
 template <class D>
 HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
-    const Vec<D> along =
-        hn::Add(hn::Add(hn::Mul(hn::Set(d, q[0]), sum[0]), hn::Mul(hn::Set(d, q[2]), sum[2])),
-                hn::Add(hn::Mul(hn::Set(d, q[1]), sum[1]), hn::Mul(hn::Set(d, q[3]), sum[3])));
-    const Vec<D> by = hn::IfThenElse(hn::Lt(along, hn::Zero(d)), hn::Neg(weight), weight);
+    const Vec<D> by = hn::IfThenElse(hn::Lt(dot(d, q, sum), hn::Zero(d)), hn::Neg(weight), weight);
     for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(by, hn::Set(d, q[i]), sum[i]);
 }
 
@@ -361,8 +357,7 @@ HWY_INLINE Vec<D> largest(const Points<D>& r) {
 /// R(q)^T m.
 template <class D>
 HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
-    const Vec<D> norm =
-        hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
+    const Vec<D> norm = squared_norm<D>(q);
     const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), norm);
     const Vec<D> x = hn::Mul(scale, q[1]);
     const Vec<D> y = hn::Mul(scale, q[2]);
@@ -510,9 +505,8 @@ template <class D>
 HWY_INLINE hn::Mask<D> is_point_at(D d, const float* second, const Points<D>& centroid) {
     const Points<D> diagonal = load_point(d, second, 0);
     const Vec<D> extent = hn::Add(diagonal.x, hn::Add(diagonal.y, diagonal.z));
-    const Vec<D> square = hn::MulAdd(centroid.x, centroid.x,
-                                     hn::MulAdd(centroid.y, centroid.y, hn::Mul(centroid.z, centroid.z)));
-    return hn::Not(hn::Gt(extent, hn::Mul(hn::Set(d, static_cast<float>(kLeastExtent)), square)));
+    const Vec<D> least = hn::Mul(hn::Set(d, static_cast<float>(kLeastExtent)), dot<D>(centroid, centroid));
+    return hn::Not(hn::Gt(extent, least));
 }
 
 /// Adds to `sum` the displacements by the bones' scales, with the weights of lane `lane` in block `b`.

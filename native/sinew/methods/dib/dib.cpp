@@ -210,10 +210,7 @@ HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, st
         scalar = hn::Sub(scalar, dot<D>(translation, axis));
         vector = add_cross<D>(add_scaled<D>(vector, q[0], translation), translation, axis);
     }
-    const Vec<D> squared =
-        hn::MulAdd(real[0], real[0],
-                   hn::MulAdd(real[1], real[1], hn::MulAdd(real[2], real[2], hn::Mul(real[3], real[3]))));
-    const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared));
+    const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared_norm<D>(real)));
     for (std::size_t i = 0; i < 4; ++i) blend.rotation[i] = hn::Mul(scale, real[i]);
     const Points<D> axis{blend.rotation[1], blend.rotation[2], blend.rotation[3]};
     const Points<D> translation =

@@ -28,11 +28,10 @@ struct DqKernel {
         Points<D> by;
         if (!scaled(d, palette, bone, rest, by)) return;
         const float* const row = row_of(palette, bone);
-        const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
+        const Points<D> axis = in_all_lanes(d, row + 1);
         const Points<D> rotated = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
         const Vec<D> half = hn::Mul(signed_weight, hn::Set(d, 0.5f));
-        const Vec<D> along = hn::MulAdd(axis.x, by.x, hn::MulAdd(axis.y, by.y, hn::Mul(axis.z, by.z)));
-        sum.value[4] = hn::NegMulAdd(half, along, sum.value[4]);
+        sum.value[4] = hn::NegMulAdd(half, dot<D>(axis, by), sum.value[4]);
         sum.value[5] = hn::MulAdd(half, rotated.x, sum.value[5]);
         sum.value[6] = hn::MulAdd(half, rotated.y, sum.value[6]);
         sum.value[7] = hn::MulAdd(half, rotated.z, sum.value[7]);
@@ -43,10 +42,7 @@ struct DqKernel {
     static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
         const Vec<D>* const real = sum.value;
         const Vec<D>* const dual = sum.value + 4;
-        const Vec<D> squared_norm =
-            hn::MulAdd(real[0], real[0],
-                       hn::MulAdd(real[1], real[1], hn::MulAdd(real[2], real[2], hn::Mul(real[3], real[3]))));
-        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm<D>(real));
         const Points<D> axis{real[1], real[2], real[3]};
         const Points<D> translation{dual[1], dual[2], dual[3]};
         const Points<D> inner = add_cross<D>(add_scaled<D>(translation, real[0], p), axis, p);
@@ -58,15 +54,13 @@ struct DqKernel {
 
     static HWY_INLINE void write_row(const Quats& real, const BonePoints& translation, BoneVec* row) {
         const BoneTag d;
-        const BoneVec half = hn::Set(d, 0.5);
-        const BonePoints by{hn::Mul(half, translation.x), hn::Mul(half, translation.y),
-                            hn::Mul(half, translation.z)};
+        const BonePoints by = times<BoneTag>(hn::Set(d, 0.5), translation);
         const BonePoints dual = add_scaled<BoneTag>(cross<BoneTag>(by, real.v), real.w, by);
         row[0] = real.w;
         row[1] = real.v.x;
         row[2] = real.v.y;
         row[3] = real.v.z;
-        row[4] = hn::Neg(dot(by, real.v));
+        row[4] = hn::Neg(dot<BoneTag>(by, real.v));
         row[5] = dual.x;
         row[6] = dual.y;
         row[7] = dual.z;

@@ -244,7 +244,7 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
         Vec3<float>* const to = &frame.points[frame.mesh->vertices[b].lane[lane]];
-        if (is_plain(*frame.palette, bones, block.influences)) {
+        if (is_added_plainly(*frame.palette, bones, block.influences)) {
             deform_plain_vertex(frame, bones, block.influences, rest + lane, weights + lane, to);
         } else {
             deform_vertex<false>(frame, bones, block.influences, rest + lane, weights + lane, to);
@@ -261,7 +261,7 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const float* const weights = weights_of(pointers, b);
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
-        const bool plain = is_plain(*frame.palette, bones, block.influences);
+        const bool plain = is_added_plainly(*frame.palette, bones, block.influences);
         const Points<One> p = load_points(d, pointers, b, lane);
         Points<One> sum = p;
         const Columns first{columns_of_bone(frame, bones[0])};
@@ -282,7 +282,7 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
 
 void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     const Block& block = frame.mesh->blocks[begin];
-    if (is_plain(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
+    if (is_added_plainly(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
         return deform_plain_set(frame, begin, end);
     }
     // With a fixed count the loop is unrolled.

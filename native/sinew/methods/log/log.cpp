@@ -39,26 +39,19 @@ struct LogKernel {
         const Points<D> angular{sum.value[0], sum.value[1], sum.value[2]};
         const Points<D> linear{sum.value[4], sum.value[5], sum.value[6]};
         const Vec<D> half = hn::Set(d, 0.5f);
-        const Points<D> by_half{hn::Mul(half, angular.x), hn::Mul(half, angular.y), hn::Mul(half, angular.z)};
-        const Vec<D> y =
-            hn::MulAdd(by_half.x, by_half.x, hn::MulAdd(by_half.y, by_half.y, hn::Mul(by_half.z, by_half.z)));
-        const ExponentialFactors<D> by(d, y);
+        const Points<D> by_half = times<D>(half, angular);
+        const ExponentialFactors<D> by(d, dot<D>(by_half, by_half));
         const Vec<D> sinc = by.sinc;
         const Vec<D> w = by.cosine;
-        const Points<D> axis{hn::Mul(sinc, by_half.x), hn::Mul(sinc, by_half.y), hn::Mul(sinc, by_half.z)};
+        const Points<D> axis = times<D>(sinc, by_half);
         // Dividing by its squared length makes the quaternion a rotation even where rounding changed its length.
-        const Vec<D> squared_norm =
-            hn::MulAdd(w, w, hn::MulAdd(axis.x, axis.x, hn::MulAdd(axis.y, axis.y, hn::Mul(axis.z, axis.z))));
-        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), hn::MulAdd(w, w, dot<D>(axis, axis)));
         const Points<D> inner = add_scaled<D>(cross<D>(axis, p), w, p);
         const Points<D> rotated = add_scaled<D>(p, scale, cross<D>(axis, inner));
         // linear + (sinc^2 / 2) angular x linear + rest angular x (angular x linear).
         const Points<D> across = cross<D>(angular, linear);
         const Vec<D> first = hn::Mul(half, hn::Mul(sinc, sinc));
-        const Vec<D> second = by.third;
-        const Points<D> terms = add_cross<D>(
-            {hn::Mul(first, across.x), hn::Mul(first, across.y), hn::Mul(first, across.z)}, angular,
-            {hn::Mul(second, across.x), hn::Mul(second, across.y), hn::Mul(second, across.z)});
+        const Points<D> terms = add_cross<D>(times<D>(first, across), angular, times<D>(by.third, across));
         return add<D>(rotated, add<D>(linear, terms));
     }
 
@@ -71,7 +64,7 @@ struct LogKernel {
         static constexpr double kArcTangent[] = {
             1.0,         -1.0 / 3.0, 1.0 / 5.0,   -1.0 / 7.0, 1.0 / 9.0,   -1.0 / 11.0, 1.0 / 13.0,
             -1.0 / 15.0, 1.0 / 17.0, -1.0 / 19.0, 1.0 / 21.0, -1.0 / 23.0, 1.0 / 25.0,  -1.0 / 27.0};
-        const BoneVec sine_squared = dot(q.v, q.v);
+        const BoneVec sine_squared = dot<BoneTag>(q.v, q.v);
         const BoneVec more = hn::Add(one, q.w);
         const BoneVec quarter_squared = hn::Div(sine_squared, hn::Mul(more, more));
         const BoneVec root = hn::Add(one, hn::Sqrt(hn::Add(one, quarter_squared)));
@@ -79,10 +72,10 @@ struct LogKernel {
         // The angle over the sine of half the angle.
         const BoneVec factor = hn::Div(hn::Mul(hn::Set(d, 8.0), polynomial(d, eighth_squared, kArcTangent)),
                                        hn::Mul(more, root));
-        const BonePoints angular{hn::Mul(factor, q.v.x), hn::Mul(factor, q.v.y), hn::Mul(factor, q.v.z)};
+        const BonePoints angular = times<BoneTag>(factor, q.v);
         // (1 - x cot(x)) / 4 x^2 with x half the angle; the series where the difference would cancel.
         static constexpr double kSeries[] = {1.0 / 12.0, 1.0 / 720.0, 1.0 / 30240.0};
-        const BoneVec angle_squared = dot(angular, angular);
+        const BoneVec angle_squared = dot<BoneTag>(angular, angular);
         const BoneVec cotangent = hn::Mul(hn::Set(d, 0.5), hn::Mul(factor, q.w));
         const BoneVec third =
             hn::IfThenElse(hn::Lt(angle_squared, hn::Set(d, 4e-4)), polynomial(d, angle_squared, kSeries),

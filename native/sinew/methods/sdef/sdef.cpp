@@ -73,9 +73,7 @@ HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, 
     const Vec<D> half = hn::IfThenElseZero(is_used, hn::Set(d, 0.5f));
     const Points<D> c{hn::IfThenElse(is_used, centre.x, rest.x), hn::IfThenElse(is_used, centre.y, rest.y),
                       hn::IfThenElse(is_used, centre.z, rest.z)};
-    const Points<D> between{hn::Mul(half, hn::Sub(first.x, second.x)),
-                            hn::Mul(half, hn::Sub(first.y, second.y)),
-                            hn::Mul(half, hn::Sub(first.z, second.z))};
+    const Points<D> between = times<D>(half, subtract<D>(first, second));
     // The midpoints of the definition: R0 minus the weighted mean of R0 and R1 is the second weight times R0 -
     // R1.
     const Points<D> midpoints[2] = {add_scaled<D>(c, weights[1], between),
@@ -86,9 +84,7 @@ HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, 
         Points<D> by;
         if (scaled(d, palette, pair.bones[k], rest, by))
             moved = add<D>(moved, rotated_by(d, pair.rows[k], by));
-        displacement = k == 0 ? Points<D>{hn::Mul(weights[0], moved.x), hn::Mul(weights[0], moved.y),
-                                          hn::Mul(weights[0], moved.z)}
-                              : add_scaled<D>(displacement, weights[1], moved);
+        displacement = k == 0 ? times<D>(weights[0], moved) : add_scaled<D>(displacement, weights[1], moved);
     }
     const Vec<D> first_share = kSlerp ? slerp_weight(d, weights[0], pair.squared_angle) : weights[0];
     const Vec<D> second_share =
@@ -98,8 +94,7 @@ HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, 
         rotation[i] = hn::MulAdd(second_share, hn::Set(d, pair.rows[1][i]),
                                  hn::Mul(first_share, hn::Set(d, pair.rows[0][i])));
     }
-    const Points<D> from_centre{hn::Sub(rest.x, c.x), hn::Sub(rest.y, c.y), hn::Sub(rest.z, c.z)};
-    return add<D>(rest, add_rotation(d, displacement, rotation, from_centre));
+    return add<D>(rest, add_rotation(d, displacement, rotation, subtract<D>(rest, c)));
 }
 
 template <bool kSlerp, class D>

@@ -20,16 +20,13 @@ namespace HWY_NAMESPACE {
 /// The point of the bone's segment nearest to `p`.
 template <class D>
 HWY_INLINE Points<D> nearest_of_segment(D d, const BulgeBone& bone, const Points<D>& p) {
-    const float* const head = bone.head.value.data();
-    const float* const along = bone.along.value.data();
     const float* const share = bone.share.value.data();
     const Vec<D> t = hn::MulAdd(
         p.x, hn::Set(d, share[0]),
         hn::MulAdd(p.y, hn::Set(d, share[1]), hn::MulAdd(p.z, hn::Set(d, share[2]), hn::Set(d, share[3]))));
     const Vec<D> within = hn::Min(hn::Max(t, hn::Zero(d)), hn::Set(d, 1.0f));
-    return {hn::MulAdd(within, hn::Set(d, along[0]), hn::Set(d, head[0])),
-            hn::MulAdd(within, hn::Set(d, along[1]), hn::Set(d, head[1])),
-            hn::MulAdd(within, hn::Set(d, along[2]), hn::Set(d, head[2]))};
+    return add_scaled<D>(in_all_lanes(d, bone.head.value.data()), within,
+                         in_all_lanes(d, bone.along.value.data()));
 }
 
 /// Limits the points of some lanes.
@@ -169,21 +166,15 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
     const MeshPointers pointers = pointers_of(frame);
     constexpr auto kAllowance = static_cast<float>(BulgeLimitStage::kAllowance);
     for (std::size_t b = begin; b < end; ++b) {
-        const Block& block = pointers.blocks[b];
-        const float* const weights = weights_of(pointers, b);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
-            const std::int32_t* const bones =
-                frame.mesh->bones.data() + block.first_bone + (block.own_bones ? block.influences * lane : 0);
             const Points<One> p = to_bones(d, frame.spaces, load_deformed(d, pointers, b, lane));
             float mean = 0.0f;
             Points<One> nearest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
             float of_heaviest = 0.0f;
             float most = 0.0f;
-            for (std::size_t k = 0; k < block.influences; ++k) {
-                const float weight = block.own_bones ? weights[kLanes * k + lane]
-                                     : k == 0        ? frame.mesh->first_weights[b].lane[lane]
-                                                     : weights[kLanes * (k - 1) + lane];
-                const auto own = nearest_of_segment(d, frame.bones[static_cast<std::size_t>(bones[k])], p);
+            for (std::size_t k = 0; k < pointers.blocks[b].influences; ++k) {
+                const auto [bone, weight] = influence_at(*frame.mesh, b, lane, k);
+                const auto own = nearest_of_segment(d, frame.bones[static_cast<std::size_t>(bone)], p);
                 nearest = add_scaled<One>(nearest, hn::Set(d, weight), own);
                 const float distance = length_of(subtract<One>(own, p));
                 mean += weight * distance;

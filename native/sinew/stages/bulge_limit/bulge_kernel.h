@@ -32,7 +32,7 @@ struct BulgeFrame {
 
 /// Functions for blocks [begin, end), compiled once for each instruction set.
 struct BulgeKernel {
-    std::array<void (*)(const BulgeFrame& frame, std::size_t begin, std::size_t end), kTargetCount> limit;
+    OfTargets<void(const BulgeFrame& frame, std::size_t begin, std::size_t end)> limit;
     /// Writes the distances of the points, which must be at rest.
     decltype(limit) measure;
 };

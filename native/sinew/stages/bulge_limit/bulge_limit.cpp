@@ -42,16 +42,14 @@ bool is_orthonormal(const Mat3<double>& m) {
 struct BulgeLimit::State {
     State(const Binding& binding, const BulgeLimitData& data);
 
-    void measure(std::span<const Vec3<float>> points, const Affine<float>& space);
+    void measure(std::vector<Vec3<float>> points, const Affine<float>& space);
     [[nodiscard]] BulgeFrame frame(std::span<Vec3<float>> points) const;
 
     std::shared_ptr<const PackedBinding> packed;
     const PackedMesh& mesh = packed->mesh;
-    std::vector<Vec3<float>> rest_points;
     std::vector<BoneSegment<float>> segments;  // for each of mesh.used_bones
     std::vector<Lanes<float>> weights;         // [blocks], or empty
     std::vector<Lanes<float>> distances[2];    // as in BulgeFrame
-    Affine<float> bones_from_model;
     SpaceRows space_rows{Affine<float>{}};
     mutable std::vector<BulgeBone> bones;  // scratch for one call
     mutable ForkSafeMutex mutex;
@@ -83,14 +81,12 @@ BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
             points.data()};
 }
 
-void BulgeLimit::State::measure(std::span<const Vec3<float>> points, const Affine<float>& space) {
-    bones_from_model = space;
+void BulgeLimit::State::measure(std::vector<Vec3<float>> points, const Affine<float>& space) {
     space_rows = SpaceRows(space);
-    rest_points.assign(points.begin(), points.end());
     for (std::size_t i = 0; i < bones.size(); ++i) {
         bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
     }
-    const BulgeFrame all = frame(rest_points);
+    const BulgeFrame all = frame(points);
     parallel_for_blocks(mesh, points.size(), 0, [&](std::size_t begin, std::size_t end) {
         kBulgeKernel.measure[target_in_use()](all, begin, end);
     });
@@ -104,7 +100,7 @@ void BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
     check_points(rest_points, vertex_count());
     check_space(bones_from_model);
     const std::scoped_lock lock(state_->mutex);
-    state_->measure(rest_points, bones_from_model);
+    state_->measure({rest_points.begin(), rest_points.end()}, bones_from_model);
 }
 
 std::size_t BulgeLimit::vertex_count() const noexcept { return state_->packed->vertex_count; }
@@ -136,22 +132,6 @@ bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
         kBulgeKernel.limit[target_in_use()](frame, begin, end);
     });
     return true;
-}
-
-BulgeLimit::Parts BulgeLimit::parts() const {
-    const State& state = *state_;
-    const std::scoped_lock lock(state.mutex);
-    Parts parts{bound_mesh(state.mesh, state.mesh.rest_points, vertex_count(), bone_count()),
-                {},
-                state.bones_from_model,
-                {}};
-    parts.mesh.rest_points = state.rest_points;
-    parts.segments.resize(bone_count());
-    for (std::size_t i = 0; i < state.segments.size(); ++i) {
-        parts.segments[static_cast<std::size_t>(state.mesh.used_bones[i])] = state.segments[i];
-    }
-    if (!state.weights.empty()) parts.weights = unpack_values(state.mesh, state.weights, vertex_count());
-    return parts;
 }
 
 }  // namespace sinew

@@ -100,10 +100,7 @@ Amount amount_of(const MushMesh& mesh, std::span<const Vec3<float>> rest_points,
 
 struct DeltaMush::State {
     State(const MeshTopology& topology, std::size_t vertices)
-        : face_offsets(topology.face_offsets.begin(), topology.face_offsets.end()),
-          corner_vertices(topology.corner_vertices.begin(), topology.corner_vertices.end()),
-          edges(topology.edges.begin(), topology.edges.end()),
-          mesh(make_mush_mesh(topology, vertices)),
+        : mesh(make_mush_mesh(topology, vertices)),
           kept(vertices + kLanes),
           smoothed{std::vector<Float4>(vertices + kLanes), std::vector<Float4>(vertices + kLanes)} {}
 
@@ -111,9 +108,7 @@ struct DeltaMush::State {
 
     /// What bind() sets.
     struct Bound {
-        std::vector<Vec3<float>> rest_points;
-        std::vector<float> weights;
-        DeltaMushSettings settings;
+        SmoothType type;
         std::size_t iterations;
         std::vector<float> factors;        // as in MushFrame, with room for one more vector
         bool is_uniform;                   // as in MushFrame
@@ -126,11 +121,6 @@ struct DeltaMush::State {
     [[nodiscard]] std::size_t threads_for(std::size_t threads) const noexcept {
         return useful_threads(threads, mesh.vertices.size(), kMushVerticesWorthAThread);
     }
-
-    // The data given to the constructor.
-    std::vector<std::int32_t> face_offsets;
-    std::vector<std::int32_t> corner_vertices;
-    std::vector<std::int32_t> edges;
 
     MushMesh mesh;
     // One pointer: a child that is forked during bind() has all or nothing of it.
@@ -147,19 +137,14 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
     Amount amount = amount_of(mesh, points, with);
     amount.factors.resize(mesh.vertices.size() + kLanes);
     auto made =
-        std::make_unique<Bound>(Bound{{points.begin(), points.end()},
-                                      {with.weights.begin(), with.weights.end()},
-                                      with,
-                                      amount.iterations,
-                                      std::move(amount.factors),
+        std::make_unique<Bound>(Bound{with.type, amount.iterations, std::move(amount.factors),
                                       with.weights.empty() && !with.pin_boundary && with.radius == 0.0f,
                                       std::vector<MushDetails>(mesh.detail_count)});
-    made->settings.weights = {};
-    for (float& weight : made->weights) weight = std::clamp(weight, 0.0f, 1.0f);
     const float by_type = with.type == SmoothType::length_weighted ? 2.0f : 1.0f;
     for (const MushRun& run : mesh.runs) {
         for (std::size_t i = run.begin; i < run.end && run.valence > 0; ++i) {
-            const float weight = made->weights.empty() ? 1.0f : made->weights[mesh.vertices[i]];
+            const float weight =
+                with.weights.empty() ? 1.0f : std::clamp(with.weights[mesh.vertices[i]], 0.0f, 1.0f);
             const bool is_pinned = with.pin_boundary && mesh.on_boundary[i] != 0;
             made->factors[i] *= is_pinned ? 0.0f : by_type * weight / static_cast<float>(run.valence);
         }
@@ -167,7 +152,7 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
 
     const std::scoped_lock lock(mutex);
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-        kept[i] = smoothed[0][i] = float4_of(made->rest_points[mesh.vertices[i]]);
+        kept[i] = smoothed[0][i] = float4_of(points[mesh.vertices[i]]);
     }
     // Uses the kernels that smooth each frame, so that the rest pose is reproduced.
     const std::size_t result = smooth(*made, threads_for(0));
@@ -241,7 +226,7 @@ private:
 
 std::size_t DeltaMush::State::smooth(const Bound& of, std::size_t threads) const noexcept {
     if (mesh.vertices.empty()) return 0;
-    const bool by_length = of.settings.type == SmoothType::length_weighted;
+    const bool by_length = of.type == SmoothType::length_weighted;
     const auto smooth_chunk =
         (by_length ? kMushKernel.smooth_by_length : kMushKernel.smooth)[target_in_use()];
     const Iterations together(mesh, threads);
@@ -273,15 +258,6 @@ std::size_t DeltaMush::vertex_count() const noexcept { return state_->mesh.verti
 std::size_t DeltaMush::iterations() const noexcept {
     const std::scoped_lock lock(state_->mutex);
     return state_->bound->iterations;
-}
-
-DeltaMush::Parts DeltaMush::parts() const {
-    const State& state = *state_;
-    const std::scoped_lock lock(state.mutex);
-    return {{state.face_offsets, state.corner_vertices, state.edges},
-            state.bound->rest_points,
-            state.bound->settings,
-            state.bound->weights};
 }
 
 bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -87,8 +86,7 @@ struct MushFrame {
 
 /// Functions for chunks [begin, end), compiled once for each instruction set.
 struct MushKernel {
-    using OfChunks =
-        std::array<void (*)(const MushFrame& frame, std::size_t begin, std::size_t end), kTargetCount>;
+    using OfChunks = OfTargets<void(const MushFrame& frame, std::size_t begin, std::size_t end)>;
 
     OfChunks smooth;
     OfChunks smooth_by_length;

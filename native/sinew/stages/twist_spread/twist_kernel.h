@@ -9,50 +9,76 @@
 
 namespace sinew {
 
-/// A rotation about a line by any angle: what sine and 1 - cosine add to a point, by rows of three numbers.
-struct Spin {
+/// A line, and two axes of length 1 that are perpendicular to it and to each other.
+struct TwistLine {
     float origin[3];
-    float sine[9];
-    float versine[9];
+    float axes[2][3];
 };
 
-/// A bone whose vertices are twisted in this frame.
+/// A bone at rest, whose vertices may be twisted.
+struct TwistRest {
+    TwistLine line;
+    float share[4];  // of a rest point (x, y, z, 1): 0 at the head, 1 at the tail
+};
+
+/// The same bone in one frame.
 struct TwistedBone {
-    Spin rest;               // about the axis at rest, followed by the linear part of the bone's motion
-    Spin posed;              // about the posed axis
+    bool is_twisted = false;  // if not, nothing else is set
+    bool is_scaled;
+    bool has_axis;       // the posed axis has a direction
+    bool is_short;       // no vertex goes beyond half a turn
+    float images[2][3];  // of the axes at rest, by the linear part of the bone's motion
+    TwistLine posed;
     float displacement[12];  // the bone's motion, as in write_displacement()
-    float share[4];          // of a rest point (x, y, z, 1): 0 at the head, 1 at the tail
     float curve;
-    float angle;   // turns
-    float offset;  // turns, added to the angle times the share
+    float angle;   // half of it, radians
+    float offset;  // likewise, added to the angle times the share
     float around;  // as in TwistSpreadStage::Bone
     float part;    // the same
-    bool is_scaled;
-    bool has_axis;              // the posed axis has a direction
-    const std::uint8_t* below;  // for each of PackedMesh::used_bones, whether it is beyond the twist
+};
+
+/// What a twist has to do with the vertices of a block.
+struct BlockTwist {
+    Lanes<float> share{};     // 0 at the bone's head, 1 at its tail
+    Lanes<float> arms[2]{};   // the vertex's distances from the line along the axes, times `weight`
+    Lanes<float> weight{};    // of the bone
+    Lanes<float> below{};     // as for TwistSpreadStage::left_out()
+    std::size_t twist;        // into TwistFrame::bones
+    bool has_weight = false;  // else bones beyond the twist share vertices with others
+};
+
+/// A block, and its twists: those that other bones carry first.
+struct TwistBlock {
+    std::size_t block;
+    std::size_t begin;  // into TwistFrame::block_twists
+    std::size_t end;
 };
 
 /// The arguments of one call of the kernel.
 struct TwistFrame {
     const PackedMesh* mesh;
     const Lanes<float>* rest_points;
-    const TwistedBone* twisted;  // those that other bones carry first
-    std::size_t twisted_count;
-    const std::int32_t* twisted_of_bone;  // for each of PackedMesh::used_bones, -1 for none
-    const Lanes<float>* weights;          // [blocks]; null if all are 1
-    const Lanes<float>* mix;              // [blocks]; null if all are 0
-    TwistBlend blend;
-    TwistBlend mix_blend;
-    bool goes_around;  // a bone is farther than the shorter way, and a method blends the shorter way
+    const TwistBlock* blocks;
+    BlockTwist* block_twists;     // output of measure
+    const TwistRest* rest;        // [twists] of measure
+    const TwistedBone* bones;     // [twists]
+    const Lanes<float>* weights;  // [PackedMesh::blocks]; null if all are 1
+    const Lanes<float>* mix;      // the same; null if all are 0
+    TwistBlend blend = TwistBlend::linear;
+    TwistBlend mix_blend = TwistBlend::linear;
+    bool goes_around = false;  // a bone is farther than the shorter way, and a method blends the shorter way
     Spaces spaces;
     Vec3<float>* points;
 };
 
-/// Twists the points of blocks [begin, end), by the kernel for the instruction set in use.
-void spread_twists(const TwistFrame& frame, std::size_t begin, std::size_t end) noexcept;
+/// Functions for `blocks` [begin, end), compiled once for each instruction set.
+struct TwistKernel {
+    OfTargets<void(const TwistFrame& frame, std::size_t begin, std::size_t end)> spread;
+    /// Writes BlockTwist::share and arms for the rest points.
+    decltype(spread) measure;
+};
+extern const TwistKernel kTwistKernel;
 
-/// The rotation about an axis of length 1, followed by a linear map.
-[[nodiscard]] Spin spin(const Vec3<double>& origin, const Vec3<double>& axis,
-                        const Mat3<double>& then) noexcept;
+[[nodiscard]] TwistLine twist_line(const Vec3<double>& origin, const Vec3<double>& axis) noexcept;
 
 }  // namespace sinew

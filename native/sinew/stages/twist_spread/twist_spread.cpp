@@ -5,7 +5,6 @@
 #include <cmath>
 #include <mutex>
 #include <string>
-#include <utility>
 
 #include "sinew/base/fork_safe.h"
 #include "sinew/mesh/check_bind_data.h"
@@ -86,63 +85,109 @@ Quat<double> rotation_between(const Affine<double>& base, const Affine<double>& 
 struct TwistSpread::State {
     State(const Binding& binding, const TwistSpreadData& data);
 
-    void set_rest_points(std::span<const Vec3<float>> points, const Affine<float>& space);
+    /// Measures the vertices' shares and arms in the space of the bones.
+    void measure(const Affine<float>& space);
+    [[nodiscard]] TwistFrame frame(std::span<Vec3<float>> points) const noexcept;
     [[nodiscard]] Affine<double> motion(std::span<const Affine<float>> posed,
                                         std::int32_t bone) const noexcept;
     [[nodiscard]] TwistSpreadStage::Reading<double> read(
         std::size_t twist, std::span<const Affine<float>> posed,
         std::span<const TwistChannels<float>> channels) const noexcept;
-    /// Fills twisted and twisted_of_bone.
-    void prepare(std::span<const Affine<float>> posed, const TwistSpreadOptions& options) const noexcept;
+    /// Lists blocks and block_twists.
+    ///
+    /// parents  TwistSpreadData::parents
+    void list_blocks(std::span<const std::int32_t> parents);
+    /// Fills `bones`. Returns whether one is twisted.
+    bool prepare(std::span<const Affine<float>> posed, const TwistSpreadOptions& options) const noexcept;
 
     std::shared_ptr<const PackedBinding> packed;
     const PackedMesh& mesh = packed->mesh;
     std::vector<TwistBone> twists;
     std::vector<Affine<float>> rest_bones;
-    std::vector<std::int32_t> parents;
-    std::vector<std::int32_t> used;  // for each of twists, its index in mesh.used_bones, or -1
-    std::vector<std::vector<std::uint8_t>> are_below;  // for each of twists: see below()
-    std::vector<Lanes<float>> own_rest_points;         // empty: use those of the binding
-    std::vector<Lanes<float>> weights;                 // [blocks], or empty
-    std::vector<Lanes<float>> mix;                     // [blocks], or empty
-    Affine<float> bones_from_model;
+    std::vector<TwistRest> rest;  // [twists]
+    std::vector<TwistBlock> blocks;
+    std::vector<BlockTwist> block_twists;
+    std::vector<Lanes<float>> own_rest_points;  // empty: use those of the binding
+    std::vector<Lanes<float>> weights;          // [PackedMesh::blocks], or empty
+    std::vector<Lanes<float>> mix;              // the same
     SpaceRows space_rows{Affine<float>{}};
-    // Scratch for one call.
-    mutable std::vector<TwistedBone> twisted;
-    mutable std::vector<std::int32_t> twisted_of_bone;
+    mutable std::vector<TwistedBone> bones;  // [twists] scratch for one call
     mutable ForkSafeMutex mutex;
 };
 
 TwistSpread::State::State(const Binding& binding, const TwistSpreadData& data)
     : packed(binding.packed()),
       twists(data.twists.begin(), data.twists.end()),
-      rest_bones(data.rest_bones.begin(), data.rest_bones.end()),
-      parents(data.parents.begin(), data.parents.end()),
-      bones_from_model(data.bones_from_model) {
+      rest_bones(data.rest_bones.begin(), data.rest_bones.end()) {
     check_rest_bones(rest_bones, packed->bone_count);
     check_twists(twists, rest_bones);
-    check_parents(parents, rest_bones.size());
+    check_parents(data.parents, rest_bones.size());
     if (!data.weights.empty()) check_weights("weights", data.weights, packed->vertex_count);
     if (!data.mix.empty()) check_weights("mix", data.mix, packed->vertex_count);
-    check_space(bones_from_model);
-    space_rows = SpaceRows(bones_from_model);
+    check_space(data.bones_from_model);
     weights = pack_weights(mesh, data.weights);
     mix = pack_weights(mesh, data.mix);
+    bones.resize(twists.size());
+    list_blocks(data.parents);
     for (const TwistBone& twist : twists) {
-        const auto found = std::ranges::lower_bound(mesh.used_bones, twist.bone);
-        const bool is_used = found != mesh.used_bones.end() && *found == twist.bone;
-        used.push_back(is_used ? static_cast<std::int32_t>(found - mesh.used_bones.begin()) : -1);
-        are_below.push_back(below(twist.tip, parents, mesh.used_bones));
+        const auto bone = cast<double>(rest_bones[static_cast<std::size_t>(twist.bone)]);
+        const Vec3<double> along = Vec3<double>(twist.tail) - Vec3<double>(twist.head);
+        const double squared = glm::dot(along, along);
+        const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
+        const Float4 row = float4(share.x, share.y, share.z, -glm::dot(share, Vec3<double>(twist.head)));
+        TwistRest& of = rest.emplace_back();
+        of.line = twist_line(bone.translation, glm::normalize(bone.linear[1]));
+        std::ranges::copy(row.value, of.share);
     }
-    twisted.reserve(twists.size());
-    twisted_of_bone.resize(mesh.used_bones.size());
+    measure(data.bones_from_model);
 }
 
-void TwistSpread::State::set_rest_points(std::span<const Vec3<float>> points, const Affine<float>& space) {
-    own_rest_points.resize(kPointRows * mesh.blocks.size());
-    pack_points(mesh, points, own_rest_points);
-    bones_from_model = space;
+void TwistSpread::State::list_blocks(std::span<const std::int32_t> parents) {
+    std::vector<std::vector<std::uint8_t>> are_below;
+    for (const TwistBone& twist : twists) are_below.push_back(below(twist.tip, parents, mesh.used_bones));
+    for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
+        const std::size_t first = block_twists.size();
+        // The last first: those that other bones carry.
+        for (std::size_t i = twists.size(); i-- > 0;) {
+            BlockTwist twist{.twist = i};
+            bool is_shared = false;
+            for (std::size_t lane = 0; lane < kLanes; ++lane) {
+                bool has_others = false;
+                for (std::size_t k = 0; k < mesh.blocks[b].influences; ++k) {
+                    const auto [bone, weight] = influence_at(mesh, b, lane, k);
+                    if (weight == 0.0f) continue;
+                    const bool is_below = are_below[i][static_cast<std::size_t>(bone)] != 0;
+                    if (is_below) twist.below.lane[lane] += weight;
+                    has_others = has_others || !is_below;
+                    if (mesh.used_bones[static_cast<std::size_t>(bone)] != twists[i].bone) continue;
+                    twist.weight.lane[lane] += weight;
+                    twist.has_weight = true;
+                }
+                is_shared = is_shared || (has_others && twist.below.lane[lane] > 0.0f);
+            }
+            if (twist.has_weight || is_shared) block_twists.push_back(twist);
+        }
+        if (block_twists.size() > first) blocks.push_back({b, first, block_twists.size()});
+    }
+}
+
+TwistFrame TwistSpread::State::frame(std::span<Vec3<float>> points) const noexcept {
+    return {.mesh = &mesh,
+            .rest_points = own_rest_points.empty() ? mesh.rest_points.data() : own_rest_points.data(),
+            .blocks = blocks.data(),
+            // measure() alone writes them, and no other call runs at the same time.
+            .block_twists = const_cast<BlockTwist*>(block_twists.data()),
+            .rest = rest.data(),
+            .bones = bones.data(),
+            .weights = weights.empty() ? nullptr : weights.data(),
+            .mix = mix.empty() ? nullptr : mix.data(),
+            .spaces = space_rows.spaces(),
+            .points = points.data()};
+}
+
+void TwistSpread::State::measure(const Affine<float>& space) {
     space_rows = SpaceRows(space);
+    kTwistKernel.measure[target_in_use()](frame({}), 0, blocks.size());
 }
 
 Affine<double> TwistSpread::State::motion(std::span<const Affine<float>> posed,
@@ -169,51 +214,49 @@ TwistSpreadStage::Reading<double> TwistSpread::State::read(
     return TwistSpreadStage::read(rotation, axis, expected);
 }
 
-void TwistSpread::State::prepare(std::span<const Affine<float>> posed,
+bool TwistSpread::State::prepare(std::span<const Affine<float>> posed,
                                  const TwistSpreadOptions& options) const noexcept {
-    twisted.clear();
-    std::ranges::fill(twisted_of_bone, -1);
+    bool any = false;
     const double amount = within(options.amount, 0.0f, 1.0f, 1.0f);
-    // The last first: those that other bones carry.
-    for (std::size_t twist = twists.size(); twist-- > 0;) {
+    for (std::size_t twist = 0; twist < twists.size(); ++twist) {
+        TwistedBone& bone = bones[twist];
+        bone.is_twisted = false;
         const double own = options.amounts.empty() ? 1.0 : within(options.amounts[twist], 0.0f, 1.0f, 1.0f);
-        if (used[twist] < 0 || amount * own == 0.0) continue;
+        if (amount * own == 0.0) continue;
         const auto [angle, around, part] = read(twist, posed, options.channels);
         if (angle == 0.0) continue;
         const TwistBone& of = twists[twist];
-        const auto rest = cast<double>(rest_bones[static_cast<std::size_t>(of.bone)]);
+        const auto at_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.bone)]);
         const Affine<double> by = motion(posed, of.bone);
-        const Vec3<double> axis = glm::normalize(rest.linear[1]);
+        const Vec3<double> axis = glm::normalize(at_rest.linear[1]);
         const Vec3<double> posed_axis = by.linear * axis;
         const double length = glm::length(posed_axis);
         const double sign = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
-        TwistedBone bone{};
-        bone.rest = spin(rest.translation, axis, by.linear);
+        any = bone.is_twisted = true;
+        const TwistLine& line = rest[twist].line;
+        for (std::size_t k = 0; k < 2; ++k) {
+            const Vec3<double> image =
+                by.linear * Vec3<double>(line.axes[k][0], line.axes[k][1], line.axes[k][2]);
+            for (int i = 0; i < 3; ++i) bone.images[k][i] = static_cast<float>(image[i]);
+        }
         bone.has_axis = length > 0.0;
         if (bone.has_axis) {
-            bone.posed =
-                spin(transform_point(by, rest.translation), sign / length * posed_axis, Mat3<double>(1.0));
+            bone.posed = twist_line(transform_point(by, at_rest.translation), sign / length * posed_axis);
         }
         std::array<Float4, kDisplacementRows> rows;
         write_displacement(by, rows.data());
         for (std::size_t row = 0; row < rows.size(); ++row) {
             std::ranges::copy(rows[row].value, bone.displacement + 4 * row);
         }
-        const Vec3<double> along = Vec3<double>(of.tail) - Vec3<double>(of.head);
-        const double squared = glm::dot(along, along);
-        const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
-        for (int i = 0; i < 3; ++i) bone.share[i] = static_cast<float>(share[i]);
-        bone.share[3] = static_cast<float>(-glm::dot(share, Vec3<double>(of.head)));
         bone.curve = options.curves.empty() ? 0.0f : within(options.curves[twist], -1.0f, 1.0f, 0.0f);
-        bone.angle = static_cast<float>(amount * own * angle);
+        bone.is_short = std::abs(angle) <= 0.5;
+        bone.angle = static_cast<float>(std::numbers::pi * amount * own * angle);
         bone.offset = of.is_from_parent ? -bone.angle : 0.0f;
         bone.around = static_cast<float>(around);
         bone.part = static_cast<float>(amount * own * part);
-        bone.is_scaled = split_scale(by, rest).has_scale;
-        bone.below = are_below[twist].data();
-        twisted_of_bone[static_cast<std::size_t>(used[twist])] = static_cast<std::int32_t>(twisted.size());
-        twisted.push_back(bone);
+        bone.is_scaled = split_scale(by, at_rest).has_scale;
     }
+    return any;
 }
 
 TwistSpread::TwistSpread(const Binding& binding, const TwistSpreadData& data)
@@ -224,7 +267,9 @@ void TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
     check_points(rest_points, vertex_count());
     check_space(bones_from_model);
     const std::scoped_lock lock(state_->mutex);
-    state_->set_rest_points(rest_points, bones_from_model);
+    state_->own_rest_points.resize(kPointRows * state_->mesh.blocks.size());
+    pack_points(state_->mesh, rest_points, state_->own_rest_points);
+    state_->measure(bones_from_model);
 }
 
 std::size_t TwistSpread::vertex_count() const noexcept { return state_->packed->vertex_count; }
@@ -254,48 +299,24 @@ bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<fl
         return false;
     }
     const std::scoped_lock lock(state.mutex);
-    state.prepare(posed_from_rest, options);
-    if (state.twisted.empty()) return true;
+    if (!state.prepare(posed_from_rest, options)) return true;
     const auto goes_short = [](TwistBlend blend) {
         return blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
     };
     const bool blends_short =
         goes_short(options.blend) || (!state.mix.empty() && goes_short(options.mix_blend));
-    const bool is_beyond =
-        std::ranges::any_of(state.twisted, [](const auto& bone) { return bone.around != 0.0f; });
-    const TwistFrame frame{
-        &state.mesh,
-        state.own_rest_points.empty() ? state.mesh.rest_points.data() : state.own_rest_points.data(),
-        state.twisted.data(),
-        state.twisted.size(),
-        state.twisted_of_bone.data(),
-        state.weights.empty() ? nullptr : state.weights.data(),
-        state.mix.empty() ? nullptr : state.mix.data(),
-        options.blend,
-        options.mix_blend,
-        blends_short && is_beyond,
-        state.space_rows.spaces(),
-        points.data()};
-    parallel_for_blocks(state.mesh, points.size(), options.threads,
-                        [&](std::size_t begin, std::size_t end) { spread_twists(frame, begin, end); });
+    const bool is_beyond = std::ranges::any_of(
+        state.bones, [](const auto& bone) { return bone.is_twisted && bone.around != 0.0f; });
+    TwistFrame frame = state.frame(points);
+    frame.blend = options.blend;
+    frame.mix_blend = options.mix_blend;
+    frame.goes_around = blends_short && is_beyond;
+    const std::size_t vertices = kLanes * state.blocks.size();
+    parallel_for(
+        state.blocks.size(), useful_threads(options.threads, vertices, kVerticesWorthAThread),
+        [&](std::size_t begin, std::size_t end) { kTwistKernel.spread[target_in_use()](frame, begin, end); },
+        kBlocksOfAChunk);
     return true;
-}
-
-TwistSpread::Parts TwistSpread::parts() const {
-    const State& state = *state_;
-    const std::scoped_lock lock(state.mutex);
-    const auto rest_points = state.own_rest_points.empty() ? std::span(state.mesh.rest_points)
-                                                           : std::span(std::as_const(state.own_rest_points));
-    Parts parts{bound_mesh(state.mesh, rest_points, vertex_count(), state.packed->bone_count),
-                state.twists,
-                state.rest_bones,
-                state.parents,
-                state.bones_from_model,
-                {},
-                {}};
-    if (!state.weights.empty()) parts.weights = unpack_values(state.mesh, state.weights, vertex_count());
-    if (!state.mix.empty()) parts.mix = unpack_values(state.mesh, state.mix, vertex_count());
-    return parts;
 }
 
 }  // namespace sinew
