@@ -15,7 +15,6 @@ from .translations import tip, tr
 
 
 class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.use_method"
     bl_label = "Use Method"
     bl_description = "Deform all meshes of the character by this method"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
@@ -36,12 +35,10 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
 
 
 class SINEW_OT_switch(OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.switch"
     bl_label = "Switch On / Off"
     bl_description = (
         "Flip all meshes of the character between Sinew and Blender's Armature modifier, to compare the two"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         shared = character.of(context.scene)
@@ -51,13 +48,11 @@ class SINEW_OT_switch(OnSinewObjects, bpy.types.Operator):
 
 
 class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.own_settings"
     bl_label = "Own Settings"
     bl_description = (
         "Let this mesh differ: it keeps settings of its own, which can have keys, and the character's do not "
         "change it. Once more: it follows the character again"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     name: bpy.props.StringProperty(
         name="Mesh", description="Empty: the active one", options={"HIDDEN", "SKIP_SAVE"}

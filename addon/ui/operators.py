@@ -2,6 +2,7 @@
 """The panel's operators: poll, gather, one call, report."""
 
 from collections.abc import Callable, Collection, Iterator
+from typing import ClassVar
 
 import bpy
 
@@ -94,8 +95,13 @@ def waits_for_render() -> str:
 
 
 class Acting:
-    """A base class of operators. Subclasses have refusal(context), or run(context), which may raise
-    SinewError, or both."""
+    """A base class of operators, which Blender knows by the class's name. Subclasses have refusal(context),
+    or run(context), which may raise SinewError, or both."""
+
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    def __init_subclass__(cls) -> None:
+        cls.bl_idname = cls.__name__.replace("SINEW_OT_", "sinew.")
 
     @classmethod
     def refusal(cls, context: bpy.types.Context) -> str:
@@ -184,13 +190,11 @@ FIRST_METHODS = [
 
 
 class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
-    bl_idname = "sinew.add"
     bl_label = "Add Sinew"
     bl_description = (
         "Deform all meshes of the armature with Sinew, in the place of their Armature modifiers. Those stay "
         "in the stack, switched off"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     method: bpy.props.EnumProperty(
         name="Method",
@@ -240,10 +244,8 @@ class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
 
 
 class SINEW_OT_rebind(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
-    bl_idname = "sinew.rebind"
     bl_label = "Rebind"
     bl_description = "Read meshes, weights and bones anew, and switch on again after an error"
-    bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
@@ -256,12 +258,10 @@ class SINEW_OT_rebind(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
 
 
 class SINEW_OT_remove(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
-    bl_idname = "sinew.remove"
     bl_label = "Remove"
     bl_description = (
         "Take Sinew off all meshes of the character and give their Armature modifiers back as they were"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
@@ -269,13 +269,11 @@ class SINEW_OT_remove(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
 
 
 class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
-    bl_idname = "sinew.take_over_smooth"
     bl_label = "Take Over Corrective Smooth"
     bl_description = (
         "Have Delta Mush smooth in the place of the Corrective Smooth modifier, by its settings. It stays in "
         "the stack, switched off, until Sinew is removed"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def refusal(cls, context: bpy.types.Context) -> str:
@@ -296,13 +294,11 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
 
 
 class SINEW_OT_make_group(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
-    bl_idname = "sinew.make_group"
     bl_label = "Make Vertex Group"
     bl_description = (
         "Make the vertex group that says where the stage acts, and choose it. The shape stays as it is until "
         "you paint: for a mix it has no weights, for other stages all"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     stage: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}, description="Name of the stage")
 

@@ -21,12 +21,10 @@ WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
 
 
 class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
-    bl_idname = "sinew.bake"
     bl_label = "Bake"
     bl_description = (
         "Write what Sinew deforms as data that plays without it. A bake into this file takes Sinew off"
     )
-    bl_options = {"REGISTER", "UNDO"}
     saying = "Sinew bakes"
     stopped = "Bake stopped; nothing was written"
 

@@ -35,13 +35,11 @@ class SinewBlendAction(bpy.types.PropertyGroup):
 
 
 class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
-    bl_idname = "sinew.blend_actions"
     bl_label = "Blend Actions"
     bl_description = (
         "Blend actions of the armature into a new one of plain keys, which it plays; the actions themselves "
         "stay as they are"
     )
-    bl_options = {"REGISTER", "UNDO"}
     saying = "Sinew blends actions"
 
     actions: bpy.props.CollectionProperty(

@@ -65,13 +65,11 @@ METHOD_ITEMS = [
 
 
 class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
-    bl_idname = "sinew.compare"
     bl_label = "Compare"
     bl_description = (
         "Show live copies of the character beside it, one for each method, until End Comparison takes them "
         "away; renders leave them out"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     methods: bpy.props.EnumProperty(
         name="Methods",
@@ -141,22 +139,20 @@ def _right_of_view(context: bpy.types.Context) -> np.ndarray:
     return np.array(viewport.region_3d.view_matrix)[0, :3]
 
 
-class _WhileComparing:
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if comparison_state.of_scene(context.scene) is not None:
-            return True
-        cls.poll_message_set("Compare methods first")
-        return False
-
-
-class SINEW_OT_flip_comparison(_WhileComparing, bpy.types.Operator):
+class SINEW_OT_flip_comparison(bpy.types.Operator):
     bl_idname = "sinew.flip_comparison"
     bl_label = "Flip Comparison"
     bl_description = "Show the other of the two copies that are compared, at the same place"
     # Only a view of the comparison: an undo step for each flip would push out the artist's own steps, and
     # take longer than the flip.
     bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if comparison_state.of_scene(context.scene) is not None:
+            return True
+        cls.poll_message_set("Compare methods first")
+        return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         state = comparison_state.of_scene(context.scene)
@@ -170,10 +166,8 @@ class SINEW_OT_flip_comparison(_WhileComparing, bpy.types.Operator):
 
 
 class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
-    bl_idname = "sinew.end_comparison"
     bl_label = "End Comparison"
     bl_description = "Take the copies away, and all that was made for them"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def refusal(cls, context: bpy.types.Context) -> str:

@@ -13,13 +13,11 @@ from . import corrective_key
 
 
 class SINEW_OT_corrective_key(OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.corrective_key"
     bl_label = "Corrective Shape Key"
     bl_description = (
         "Add a shape key by which the Armature modifier alone has the shape that Sinew shows in this pose. "
         "It is muted, as Sinew's shape has it already"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     driven: bpy.props.BoolProperty(
         name="Driven by the Active Bone",

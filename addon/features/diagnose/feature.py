@@ -23,7 +23,6 @@ def _checkable(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 class SINEW_OT_check(operators.OnDeformed, bpy.types.Operator):
-    bl_idname = "sinew.check"
     bl_label = "Check"
     bl_description = "Look for faults in the weights, and for what dual quaternions do in the pose of now"
     bl_options = {"REGISTER"}
@@ -34,7 +33,6 @@ class SINEW_OT_check(operators.OnDeformed, bpy.types.Operator):
 
 
 class SINEW_OT_check_frames(operators.OnDeformed, stepped.Stepped, bpy.types.Operator):
-    bl_idname = "sinew.check_frames"
     bl_label = "Check over Frames"
     bl_description = (
         "Look for faults in the weights, and for what dual quaternions do in the poses of all frames"
@@ -72,7 +70,6 @@ class _OnFinding(operators.Acting):
 
 
 class SINEW_OT_select_finding(_OnFinding, bpy.types.Operator):
-    bl_idname = "sinew.select_finding"
     bl_label = "Select"
     bl_description = "Enter edit mode with exactly these vertices selected; hidden ones are shown"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
@@ -84,7 +81,6 @@ class SINEW_OT_select_finding(_OnFinding, bpy.types.Operator):
 
 
 class SINEW_OT_mend(_OnFinding, bpy.types.Operator):
-    bl_idname = "sinew.mend"
     bl_label = "Mend"
     bl_description = (
         "Mend this fault, on exactly these vertices, and check again. Locked groups stay as they are"

@@ -33,13 +33,11 @@ class OfHeatMap:
 
 
 class SINEW_OT_heat_map(operators.Acting, bpy.types.Operator):
-    bl_idname = "sinew.heat_map"
     bl_label = "Heat Map"
     bl_description = (
         "Show a measure of the deformation as colours, in Solid shading, in materials and in renders; once "
         "more: everything as it was. Switch errors of a bake off before an export, which would write them"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     quantity: bpy.props.StringProperty(
         name="Measure",
@@ -83,7 +81,6 @@ class _Scans(OnSinewObjects, stepped.Stepped):
 
 
 class SINEW_OT_worst_frames(_Scans, bpy.types.Operator):
-    bl_idname = "sinew.worst_frames"
     bl_label = "Find Worst Frames"
     bl_description = "Go through frames and list those at which the measure is worst, one for each peak"
     bl_options = {"REGISTER"}
@@ -101,10 +98,8 @@ class SINEW_OT_worst_frames(_Scans, bpy.types.Operator):
 
 
 class SINEW_OT_fit_heat_range(_Scans, bpy.types.Operator):
-    bl_idname = "sinew.fit_heat_range"
     bl_label = "Fit to Frames"
     bl_description = "Go through frames and fix the range so that it holds the values at all of them"
-    bl_options = {"REGISTER", "UNDO"}
 
     over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 

@@ -17,13 +17,11 @@ from . import ik_bake
 
 
 class SINEW_OT_bake_ik(OnArmature, stepped.WithDialog, bpy.types.Operator):
-    bl_idname = "sinew.bake_ik"
     bl_label = "Bake Sinew IK"
     bl_description = (
         "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in "
         "a copy of the action; the constraints are muted until Original Action"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     saying = "Sinew solves inverse kinematics"
 

@@ -14,13 +14,11 @@ from . import inbetween_bake
 
 
 class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operator):
-    bl_idname = "sinew.bake_inbetweens"
     bl_label = "Bake In-betweens"
     bl_description = (
         "Move the selected bones, or all, between the keyed poses of their action by another method than "
         "curves, by plain keys in a copy of the action"
     )
-    bl_options = {"REGISTER", "UNDO"}
     saying = "Sinew keys in-betweens"
 
     method: bpy.props.EnumProperty(

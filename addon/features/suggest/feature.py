@@ -22,7 +22,6 @@ MOST_BEST = 3
 
 
 class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
-    bl_idname = "sinew.suggest"
     bl_label = "Suggest a Method"
     bl_description = (
         "Measure what every method would make of the frames, and say which is best at what. The method stays "
