@@ -170,8 +170,13 @@ SETUPS = [
 ]
 
 
-@pytest.mark.parametrize("skinned", [False, True], ids=["plain", "skinned"])
-@pytest.mark.parametrize("set_up", SETUPS, ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    ("set_up", "skinned"),
+    [
+        *((set_up, False) for set_up in SETUPS),
+        *((set_up, True) for set_up in (plain, mirrored_in_front, two_modifiers)),
+    ],
+)
 def test_rigs(set_up, skinned):
     obj, armature = scenes.make_arm(sides=8, rings=11)
     set_up(obj, armature)

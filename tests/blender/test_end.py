@@ -36,12 +36,11 @@ sinew_addon.unregister()
     "parts",
     [
         (REGISTER,),
-        (REGISTER, UNREGISTER),
         (REGISTER, UNREGISTER, REGISTER, UNREGISTER),
         (REGISTER, USE, HEAT),
         (REGISTER, USE, HEAT, UNREGISTER),
     ],
-    ids=["registered", "unregistered", "registered again", "in use", "used"],
+    ids=["registered", "registered again", "in use", "used"],
 )
 def test_a_script_ends_with_status_0(parts, tmp_path):
     script = tmp_path / "script.py"
