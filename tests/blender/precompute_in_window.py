@@ -14,7 +14,7 @@ import window
 import window_scene
 
 _ZIP, FOLDER = window.arguments()
-VERTICES, PATIENCE = 80_000, 300.0
+VERTICES, PATIENCE = 60_000, 300.0
 facts: dict[str, object] = {}
 
 
