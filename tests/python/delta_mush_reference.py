@@ -61,6 +61,7 @@ def amount(rest, edges, factor, radius, smooth_type, most=1000):
 
 
 def angle(cosine):
+    """Blender's polynomial for acos."""
     m = min(abs(cosine), 1.0)
     size = np.sqrt(1 - m) * (1.5707963267 + m * (-0.213300989 + m * (0.077980478 + m * -0.02164095)))
     return np.pi - size if cosine < 0 else size

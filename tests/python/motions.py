@@ -32,6 +32,10 @@ LAYOUT_OF = {
 }
 
 
+def close(got, wanted, tolerance=1e-13):
+    np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance)
+
+
 def rigid(rng, count=None, extent=2.0):
     """A RigidTransform of scipy, one or `count`."""
     translation = rng.uniform(-extent, extent, 3 if count is None else (count, 3))

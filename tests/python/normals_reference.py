@@ -9,21 +9,7 @@ time.
 from __future__ import annotations
 
 import numpy as np
-
-SHORTEST = 1e-35  # squared: a shorter vector has no direction
-
-
-def unit(vector):
-    squared = vector @ vector
-    return vector / np.sqrt(squared) if squared > SHORTEST else np.zeros(3)
-
-
-def angle(cosine):
-    """Blender's polynomial for acos."""
-    m = min(abs(cosine), 1.0)
-    polynomial = 1.5707963267 + m * (-0.213300989 + m * (0.077980478 + m * -0.02164095))
-    angle_of_size = np.sqrt(1.0 - m) * polynomial
-    return np.pi - angle_of_size if cosine < 0 else angle_of_size
+from delta_mush_reference import angle, unit
 
 
 def face_normals(points, faces):

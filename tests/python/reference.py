@@ -145,14 +145,19 @@ def qv(point, motions, rotations, weights):
 
 def dq(point, motions, rotations, weights):
     quaternions, translations = rigid_terms(point, motions, rotations)
+    rotated, translated, margin = blended_motion(quaternions, translations, weights)
+    return rotated @ point + translated, margin
+
+
+def blended_motion(quaternions, translations, weights):
+    """Rotation and translation of the sum of unit dual quaternions, and the margin."""
     duals = np.array(
         [0.5 * left_multiplication([0.0, *t]) @ q for q, t in zip(quaternions, translations, strict=True)]
     )
     signs, margin = in_one_hemisphere(quaternions, weights)
     real, dual = (signs * weights) @ quaternions, (signs * weights) @ duals
     length = np.linalg.norm(real)
-    real, dual = real / length, dual / length
-    return rotation(real) @ point + translation(real, dual), margin
+    return rotation(real / length), translation(real / length, dual / length), margin
 
 
 @functools.lru_cache(maxsize=1000)
@@ -269,13 +274,7 @@ def integral(vectors):
 def dib(point, motions, rotations, weights):
     """Iterated to the end. The ties are at 180 degrees from the result, and where the iteration is slow."""
     quaternions, shifts = rigid_terms(point, motions, rotations)
-    duals = np.array(
-        [0.5 * left_multiplication([0.0, *t]) @ q for q, t in zip(quaternions, shifts, strict=True)]
-    )
-    signs, margin = in_one_hemisphere(quaternions, weights)
-    real, dual = (signs * weights) @ quaternions, (signs * weights) @ duals
-    length = np.linalg.norm(real)
-    rotated, translated = rotation(real / length), translation(real / length, dual / length)
+    rotated, translated, margin = blended_motion(quaternions, shifts, weights)
     steps = 0
     while steps < 200:
         steps += 1

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Random rigs and meshes in the arrays that sinew.Deformer takes."""
 
+import sys
+import threading
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,3 +128,31 @@ def random_rig(seed, vertices=200, bones=15, extent=1.0, most_influences=12, sca
         rest_bones=rest_bones.astype(np.float32),
         centres=rng.uniform(-extent, extent, (vertices, 3)).astype(np.float32),
     )
+
+
+def lets_others_run(call, times):
+    """Whether a thread that waits for the GIL gets it during one of so many calls. Python itself never takes
+    it away within this time: who works must release it."""
+    gate, ready, progress = threading.Lock(), threading.Event(), []
+
+    def work():
+        ready.set()
+        with gate:
+            progress.append(True)
+
+    gate.acquire()
+    thread = threading.Thread(target=work)
+    thread.start()
+    ready.wait()
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000.0)
+    try:
+        gate.release()
+        for _ in range(times):
+            call()
+            if progress:
+                break
+        return bool(progress)
+    finally:
+        sys.setswitchinterval(interval)
+        thread.join()

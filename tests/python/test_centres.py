@@ -5,7 +5,6 @@ tube."""
 import signal
 import subprocess
 import sys
-import threading
 import time
 from functools import partial
 from itertools import pairwise
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sinew
+from rigs import lets_others_run
 from tube import TABLE, Tube, numbers, three_bones
 
 SIGMA = 0.1
@@ -118,6 +118,7 @@ every_precomputation = pytest.mark.parametrize("start", START.values(), ids=STAR
 LONG = """
 import sys
 import numpy as np, sinew
+from rigs import lets_others_run
 from tube import Tube
 tube = Tube(2001, 256)
 run = sinew.centres_of_rotation(*tube.mesh, tube.triangles, exact=True)
@@ -239,26 +240,5 @@ def test_a_process_ends_meanwhile(code):
 
 
 def test_other_threads_run_meanwhile():
-    tube, moved, stop = Tube(161, 64), [], threading.Event()
-
-    def count():
-        while not stop.is_set():
-            moved.append(True)
-            stop.wait(0.0005)
-
-    thread = threading.Thread(target=count)
-    interval = sys.getswitchinterval()
-    thread.start()
-    sys.setswitchinterval(1000.0)
-    try:
-        before = len(moved)
-        for _ in range(20):
-            tube.centres(threads=1)
-            if len(moved) > before:
-                break
-        seen = len(moved) > before
-    finally:
-        sys.setswitchinterval(interval)
-        stop.set()
-        thread.join()
-    assert seen
+    tube = Tube(161, 64)
+    assert lets_others_run(lambda: tube.centres(threads=1), 20)

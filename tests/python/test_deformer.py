@@ -5,13 +5,12 @@ import os
 import pickle
 import subprocess
 import sys
-import threading
 
 import numpy as np
 import pytest
 import reference
 import sinew
-from rigs import LINEAR, about, random_motion, random_rig, transform, translation
+from rigs import LINEAR, about, lets_others_run, random_motion, random_rig, transform, translation
 
 METHODS = [method.name for method in sinew.methods()]
 # Methods that a build may lack.
@@ -422,33 +421,7 @@ def test_gil_is_released(method):
     rig = random_rig(50, vertices=50000, most_influences=4)
     deformer = rig.deformer(method)
     out = np.empty_like(rig.rest_points)
-    gate = threading.Lock()
-    gate.acquire()
-    ready = threading.Event()
-    progress = []
-
-    def work():
-        ready.set()
-        with gate:
-            progress.append(True)
-
-    thread = threading.Thread(target=work)
-    interval = sys.getswitchinterval()
-    thread.start()
-    ready.wait()
-    # Python never switches threads within this time: the other thread only runs if someone releases the GIL.
-    sys.setswitchinterval(1000.0)
-    try:
-        gate.release()
-        for _ in range(1000):
-            deformer.deform(rig.transforms, out=out, threads=1)
-            if progress:
-                break
-        moved = bool(progress)
-    finally:
-        sys.setswitchinterval(interval)
-        thread.join()
-    assert moved
+    assert lets_others_run(lambda: deformer.deform(rig.transforms, out=out, threads=1), 1000)
 
 
 @every_method

@@ -22,7 +22,11 @@ DIAMETER = 1.0
 
 
 def solved(motion, wanted, solver=helper_bones.Solver):
-    steps = helper_bones.solve(motion, wanted, solver)
+    return result_of(helper_bones.solve(motion, wanted, solver))
+
+
+def result_of(steps):
+    """What a generator of shares that are done returns."""
     shares = []
     while True:
         try:

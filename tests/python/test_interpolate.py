@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 import sinew
 from hypothesis import given
-from motions import LAYOUT_OF, LAYOUTS, layout, matrix, rigid, rigid_motions
+from motions import LAYOUT_OF, LAYOUTS, close, layout, matrix, rigid, rigid_motions
 from scipy.spatial.transform import RigidTransform, Rotation
 from sinew.interpolate import METHODS, between, blend
 
 ALL = pytest.mark.parametrize("method", METHODS)
-
-
-def close(got, wanted, tolerance=1e-13):
-    np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance)
 
 
 @ALL

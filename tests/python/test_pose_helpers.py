@@ -11,7 +11,16 @@ from rigs import LINEAR, about
 from sinew_addon.core import pose_helpers, pose_samples
 from sinew_addon.core.helper_bones import Motion, Wanted
 from sinew_addon.core.pose_samples import Joints
-from test_helper_bones import POSES, SEGMENTS, TUBE, errors_of, influences_of_tube, motion_by, played
+from test_helper_bones import (
+    POSES,
+    SEGMENTS,
+    TUBE,
+    errors_of,
+    influences_of_tube,
+    motion_by,
+    played,
+    result_of,
+)
 
 # Bones are along z, with Y along each bone.
 REST = np.tile(np.identity(4), (2, 1, 1))
@@ -38,14 +47,7 @@ def random_motion(method, count, seed, size=1.0):
 
 
 def solved(motion, wanted):
-    steps = pose_helpers.solve(motion, wanted, REST)
-    shares = []
-    while True:
-        try:
-            shares.append(next(steps))
-        except StopIteration as stop:
-            assert shares == sorted(shares)
-            return stop.value
+    return result_of(pose_helpers.solve(motion, wanted, REST))
 
 
 # The share of linear blending's error that remains, bent and twisted in ways that they were not made for.

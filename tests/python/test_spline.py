@@ -5,7 +5,7 @@ exact_interpolation.py has the oracles."""
 import numpy as np
 import pytest
 import sinew
-from motions import LAYOUT_OF, layout, matrix, rigid
+from motions import LAYOUT_OF, close, layout, matrix, rigid
 from scipy.spatial.transform import RigidTransform, Rotation
 from sinew.interpolate import METHODS, between
 from sinew.spline import catmull_rom, catmull_rom_vector
@@ -13,10 +13,6 @@ from sinew.spline import catmull_rom, catmull_rom_vector
 TIMES = np.array([0.0, 1.0, 1.5, 4.0, 5.0])
 AT = np.linspace(-0.5, 5.5, 61)
 ALL = pytest.mark.parametrize("method", METHODS)
-
-
-def close(got, wanted, tolerance=1e-13):
-    np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance)
 
 
 @ALL
