@@ -218,14 +218,17 @@ def remove(obj: bpy.types.Object) -> None:
     take_off(obj)
 
 
-def take_off(obj: bpy.types.Object) -> None:
-    """Takes Sinew off: the Armature modifiers are as before, and nothing of Sinew stays in the file."""
+def take_off(obj: bpy.types.Object, is_by_others: bool = False) -> None:
+    """Takes Sinew off: the Armature modifiers are as before, and nothing of Sinew stays in the file.
+
+    is_by_others  somebody removed its modifier
+    """
     with updates_suspended():
-        _take_off(obj)
+        _take_off(obj, is_by_others)
     notify(subscribers.after_removal)
 
 
-def _take_off(obj: bpy.types.Object) -> None:
+def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
     follow_icons(obj)
     switch(obj, on=False)
     restore_volume(obj)
@@ -235,7 +238,7 @@ def _take_off(obj: bpy.types.Object) -> None:
             _show(modifier, *own_visibility(replaced))
     baked.switch_on(obj)
     notify(subscribers.before_removal, obj)
-    undeformed.remove(obj)
+    (undeformed.remove_later if is_by_others else undeformed.remove)(obj)
     if nodes is not None:
         active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
         obj.modifiers.remove(nodes)

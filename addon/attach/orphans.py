@@ -23,11 +23,7 @@ def remove() -> None:
     }
     if helpers:
         for helper in [h for h, users in bpy.data.user_map(subset=helpers).items() if not users]:
-            # A proxy's mesh is the artist's own, who may still want it.
-            mesh = None if upstream_proxy.is_proxy(helper) else helper.data
-            bpy.data.objects.remove(helper)
-            if mesh is not None and mesh.users == 0:
-                bpy.data.meshes.remove(mesh)
+            upstream_proxy.remove_helper(helper)
     node_group.remove_unused()
 
 

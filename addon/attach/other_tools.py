@@ -7,7 +7,7 @@ import bpy
 
 from ..core.icons import Situation
 from ..core.phrases import phrase
-from . import properties, stack
+from . import properties, stack, upstream_proxy
 
 # Such a tool also applies Sinew's modifier, and Sinew then removes the Armature modifiers.
 APPLYING = phrase(
@@ -24,7 +24,7 @@ def notes(obj: bpy.types.Object) -> list[str]:
         found.append(
             phrase("Switch Sinew off before other tools look for its Armature modifier: that is off")
         )
-    if properties.of(obj).upstream_proxy is not None:
+    if upstream_proxy.shares_mesh(obj) and obj.data.users - obj.data.use_fake_user == 2:
         text = "Switch Sinew off before a script applies its modifiers: Sinew also uses its mesh meanwhile"
         found.append(phrase(text))
     # FBX files have no shape keys where any modifier but the Armature modifier is on.

@@ -39,10 +39,10 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
     """
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
     if in_buffer:
-        made = upstream_proxy.ensure(obj)
         if settings.attribute:
             remove_attributes(obj)
             _forget_names(settings)
+        made = upstream_proxy.ensure(obj)
         kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Upstream": made}
     else:
         upstream_proxy.remove(obj)

@@ -86,3 +86,34 @@ def remove(obj: bpy.types.Object) -> None:
     neutral = stack.neutral_modifier(obj)
     if neutral is not None:
         obj.modifiers.remove(neutral)
+
+
+# The session_uid of each object that remove_later() was called for.
+_to_remove: set[int] = set()
+
+
+def remove_later(obj: bpy.types.Object) -> None:
+    """Called where Sinew's modifier was applied or deleted: a script that goes through a list of modifiers
+    would crash Blender where another of these is gone."""
+    mark(obj, False)
+    neutral = stack.neutral_modifier(obj)
+    if neutral is not None:
+        neutral.show_viewport = neutral.show_render = False
+        _to_remove.add(obj.session_uid)
+        if not bpy.app.background and not bpy.app.timers.is_registered(remove_leftovers):
+            bpy.app.timers.register(remove_leftovers)
+
+
+def has_leftovers() -> bool:
+    return bool(_to_remove)
+
+
+def remove_leftovers() -> None:
+    """Called when no script runs; without a window, at the next frame and before the file is saved."""
+    if not has_leftovers():
+        return
+    for obj in [each for each in bpy.data.objects if each.session_uid in _to_remove]:
+        neutral = stack.neutral_modifier(obj)
+        if neutral is not None and not properties.has_sinew(obj):
+            obj.modifiers.remove(neutral)
+    _to_remove.clear()

@@ -2,7 +2,8 @@
 """The mesh that the Armature modifier gets, where something before it changes the mesh.
 
 A copy of the object, in no scene, has only the upstream modifiers. Sinew's own modifier names it, so Blender
-evaluates it along with the object, and Sinew deforms its evaluated mesh.
+evaluates it along with the object, and Sinew deforms its evaluated mesh. It has a copy of the mesh, too:
+Blender applies no modifier to a mesh with a second user, and other people's tools do not expect one.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import uuid
 import bpy
 
 from ..core.errors import SinewError
+from ..io import mesh_compare
 from ..io.animation_paths import animated_paths
 from . import properties, references, stack
 
@@ -41,6 +43,15 @@ WEIGHT_CHANGERS = {
     "DATA_TRANSFER",
     "NODES",
 }
+
+# They read from the mesh what scripts cannot: nobody could tell when a copy is out of date.
+_READERS = {"MULTIRES", "SKIN"}
+
+# The session_uid of meshes whose copies differ from them, as where a weight is not a number.
+_unlike_copies: set[int] = set()
+
+# Marks a proxy's own copy of the mesh.
+_COPY = "sinew_copy"
 
 
 def is_needed(obj: bpy.types.Object) -> bool:
@@ -85,29 +96,77 @@ def check(obj: bpy.types.Object) -> None:
 
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """Returns the copy, made again where the upstream modifiers differ from its own."""
+    """Returns the copy, made again where the upstream modifiers or the mesh differ from its own."""
     settings = properties.of(obj)
     if not is_needed(obj):
         remove(obj)
         return None
     check(obj)
-    wanted = signature(obj)
+    wanted, shares = signature(obj), _has_to_share_mesh(obj)
     if (
         settings.upstream_proxy is None
-        or settings.upstream_proxy.data != obj.data
         or settings.upstream_signature != wanted
+        or shares_mesh(obj) != shares
+        or not is_current(obj)
     ):
+        # Never the old one with another mesh: see references.py.
         references.note(obj)
         remove(obj)
-        settings.upstream_proxy, settings.upstream_signature = _make(obj), wanted
+        settings.upstream_proxy, settings.upstream_signature = _make(obj, shares), wanted
+        if not is_current(obj):
+            _unlike_copies.add(obj.data.session_uid)
+            return ensure(obj)
     return settings.upstream_proxy
+
+
+def shares_mesh(obj: bpy.types.Object) -> bool:
+    """Whether the object has a proxy, and that is a second user of its mesh."""
+    proxy = properties.of(obj).upstream_proxy
+    return proxy is not None and proxy.data == obj.data
+
+
+def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
+    """Whether a copy of the mesh would have to be made again with each stroke, could be out of date, or would
+    be of no use, as others use the mesh, too."""
+    mesh = obj.data
+    if (
+        obj.mode != "OBJECT"
+        or not mesh.is_editable
+        or mesh.session_uid in _unlike_copies
+        or any(modifier.type in _READERS for modifier in stack.upstream(obj))
+    ):
+        return True
+    has_copy = properties.of(obj).upstream_proxy is not None and not shares_mesh(obj)
+    return not has_copy and mesh.users - mesh.use_fake_user - shares_mesh(obj) > 1
+
+
+def is_current(obj: bpy.types.Object) -> bool:
+    """Whether the proxy's mesh, if it has one, is the object's."""
+    proxy = properties.of(obj).upstream_proxy
+    return proxy is None or proxy.data == obj.data or mesh_compare.are_alike(obj.data, proxy.data)
+
+
+def follow_points(obj: bpy.types.Object) -> None:
+    """Gives the proxy's copy of the mesh the points of the mesh. Another add-on's handler can move these with
+    each frame, also of a render."""
+    if not is_current(obj):
+        mesh_compare.write_points(obj.data, properties.of(obj).upstream_proxy.data)
 
 
 def remove(obj: bpy.types.Object) -> None:
     settings = properties.of(obj)
     copy, settings.upstream_proxy, settings.upstream_signature = settings.upstream_proxy, None, ""
     if copy is not None and copy.library is None:
-        bpy.data.objects.remove(copy)
+        remove_helper(copy)
+
+
+def remove_helper(helper: bpy.types.Object) -> None:
+    """Removes a proxy or a point buffer, with its mesh. A mesh that a proxy shares is the artist's, who may
+    still want it."""
+    mesh, is_own = helper.data, not is_proxy(helper) or bool(helper.data.get(_COPY))
+    bpy.data.objects.remove(helper)
+    if is_own and mesh.users == 0:
+        bpy.data.meshes.remove(mesh)
 
 
 def is_proxy(helper: bpy.types.Object) -> bool:
@@ -125,7 +184,7 @@ def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy
         return None
     # For a hidden object Blender may need only the transform, as a constraint's target: then it does not
     # evaluate the upstream modifiers, and the mesh is their input.
-    is_plain = evaluated.data == obj.data.evaluated_get(depsgraph)
+    is_plain = evaluated.data == proxy.data.evaluated_get(depsgraph)
     if is_plain and not obj.visible_get(view_layer=depsgraph.view_layer):
         return None
     return evaluated.data
@@ -136,11 +195,14 @@ def changes_weights(obj: bpy.types.Object) -> bool:
     return any(m.type in WEIGHT_CHANGERS for m in stack.upstream_changes(obj))
 
 
-def _make(obj: bpy.types.Object) -> bpy.types.Object:
+def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
+    """shares: it has no copy of the mesh, but the mesh."""
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
     copy.name = f"{obj.name} Sinew upstream"
+    if not shares:
+        copy.data = _copy_of_mesh(obj)
     properties.clear(copy)
     copy.add_rest_position_attribute = False
     properties.of(copy).helper, properties.of(copy).token = True, uuid.uuid4().hex
@@ -154,6 +216,26 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
     _keep_animation_of_modifiers(copy)
     _clear_parent(copy)
     return copy
+
+
+def _copy_of_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """Returns a copy whose shape keys follow those of the mesh, be they animated or set by hand."""
+    copy, keys = obj.data.copy(), obj.data.shape_keys
+    copy.name, copy[_COPY], copy.use_fake_user = f"{obj.name} Sinew upstream", True, False
+    if keys is not None:
+        copy.shape_keys.animation_data_clear()
+        values = [key.path_from_id("value") for key in keys.key_blocks]
+        for path in {*values, "eval_time", *animated_paths(keys)}:
+            variable = _driver(copy.shape_keys, path).variables.new()
+            target = variable.targets[0]
+            target.id_type, target.id, target.data_path = "KEY", keys, path
+    return copy
+
+
+def _driver(owner: bpy.types.ID, path: str) -> bpy.types.Driver:
+    driver = owner.driver_add(path).driver
+    driver.type = "SUM"
+    return driver
 
 
 def _clear_parent(copy: bpy.types.Object) -> None:

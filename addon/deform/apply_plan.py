@@ -102,7 +102,6 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         attach.adopt_pointers(obj)
         if is_given_up:
             point_store.remove_point_attributes(obj)
-            # Other tools apply no modifier to a mesh with a second user.
             upstream_proxy.remove(obj)
         elif obj.mode not in ARMATURE_MODIFIER_MODES:
             point_store.remove(obj)
@@ -185,12 +184,12 @@ def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.nda
     """
     if point_store.are_applied(obj, rest, shown):
         applied = [modifier.name for modifier in stack.armature_modifiers(obj)]
-        attach.take_off(obj)
+        attach.take_off(obj, is_by_others=True)
         for name in applied:
             obj.modifiers.remove(obj.modifiers[name])
         log.info("%s: its shape is in its mesh now, and Sinew is off it", obj.name)
     else:
-        attach.take_off(obj)
+        attach.take_off(obj, is_by_others=True)
         log.info("%s: its modifier was deleted, and Sinew is off it", obj.name)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import pose_driver, properties, references, stack
+from ..attach import pose_driver, properties, references, stack, undeformed, upstream_proxy
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import (
     is_main_thread,
@@ -64,6 +64,8 @@ def _react_to_update(depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    if may_change_file():
+        undeformed.remove_leftovers()
     if current.all_use_builtin:
         return
     _subscribe_behind_others("frame_change_post", on_frame_change)
@@ -200,6 +202,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     continue
                 if obj.data.name_full in seen or properties.of(obj).upstream_proxy is not None:
                     unread.append(obj)
+                    upstream_proxy.follow_points(obj)
                 else:
                     new.meshes.add(obj.data.session_uid)
         if new.meshes or new.objects:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import note, overrides, point_store, properties, references
+from ..attach import note, overrides, point_store, properties, references, undeformed
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, phase, updates_suspended
 from ..core.precompute import precomputations
@@ -107,7 +107,7 @@ def on_save(*_args: object) -> None:
     """From here to on_saved() Sinew changes nothing in the file, even if Blender evaluates it, as for its
     thumbnail."""
     with updates_suspended() as may_react:
-        if not may_react or session.current.is_idle:
+        if not may_react or (session.current.is_idle and not undeformed.has_leftovers()):
             return
     if is_rendering_in_window():
         # A thread reads the file meanwhile. With Sinew, the saved file is complete, as an autosave is.
@@ -133,6 +133,7 @@ def on_saved(*_args: object) -> None:
 def prepare_for_save() -> None:
     """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has.
     Raises nothing: what fails is reported, and the rest of the file is prepared."""
+    undeformed.remove_leftovers()
     notify(subscribers.saving)
     objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
     # Known before anything can fail, so that resume_after_save() reverses all of it.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ..attach import attach, normals, point_store, properties, stack
+from ..attach import attach, normals, point_store, properties, stack, upstream_proxy
 from ..attach.updates import may_change_file
 from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths
@@ -89,7 +89,7 @@ class _Event:
             is_due=skinned.needs_apply,
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
-            is_other=skinned.noted.mode != apply_plan.mode_of(obj),
+            is_other=skinned.noted.mode != apply_plan.mode_of(obj) or self._is_copy_outdated(),
             is_untouched=skinned.is_untouched_by(changes),
         )
         if facts.calls_for_plan or facts.is_untouched:
@@ -101,6 +101,15 @@ class _Event:
         # Blender lists an armature's bones with each change of its pose.
         has_shape = skinned.was_deformed(obj, self.depsgraph) and obj.data.session_uid not in changes.touched
         return replace(facts, has_shape=has_shape and not self._have_bones_changed())
+
+    def _is_copy_outdated(self) -> bool:
+        """Whether the upstream proxy's copy of the mesh has to be made again."""
+        obj, changes = self.obj, self.changes
+        if obj.data.session_uid not in changes.meshes or obj.data.is_editmode:
+            return False
+        if changes.frame:
+            upstream_proxy.follow_points(obj)
+        return not upstream_proxy.is_current(obj)
 
     def _with_rest(self, facts: Facts) -> Facts:
         """Adds what decides what is read."""

@@ -56,7 +56,7 @@ def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
     return points
 
 
-def _read_key_points(block: bpy.types.ShapeKey) -> np.ndarray:
+def read_key_points(block: bpy.types.ShapeKey) -> np.ndarray:
     """Returns float32 [vertices, 3], as stored."""
     points = np.empty((len(block.points), 3), dtype=np.float32)
     block.points.foreach_get("co", points.ravel())
@@ -70,7 +70,7 @@ def read_sdef_keys(mesh: bpy.types.Mesh) -> np.ndarray | None:
     blocks = [] if keys is None else [keys.key_blocks.get(name) for name in sdef.KEYS]
     if not blocks or None in blocks:
         return None
-    points = np.array([_read_key_points(block) for block in (keys.reference_key, *blocks)])
+    points = np.array([read_key_points(block) for block in (keys.reference_key, *blocks)])
     # In edit mode the mesh can have other vertices than its keys.
     return points if points.shape[1] == len(mesh.vertices) else None
 
@@ -244,7 +244,7 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
         raise SinewError(
             f"{obj.name}: its shape keys are absolute, which Sinew does not mix; switch them to Relative"
         )
-    points = {block.name: _read_key_points(block) for block in keys.key_blocks}
+    points = {block.name: read_key_points(block) for block in keys.key_blocks}
     basis = keys.reference_key
     moves: list[np.ndarray | None] = []
     for block in keys.key_blocks:
@@ -277,7 +277,7 @@ def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
     active  the index of the shape key
     """
     block = keys.key_blocks[active] if 0 <= active < len(keys.key_blocks) else keys.reference_key
-    return _read_key_points(keys.reference_key if block.mute else block)
+    return read_key_points(keys.reference_key if block.mute else block)
 
 
 def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, domain: str = "POINT") -> None:

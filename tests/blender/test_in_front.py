@@ -5,15 +5,18 @@ from __future__ import annotations
 
 import json
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
 import routes
 import scenes
 import whole_file
+from bpy.app.handlers import persistent
 from sinew_addon.attach import attach, properties, upstream_proxy
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import session
+from sinew_addon.io import mesh_io
 from test_against_armature_modifier import assert_equal_to_modifier
 
 FRAMES = [1, 4, 8, 11]
@@ -145,7 +148,7 @@ def test_an_object_that_gets_sinew_while_it_is_hidden(event, monkeypatch):
     """What is in front is evaluated for the first time when it is shown."""
     made = []
     make = upstream_proxy._make
-    monkeypatch.setattr(upstream_proxy, "_make", lambda obj: made.append(obj) or make(obj))
+    monkeypatch.setattr(upstream_proxy, "_make", lambda obj, shares: made.append(obj) or make(obj, shares))
     obj = arm_with("DECIMATE", ratio=0.5)
     obj.hide_viewport = True
     bpy.context.scene.frame_set(8)
@@ -223,3 +226,121 @@ def test_one_view_layer_has_it_for_its_position_alone():
     expected = scenes.final_points(obj)
     assert scenes.worst(expected, scenes.rest_points(obj)[-len(expected) :]) > 0.05
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def move_points(obj):
+    for points in (obj.data.vertices, obj.data.shape_keys.key_blocks["Basis"].data):
+        for point in points:
+            point.co.x += 0.1 * point.co.z
+
+
+def move_key(obj):
+    for point in obj.data.shape_keys.key_blocks["Key"].data:
+        point.co.y += 0.3
+
+
+def weight(obj):
+    obj.vertex_groups["bone.1"].add(range(0, len(obj.data.vertices), 3), 0.7, "ADD")
+
+
+def fewer_faces(obj):
+    made = bmesh.new()
+    made.from_mesh(obj.data)
+    bmesh.ops.delete(made, geom=list(made.faces)[:20], context="FACES")
+    made.to_mesh(obj.data)
+    made.free()
+
+
+def set_key(obj):
+    """Over its animation: as long as the frame stays, the artist's value holds."""
+    obj.data.shape_keys.key_blocks["Key"].value = 0.3
+
+
+def mute_key(obj):
+    obj.data.shape_keys.key_blocks["Key"].mute = True
+
+
+def mask(obj):
+    """An attribute that the modifier in front reads."""
+    obj.vertex_groups.new(name="front").add([0, 5, 9], 1.0, "REPLACE")
+    obj.modifiers["Front"].vertex_group = "front"
+
+
+@pytest.mark.parametrize("edit", [move_points, move_key, weight, fewer_faces, set_key, mute_key, mask])
+def test_the_proxy_follows_the_mesh(edit, route):
+    """It has a mesh of its own, so that the artist's has one user."""
+
+    def shown(has_sinew: bool) -> tuple[np.ndarray, ...]:
+        obj, _armature = scenes.make_arm(bones=3)
+        scenes.key_shape(obj)
+        scenes.put_in_front(obj, "SOLIDIFY")
+        if has_sinew:
+            scenes.add_sinew(obj, "lbs")
+        bpy.context.scene.frame_set(8)
+        assert obj.data.users == 1
+        before = scenes.final_points(obj)
+        edit(obj)
+        obj.data.update_tag()
+        bpy.context.view_layer.update()
+        after = scenes.final_points(obj)
+        assert after.shape != before.shape or scenes.worst(after, before) > 1e-3, "nothing is tested"
+        later = scenes.shapes(obj, FRAMES)
+        if has_sinew:
+            assert properties.of(obj).upstream_proxy.data != obj.data
+            attach.remove(obj)
+        assert [mesh.name for mesh in bpy.data.meshes if mesh.users == 1] == [obj.data.name]
+        bpy.data.batch_remove([obj, obj.data])
+        return after, *later
+
+    for mine, its in zip(shown(has_sinew=True), shown(has_sinew=False), strict=True):
+        assert scenes.worst(mine, its) <= 1e-5
+
+
+@pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
+def test_a_mesh_that_another_addon_moves_with_each_frame(event, route):
+    if event == "frame_change_post" and route == routes.UPDATE:
+        pytest.skip("what handlers change behind Sinew's is shown with the next event")
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.put_in_front(obj, "MIRROR").use_axis = (False, True, False)
+    rest = np.array([vertex.co for vertex in obj.data.vertices])
+
+    @persistent
+    def move(scene, _depsgraph=None):
+        obj.data.attributes["position"].data.foreach_set(
+            "vector", (rest + 0.02 * scene.frame_current).ravel()
+        )
+        obj.data.update_tag()
+
+    scenes.add_sinew(obj, "lbs")
+    getattr(bpy.app.handlers, event).append(move)
+    shown = scenes.shapes(obj, FRAMES)
+    proxy = properties.of(obj).upstream_proxy
+    assert proxy.data != obj.data
+    properties.of(obj).enabled = False
+    expected = scenes.shapes(obj, FRAMES)
+    getattr(bpy.app.handlers, event).remove(move)
+    assert scenes.worst(shown, expected) <= 1e-5
+
+
+def test_a_mesh_that_does_not_equal_its_copy_is_shared():
+    """Weights that are no numbers equal nothing: Sinew would copy the mesh again and again."""
+    obj, _armature = scenes.make_arm(bones=3)
+    obj.vertex_groups["bone.1"].add([3], float("nan"), "REPLACE")
+    scenes.put_in_front(obj, "MIRROR")
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(8)
+    proxy = properties.of(obj).upstream_proxy
+    assert proxy is not None
+    assert proxy.data == obj.data or not np.isnan(mesh_io.read_group_weights(obj.data).weights).any()
+
+
+def test_weights_are_painted_on_the_shared_mesh():
+    """A copy would be made again with each stroke."""
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.put_in_front(obj, "MIRROR")
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.view_layer.update()
+    for mode, users in (("WEIGHT_PAINT", 2), ("OBJECT", 1)):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.view_layer.update()
+        assert obj.data.users == users

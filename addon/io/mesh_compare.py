@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compares a mesh with its copy, and keeps the copy's points as those of the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+
+from . import mesh_io
+
+_SETTINGS = ("texspace_location", "texspace_size", "use_auto_texspace", "has_custom_normals")
+_KEY_SETTINGS = ("name", "mute", "vertex_group", "slider_min", "slider_max", "interpolation")
+# What an attribute's values are called, and how many numbers each has.
+_VALUES = {
+    "FLOAT": ("value", 1),
+    "INT": ("value", 1),
+    "INT8": ("value", 1),
+    "BOOLEAN": ("value", 1),
+    "FLOAT_VECTOR": ("vector", 3),
+    "FLOAT2": ("vector", 2),
+    "FLOAT_COLOR": ("color", 4),
+    "BYTE_COLOR": ("color", 4),
+    "QUATERNION": ("value", 4),
+    "FLOAT4X4": ("value", 16),
+    "INT16_2D": ("value", 2),
+    "INT32_2D": ("value", 2),
+}
+
+
+def are_alike(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+    """Whether modifiers make the same of both: their points, faces, attributes, weights, materials and shape
+    keys, but for the values of the keys. Neither is in edit mode."""
+    return (
+        all(mine == its for mine, its in zip(_facts(mesh), _facts(other), strict=True))
+        and all(
+            np.array_equal(mine, its, equal_nan=mine.dtype.kind == "f")
+            for mine, its in zip(_arrays(mesh), _arrays(other), strict=True)
+        )
+        and mesh_io.read_group_weights(mesh).equals(mesh_io.read_group_weights(other))
+    )
+
+
+def _facts(mesh: bpy.types.Mesh) -> Iterator[object]:
+    """What is compared first: all that says how many arrays there are, and how long they are."""
+    yield len(mesh.vertices), len(mesh.edges), len(mesh.loops), len(mesh.polygons)
+    yield [(each.name, each.data_type, each.domain) for each in mesh.attributes]
+    yield list(mesh.materials)
+    yield [
+        tuple(value) if hasattr(value, "__len__") else value
+        for value in map(lambda name: getattr(mesh, name), _SETTINGS)
+    ]
+    keys = mesh.shape_keys
+    yield keys is not None and keys.use_relative
+    yield [
+        (*(getattr(key, name) for name in _KEY_SETTINGS), key.relative_key.name)
+        for key in (() if keys is None else keys.key_blocks)
+    ]
+
+
+def _arrays(mesh: bpy.types.Mesh) -> Iterator[np.ndarray]:
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    yield starts
+    for attribute in mesh.attributes:
+        yield _values_of(attribute)
+    if mesh.has_custom_normals and mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS) is None:
+        normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
+        mesh.corner_normals.foreach_get("vector", normals.ravel())
+        yield normals
+    for key in () if mesh.shape_keys is None else mesh.shape_keys.key_blocks:
+        yield mesh_io.read_key_points(key)
+
+
+def _values_of(attribute: bpy.types.Attribute) -> np.ndarray:
+    count = len(attribute.data)
+    if attribute.data_type not in _VALUES:
+        return np.array([each.value for each in attribute.data])
+    name, size = _VALUES[attribute.data_type]
+    is_real = attribute.data_type.startswith(("FLOAT", "QUATERNION", "BYTE_COLOR"))
+    values = np.empty(count * size, dtype=np.float32 if is_real else np.int32)
+    if attribute.data_type == "BOOLEAN":
+        values = np.empty(count, dtype=bool)
+    attribute.data.foreach_get(name, values)
+    return values
+
+
+def write_points(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> None:
+    """Gives the copy the points of the mesh and of its shape keys, where it has as many."""
+    keys = [() if each.shape_keys is None else each.shape_keys.key_blocks for each in (mesh, copy)]
+    if len(mesh.vertices) != len(copy.vertices) or len(keys[0]) != len(keys[1]):
+        return
+    mesh_io.attribute_to_write(copy, mesh_io.POSITION).data.foreach_set(
+        "vector", mesh_io.read_points(mesh).ravel()
+    )
+    for mine, its in zip(*keys, strict=True):
+        its.points.foreach_set("co", mesh_io.read_key_points(mine).ravel())
+    copy.update_tag()
