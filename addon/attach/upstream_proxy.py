@@ -47,8 +47,9 @@ WEIGHT_CHANGERS = {
 # They read from the mesh what scripts cannot: nobody could tell when a copy is out of date.
 _READERS = {"MULTIRES", "SKIN"}
 
-# The session_uid of meshes whose copies differ from them, as where a weight is not a number.
-_unlike_copies: set[int] = set()
+# The session_uid of meshes that are never copied: another add-on moves them with each frame, or they differ
+# from any copy, as where a weight is not a number.
+_shared: set[int] = set()
 
 # Marks a proxy's own copy of the mesh.
 _COPY = "sinew_copy"
@@ -114,7 +115,7 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
         remove(obj)
         settings.upstream_proxy, settings.upstream_signature = _make(obj, shares), wanted
         if not is_current(obj):
-            _unlike_copies.add(obj.data.session_uid)
+            share_mesh(obj)
             return ensure(obj)
     return settings.upstream_proxy
 
@@ -125,6 +126,11 @@ def shares_mesh(obj: bpy.types.Object) -> bool:
     return proxy is not None and proxy.data == obj.data
 
 
+def share_mesh(obj: bpy.types.Object) -> None:
+    """From now on, no proxy has a copy of the object's mesh."""
+    _shared.add(obj.data.session_uid)
+
+
 def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
     """Whether a copy of the mesh would have to be made again with each stroke, could be out of date, or would
     be of no use, as others use the mesh, too."""
@@ -132,7 +138,7 @@ def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
     if (
         obj.mode != "OBJECT"
         or not mesh.is_editable
-        or mesh.session_uid in _unlike_copies
+        or mesh.session_uid in _shared
         or any(modifier.type in _READERS for modifier in stack.upstream(obj))
     ):
         return True

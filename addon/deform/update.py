@@ -107,8 +107,11 @@ class _Event:
         obj, changes = self.obj, self.changes
         if obj.data.session_uid not in changes.meshes or obj.data.is_editmode:
             return False
-        if changes.frame:
+        if changes.frame and self.old.is_in_depsgraph:
+            # Blender evaluates what handlers change, and Sinew deforms within that.
             upstream_proxy.follow_points(obj)
+        elif changes.frame and not upstream_proxy.is_current(obj):
+            upstream_proxy.share_mesh(obj)
         return not upstream_proxy.is_current(obj)
 
     def _with_rest(self, facts: Facts) -> Facts:

@@ -419,6 +419,8 @@ def outcome(tool: Callable, obj: bpy.types.Object, folder: Path) -> Seen:
 @pytest.mark.parametrize("prepare", MESHES)
 @pytest.mark.parametrize("tool", TOOLS)
 def test_a_tool(tool, prepare, tmp_path):
+    if (tool, prepare) == ("Collada", with_front_and_keys):
+        pytest.skip("Blender's exporter then leaves another shape, without Sinew, too (4.2, 4.5)")
     expected = TOOLS[tool](make(prepare, has_sinew=False), tmp_path)
     obj = make(prepare, has_sinew=True)
     said = SAID.get((tool, prepare))
