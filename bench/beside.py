@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures playback while a precomputation runs: python bench/beside.py [--name NAME]
 
-Frames of bench/frames.py at 24 a second, or as they come where they take longer, as Blender plays them:
-beside a computation for another mesh, and then as many alone, in one process.
+Frames of bench/frames.py at 24 and 60 a second, and as fast as they come: beside a computation for another mesh,
+and then as many alone, in one process.
 """
 
 from __future__ import annotations
@@ -18,30 +18,33 @@ import precompute
 import sinew
 
 CASES = (frames.Case(100_000, normals=True), frames.Case(characters=50, bones=50, normals=True))
-PERIOD, MOST_SECONDS = 1 / 24, 10.0
+RATES = {"24/s": 1 / 24, "60/s": 1 / 60, "free": 0.0}
+MOST_SECONDS = 10.0
 
 
-def play(scene: frames.Scene, numbers: Iterator[int]) -> list[float]:
+def play(scene: frames.Scene, numbers: Iterator[int], period: float) -> list[float]:
     """Seconds from a frame to the next one, of one frame."""
     began = time.perf_counter()
     scene.run([next(numbers)])
-    time.sleep(max(0.0, PERIOD - (time.perf_counter() - began)))
+    time.sleep(max(0.0, period - (time.perf_counter() - began)))
     return [time.perf_counter() - began]
 
 
-def measure(scene: frames.Scene, start: Callable[[], sinew.Precomputation], runs: int) -> dict:
+def measure(
+    scene: frames.Scene, start: Callable[[], sinew.Precomputation], runs: int, period: float
+) -> dict:
     """Seconds from frame to frame beside it and alone, and the frame rate beside it over that alone."""
     times: dict[str, list[float]] = {"beside": [], "alone": []}
     numbers = itertools.cycle(range(1, frames.FRAMES + 1))
     for _ in range(frames.BEFORE):
-        play(scene, numbers)
+        play(scene, numbers, period)
     for _run in range(runs):
         run, end = start(), time.perf_counter() + MOST_SECONDS
         while not run.has_ended and time.perf_counter() < end:
-            times["beside"] += play(scene, numbers)
+            times["beside"] += play(scene, numbers, period)
         del run
         while len(times["alone"]) < len(times["beside"]):
-            times["alone"] += play(scene, numbers)
+            times["alone"] += play(scene, numbers, period)
     rate = sum(times["alone"]) / sum(times["beside"])
     return {name: common.spread(of) for name, of in times.items()} | {"rate": rate}
 
@@ -61,15 +64,15 @@ def main() -> None:
     }
     results = {}
     with frames.quiet_blender() as say:
-        say(f"{'frame rate beside it / alone':30}{'rate':>6}{'milliseconds, medians':>28}")
+        say(f"{'frame rate beside it / alone':38}{'rate':>6}{'milliseconds, medians':>28}")
         for case in CASES:
             scene = frames.Scene(case, leave_small=False)
             scene.switch(on=True)
-            for method, start in starts.items():
-                name = f"{case.name}, {method}"
-                found = results[name] = measure(scene, start, arguments.runs)
+            for (method, start), (rate, period) in itertools.product(starts.items(), RATES.items()):
+                name = f"{case.name}, {method}, {rate}"
+                found = results[name] = measure(scene, start, arguments.runs, period)
                 medians = " / ".join(f"{found[when]['median'] * 1e3:.2f}" for when in ("beside", "alone"))
-                say(f"{name:30}{found['rate']:6.2f}{medians:>28}")
+                say(f"{name:38}{found['rate']:6.2f}{medians:>28}")
     if arguments.name:
         common.write(arguments.name, machine=facts, results=results)
 

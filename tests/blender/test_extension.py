@@ -139,11 +139,11 @@ def test_the_zip_holds_what_the_platform_asks_for(package):
 REFUSED_MODULES = (
     *("threading", "_thread", "concurrent.futures", "multiprocessing", "dask", "distributed"),
     *("socket", "ssl", "http", "urllib.request", "ftplib", "smtplib", "requests"),
-    *("pip", "ensurepip", "venv", "site"),
+    *("pip", "ensurepip", "venv", "site", "importlib.reload"),
 )
 REFUSED = {
     *("exec", "eval", "compile", "__import__", "bl_info"),
-    *("sys.path", "sys.meta_path", "sys.path_hooks", "os.system", "os.fork"),
+    *("sys.path", "sys.meta_path", "sys.path_hooks", "os.system", "os.fork", "importlib.reload"),
 }
 
 

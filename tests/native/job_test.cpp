@@ -7,10 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <optional>
 #include <stdexcept>
 #include <thread>
 #include <vector>
+
+#include "sinew/base/thread_pool.h"
 
 #ifndef _WIN32
 #include <sys/wait.h>
@@ -65,6 +68,19 @@ TEST(Job, throws_what_a_chunk_threw) {
         if (begin == 500) throw std::runtime_error("enough");
     };
     EXPECT_THROW(job.for_each(1000, 1, work), std::runtime_error);
+}
+
+TEST(Job, rests_as_long_as_it_works_where_frames_are_deformed) {
+    using Clock = std::chrono::steady_clock;
+    constexpr std::chrono::milliseconds kChunk{5};
+    constexpr int kChunks = 10;
+    Job job(1, true);
+    const auto began = Clock::now();
+    job.for_each(kChunks, 1, [&](std::size_t, std::size_t) {
+        parallel_for(1, 1, [](std::size_t, std::size_t) {});
+        std::this_thread::sleep_for(kChunk);
+    });
+    EXPECT_GE(Clock::now() - began, 2 * kChunks * kChunk);
 }
 
 TEST(BackgroundJob, says_when_it_has_ended) {

@@ -2,6 +2,7 @@
 #include "sinew/base/job.h"
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
@@ -36,6 +37,14 @@ void give_way() noexcept {
     // the work would never end. Relative to the main thread, as a thread inherits the value of the one that starts it.
     setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, static_cast<id_t>(getpid())) + 15);
 #endif
+}
+
+/// Sleeps for as long as a chunk took, where frames are deformed meanwhile: a thread of low priority still delays
+/// those that Blender wakes many times a frame, and takes their share of memory and caches.
+void make_room(std::chrono::steady_clock::duration taken) {
+    constexpr std::chrono::milliseconds kLongest{50};
+    if (is_in_use())
+        std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(taken, kLongest));
 }
 
 /// Starts a thread. Returns false if the system refuses.
@@ -74,7 +83,9 @@ void Job::for_each(std::size_t count, std::size_t chunk,
             while (!is_cancelled_.load(std::memory_order_relaxed)) {
                 const std::size_t begin = next.fetch_add(chunk, std::memory_order_relaxed);
                 if (begin >= count) return;
+                const auto began = std::chrono::steady_clock::now();
                 work(begin, std::min(begin + chunk, count));
+                if (gives_way_) make_room(std::chrono::steady_clock::now() - began);
             }
         } catch (...) {
             next.store(count, std::memory_order_relaxed);

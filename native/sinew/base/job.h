@@ -17,8 +17,8 @@ namespace sinew {
 class SINEW_EXPORT Job {
 public:
     /// threads    at most so many share the work; 0: as many as useful
-    /// gives_way  whether threads that it starts have a lower priority, so that no processor is missing where a frame is
-    ///            deformed meanwhile; on a busy machine the work then takes much longer
+    /// gives_way  whether threads that it starts have a lower priority, and work half of the time while frames are
+    ///            deformed; on a busy machine the work then takes much longer
     explicit Job(std::size_t threads = 0, bool gives_way = false) noexcept;
 
     // For any thread.

@@ -256,6 +256,10 @@ private:
 constinit Pool pool;
 static_assert(std::is_trivially_destructible_v<Pool>);
 
+// When parallel_for() was called last, by any thread.
+constinit std::atomic<std::chrono::steady_clock::time_point> last_use{
+    std::chrono::steady_clock::time_point{}};
+
 std::size_t Pool::start_workers(std::size_t wanted) noexcept {
     while (worker_count_ < wanted) {
         const auto serve = [](std::size_t self) { pool.serve(self); };
@@ -287,12 +291,18 @@ std::size_t hardware_threads() noexcept {
 }
 
 void run_chunks(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
+    last_use.store(std::chrono::steady_clock::now(), std::memory_order_relaxed);
     if (count == 0) return;
     chunk = std::clamp<std::size_t>(chunk, 1, count);
     const std::size_t useful =
         std::min({useful_threads(threads, count - 1, chunk), (count - 1) / chunk + 1, kMaxThreads});
     if (useful <= 1) return work(0, count);
     pool.run(count, useful, work, chunk);
+}
+
+bool is_in_use() noexcept {
+    constexpr std::chrono::milliseconds kFramesAreApart{100};
+    return std::chrono::steady_clock::now() - last_use.load(std::memory_order_relaxed) < kFramesAreApart;
 }
 
 void end_threads() noexcept { pool.end(); }

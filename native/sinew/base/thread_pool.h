@@ -38,6 +38,9 @@ void parallel_for(std::size_t count, std::size_t threads, const Work& work, std:
     run_chunks(count, threads, std::cref(work), chunk);
 }
 
+/// Whether parallel_for() was called in the last tenth of a second, as it is while an animation plays.
+[[nodiscard]] SINEW_EXPORT bool is_in_use() noexcept;
+
 /// Ends the threads of parallel_for() and returns when they are gone. The next call of parallel_for() starts new
 /// ones. A host that unloads the library must call this first. Waits for calls in progress. Must not be called
 /// from their work.
