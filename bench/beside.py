@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures playback while a precomputation runs: python bench/beside.py [--name NAME]
 
-Frames of bench/frames.py at 24 and 60 a second, and as fast as they come: beside a computation for another mesh,
-and then as many alone, in one process.
+Frames of bench/frames.py at 24 and 60 a second, and as fast as they come: beside a computation for another
+mesh, and then as many alone, in one process.
 """
 
 from __future__ import annotations
@@ -30,9 +30,7 @@ def play(scene: frames.Scene, numbers: Iterator[int], period: float) -> list[flo
     return [time.perf_counter() - began]
 
 
-def measure(
-    scene: frames.Scene, start: Callable[[], sinew.Precomputation], runs: int, period: float
-) -> dict:
+def measure(scene: frames.Scene, start: Callable[[], sinew.Precomputation], runs: int, period: float) -> dict:
     """Seconds from frame to frame beside it and alone, and the frame rate beside it over that alone."""
     times: dict[str, list[float]] = {"beside": [], "alone": []}
     numbers = itertools.cycle(range(1, frames.FRAMES + 1))
