@@ -149,6 +149,29 @@ def test_smooth_meshes_have_the_normals_of_vertices_too():
     np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
 
 
+@needs_support
+def test_edges_that_are_marked_between_frames_are_followed_at_once():
+    obj, _armature = make(smooth)
+    assert evaluated(obj).normals_domain == "POINT"
+    for shading in (sharp, custom, partly_flat, smooth, flat, sharp):
+        if "custom_normal" in obj.data.attributes:
+            obj.data.attributes.remove(obj.data.attributes["custom_normal"])
+        if "sharp_edge" in obj.data.attributes:
+            obj.data.attributes.remove(obj.data.attributes["sharp_edge"])
+        shading(obj)
+        bpy.context.view_layer.update()
+        assert has_given(obj) == bool(DOMAINS[shading]), shading.__name__
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+    # The same domain, but other edges.
+    obj.data.edges[40].use_edge_sharp = not obj.data.edges[40].use_edge_sharp
+    obj.data.update()
+    bpy.context.view_layer.update()
+    given = corners(obj)
+    choose(obj, LEAVE)
+    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
+
+
 def add_nodes_that_read(obj):
     """Another object whose Geometry Nodes read this one."""
     group = bpy.data.node_groups.new("Reader", "GeometryNodeTree")
@@ -320,6 +343,41 @@ def test_modifiers_behind_that_are_off_allow_given_normals():
         subdivision.levels = levels
         bpy.context.scene.frame_set(6 + levels)
         assert has_given(obj) == (levels == 0)
+
+
+BEHIND = {
+    "cast": lambda obj: obj.modifiers.new("Cast", "CAST"),
+    "switched on": lambda obj: setattr(obj.modifiers["Off"], "show_viewport", True),
+    "instances": instance_faces,
+}
+
+
+@needs_support
+@pytest.mark.parametrize("act", BEHIND.values(), ids=BEHIND)
+@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
+def test_modifiers_that_a_handler_adds_behind_end_given_normals_at_once(event, act):
+    """Blender evaluates it without notification."""
+    obj, _armature = make(smooth)
+    off = obj.modifiers.new("Off", "CAST")
+    off.show_viewport = off.show_render = False
+    bpy.context.scene.frame_set(4)
+    assert has_given(obj)
+    handlers = getattr(bpy.app.handlers, event)
+
+    def call(*_args):
+        handlers.remove(call)
+        act(obj)
+
+    handlers.append(call)
+    obj.update_tag()
+    if event == "frame_change_post":
+        bpy.context.scene.frame_set(5)
+    else:
+        bpy.context.view_layer.update()
+    assert call not in handlers
+    assert not has_given(obj)
+    given, left = both(obj)
+    np.testing.assert_array_equal(given, left)
 
 
 @needs_support

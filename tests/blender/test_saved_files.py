@@ -260,6 +260,22 @@ def test_an_error_is_not_saved_as_the_artists_choice(tmp_path, monkeypatch):
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
 
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+def test_saved_in_a_mode_of_the_modifier(tmp_path, mode):
+    obj, _armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
+    scenes.add_sinew(obj, "dq")
+    ours = scenes.shapes(obj, FRAMES)
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.context.view_layer.update()
+    save(tmp_path / "saved.blend")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
+    assert not obj.modifiers["Armature"].use_deform_preserve_volume
+    shapes, _facts = played_without_sinew(tmp_path / "saved.blend")
+    assert scenes.worst(shapes, expected) <= 1e-6
+
+
 @pytest.mark.parametrize("what", ["small", "throws", "off"])
 def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
     small, armature = scenes.make_arm(name="A First")

@@ -199,7 +199,10 @@ CASES = {
     "a modifier behind by a handler": "shade Arm smooth; add Arm dq; frame 4; "
     "neighbour Arm frame_change_post add 5; update; frame 6; neighbour Arm depsgraph_update_post add 7; "
     "frame 8",
-    # Renamed by a handler, removed, undone
+    # Renamed, removed, undone
+    "envelopes of a moving shape key": "armature_options Arm envelopes; add_shape_key Arm; "
+    "key_shape_key Arm 1 11; add Arm; frame 6; frame 11",
+    "a modifier renamed": "add Arm dq; rename_modifier Arm; frame 6; remove Arm; frame 11",
     "renamed by a handler": "add Arm dq; neighbour Arm frame_change_pre name 6; frame 9; frame 3",
     "modifiers renamed by a handler": "add_modifier Arm CAST; add Arm dq; "
     "neighbour Arm frame_change_pre rename 6; frame 9; neighbour Arm frame_change_post rename 4; frame 3",

@@ -45,6 +45,33 @@ def test_two_scenes_at_different_frames():
         assert scenes.worst(points_in(obj, first), expected[3]) <= 1e-5
 
 
+def test_a_view_layer_is_shown_for_the_first_time(route):
+    """Blender sends no notification of its first evaluation, nor of changes by handlers after Sinew's."""
+    obj, armature = scenes.make_arm()
+    scene, first = bpy.context.scene, bpy.context.view_layer
+
+    def lift(*_args: object) -> None:
+        armature.delta_location.z = 0.5
+
+    try:
+        scenes.add_sinew(obj, "lbs")
+        scene.frame_set(5)
+        unmoved = scenes.final_points(obj)
+        bpy.app.handlers.frame_change_post.append(lift)
+        scene.frame_set(5)
+        bpy.app.handlers.frame_change_post.remove(lift)
+        bpy.context.window.view_layer = scene.view_layers.new("Second")
+        bpy.context.view_layer.update()
+        handlers.check_unannounced()
+        shown = scenes.final_points(obj)
+        properties.of(obj).enabled = False
+        expected = scenes.final_points(obj)
+        assert scenes.worst(expected, unmoved) > 0.1, "nothing is tested"
+        assert scenes.worst(shown, expected) <= 1e-5
+    finally:
+        bpy.context.window.view_layer = first
+
+
 def test_undo_with_a_view_layer_that_is_not_shown(route):
     """Blender keeps the point buffer's evaluated data from before the step that undo goes back to: points
     of another frame, or as many as another subdivision had."""
