@@ -15,7 +15,7 @@ import bpy
 
 from ..core import icons
 from ..core.errors import SinewError
-from ..core.icons import RENDER, VIEWS, Deformer, Icons, Situation
+from ..core.icons import VIEWS, Deformer, Icons, Situation
 from ..core.phrases import phrase
 from ..io.animation_paths import animated_paths, is_animated, is_visibility_animated
 from . import (
@@ -33,9 +33,6 @@ from . import (
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
-
-# Blender permits no modifier that does more than deform in front of these.
-_NEED_ORIGINAL_MESH = {"MULTIRES", "SOFT_BODY"}
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -93,8 +90,13 @@ def check_stack(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
     """Raises SinewError where an object's other modifiers, without types of `left_out`, do not permit
     Sinew's."""
     upstream_proxy.check(obj)
+    check_behind(obj, left_out)
+
+
+def check_behind(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
+    """Raises SinewError where a modifier behind, without types of `left_out`, does not permit Sinew's."""
     for modifier in stack.downstream(obj):
-        if modifier.type in _NEED_ORIGINAL_MESH.difference(left_out):
+        if modifier.type in stack.NEED_ORIGINAL_MESH.difference(left_out):
             raise SinewError(
                 f"{obj.name}: in front of {modifier.name} Blender permits only modifiers that just deform, "
                 "so not Sinew's; move it in front of the Armature modifier, or apply or remove it"
@@ -380,7 +382,7 @@ def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
-    neutral, smooth = stack.neutral_modifier(obj), {}
+    marks, smooth = (stack.mark_modifier(obj), stack.neutral_modifier(obj)), {}
     for name in VIEWS:
         view = _view(obj, name)
         wanted = icons.icons(view, situation)
@@ -390,9 +392,9 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
                 _show_in(modifier, name, is_on)
         if nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
             _show_in(nodes, name, wanted.sinew)
-        if name == RENDER:
-            # Where an animation switches Sinew's, it stays on, as it changes nothing.
-            _show_in(neutral, name, wanted.sinew)
+        for mark in marks:
+            # Where an animation switches Sinew's, they stay on, as they change nothing.
+            _show_in(mark, name, wanted.sinew)
         smooth[name] = not situation.is_by_sinew or view.deformer is Deformer.ARMATURE
     undeformed.mark(obj, situation.is_by_sinew)
     corrective_smooth.switch(obj, **smooth)
@@ -571,11 +573,8 @@ def position_modifier(obj: bpy.types.Object) -> None:
     """Moves Sinew's modifier behind the Armature modifiers that it replaces: it sets each vertex to its point
     regardless of the modifiers before it. In front of them or between them, even one that is off would
     decide what a Multi Modifier mixes with."""
-    run, nodes = stack.armature_modifiers(obj), sinew_modifier(obj)
-    if nodes is None or not run:
-        return
-    stack.move_behind(obj, nodes, run[-1])
-    undeformed.position(obj)
+    if sinew_modifier(obj) is not None:
+        stack.position_own(obj)
 
 
 def _is_icon_animated(obj: bpy.types.Object) -> bool:
@@ -596,7 +595,8 @@ def _methods(settings: properties.SinewSettings) -> dict[str, str]:
 def adopt_pointers(obj: bpy.types.Object) -> None:
     """Takes over armatures that the artist chose in the Armature modifiers."""
     for modifier, replaced in replaced_modifiers(obj):
-        if modifier.object not in (None, replaced.armature):
+        # An undo can have the object in its own modifier (point_store.clear_references_to_itself).
+        if modifier.object not in (None, obj, replaced.armature):
             replaced.armature = modifier.object
 
 

@@ -17,6 +17,8 @@ from ..io import mesh_io
 # group gets the points.
 MARK = "sinew_node_group"
 ATTRIBUTE, POINT_BUFFER = 13, 14
+# The group that marks a mesh, and the attribute that it adds. The heat map's has 15.
+STACK_MARK, IN_STACK = 16, ".sinew_in_stack"
 # Added to the value where the group gives normals of this domain.
 _WITH_NORMALS = {"": 0, "POINT": 30, "CORNER": 40}
 # The input with the name of the normals attribute.
@@ -45,7 +47,7 @@ IS_MARKED, MARK_TO_REMOVE = "Is Marked", "Mark to Remove"
 _MARK_SOCKETS = {
     IS_MARKED: (
         "NodeSocketBool",
-        "In renders, a mesh without rest positions is the undeformed one: it stays",
+        "In the stack, a mesh without rest positions is the undeformed one: it stays",
     ),
     MARK_TO_REMOVE: ("NodeSocketString", "Attribute of rest positions that is not needed behind"),
 }
@@ -86,6 +88,22 @@ def is_sinew(modifier: bpy.types.Modifier) -> bool:
     return (
         modifier.type == "NODES" and modifier.node_group is not None and bool(modifier.node_group.get(MARK))
     )
+
+
+def get_or_make_stack_mark() -> bpy.types.NodeTree:
+    """Returns the group that marks each mesh that Blender sends through the whole stack (undeformed.py)."""
+    group = find(STACK_MARK)
+    if group is None:
+        group = new_group("Sinew Stack Mark", STACK_MARK, {})
+        inputs = {"Geometry": add(group, "NodeGroupInput"), "Name": IN_STACK}
+        marked = add(group, "GeometryNodeStoreNamedAttribute", inputs, data_type="BOOLEAN")
+        add(group, "NodeGroupOutput", {"Geometry": marked})
+        note_structure(group)
+    return group
+
+
+def is_stack_mark(modifier: bpy.types.NodesModifier) -> bool:
+    return modifier.node_group is not None and modifier.node_group.get(MARK) == STACK_MARK
 
 
 def note_structure(group: bpy.types.NodeTree) -> None:
@@ -289,8 +307,12 @@ def _switch(group: bpy.types.NodeTree, which: _Source | bool, off: _Source, on: 
     return add(group, "GeometryNodeSwitch", inputs, input_type="GEOMETRY")
 
 
-def _without(group: bpy.types.NodeTree, geometry: _Source, attribute: _Source) -> bpy.types.Node:
+def _without(group: bpy.types.NodeTree, geometry: _Source, attribute: _Source | str) -> bpy.types.Node:
     return add(group, "GeometryNodeRemoveAttribute", {"Geometry": geometry, "Name": attribute})
+
+
+def _without_marks(group: bpy.types.NodeTree, geometry: _Source, source: bpy.types.Node) -> bpy.types.Node:
+    return _without(group, _without(group, geometry, source.outputs[MARK_TO_REMOVE]), IN_STACK)
 
 
 def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
@@ -323,7 +345,7 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
     )
     # Removed, as a subdivision behind would interpolate it for each of its vertices, and exports would
     # contain it.
-    moved = _without(group, _without(group, place, given["Points"]), given[MARK_TO_REMOVE])
+    moved = _without_marks(group, _without(group, place, given["Points"]), source)
     if normals:
         named = named_attribute(group, given[NORMALS])
         first = sample(group, moved, named, 0, normals)
@@ -334,9 +356,10 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
 
 def _is_deformed(group: bpy.types.NodeTree, source: bpy.types.Node) -> bpy.types.Node:
     """Returns a field that says whether the mesh is the deformed one, or may be (undeformed.py)."""
-    has_mark = named_attribute(group, REST_POSITION).outputs["Exists"]
-    implied = _logic(group, "IMPLY", source.outputs[IS_MARKED], has_mark)
-    return _logic(group, "OR", add(group, "GeometryNodeIsViewport"), implied)
+    has_mark, is_in_stack = (
+        named_attribute(group, name).outputs["Exists"] for name in (REST_POSITION, IN_STACK)
+    )
+    return _logic(group, "IMPLY", _logic(group, "AND", source.outputs[IS_MARKED], is_in_stack), has_mark)
 
 
 def _with_normals(
@@ -391,7 +414,7 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
             "Position": sample(group, buffer, stored, index),
         },
     )
-    moved = _without(group, place, given[MARK_TO_REMOVE])
+    moved = _without_marks(group, place, source)
     if normals:
         # They are those of the buffer's vertices behind the points.
         size = add(group, "GeometryNodeAttributeDomainSize", {"Geometry": moved}, component="MESH")

@@ -26,7 +26,7 @@ from .subscribers import subscribers
 
 ATTRIBUTE, NORMALS_ATTRIBUTE = ".sinew_points", ".sinew_normals"
 # Earlier versions also stored colours in the mesh.
-_OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, "sinew_colours")
+_OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, node_group.IN_STACK, "sinew_colours")
 
 
 def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders: bool = True) -> None:
@@ -191,15 +191,17 @@ def clear_references(obj: bpy.types.Object) -> None:
     if nodes is not None and nodes.node_group is not None:
         node_group.forget_helpers(nodes)
         nodes.node_group = None
+    mark = stack.mark_modifier(obj)
+    if mark is not None:
+        mark.node_group = None
 
 
 def clear_references_to_itself(obj: bpy.types.Object) -> None:
-    """Called after undo and redo, which read an object that changed into new memory. Where a deleted helper
-    was in that memory when the step was made, Blender (4.2 to 5.2) has the object's pointers to the helper
-    point to the object itself: it remaps these before it links the others, in its function
+    """Called after undo and redo, which read an object that changed into new memory. Where a deleted object
+    was in that memory when the step was made, Blender (4.2 to 5.2) has pointers to it point to the object
+    itself: it remaps these before it links the others, in its function
     read_libblock_undo_restore_at_old_address(). Sinew would write its points into the artist's mesh."""
-    settings = properties.of(obj)
-    if obj in (settings.point_buffer, settings.upstream_proxy):
+    if properties.clear_pointers(properties.of(obj), obj):
         clear_references(obj)
 
 

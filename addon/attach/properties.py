@@ -273,7 +273,8 @@ class SinewSettings(bpy.types.PropertyGroup):
     baked: bpy.props.CollectionProperty(
         type=SinewSwitchedOff, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
-    neutral_uid: _hidden(bpy.props.IntProperty, "The modifier of undeformed.py")
+    neutral_uid: _hidden(bpy.props.IntProperty, "The modifier that changes nothing (undeformed.py)")
+    mark_uid: _hidden(bpy.props.IntProperty, "The modifier that marks the mesh (undeformed.py)")
     marks_rest: _hidden(bpy.props.BoolProperty, "Sinew has Blender add rest positions")
     adds_rest_position: _hidden(
         bpy.props.BoolProperty, "The artist's own choice of Add Rest Position while Sinew sets it"
@@ -426,6 +427,22 @@ def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) ->
     change of weights does."""
     if getattr(group, name) != value:
         group[name] = value
+
+
+def clear_pointers(group: bpy.types.PropertyGroup, target: bpy.types.ID) -> bool:
+    """Clears the pointers to the target, also of groups within the group. Returns whether there were any."""
+    found = False
+    for name, prop in group.bl_rna.properties.items():
+        if prop.type not in ("POINTER", "COLLECTION") or name == "rna_type":
+            continue
+        value = getattr(group, name)
+        if value == target:
+            setattr(group, name, None)
+            found = True
+        for each in value if prop.type == "COLLECTION" else (value,):
+            if isinstance(each, bpy.types.PropertyGroup):
+                found |= clear_pointers(each, target)
+    return found
 
 
 def clear(obj: bpy.types.Object) -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import bpy
 
 from ..io.animation_paths import is_visibility_animated
@@ -27,6 +29,11 @@ LEFT_OUT_IN_PAINT = {
 }
 
 
+# Blender permits no modifier that does more than deform in front of these, and puts a new one in front of it.
+NEED_ORIGINAL_MESH = {"MULTIRES", "SOFT_BODY"}
+MARK_NAME = "Sinew Stack Mark"
+
+
 def is_on(modifier: bpy.types.Modifier) -> bool:
     return modifier.show_viewport or modifier.show_render
 
@@ -39,7 +46,8 @@ def can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     """Returns Sinew's own modifier. One that has no node group is recognised by its uid, or, without Sinew's
     settings, by its name."""
-    nodes = [m for m in obj.modifiers if m.type == "NODES"]
+    mark = mark_modifier(obj)
+    nodes = [m for m in obj.modifiers if m.type == "NODES" and m != mark]
     bare = (m for m in nodes if m.node_group is None and _is_ours(obj, m))
     return next((m for m in nodes if node_group.is_sinew(m)), None) or next(bare, None)
 
@@ -51,9 +59,19 @@ def neutral_modifier(obj: bpy.types.Object) -> bpy.types.LaplacianDeformModifier
     return next(same, None) or next((m for m in found if m.name.startswith("Sinew")), None)
 
 
+def mark_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    """Returns Sinew's modifier that marks the mesh (undeformed.py), also without its node group."""
+    nodes = [m for m in obj.modifiers if m.type == "NODES"]
+    bare = [m for m in nodes if m.node_group is None]
+    same = (m for m in bare if m.persistent_uid == properties.of(obj).mark_uid)
+    named = (m for m in bare if m.name.startswith(MARK_NAME))
+    return next(itertools.chain((m for m in nodes if node_group.is_stack_mark(m)), same, named), None)
+
+
 def own_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Returns the modifiers that Sinew put on the object."""
-    return [m for m in (sinew_modifier(obj), neutral_modifier(obj)) if m is not None]
+    """Returns the modifiers that Sinew put on the object, in their order."""
+    own = (mark_modifier(obj), sinew_modifier(obj), neutral_modifier(obj))
+    return [modifier for modifier in own if modifier is not None]
 
 
 def _is_ours(obj: bpy.types.Object, modifier: bpy.types.NodesModifier) -> bool:
@@ -121,6 +139,15 @@ def _deforms(modifier: bpy.types.Modifier) -> bool:
 
 def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
     return next((i for i, m in enumerate(obj.modifiers) if m == modifier), len(obj.modifiers))
+
+
+def position_own(obj: bpy.types.Object) -> None:
+    """Moves Sinew's modifiers behind the Armature modifiers that it replaces."""
+    run = armature_modifiers(obj)
+    if any(modifier.type in NEED_ORIGINAL_MESH for modifier in downstream(obj)):
+        return
+    for ahead, modifier in itertools.pairwise([run[-1], *own_modifiers(obj)] if run else []):
+        move_behind(obj, modifier, ahead)
 
 
 def move_behind(obj: bpy.types.Object, modifier: bpy.types.Modifier, other: bpy.types.Modifier) -> None:

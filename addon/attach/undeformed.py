@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps Generated texture coordinates at the rest shape in renders.
+"""Keeps Generated texture coordinates at the rest shape.
 
 Blender sends the undeformed mesh, from which they are made, through all modifiers that do more than deform,
 so through Sinew's, too. It does so only where a modifier that just deforms is on; else it takes the deformed
@@ -8,9 +8,8 @@ Sinew's modifier stands one that changes nothing, in no time: a Laplacian Deform
 option Add Rest Position of the object adds an attribute to the deformed mesh alone. Without it, Sinew's node
 group leaves a mesh as it is.
 
-Not in viewports: applying Sinew's modifier evaluates it there, on a mesh that has not that attribute either.
-Nodes can tell the two apart only where the mesh has a Texture Space Mesh: another mesh in the file, which
-would have to follow each edit of the first, and which neither undo nor saving could leave as it is.
+Applying Sinew's modifier evaluates it alone, on a mesh without that attribute, too. So in front of Sinew's
+modifier stands one that marks each mesh that goes through the whole stack: one without this mark is deformed.
 """
 
 from __future__ import annotations
@@ -18,14 +17,15 @@ from __future__ import annotations
 import bpy
 
 from ..io import mesh_io
-from . import node_group, properties, stack
+from . import node_group, properties, references, stack
 
 
 def ensure(obj: bpy.types.Object) -> dict[str, object]:
-    """Makes the modifier behind Sinew's, and returns inputs of Sinew's."""
+    """Makes the modifiers around Sinew's, and returns inputs of Sinew's."""
     if stack.neutral_modifier(obj) is None and _can_make(obj):
-        _make(obj)
-    position(obj)
+        _make_neutral(obj)
+    _ensure_mark(obj)
+    stack.position_own(obj)
     can_mark = _can_mark(obj)
     keeps = properties.of(obj).adds_rest_position or not can_mark
     return {
@@ -41,26 +41,35 @@ def _can_make(obj: bpy.types.Object) -> bool:
     return obj.data.is_editable and not mesh_io.read_group_weights(obj.data).counts.any()
 
 
-def _make(obj: bpy.types.Object) -> None:
-    active = obj.modifiers.active
-    neutral = obj.modifiers.new("Sinew Texture Coordinates", "LAPLACIANDEFORM")
+def _make_neutral(obj: bpy.types.Object) -> None:
+    neutral = _new(obj, "Sinew Texture Coordinates", "LAPLACIANDEFORM")
     # Blender calls one without a group's name disabled. The group itself is not needed.
     made = None if obj.vertex_groups else obj.vertex_groups.new(name="Sinew")
     neutral.vertex_group = obj.vertex_groups[0].name
     if made is not None:
         obj.vertex_groups.remove(made)
-    neutral.show_expanded = neutral.show_in_editmode = False
-    neutral.show_viewport = neutral.show_render = False
     properties.of(obj).neutral_uid = neutral.persistent_uid
+
+
+def _ensure_mark(obj: bpy.types.Object) -> None:
+    mark = stack.mark_modifier(obj) or _new(obj, stack.MARK_NAME, "NODES")
+    properties.store(properties.of(obj), "mark_uid", mark.persistent_uid)
+    group = node_group.get_or_make_stack_mark()
+    if mark.node_group != group:
+        references.note(obj)
+        mark.node_group = group
+    if obj.data.is_editable and mesh_io.find_attribute(obj.data, node_group.IN_STACK) is not None:
+        # Somebody has applied it.
+        mesh_io.remove_attribute(obj.data, node_group.IN_STACK)
+
+
+def _new(obj: bpy.types.Object, name: str, kind: str) -> bpy.types.Modifier:
+    active = obj.modifiers.active
+    made = obj.modifiers.new(name, kind)
+    made.show_expanded = made.show_in_editmode = made.show_viewport = made.show_render = False
     if active is not None:
         obj.modifiers.active = active
-
-
-def position(obj: bpy.types.Object) -> None:
-    """Moves it directly behind Sinew's modifier."""
-    nodes, neutral = stack.sinew_modifier(obj), stack.neutral_modifier(obj)
-    if nodes is not None and neutral is not None:
-        stack.move_behind(obj, neutral, nodes)
+    return made
 
 
 def mark(obj: bpy.types.Object, is_marked: bool) -> None:
@@ -83,9 +92,13 @@ def _can_mark(obj: bpy.types.Object) -> bool:
 
 def remove(obj: bpy.types.Object) -> None:
     mark(obj, False)
-    neutral = stack.neutral_modifier(obj)
-    if neutral is not None:
-        obj.modifiers.remove(neutral)
+    for modifier in _both(obj):
+        obj.modifiers.remove(modifier)
+
+
+def _both(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    both = (stack.mark_modifier(obj), stack.neutral_modifier(obj))
+    return [modifier for modifier in both if modifier is not None]
 
 
 # The session_uid of each object that remove_later() was called for.
@@ -96,12 +109,11 @@ def remove_later(obj: bpy.types.Object) -> None:
     """Called where Sinew's modifier was applied or deleted: a script that goes through a list of modifiers
     would crash Blender where another of these is gone."""
     mark(obj, False)
-    neutral = stack.neutral_modifier(obj)
-    if neutral is not None:
-        neutral.show_viewport = neutral.show_render = False
+    for modifier in _both(obj):
+        modifier.show_viewport = modifier.show_render = False
         _to_remove.add(obj.session_uid)
-        if not bpy.app.background and not bpy.app.timers.is_registered(remove_leftovers):
-            bpy.app.timers.register(remove_leftovers)
+    if _to_remove and not bpy.app.background and not bpy.app.timers.is_registered(remove_leftovers):
+        bpy.app.timers.register(remove_leftovers)
 
 
 def has_leftovers() -> bool:
@@ -113,7 +125,6 @@ def remove_leftovers() -> None:
     if not has_leftovers():
         return
     for obj in [each for each in bpy.data.objects if each.session_uid in _to_remove]:
-        neutral = stack.neutral_modifier(obj)
-        if neutral is not None and not properties.has_sinew(obj):
-            obj.modifiers.remove(neutral)
+        for modifier in [] if properties.has_sinew(obj) else _both(obj):
+            obj.modifiers.remove(modifier)
     _to_remove.clear()

@@ -343,6 +343,7 @@ def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
     # The plan depends on settings such as Preserve Volume as the artist set them.
     attach.restore_volume(obj)
     attach.follow_stack(obj)
+    attach.check_behind(obj)
     attach.adopt_pointers(obj)
     armatures = properties.of(obj).armatures
     if not armatures:

@@ -19,8 +19,8 @@ rounding moves by the tolerance, directly or by a later modifier; for stages, a 
 these are computed from the input. Behind several modifiers it also leaves out vertices where Sinew is
 within the tolerance of the float64 reference: the rest of the difference is Blender's own rounding.
 
-Generated texture coordinates in renders must be Blender's. Sinew must refuse a rig that it cannot deform as
-Blender does: with a sentence, and nothing of it stays.
+Generated texture coordinates must be Blender's, in renders, and in the viewport where hair needs them. Sinew
+must refuse a rig that it cannot deform as Blender does: with a sentence, and nothing of it stays.
 Vertices that a seam split, as files of engines have them, must stay together.
 """
 
@@ -86,6 +86,7 @@ FEATURES = (
     "first multi",
     "refused behind",
     "seams",
+    "hair",
 )
 # Blender's own methods, and whether each has Preserve Volume.
 ORACLES = (("lbs", False), ("dq", True))
@@ -104,6 +105,7 @@ MIX, AFTER = "mix", "stages after"
 TORN = "seams"
 # The points that Generated texture coordinates are made from.
 COORDINATES = "coordinates"
+COORDINATES_IN_VIEWPORT = "coordinates in the viewport"
 # Vertex groups that stages use.
 PAINTED = ("painted", "painted too")
 NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after the update"}
@@ -372,6 +374,9 @@ def add_modifiers(seed: int, features: set[str], obj: bpy.types.Object, armature
     if has(seed, "refused behind", features, share=0.03):
         kind = str(numbers(seed, "refused behind").choice(REFUSED_BEHIND))
         obj.modifiers.new("Refused", kind)
+    if has(seed, "hair", features, share=0.3):
+        settings = obj.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings
+        settings.type, settings.count = "HAIR", 2
 
 
 def place(seed: int, features: set[str], obj: bpy.types.Object, armature: bpy.types.Object) -> None:
@@ -563,7 +568,7 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
         bpy.context.view_layer.update()
         expected[method] = scenes.final_points(obj)
     outcome = Outcome(seed, vertices=len(expected["lbs"]), refused=must_be_refused(obj))
-    expected[COORDINATES] = coordinates_of(obj)
+    expected |= coordinates_of(obj)
     is_split = has(seed, "seams", features, share=0.2)
     for route in wanted:
         routes.force(route)
@@ -577,10 +582,7 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
-        found = coordinates_of(obj)
-        is_alike = found.shape == expected[COORDINATES].shape
-        error = scenes.worst(found, expected[COORDINATES]) if is_alike else float("inf")
-        outcome.errors[route, COORDINATES] = error / scenes.diagonal(obj)
+        check_coordinates(obj, expected, outcome, route)
         properties.of(obj).sdef.interpolation = str(numbers(seed, "sdef").choice(["nlerp", "slerp"]))
         for method in OTHERS:
             try:
@@ -599,11 +601,23 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
     return outcome
 
 
-def coordinates_of(obj: bpy.types.Object) -> np.ndarray:
-    """float32 [vertices, 3], object space"""
+def coordinates_of(obj: bpy.types.Object) -> dict[str, np.ndarray]:
+    """float32 [vertices, 3], object space, by kind"""
     with scenes.rendering() as render:
         render(obj)
-    return scenes.KeepingEngine.undeformed[obj.name]
+    found = {COORDINATES: scenes.KeepingEngine.undeformed[obj.name]}
+    if "Hair" in obj.modifiers:
+        found[COORDINATES_IN_VIEWPORT] = scenes.final_points(obj, "undeformed_co")
+    return found
+
+
+def check_coordinates(
+    obj: bpy.types.Object, expected: dict[str, np.ndarray], outcome: Outcome, route: str
+) -> None:
+    for kind, points in coordinates_of(obj).items():
+        is_alike = points.shape == expected[kind].shape
+        error = scenes.worst(points, expected[kind]) if is_alike else float("inf")
+        outcome.errors[route, kind] = error / scenes.diagonal(obj)
 
 
 def must_be_refused(obj: bpy.types.Object) -> bool:

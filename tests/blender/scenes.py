@@ -102,8 +102,9 @@ def key_shape(obj: bpy.types.Object) -> None:
 
 
 def modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Its modifiers without the one that changes nothing (attach/undeformed.py)."""
-    return [modifier for modifier in obj.modifiers if modifier != stack.neutral_modifier(obj)]
+    """Its modifiers without those that keep texture coordinates (attach/undeformed.py)."""
+    own = (stack.mark_modifier(obj), stack.neutral_modifier(obj))
+    return [modifier for modifier in obj.modifiers if modifier not in own]
 
 
 def put_in_front(obj: bpy.types.Object, kind: str = "SUBSURF", name: str = "Front") -> bpy.types.Modifier:
@@ -115,11 +116,14 @@ def put_in_front(obj: bpy.types.Object, kind: str = "SUBSURF", name: str = "Fron
     return modifier
 
 
-def final_points(obj: bpy.types.Object) -> np.ndarray:
-    """float32 [vertices, 3]: the final evaluated mesh, object space."""
+def final_points(obj: bpy.types.Object, name: str = "co") -> np.ndarray:
+    """float32 [vertices, 3]: the final evaluated mesh, object space.
+
+    name  undeformed_co for its Generated texture coordinates, if hair or the like has Blender make them
+    """
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", points.ravel())
+    mesh.vertices.foreach_get(name, points.ravel())
     return points
 
 

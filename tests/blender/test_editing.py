@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 import whole_file
-from sinew_addon.attach import attach, behind_nodes, point_store, properties
+from sinew_addon.attach import attach, behind_nodes, point_store, properties, stack
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import safe_mode, session, survey
 from sinew_addon.deform.plan import State
@@ -162,7 +162,7 @@ def test_hooks_behind_take_a_vertex_group(has_group):
 def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
     """A sculpted character; Blender refuses also what Sinew does not know to be refused."""
     if not is_known:
-        monkeypatch.setattr(attach, "_NEED_ORIGINAL_MESH", frozenset())
+        monkeypatch.setattr(stack, "NEED_ORIGINAL_MESH", frozenset())
     other, armature = scenes.make_arm()
     obj = scenes.copied(other)
     obj.modifiers.clear()
@@ -182,6 +182,32 @@ def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
     assert bpy.ops.sinew.add() == {"FINISHED"}
     assert [properties.has_sinew(each) for each in (other, obj)] == [True, False]
     assert [modifier.type for modifier in obj.modifiers] == ["MULTIRES"]
+
+
+@pytest.mark.parametrize("kind", ["MULTIRES", "SOFT_BODY"])
+def test_a_modifier_in_front_of_which_sinew_can_not_be_is_added_while_it_deforms(kind):
+    """Blender puts it in front of Sinew's: the Armature modifier deforms, and a sentence says why. Once it is
+    gone, Sinew deforms again."""
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(6)
+    by_sinew = scenes.final_points(obj)
+    bpy.ops.object.modifier_add(type=kind)
+    added = obj.modifiers.active
+    if kind == "MULTIRES":
+        bpy.ops.object.multires_subdivide(modifier=added.name)
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    got = scenes.shapes(obj, [5, 6])
+    assert f"in front of {added.name} Blender permits only" in state_text.sentence_of(obj)
+    assert not any(map(stack.is_on, stack.own_modifiers(obj)))
+    properties.of(obj).enabled = False
+    assert scenes.worst(got, scenes.shapes(obj, [5, 6])) == 0.0
+    properties.of(obj).enabled = True
+    obj.modifiers.remove(added)
+    session.rebind(obj, bpy.context)
+    assert not properties.of(obj).error
+    assert scenes.worst(scenes.final_points(obj), by_sinew) <= 1e-6
+    assert [m.name for m in scenes.modifiers(obj)] == ["Armature", "Sinew"]
 
 
 @pytest.mark.parametrize("in_front", [False, True])

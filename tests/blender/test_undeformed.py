@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import routes
 import scenes
-from sinew_addon.attach import attach, properties, stack
+from sinew_addon.attach import attach, node_group, properties, stack
 
 
 @pytest.fixture(autouse=True)
@@ -96,6 +96,59 @@ def test_coordinates_are_those_with_the_armature_modifier(rendered, route, name)
     _assert_same(rendered(obj), expected)
 
 
+def _in_viewport(obj):
+    """Its shape and its undeformed shape, as viewports get them that draw materials."""
+    bpy.context.scene.frame_set(9)
+    return scenes.final_points(obj), scenes.final_points(obj, "undeformed_co")
+
+
+@pytest.mark.parametrize("name", CHARACTERS)
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_coordinates_in_viewports(route, name):
+    routes.force(route)
+    obj, _armature = scenes.make_arm()
+    CHARACTERS[name](obj)
+    # Without a window, hair alone has Blender make the coordinates.
+    obj.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings.count = 1
+    shape, rest = _in_viewport(obj)
+    assert scenes.worst(shape, rest) > 0.1
+    scenes.add_sinew(obj, "lbs")
+    got, coordinates = _in_viewport(obj)
+    assert scenes.worst(got, shape) <= 1e-5
+    assert scenes.worst(coordinates, rest) <= 1e-6
+
+
+# Blender applies no modifier of the others, as their meshes have two users.
+@pytest.mark.parametrize("name", [n for n in CHARACTERS if n != "shared mesh" and "in front" not in n])
+@pytest.mark.parametrize("is_hidden", [False, True])
+def test_applying_the_modifier_keeps_the_shape(name, is_hidden):
+    """Blender evaluates it alone then. Where that gives rest points, as for a hidden object, the Armature
+    modifier deforms again."""
+    obj, _armature = scenes.make_arm()
+    CHARACTERS[name](obj)
+    if obj.data.shape_keys is not None:
+        obj.shape_key_clear()
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(9)
+    shape = scenes.final_points(obj)
+    obj.hide_viewport = is_hidden
+    bpy.ops.object.modifier_apply(modifier=stack.sinew_modifier(obj).name)
+    obj.hide_viewport = False
+    assert scenes.worst(scenes.final_points(obj), shape) <= 1e-5
+    assert (stack.armature_modifier(obj) is None) == (not is_hidden)
+    assert not any("sinew" in name for name in obj.data.attributes.keys())  # noqa: SIM118
+
+
+def test_the_mark_that_somebody_applied_is_made_again(rendered):
+    obj, _armature = scenes.make_arm()
+    expected = rendered(obj)
+    scenes.add_sinew(obj, "lbs")
+    bpy.ops.object.modifier_apply(modifier=stack.mark_modifier(obj).name)
+    _assert_same(rendered(obj), expected)
+    assert stack.mark_modifier(obj) is not None
+    assert node_group.IN_STACK not in obj.data.attributes
+
+
 @pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Sinew gives no normals")
 def test_also_where_sinew_gives_the_normals(rendered):
     obj, _armature = scenes.make_arm()
@@ -130,13 +183,16 @@ def test_the_modifier_is_made_again_and_follows(rendered):
     scenes.add_sinew(obj, "lbs")
     obj.modifiers.remove(stack.neutral_modifier(obj))
     _assert_same(rendered(obj), expected)
-    neutral = stack.neutral_modifier(obj)
-    neutral.name = "Renamed"
+    obj.modifiers.remove(stack.mark_modifier(obj))
+    _assert_same(rendered(obj), expected)
+    mark, neutral = stack.mark_modifier(obj), stack.neutral_modifier(obj)
+    mark.name, neutral.name = "First", "Renamed"
     behind = obj.modifiers.new("Behind", "CAST")
     behind.show_viewport = behind.show_render = False
     obj.modifiers.move(list(obj.modifiers).index(neutral), len(obj.modifiers) - 1)
+    obj.modifiers.move(list(obj.modifiers).index(mark), 0)
     _assert_same(rendered(obj), expected)
-    assert [m.type for m in obj.modifiers] == ["ARMATURE", "NODES", "LAPLACIANDEFORM", "CAST"]
+    assert [m.name for m in obj.modifiers] == ["Armature", "First", "Sinew", "Renamed", "Behind"]
     attach.remove(obj)
     assert [m.type for m in obj.modifiers] == ["ARMATURE", "CAST"]
 
@@ -166,6 +222,6 @@ def test_a_saved_file_is_as_without_sinew(rendered, tmp_path):
         loaded.objects = [obj.name]
     (saved,) = loaded.objects
     assert not saved.add_rest_position_attribute
-    assert [m.show_viewport or m.show_render for m in saved.modifiers] == [True, False, False]
+    assert [m.show_viewport or m.show_render for m in saved.modifiers] == [True, False, False, False]
     bpy.ops.wm.open_mainfile(filepath=path)
     _assert_same(rendered(bpy.data.objects["Arm"]), expected)

@@ -349,9 +349,9 @@ def test_shapes_after_undo_and_redo(route, edit, tmp_path):
     _assert_same(_shapes(), _shapes(_of_modifier), near)
 
 
-@pytest.mark.parametrize("helper", ["point_buffer", "upstream_proxy"])
-def test_undo_that_takes_a_helper_for_the_object(helper):
-    """Blender does that where it reads the object into the memory that the helper had
+@pytest.mark.parametrize("helper", ["point_buffer", "upstream_proxy", "armature", "copied"])
+def test_undo_that_takes_another_object_for_the_object(helper):
+    """Blender does that where it reads the object into the memory that the other had
     (point_store.clear_references_to_itself)."""
     routes.force(routes.UPDATE)
     arm, _rig = scenes.make_arm()
@@ -365,11 +365,13 @@ def test_undo_that_takes_a_helper_for_the_object(helper):
 
     def take(*_args):
         found = bpy.data.objects["Arm"]
-        nodes, taken = stack.sinew_modifier(found), getattr(properties.of(found), helper)
+        settings = properties.of(found)
+        group = settings.replaced_modifiers[0] if helper == "armature" else settings
+        nodes, taken = stack.sinew_modifier(found), getattr(group, helper)
         for name in ("Points", "Upstream"):
             if node_group.get_input(nodes, name) == taken:
                 node_group.set_inputs(nodes, {name: found})
-        setattr(properties.of(found), helper, found)
+        setattr(group, helper, found)
 
     bpy.app.handlers.undo_post.insert(0, take)
     try:
@@ -379,6 +381,8 @@ def test_undo_that_takes_a_helper_for_the_object(helper):
     arm = bpy.data.objects["Arm"]
     assert scenes.worst(scenes.final_points(arm), shape) <= 1e-6
     np.testing.assert_array_equal(scenes.rest_points(arm), mesh)
+    settings = properties.of(arm)
+    assert arm not in (settings.point_buffer, settings.upstream_proxy, settings.copied, *settings.armatures)
     attach.remove(arm)
     assert arm == bpy.data.objects.get("Arm")
 

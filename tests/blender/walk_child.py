@@ -209,6 +209,10 @@ class Child:
                 continue
             evaluated = obj.evaluated_get(depsgraph)
             found[obj.name_full] = (self.points_of(evaluated), self.np.array(evaluated.matrix_world))
+            # Without a window, hair alone has Blender make them.
+            if any(m.type == "PARTICLE_SYSTEM" and m.show_viewport for m in obj.modifiers):
+                name = f"{obj.name_full} in the render, coordinates in the viewport"
+                self.walker.rendered[name] = self.points_of(evaluated, "undeformed_co")
             if self.side.is_sinew:
                 import walk_normals
 

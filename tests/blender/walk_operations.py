@@ -1455,6 +1455,20 @@ def hair(w: Walker, r: random.Random) -> str | None:
     return f"hair on {obj.name}, from {source}"
 
 
+@operation(0.4)
+def needs_original_mesh(w: Walker, r: random.Random) -> str | None:
+    """A modifier in front of which Sinew's can not be comes and goes, as for a sculpted character."""
+    obj = w.mesh(r, lambda o: w.is_editable(o) and o.mode == "OBJECT" and not o.data.is_editmode)
+    kind = r.choice(("MULTIRES", "SOFT_BODY"))
+    modifier = obj.modifiers.new(w.new_name("Original"), kind)
+    w.skip_if(modifier is None)
+    w.side.check_refused(obj, modifier)
+    obj.modifiers.remove(modifier)
+    if w.side.has_sinew(obj):
+        w.side.rebind(obj)
+    return f"{kind} on {obj.name}, and off it"
+
+
 @operation(2)
 def move_modifier(w: Walker, r: random.Random) -> str | None:
     """Moves it to just before or after another one of the artist's; Sinew's is not counted."""

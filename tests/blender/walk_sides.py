@@ -167,7 +167,7 @@ class Side:
 
     prepare = set_safe = compute_beside = wait = nothing
     may_react = own_modifier = nothing
-    check_warned = check_said_gone = before_render = note_flags = nothing
+    check_warned = check_refused = check_said_gone = before_render = note_flags = nothing
     bake_to_bones = add_corrective_key = applied = copied_modifiers = nothing
     start_comparison = end_comparison = arrange_comparison = nothing
 
@@ -635,13 +635,30 @@ class SinewSide(Side):
                 raise ValueError(f"{obj.name}: nothing says that {rig.name} is gone")
 
     def check_warned(self, obj: bpy.types.Object, modifier: bpy.types.ParticleSystemModifier) -> None:
-        from sinew_addon.attach import behind_nodes
+        from sinew_addon.attach import behind_nodes, stack
 
-        others = {each.type for each in obj.modifiers if each not in (modifier, self.own_modifier(obj))}
+        own = stack.own_modifiers(obj)
+        others = {each.type for each in obj.modifiers if each != modifier and each not in own}
         if self.has_sinew(obj) and others == {"ARMATURE"}:
             is_warned = any(text.startswith(f"{modifier.name}: ") for text in behind_nodes.warnings(obj))
             if is_warned != (modifier.particle_system.settings.emit_from != "VERT"):
                 raise ValueError(f"{obj.name}: {'a' if is_warned else 'no'} warning about {modifier.name}")
+
+    def check_refused(self, obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+        from sinew_addon.attach import attach, stack
+        from sinew_addon.core.errors import SinewError
+
+        if modifier not in stack.downstream(obj) or not (obj.visible_get() and obj.sinew.enabled):
+            return
+        bpy.context.view_layer.update()
+        said = obj.sinew.error
+        if not self.has_sinew(obj):
+            try:
+                attach.add(obj)
+            except SinewError as error:
+                said = str(error)
+        if f"in front of {modifier.name} Blender permits" not in said:
+            raise ValueError(f"{obj.name}: nothing says that Sinew can not be in front of {modifier.name}")
 
     def rebind(self, obj: bpy.types.Object) -> None:
         from sinew_addon.deform import session
