@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Counts allocations and locks: a frame must have none. A program of its own, because it counts everything in the
-// process.
+// Protects frames from allocations and locks: they are counted, in a program of its own, as that counts everything
+// in the process.
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host that loads the library, uses its threads, ends them and unloads the library.
+// Protects a host that loads the library, uses its threads, ends them and unloads the library.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an event means for an object, as a table, without Blender: what is read, planned and shown again."""
+"""Protects what an event means for an object, as a table without Blender: what is read, planned and shown."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stub, which editors and type checkers read, is what ./dev stub makes of the module, and describes
-everything."""
+"""Protects the stub, which editors and type checkers read: it is what ./dev stub makes of the module, and
+describes everything."""
 
 import ast
 import subprocess
