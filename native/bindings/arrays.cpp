@@ -142,11 +142,12 @@ std::string checked_name(const py::handle& value, const char* argument, const st
 
 std::size_t checked_choice(const py::handle& value, const char* argument,
                            std::span<const std::string_view> names) {
+    for (std::size_t i = 0; i < names.size() && PyUnicode_Check(value.ptr()); ++i) {
+        // Names end with 0, as literals do.
+        if (PyUnicode_CompareWithASCIIString(value.ptr(), names[i].data()) == 0) return i;
+    }
     const std::string wanted = one_of(names);
-    const std::string given = checked_name(value, argument, wanted);
-    const auto found = std::ranges::find(names, given);
-    if (found == names.end()) fail(argument, wanted, "'" + given + "'");
-    return static_cast<std::size_t>(found - names.begin());
+    fail(argument, wanted, "'" + checked_name(value, argument, wanted) + "'");
 }
 
 py::tuple names_in_python(std::span<const std::string_view> names) {

@@ -15,7 +15,8 @@ py::array_t<float> applied(const Timed<Stage>& stage, const py::array_t<float>& 
     py::array_t<float> result = checked_out(out, stage.vertex_count());
     const auto to = as_points_to_write(result);
     stage.call([&] {
-        std::memmove(to.data(), given.data(), static_cast<std::size_t>(given.nbytes()));
+        const auto from = as_points(given);
+        if (from.data() != to.data()) std::memmove(to.data(), from.data(), from.size_bytes());
         static_cast<void>(apply(to));
     });
     return result;

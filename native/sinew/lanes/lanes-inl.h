@@ -23,6 +23,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Full = hn::CappedTag<float, kLanes>;
 using One = hn::CappedTag<float, 1>;
 
+/// A point, a quaternion or a row of four numbers at once; one number after the other where vectors have one lane.
+using Four = hn::CappedTag<float, 4>;
+
 template <class D>
 using Vec = hn::Vec<D>;
 
@@ -65,6 +68,19 @@ HWY_INLINE Points<D> load_points(D d, const MeshPointers& pointers, std::size_t 
     const Lanes<float>* const rows = pointers.rest_points + kPointRows * b;
     return {hn::Load(d, rows[0].lane.data() + lane), hn::Load(d, rows[1].lane.data() + lane),
             hn::Load(d, rows[2].lane.data() + lane)};
+}
+
+HWY_INLINE const float* numbers_of(const Float4* float4s) { return reinterpret_cast<const float*>(float4s); }
+HWY_INLINE float* numbers_of(Float4* float4s) { return reinterpret_cast<float*>(float4s); }
+
+/// Stores four numbers for each lane.
+template <class D>
+HWY_INLINE void store_float4s(D d, Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e, Float4* to) {
+    if constexpr (hn::MaxLanes(D()) == 1) {
+        *to = {{hn::GetLane(a), hn::GetLane(b), hn::GetLane(c), hn::GetLane(e)}};
+    } else {
+        hn::StoreInterleaved4(a, b, c, e, d, numbers_of(to));
+    }
 }
 
 /// Three consecutive rows of numbers as points.

@@ -139,8 +139,6 @@ HWY_INLINE void subtract_first(float* rows, std::size_t count) {
 
 #if HWY_TARGET != HWY_SCALAR
 
-using Four = hn::CappedTag<float, 4>;
-
 /// The dot product in every lane, rounded as by the scalar dot().
 HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
     const Vec<Four> product = hn::Mul(a, b);

@@ -2,9 +2,8 @@
 #include "sinew/mesh/bone_sets.h"
 
 #include <algorithm>
-#include <bit>
+#include <map>
 #include <span>
-#include <unordered_map>
 
 namespace sinew {
 namespace {
@@ -44,33 +43,17 @@ private:
     }
 
     std::size_t find(std::span<const std::int32_t> of) {
-        std::uint64_t hash = 0;
-        for (const std::int32_t bone : of) {
-            hash = (std::rotl(hash, 23) ^ static_cast<std::uint64_t>(bone)) * 0x9E3779B97F4A7C15u;
+        const auto [known, is_new] = known_.try_emplace({of.begin(), of.end()}, known_.size());
+        if (is_new) {
+            sets_.bones.insert(sets_.bones.end(), of.begin(), of.end());
+            sets_.offsets.push_back(static_cast<std::uint32_t>(sets_.bones.size()));
         }
-        const auto [begin, end] = known_.equal_range(hash);
-        for (auto it = begin; it != end; ++it) {
-            if (equals(it->second, of)) return it->second;
-        }
-        const std::size_t set = sets_.offsets.size() - 1;
-        for (const std::int32_t bone : of) sets_.bones.push_back(static_cast<std::uint32_t>(bone));
-        sets_.offsets.push_back(static_cast<std::uint32_t>(sets_.bones.size()));
-        known_.emplace(hash, set);
-        return set;
-    }
-
-    [[nodiscard]] bool equals(std::size_t set, std::span<const std::int32_t> of) const {
-        const std::size_t begin = sets_.offsets[set];
-        if (sets_.offsets[set + 1] - begin != of.size()) return false;
-        for (std::size_t k = 0; k < of.size(); ++k) {
-            if (sets_.bones[begin + k] != static_cast<std::uint32_t>(of[k])) return false;
-        }
-        return true;
+        return known->second;
     }
 
     const PackedMesh& mesh_;
     BoneSets sets_;
-    std::unordered_multimap<std::uint64_t, std::size_t> known_;
+    std::map<std::vector<std::int32_t>, std::size_t> known_;
 };
 
 }  // namespace

@@ -27,9 +27,6 @@ constexpr float kShortest = 1e-35f;
 // Blender defines no custom normals where the absolute cosine reaches this.
 constexpr float kTooSteep = 0.9999f;
 
-// Processes a point or normal at once, or one number after the other where vectors have one lane.
-using Four = hn::CappedTag<float, 4>;
-
 template <class D>
 HWY_INLINE Vec<D> rounded_dot(const Points<D>& a, const Points<D>& b) {
     return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
@@ -60,26 +57,11 @@ HWY_INLINE Vec<D> polynomial_angle(D d, Vec<D> cosine) {
     return hn::IfThenElse(is_negative, hn::Sub(hn::Set(d, 3.14159265358979f), of_size), of_size);
 }
 
-HWY_INLINE float* numbers_of(Float4* slots) { return reinterpret_cast<float*>(slots); }
-HWY_INLINE const float* numbers_of(const Float4* slots) { return reinterpret_cast<const float*>(slots); }
-
-template <class D>
-HWY_INLINE void store_interleaved(D d, Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e, float* to) {
-    if constexpr (hn::MaxLanes(D()) == 1) {
-        to[0] = hn::GetLane(a);
-        to[1] = hn::GetLane(b);
-        to[2] = hn::GetLane(c);
-        to[3] = hn::GetLane(e);
-    } else {
-        hn::StoreInterleaved4(a, b, c, e, d, to);
-    }
-}
-
 /// Stores the four numbers of each lane to every other Float4 of `to`.
 template <class D>
 HWY_INLINE void store_slots(D d, Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e, Float4* to) {
     alignas(64) Float4 numbers[hn::MaxLanes(D())];
-    store_interleaved(d, a, b, c, e, numbers_of(numbers));
+    store_float4s(d, a, b, c, e, numbers);
     for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) to[2 * lane] = numbers[lane];
 }
 
@@ -253,8 +235,8 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
             const Points<D> normals = custom_normals<D>(
                 d, normal, {edges[k], back, along_first, along_last, mean},
                 hn::Load(d, fans.tilt.lane.data() + lane), hn::Load(d, fans.spin.lane.data() + lane));
-            store_interleaved(d, normals.x, normals.y, normals.z, zero,
-                              numbers_of(frame.lone_normals + kLanes * (block.first_lone + k) + lane));
+            store_float4s(d, normals.x, normals.y, normals.z, zero,
+                          frame.lone_normals + kLanes * (block.first_lone + k) + lane);
         }
     }
 }
@@ -400,8 +382,8 @@ void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {
             const FanBlock& block = frame.mesh->fan_blocks[b];
             const Points<Full> normals = block.reads_last_point ? fan_normals<true>(d, frame, block, lane)
                                                                 : fan_normals<false>(d, frame, block, lane);
-            store_interleaved(d, normals.x, normals.y, normals.z, hn::Zero(d),
-                              numbers_of(frame.block_normals + kLanes * b + lane));
+            store_float4s(d, normals.x, normals.y, normals.z, hn::Zero(d),
+                          frame.block_normals + kLanes * b + lane);
         }
     }
 }

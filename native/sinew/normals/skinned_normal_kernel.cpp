@@ -83,14 +83,7 @@ void cofactors(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end) 
         const auto of = cofactors_of(d, frame, i);
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const auto& v = of.axis[axis];
-            float* const to = frame.cofactors[axis][i].value.data();
-            if constexpr (hn::MaxLanes(decltype(d)()) == 1) {
-                to[0] = hn::GetLane(v.x);
-                to[1] = hn::GetLane(v.y);
-                to[2] = hn::GetLane(v.z);
-            } else {
-                hn::StoreInterleaved4(v.x, v.y, v.z, v.z, d, to);
-            }
+            store_float4s(d, v.x, v.y, v.z, v.z, &frame.cofactors[axis][i]);
         }
     });
 }

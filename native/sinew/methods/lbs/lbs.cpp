@@ -192,8 +192,6 @@ inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t 
 
 #if HWY_TARGET != HWY_SCALAR
 
-using Four = hn::CappedTag<float, 4>;
-
 /// Deforms one vertex, with x, y and z in the lanes: the same operations in the same order.
 ///
 /// rest     the vertex's rest point: numbers kLanes apart

@@ -24,12 +24,6 @@ namespace HWY_NAMESPACE {
 
 constexpr float kRootOfTwo = 1.41421356237f;
 
-// Processes the four numbers of a point at once, or one after the other where vectors have one lane.
-using Four = hn::CappedTag<float, 4>;
-
-HWY_INLINE const float* numbers_of(const Float4* points) { return reinterpret_cast<const float*>(points); }
-HWY_INLINE float* numbers_of(Float4* points) { return reinterpret_cast<float*>(points); }
-
 /// One iteration for the numbers of one vector.
 ///
 /// neighbour(k)  pointer to the numbers of the k-th neighbour
@@ -126,7 +120,7 @@ HWY_INLINE std::size_t vertex_of(std::size_t lane) { return 4 * (lane % 4) + lan
 template <class D>
 HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
     const float* const numbers = numbers_of(points + vertex_of(lane));
-    return {hn::Set(d, numbers[0]), hn::Set(d, numbers[1]), hn::Set(d, numbers[2])};
+    return in_all_lanes(d, numbers);
 }
 
 /// The same for arbitrary points: index_of(vertex) returns the index of the point.

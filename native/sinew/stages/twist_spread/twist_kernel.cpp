@@ -28,10 +28,13 @@ struct Turned {
 
     /// half_angle  radians, at most a quarter turn
     HWY_INLINE Turned(D d, Vec<D> half_angle) {
-        const ExponentialFactors<D> factors(d, hn::Mul(half_angle, half_angle));
-        const Vec<D> half_sine = hn::Mul(half_angle, factors.sinc);
+        // To 1.2e-7 for these angles, with two operations less than in ExponentialFactors.
+        static constexpr float kCosine[] = {0.9999999403953552f, -0.4999990463256836f, 0.04166358336806297f,
+                                            -0.0013853703858330846f, 2.315393248863984e-05f};
+        const Vec<D> y = hn::Mul(half_angle, half_angle);
+        const Vec<D> half_sine = hn::Mul(half_angle, ExponentialFactors<D>(d, y).sinc);
         const Vec<D> twice = hn::Add(half_sine, half_sine);
-        sine = hn::Mul(twice, factors.cosine);
+        sine = hn::Mul(twice, polynomial(d, y, kCosine));
         versine = hn::Mul(twice, half_sine);
     }
 };
@@ -116,8 +119,7 @@ HWY_INLINE void twist_by(D d, const TwistFrame& frame, const BlockTwist& twist, 
         of.point = add_scaled<D>(of.point, factor, by);
     };
     const bool first_is_linear = frame.blend == TwistBlend::linear;
-    const bool second_is_linear =
-        frame.mix == nullptr ? first_is_linear : frame.mix_blend == TwistBlend::linear;
+    const bool second_is_linear = frame.mix_blend == TwistBlend::linear;
     const Points<D> before = of.point;
     const Vec<D> one = hn::Set(d, 1.0f);
     Vec<D> others = one;
@@ -194,9 +196,7 @@ void spread_blocks(const TwistFrame& of, std::size_t begin, std::size_t end) {
 }
 
 void spread(const TwistFrame& frame, std::size_t begin, std::size_t end) {
-    const bool is_linear =
-        frame.blend == TwistBlend::linear && (frame.mix == nullptr || frame.mix_blend == TwistBlend::linear);
-    is_linear ? spread_blocks<true>(frame, begin, end) : spread_blocks<false>(frame, begin, end);
+    frame.is_linear ? spread_blocks<true>(frame, begin, end) : spread_blocks<false>(frame, begin, end);
 }
 
 void measure(const TwistFrame& frame, std::size_t begin, std::size_t end) {

@@ -72,12 +72,13 @@ float within(float value, float least, float most, float otherwise) {
 }
 
 /// The rotation of a bone relative to another, of length 1. The other's scale is taken off both.
-Quat<double> rotation_between(const Affine<double>& base, const Affine<double>& tip,
-                              const Affine<double>& tip_rest) {
-    const Affine<double> relative = glm::determinant(base.linear) != 0.0
-                                        ? inverse(base) * tip
-                                        : inverse(split_scale(base, tip_rest).rigid) * tip;
-    return glm::normalize(to_quat(split_scale(relative, tip_rest).rigid.linear));
+Quat<double> rotation_between(const Mat3<double>& base, const Mat3<double>& tip,
+                              const Mat3<double>& tip_rest) {
+    const Affine<double> rest{tip_rest};
+    const bool is_flat = glm::determinant(base) == 0.0;
+    const Mat3<double> of_base = is_flat ? split_scale(Affine<double>{base}, rest).rigid.linear : base;
+    const Affine<double> relative{glm::inverse(of_base) * tip};
+    return glm::normalize(to_quat(split_scale(relative, rest).rigid.linear));
 }
 
 }  // namespace
@@ -98,7 +99,10 @@ struct TwistSpread::State {
     /// parents  TwistSpreadData::parents
     void list_blocks(std::span<const std::int32_t> parents);
     /// Fills `bones`. Returns whether one is twisted.
-    bool prepare(std::span<const Affine<float>> posed, const TwistSpreadOptions& options) const noexcept;
+    ///
+    /// is_linear  as in TwistFrame: what other blends need is then left out
+    bool prepare(std::span<const Affine<float>> posed, const TwistSpreadOptions& options,
+                 bool is_linear) const noexcept;
 
     std::shared_ptr<const PackedBinding> packed;
     const PackedMesh& mesh = packed->mesh;
@@ -203,7 +207,8 @@ TwistSpreadStage::Reading<double> TwistSpread::State::read(
     const auto tip_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.tip)]);
     const Vec3<double> axis =
         glm::normalize(Vec3<double>(rest_bones[static_cast<std::size_t>(of.bone)].linear[1]));
-    const Quat<double> rotation = rotation_between(motion(posed, of.base), motion(posed, of.tip), tip_rest);
+    const Quat<double> rotation =
+        rotation_between(motion(posed, of.base).linear, motion(posed, of.tip).linear, tip_rest.linear);
     double expected = 0.0;
     if (!channels.empty() && channels[twist].rotation != Quat<float>(0.0f, 0.0f, 0.0f, 0.0f)) {
         const TwistChannels<double> told{glm::normalize(Quat<double>(channels[twist].rotation)),
@@ -214,8 +219,8 @@ TwistSpreadStage::Reading<double> TwistSpread::State::read(
     return TwistSpreadStage::read(rotation, axis, expected);
 }
 
-bool TwistSpread::State::prepare(std::span<const Affine<float>> posed,
-                                 const TwistSpreadOptions& options) const noexcept {
+bool TwistSpread::State::prepare(std::span<const Affine<float>> posed, const TwistSpreadOptions& options,
+                                 bool is_linear) const noexcept {
     bool any = false;
     const double amount = within(options.amount, 0.0f, 1.0f, 1.0f);
     for (std::size_t twist = 0; twist < twists.size(); ++twist) {
@@ -225,20 +230,26 @@ bool TwistSpread::State::prepare(std::span<const Affine<float>> posed,
         if (amount * own == 0.0) continue;
         const auto [angle, around, part] = read(twist, posed, options.channels);
         if (angle == 0.0) continue;
-        const TwistBone& of = twists[twist];
-        const auto at_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.bone)]);
-        const Affine<double> by = motion(posed, of.bone);
-        const Vec3<double> axis = glm::normalize(at_rest.linear[1]);
-        const Vec3<double> posed_axis = by.linear * axis;
-        const double length = glm::length(posed_axis);
-        const double sign = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
         any = bone.is_twisted = true;
+        const TwistBone& of = twists[twist];
+        const Affine<double> by = motion(posed, of.bone);
         const TwistLine& line = rest[twist].line;
         for (std::size_t k = 0; k < 2; ++k) {
             const Vec3<double> image =
                 by.linear * Vec3<double>(line.axes[k][0], line.axes[k][1], line.axes[k][2]);
             for (int i = 0; i < 3; ++i) bone.images[k][i] = static_cast<float>(image[i]);
         }
+        bone.curve = options.curves.empty() ? 0.0f : within(options.curves[twist], -1.0f, 1.0f, 0.0f);
+        bone.is_short = std::abs(angle) <= 0.5;
+        bone.angle = static_cast<float>(std::numbers::pi * amount * own * angle);
+        bone.offset = of.is_from_parent ? -bone.angle : 0.0f;
+        bone.around = static_cast<float>(around);
+        bone.part = static_cast<float>(amount * own * part);
+        if (is_linear) continue;
+        const auto at_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.bone)]);
+        const Vec3<double> posed_axis = by.linear * glm::normalize(at_rest.linear[1]);
+        const double length = glm::length(posed_axis);
+        const double sign = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
         bone.has_axis = length > 0.0;
         if (bone.has_axis) {
             bone.posed = twist_line(transform_point(by, at_rest.translation), sign / length * posed_axis);
@@ -248,12 +259,6 @@ bool TwistSpread::State::prepare(std::span<const Affine<float>> posed,
         for (std::size_t row = 0; row < rows.size(); ++row) {
             std::ranges::copy(rows[row].value, bone.displacement + 4 * row);
         }
-        bone.curve = options.curves.empty() ? 0.0f : within(options.curves[twist], -1.0f, 1.0f, 0.0f);
-        bone.is_short = std::abs(angle) <= 0.5;
-        bone.angle = static_cast<float>(std::numbers::pi * amount * own * angle);
-        bone.offset = of.is_from_parent ? -bone.angle : 0.0f;
-        bone.around = static_cast<float>(around);
-        bone.part = static_cast<float>(amount * own * part);
         bone.is_scaled = split_scale(by, at_rest).has_scale;
     }
     return any;
@@ -299,18 +304,17 @@ bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<fl
         return false;
     }
     const std::scoped_lock lock(state.mutex);
-    if (!state.prepare(posed_from_rest, options)) return true;
+    TwistFrame frame = state.frame(points);
+    frame.blend = options.blend;
+    frame.mix_blend = state.mix.empty() ? options.blend : options.mix_blend;
+    frame.is_linear = frame.blend == TwistBlend::linear && frame.mix_blend == TwistBlend::linear;
+    if (!state.prepare(posed_from_rest, options, frame.is_linear)) return true;
     const auto goes_short = [](TwistBlend blend) {
         return blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
     };
-    const bool blends_short =
-        goes_short(options.blend) || (!state.mix.empty() && goes_short(options.mix_blend));
     const bool is_beyond = std::ranges::any_of(
         state.bones, [](const auto& bone) { return bone.is_twisted && bone.around != 0.0f; });
-    TwistFrame frame = state.frame(points);
-    frame.blend = options.blend;
-    frame.mix_blend = options.mix_blend;
-    frame.goes_around = blends_short && is_beyond;
+    frame.goes_around = is_beyond && (goes_short(frame.blend) || goes_short(frame.mix_blend));
     const std::size_t vertices = kLanes * state.blocks.size();
     parallel_for(
         state.blocks.size(), useful_threads(options.threads, vertices, kVerticesWorthAThread),
