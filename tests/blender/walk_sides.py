@@ -620,8 +620,10 @@ class SinewSide(Side):
     def click(self, obj: bpy.types.Object, which: str, view: str, deformers: dict[str, str]) -> None:
         own, (armature,) = self.own_modifier(obj), armature_modifiers(obj)
         if obj.sinew.situation == "alone":
-            # The Armature modifier's icon is off while Sinew deforms: other clicks come to the same.
+            # The Armature modifier's icon is off while Sinew deforms: other clicks come to the same. Switched
+            # off again, it brings Sinew back.
             setattr(armature, f"show_{view}", deformers[view] == "Armature")
+            bpy.context.view_layer.update()
             setattr(own, f"show_{view}", deformers[view] == "Sinew")
             return
         modifier = own if which == "Sinew" else armature
