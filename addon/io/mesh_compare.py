@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
+from ..core.influences import GroupWeights
 from . import mesh_io
 
 _SETTINGS = ("texspace_location", "texspace_size", "use_auto_texspace", "has_custom_normals")
@@ -29,17 +30,29 @@ _VALUES = {
 }
 
 
-def are_alike(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+def are_alike(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
     """Whether modifiers make the same of both: their points, faces, attributes, weights, materials and shape
     keys, but for the values of the keys. Neither is in edit mode."""
     return (
-        all(mine == its for mine, its in zip(_facts(mesh), _facts(other), strict=True))
+        all(mine == its for mine, its in zip(_facts(mesh), _facts(copy), strict=True))
         and all(
             np.array_equal(mine, its, equal_nan=mine.dtype.kind == "f")
-            for mine, its in zip(_arrays(mesh), _arrays(other), strict=True)
+            for mine, its in zip(_arrays(mesh), _arrays(copy), strict=True)
         )
-        and mesh_io.read_group_weights(mesh).equals(mesh_io.read_group_weights(other))
+        and mesh_io.read_group_weights(mesh).equals(_weights_of(copy))
     )
+
+
+# Those of copies, by session_uid. Nobody changes them, and reading them takes longer than all else.
+_weights: dict[int, GroupWeights] = {}
+
+
+def _weights_of(copy: bpy.types.Mesh) -> GroupWeights:
+    if copy.session_uid not in _weights:
+        if len(_weights) > 15:
+            _weights.clear()
+        _weights[copy.session_uid] = mesh_io.read_group_weights(copy)
+    return _weights[copy.session_uid]
 
 
 def _facts(mesh: bpy.types.Mesh) -> Iterator[object]:
