@@ -199,6 +199,10 @@ CASES = {
     "a modifier behind by a handler": "shade Arm smooth; add Arm dq; frame 4; "
     "neighbour Arm frame_change_post add 5; update; frame 6; neighbour Arm depsgraph_update_post add 7; "
     "frame 8",
+    # Stages, where the rest shape moves
+    "a limit on a mesh that moves": "key_object Arm 2 9; add Arm dq; stages Arm 3; frame 3; frame 9; frame 6",
+    "a limit on a shape key": "add_shape_key Arm; key_shape_key Arm 1 11; add Arm dq; stages Arm 3; frame 3; "
+    "frame 9",
     # Renamed, removed, undone
     "envelopes of a moving shape key": "armature_options Arm envelopes; add_shape_key Arm; "
     "key_shape_key Arm 1 11; add Arm; frame 6; frame 11",
