@@ -14,7 +14,7 @@ import window
 import window_scene
 
 _ZIP, FOLDER = window.arguments()
-VERTICES, PATIENCE = 40_000, 300.0
+VERTICES, PATIENCE = 60_000, 300.0
 facts: dict[str, object] = {}
 
 
@@ -104,7 +104,7 @@ def see_it_found() -> Generator[None, None, np.ndarray]:
     ticks = 0
     while plan() == "waiting" and ticks < 2000:
         ticks += 1
-        if ticks == 2:
+        if ticks == 3:
             facts["off_modifier_meanwhile"] = off_modifier()
             facts["watched"] = [op.bl_idname for op in bpy.context.window_manager.windows[0].modal_operators]
         yield
