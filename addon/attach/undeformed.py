@@ -19,6 +19,11 @@ import bpy
 from ..io import mesh_io
 from . import node_group, properties, references, stack
 
+# These make a mesh that has none of the attributes of what they get.
+_MAKE_A_MESH = {
+    *("MESH_SEQUENCE_CACHE", "OCEAN", "PARTICLE_INSTANCE", "REMESH", "SCREW", "SKIN", "VOLUME_TO_MESH"),
+}
+
 
 def ensure(obj: bpy.types.Object) -> dict[str, object]:
     """Makes the modifiers around Sinew's, and returns inputs of Sinew's."""
@@ -26,12 +31,20 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
         _make_neutral(obj)
     _ensure_mark(obj)
     stack.position_own(obj)
-    can_mark = _can_mark(obj)
+    can_mark = _can_mark(obj) and not _loses_marks(obj)
     keeps = properties.of(obj).adds_rest_position or not can_mark
     return {
         node_group.IS_MARKED: can_mark,
         node_group.MARK_TO_REMOVE: "" if keeps else node_group.REST_POSITION,
     }
+
+
+def _loses_marks(obj: bpy.types.Object) -> bool:
+    """Whether modifiers in front can make another mesh, without the attribute: then the mesh can not be told
+    from the undeformed one. Node groups pass attributes on where they pass on weights."""
+    kinds = {modifier.type for modifier in stack.upstream_changes(obj)}
+    by_envelopes = any(modifier.use_bone_envelopes for modifier in stack.armature_modifiers(obj))
+    return not kinds.isdisjoint(_MAKE_A_MESH) or (by_envelopes and "NODES" in kinds)
 
 
 def _can_make(obj: bpy.types.Object) -> bool:

@@ -96,6 +96,25 @@ def test_coordinates_are_those_with_the_armature_modifier(rendered, route, name)
     _assert_same(rendered(obj), expected)
 
 
+@pytest.mark.parametrize("kind", ["SKIN", "REMESH", "SCREW", "NODES"])
+def test_modifiers_in_front_that_make_another_mesh(rendered, kind):
+    """It has no mark, so it has to be deformed."""
+    obj, _armature = scenes.make_arm()
+    if kind != "SKIN":
+        obj.modifiers["Armature"].use_bone_envelopes = True
+    modifier = scenes.put_in_front(obj, kind)
+    if kind == "NODES":
+        modifier.node_group = bpy.data.node_groups.new("Cone", "GeometryNodeTree")
+        made = node_group.add(modifier.node_group, "GeometryNodeMeshCone")
+        modifier.node_group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        node_group.add(modifier.node_group, "NodeGroupOutput", {0: made})
+    expected = rendered(obj)[0], scenes.final_points(obj)
+    assert scenes.worst(expected[1], scenes.shapes(obj, [1])[0]) > 0.05
+    scenes.add_sinew(obj, "lbs")
+    got = rendered(obj)[0], scenes.final_points(obj)
+    assert max(map(scenes.worst, got, expected)) <= 1e-5
+
+
 def _in_viewport(obj):
     """Its shape and its undeformed shape, as viewports get them that draw materials."""
     bpy.context.scene.frame_set(9)
