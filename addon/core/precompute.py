@@ -4,6 +4,7 @@ one of them has the results of all that have ended taken."""
 
 from __future__ import annotations
 
+import time
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import TypeAlias
@@ -13,10 +14,13 @@ import sinew
 
 from . import interrupt
 from .errors import SinewError
+from .file_cache import FileCache
 
 Start: TypeAlias = Callable[..., sinew.Precomputation]
 """Takes `gives_way`: whether the artist works meanwhile."""
 
+# Results that took longer are stored in the folder.
+SECONDS_WORTH_A_FILE = 0.1
 # Bytes of results that are kept in memory, so that undo finds them.
 MEMORY = 256 * 2**20
 _SECONDS_BETWEEN_CHECKS = 0.05
@@ -26,13 +30,16 @@ class Precomputations:
     """All precomputations of a process. Any thread may use it.
 
     waits    results are computed at once while the caller waits: nobody watches, or a render needs them
+    cache    the folder that stores results, None for none
     stopped  the keys that the artist has stopped
     """
 
-    def __init__(self) -> None:
+    def __init__(self, cache: FileCache | None = None) -> None:
         self.waits = True
+        self.cache = cache
         self.stopped: set[str] = set()
-        self._running: dict[str, sinew.Precomputation] = {}
+        # With the time when each was started.
+        self._running: dict[str, tuple[sinew.Precomputation, float]] = {}
         self._made: OrderedDict[str, np.ndarray] = OrderedDict()
         self._lock = sinew.Lock()
 
@@ -40,15 +47,19 @@ class Precomputations:
     def running(self) -> list[sinew.Precomputation]:
         with self._lock:
             self._take_results()
-            return list(self._running.values())
+            return [run for run, _started in self._running.values()]
 
     def find(self, key: str) -> np.ndarray | None:
-        """Returns the result of an earlier run; None where there is none."""
+        """Returns the result of an earlier run, in this process or another; None where there is none."""
         with self._lock:
             self._take_results()
             if key in self._made:
                 self._made.move_to_end(key)
-            return self._made.get(key)
+                return self._made[key]
+            found = self.cache.load(key) if self.cache is not None else None
+            if found is not None:
+                self._keep(key, found)
+            return found
 
     def start(self, key: str, start: Start, gives_way: bool = True) -> sinew.Precomputation:
         """Starts a run, or returns the one that already runs with this key."""
@@ -56,8 +67,8 @@ class Precomputations:
             self._take_results()
             if key not in self._running:
                 self.stopped.discard(key)
-                self._running[key] = start(gives_way=gives_way)
-            return self._running[key]
+                self._running[key] = start(gives_way=gives_way), time.monotonic()
+            return self._running[key][0]
 
     def make_now(self, key: str, start: Start) -> np.ndarray:
         """Waits for the result. Raises what the run raises, and SinewError where Ctrl-C was pressed: Blender
@@ -90,7 +101,7 @@ class Precomputations:
             self.cancel_all()
 
     def _take_results(self) -> None:
-        for key, run in list(self._running.items()):
+        for key, (run, started) in list(self._running.items()):
             if not run.has_ended:
                 continue
             del self._running[key]
@@ -101,6 +112,8 @@ class Precomputations:
                 continue
             if made is not None:
                 self._keep(key, made)
+                if self.cache is not None and time.monotonic() - started > SECONDS_WORTH_A_FILE:
+                    self.cache.store(key, made)
 
     def _keep(self, key: str, made: np.ndarray) -> None:
         self._made[key] = made

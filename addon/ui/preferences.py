@@ -8,7 +8,7 @@ import os
 import bpy
 
 from ..attach.subscribers import notify, subscribers
-from ..deform import safe_mode, session
+from ..deform import precomputing, safe_mode, session
 from ..io import addon_preferences, units
 from . import menus, operators
 from .sidebar import draw_text
@@ -18,6 +18,10 @@ from .translations import tr
 def _safe_mode_changed(_preferences: SinewPreferences, context: bpy.types.Context) -> None:
     session.refresh(context)
     notify(subscribers.safe_mode_changed)
+
+
+def _cache_changed(_preferences: SinewPreferences, _context: bpy.types.Context) -> None:
+    precomputing.open_cache()
 
 
 class SinewPreferences(bpy.types.AddonPreferences):
@@ -41,6 +45,14 @@ class SinewPreferences(bpy.types.AddonPreferences):
         default=units.OF_SCENE,
         options=set(),
     )
+    cache_folder: bpy.props.StringProperty(
+        name="Cache Folder",
+        description="Where numbers of vertices are kept that methods take long to compute; empty: the "
+        "extension's own folder",
+        subtype="DIR_PATH",
+        options=set(),
+        update=_cache_changed,
+    )
     safe_mode: bpy.props.BoolProperty(
         name="Safe Mode",
         description="Run nothing of Sinew within Blender's own evaluation: meshes are deformed after it, and "
@@ -54,15 +66,20 @@ class SinewPreferences(bpy.types.AddonPreferences):
         layout.use_property_split = True
         layout.prop(self, "first_method")
         layout.prop(self, "units")
+        layout.prop(self, "cache_folder")
+        _draw_variable(layout, context, precomputing.VARIABLE)
         layout.prop(self, "safe_mode")
-        if os.environ.get(safe_mode.VARIABLE) is not None:
-            text = tr(
-                "The environment variable {name} decides: it is {value}",
-                name=safe_mode.VARIABLE,
-                value=repr(os.environ[safe_mode.VARIABLE]),
-            )
-            draw_text(layout, context, text, icon="INFO")
+        _draw_variable(layout, context, safe_mode.VARIABLE)
         menus.draw_shortcuts(self.layout, context)
+
+
+def _draw_variable(layout: bpy.types.UILayout, context: bpy.types.Context, name: str) -> None:
+    """Draws a note where an environment variable overrides the setting."""
+    if os.environ.get(name) is not None:
+        text = tr(
+            "The environment variable {name} decides: it is {value}", name=name, value=repr(os.environ[name])
+        )
+        draw_text(layout, context, text, icon="INFO")
 
 
 CLASSES = (SinewPreferences,)

@@ -7,6 +7,9 @@ import os
 import sys
 from pathlib import Path
 
+# Nothing that one test computes is visible to another.
+os.environ["SINEW_CACHE"] = "0"
+
 import bpy
 import numpy as np
 import pytest

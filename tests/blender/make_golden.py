@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import os
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -300,6 +301,8 @@ def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     folder.mkdir(parents=True, exist_ok=True)
+    # Results of earlier runs must not be used.
+    os.environ["SINEW_CACHE"] = "0"
     sinew_addon.register()
     for set_up in CASES:
         about, arrays = make(set_up)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Precomputation for cor: in the background while the artist works, immediately where nobody can look again;
-kept in files."""
+cached."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ import pytest
 import scenes
 import sinew
 from program import run_sinew
-from sinew_addon.attach import attach, stored_vertex_data
+from sinew_addon.attach import attach, properties, stored_vertex_data
 from sinew_addon.core import interrupt, vertex_data
+from sinew_addon.core.file_cache import FileCache
 from sinew_addon.core.precompute import precomputations
 from sinew_addon.deform import characters, precompute_watch, precomputing, session
 from sinew_addon.deform.plan import State
@@ -71,11 +72,12 @@ class BehindGate:
 
 
 @pytest.fixture(autouse=True)
-def gate(monkeypatch):
+def gate(monkeypatch, tmp_path):
     """No results of earlier tests exist, and nothing runs after a test."""
     provider = vertex_data.PROVIDERS["cor"]
     gate = Gate(provider.start)
     monkeypatch.setitem(vertex_data.PROVIDERS, "cor", dataclasses.replace(provider, start=gate))
+    monkeypatch.setattr(precomputations, "cache", FileCache(tmp_path / "cache", 10**8))
     monkeypatch.setattr(precomputations, "_made", type(precomputations._made)())
     yield gate
     gate.open()
@@ -358,7 +360,7 @@ def test_a_mesh_without_faces_is_blended_linearly_and_the_panel_says_so():
     assert scenes.worst(by_cor, scenes.final_points(obj)) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-# --- What the file has
+# --- The cache
 
 
 def saved(tmp_path) -> tuple[np.ndarray, str]:
@@ -520,3 +522,15 @@ def test_reskin_puts_it_into_the_file(gate, tmp_path):
     assert len(stored_vertex_data.read(obj.data)) == 1
     assert plan_of(obj).state is State.IN_DEPSGRAPH
     assert gate.count == 0
+
+
+def test_the_folder_has_what_no_file_has(gate, monkeypatch):
+    monkeypatch.setattr("sinew_addon.core.precompute.SECONDS_WORTH_A_FILE", 0.0)
+    for _ in range(2):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        forget_made()
+        obj, _armature = scenes.make_arm(bones=3)
+        scenes.add_sinew(obj, "cor")
+        assert "cor" in session.state_of(obj).bound.first_deformer.vertex_data.made
+    assert gate.count == 1
+    assert properties.has_sinew(obj)

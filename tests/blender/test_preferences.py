@@ -8,7 +8,9 @@ import bpy
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.deform import session
+from sinew_addon.core import precompute
+from sinew_addon.core.precompute import precomputations
+from sinew_addon.deform import precomputing, session
 from sinew_addon.io import addon_preferences, units
 
 
@@ -19,6 +21,7 @@ def preferences():
     entry.module = addon_preferences.ADDON
     yield entry.preferences
     addons.remove(entry)
+    precomputing.open_cache()
 
 
 @pytest.fixture
@@ -50,6 +53,22 @@ def test_lengths_are_in_the_chosen_units(preferences, chosen, system, text):
     scene.unit_settings.system, scene.unit_settings.scale_length = system, 0.1
     preferences.units = chosen
     assert units.text(scene, "length", 0.25) == text
+
+
+def test_numbers_of_methods_go_to_the_chosen_folder(preferences, selected, tmp_path, monkeypatch):
+    monkeypatch.delenv(precomputing.VARIABLE)
+    monkeypatch.setattr(precompute, "SECONDS_WORTH_A_FILE", 0.0)
+    preferences.cache_folder = str(tmp_path / "numbers")
+    assert precomputations.cache is not None
+    # A mesh that no other test has: results in memory are not written again.
+    selected.data.vertices[0].co.x += 0.0123
+    scenes.add_sinew(selected, "cor")
+    assert session.state_of(selected) is not None
+    assert list((tmp_path / "numbers").iterdir())
+    # The environment at Blender's start overrides the preferences.
+    monkeypatch.setenv(precomputing.VARIABLE, "0")
+    preferences.cache_folder = str(tmp_path / "others")
+    assert precomputations.cache is None
 
 
 def test_safe_mode_takes_effect_at_once(preferences, selected):
