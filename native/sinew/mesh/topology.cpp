@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "sinew/mesh/check_bind_data.h"
+#include "sinew/base/fail.h"
 
 namespace sinew {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "sinew/mesh/check_bind_data.h"
+#include "sinew/methods/check_bind_data.h"
 #include "sinew/methods/packed_binding.h"
 #include "sinew/transform/split_scale.h"
 

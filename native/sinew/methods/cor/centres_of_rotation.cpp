@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <unordered_map>
 
-#include "sinew/mesh/check_bind_data.h"
+#include "sinew/methods/check_bind_data.h"
 
 namespace sinew {
 namespace {

@@ -9,7 +9,7 @@
 #include <map>
 #include <string>
 
-#include "sinew/mesh/check_bind_data.h"
+#include "sinew/methods/check_bind_data.h"
 #include "sinew/methods/ddm/block_factor.h"
 
 namespace sinew {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/mesh/check_bind_data.h"
+#include "sinew/methods/check_bind_data.h"
 
 #include <cmath>
 
