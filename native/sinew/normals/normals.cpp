@@ -8,8 +8,8 @@
 
 #include "sinew/base/fork_safe.h"
 #include "sinew/base/thread_pool.h"
+#include "sinew/mesh/check_arrays.h"
 #include "sinew/mesh/topology.h"
-#include "sinew/methods/check_bind_data.h"
 #include "sinew/normals/normal_mesh.h"
 
 namespace sinew {

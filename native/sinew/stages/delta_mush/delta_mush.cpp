@@ -10,7 +10,7 @@
 
 #include "sinew/base/fork_safe.h"
 #include "sinew/base/thread_pool.h"
-#include "sinew/methods/check_bind_data.h"
+#include "sinew/mesh/check_arrays.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 #include "sinew/stages/delta_mush/mush_mesh.h"
 

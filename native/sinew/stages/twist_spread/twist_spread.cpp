@@ -7,7 +7,7 @@
 #include <string>
 
 #include "sinew/base/fork_safe.h"
-#include "sinew/methods/check_bind_data.h"
+#include "sinew/mesh/check_arrays.h"
 #include "sinew/methods/packed_binding.h"
 #include "sinew/stages/twist_spread/twist_kernel.h"
 #include "sinew/transform/split_scale.h"

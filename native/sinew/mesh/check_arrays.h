@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "sinew/base/fail.h"
+#include "sinew/transform/affine.h"
+
+namespace sinew {
+
+/// Throws if a vector is not finite.
+///
+/// of  what the vectors belong to, such as "vertex"
+void check_finite(const std::string& argument, std::span<const Vec3<float>> vectors, const std::string& of);
+
+/// Throws if the rest points are not `count`, or if one is not finite.
+void check_points(std::span<const Vec3<float>> points, std::size_t count);
+
+/// Throws if the weights are not one for each vertex, or if one is NaN.
+void check_weights(const std::string& argument, std::span<const float> weights, std::size_t vertex_count);
+
+/// Throws if there are some but fewer than `bone_count` rest bones, or if one is not finite.
+///
+/// bone_count  one more than the highest bone index in the influences
+void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
+
+/// Throws if a value is not finite, or if the transform has no inverse.
+void check_space(const Affine<float>& bones_from_model);
+
+/// Throws if `triangles` [3 x any number] has a corner that is no vertex.
+void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);
+
+}  // namespace sinew
