@@ -3,10 +3,6 @@
 
 import os
 import shutil
-import signal
-import sys
-import threading
-from contextlib import nullcontext
 from typing import NoReturn
 
 from .core.errors import SinewError
@@ -15,10 +11,7 @@ from .core.errors import SinewError
 def prepare_blender() -> None:
     """Registers Sinew in Blender. Raises SinewError where this Python has no Blender."""
     try:
-        # Only the main thread can handle signals.
-        is_main = threading.current_thread() is threading.main_thread()
-        with _Interrupts() if is_main and "bpy" not in sys.modules else nullcontext():
-            import bpy
+        import bpy
     except ImportError as error:
         raise SinewError(f"this Python has no Blender: {error}; install bpy") from None
     from . import native, registration
@@ -34,30 +27,6 @@ def prepare_blender() -> None:
     normals.are_used = False
     if not hasattr(bpy.types.Object, "sinew"):
         registration.register()
-
-
-class _Interrupts:
-    """Notes Ctrl-C while Blender is imported. Blender puts a handler of its own in place of Python's, and its
-    scripts hide what is raised in them; each module that they import has Python's handler set again."""
-
-    def __init__(self) -> None:
-        self.was_one = False
-
-    def __enter__(self) -> None:
-        self.find_spec()
-        sys.meta_path.insert(0, self)
-
-    def __exit__(self, *_error: object) -> None:
-        sys.meta_path.remove(self)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        if self.was_one:
-            raise KeyboardInterrupt
-
-    def find_spec(self, *_module: object) -> None:
-        signal.signal(signal.SIGINT, self._note)
-
-    def _note(self, *_signal: object) -> None:
-        self.was_one = True
 
 
 def leave_blender(status: int) -> NoReturn:

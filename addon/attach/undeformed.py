@@ -140,4 +140,7 @@ def remove_leftovers() -> None:
     for obj in [each for each in bpy.data.objects if each.session_uid in _to_remove]:
         for modifier in [] if properties.has_sinew(obj) else _both(obj):
             obj.modifiers.remove(modifier)
+        if not properties.has_sinew(obj):
+            # Reading settings makes them.
+            properties.clear(obj)
     _to_remove.clear()

@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
-import subprocess
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -15,7 +12,7 @@ import pytest
 import scenes
 import sinew
 from conftest import REPOSITORY
-from program import needs_interrupts, run_program, run_sinew, start_sinew
+from program import run_program, run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.cli import make_parser
 from sinew_addon.features.action_copy import action_copy
@@ -52,19 +49,6 @@ def test_wrong_use_has_status_2():
 
 
 @pytest.mark.once
-@needs_interrupts
-def test_ctrl_c_while_blender_is_imported(arm_file):
-    process = start_sinew("info", arm_file, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    loaded = Path(f"/proc/{process.pid}/maps")
-    if not loaded.exists():
-        pytest.skip("this system does not say what a process has loaded")
-    while "/bpy/__init__" not in loaded.read_text():
-        assert process.poll() is None
-    process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=60)
-    assert (process.returncode, output, errors) == (130, "", "sinew: stopped\n")
-
-
 def test_methods_is_the_table():
     printed = json.loads(run_sinew("methods", "--json").stdout)
     assert [row["name"] for row in printed["methods"]] == METHODS

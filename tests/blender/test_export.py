@@ -248,7 +248,7 @@ def test_parameters_and_stages_are_named(tmp_path):
     assert extras == {
         "version": 1,
         "method": "ddm",
-        "parameters": {"ddm.variant": "2", "ddm.radius": 0.25},
+        "parameters": {"ddm.variant": "2", "ddm.radius": 0.25, "ddm.weld": True},
         "stages": ["bulge_limit"],
     }
 

@@ -576,6 +576,8 @@ def compare(w: Walker, r: random.Random) -> str | None:
             and o.override_library is None
             # Sinew refuses this.
             and not (o.parent_type == "ARMATURE" and armature_modifiers(o)[0].use_multi_modifier)
+            and "PARTICLE_SYSTEM"
+            not in [m.type for m in o.modifiers][: list(o.modifiers).index(armature_modifiers(o)[0])]
         ),
     )
     methods = r.sample((*METHODS, "blender"), r.randint(1, 2))

@@ -48,8 +48,9 @@ struct Ddm : BlendsQuatVecs {
          .initial = 0.05,
          .minimum = 0.0,
          .maximum = 1e6},
-        {"weld", "Weld", "Vertices at one place that the same bones move count as one, as if seams were closed",
-         "", ParameterKind::boolean, 1.0, 0.0, 1.0}};
+        {"weld", "Weld",
+         "Vertices at one place that the same bones move count as one, as if seams were closed", "",
+         ParameterKind::boolean, 1.0, 0.0, 1.0}};
     static constexpr MethodInfo info{
         9,
         "ddm",
