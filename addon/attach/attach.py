@@ -382,7 +382,7 @@ def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
-    marks, smooth = (stack.mark_modifier(obj), stack.neutral_modifier(obj)), {}
+    helping, smooth = stack.helping_modifiers(obj), {}
     for name in VIEWS:
         view = _view(obj, name)
         wanted = icons.icons(view, situation)
@@ -392,9 +392,9 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
                 _show_in(modifier, name, is_on)
         if nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
             _show_in(nodes, name, wanted.sinew)
-        for mark in marks:
+        for modifier in helping:
             # Where an animation switches Sinew's, they stay on, as they change nothing.
-            _show_in(mark, name, wanted.sinew)
+            _show_in(modifier, name, wanted.sinew)
         smooth[name] = not situation.is_by_sinew or view.deformer is Deformer.ARMATURE
     undeformed.mark(obj, situation.is_by_sinew)
     corrective_smooth.switch(obj, **smooth)

@@ -74,6 +74,12 @@ def own_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [modifier for modifier in own if modifier is not None]
 
 
+def helping_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Returns those of Sinew's modifiers that change nothing (undeformed.py)."""
+    helping = (mark_modifier(obj), neutral_modifier(obj))
+    return [modifier for modifier in helping if modifier is not None]
+
+
 def _is_ours(obj: bpy.types.Object, modifier: bpy.types.NodesModifier) -> bool:
     return modifier.name.startswith("Sinew") or (
         properties.has_sinew(obj) and properties.of(obj).modifier_uid == modifier.persistent_uid

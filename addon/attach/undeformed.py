@@ -105,13 +105,8 @@ def _can_mark(obj: bpy.types.Object) -> bool:
 
 def remove(obj: bpy.types.Object) -> None:
     mark(obj, False)
-    for modifier in _both(obj):
+    for modifier in stack.helping_modifiers(obj):
         obj.modifiers.remove(modifier)
-
-
-def _both(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    both = (stack.mark_modifier(obj), stack.neutral_modifier(obj))
-    return [modifier for modifier in both if modifier is not None]
 
 
 # The session_uid of each object that remove_later() was called for.
@@ -122,7 +117,7 @@ def remove_later(obj: bpy.types.Object) -> None:
     """Called where Sinew's modifier was applied or deleted: a script that goes through a list of modifiers
     would crash Blender where another of these is gone."""
     mark(obj, False)
-    for modifier in _both(obj):
+    for modifier in stack.helping_modifiers(obj):
         modifier.show_viewport = modifier.show_render = False
         _to_remove.add(obj.session_uid)
     if _to_remove and not bpy.app.background and not bpy.app.timers.is_registered(remove_leftovers):
@@ -137,10 +132,10 @@ def remove_leftovers() -> None:
     """Called when no script runs; without a window, at the next frame and before the file is saved."""
     if not has_leftovers():
         return
-    for obj in [each for each in bpy.data.objects if each.session_uid in _to_remove]:
-        for modifier in [] if properties.has_sinew(obj) else _both(obj):
-            obj.modifiers.remove(modifier)
-        if not properties.has_sinew(obj):
+    for obj in bpy.data.objects:
+        if obj.session_uid in _to_remove and not properties.has_sinew(obj):
+            for modifier in stack.helping_modifiers(obj):
+                obj.modifiers.remove(modifier)
             # Reading settings makes them.
             properties.clear(obj)
     _to_remove.clear()

@@ -153,10 +153,9 @@ def is_current(obj: bpy.types.Object) -> bool:
 
 
 def follow_points(obj: bpy.types.Object) -> None:
-    """Gives the proxy's copy of the mesh the points of the mesh. Another add-on's handler can move these with
-    each frame, also of a render."""
-    if not is_current(obj):
-        mesh_compare.write_points(obj.data, properties.of(obj).upstream_proxy.data)
+    """Gives the proxy's copy of the mesh, which is not current, the points of the mesh. Another add-on's
+    handler can move these with each frame, also of a render."""
+    mesh_compare.write_points(obj.data, properties.of(obj).upstream_proxy.data)
 
 
 def remove(obj: bpy.types.Object) -> None:

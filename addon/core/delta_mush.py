@@ -2,6 +2,7 @@
 """The stage delta_mush of one mesh."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,21 +43,18 @@ class DeltaMush:
         settings = tuple(values[name] for name in (*BIND_PARAMETERS, "invert_group", "weld"))
         if self._native is not None and settings == self._settings and rest_points is self._rest_points:
             return self._native
-        mesh, weights = self._mesh, self._mask
-        if self._native is None or values["weld"] != self._settings[-1]:
-            self._native, self._weld = None, None
-            if values["weld"] and mesh.rest_points is not None:
-                moved_by = [each.entries.influences() for each in mesh.weightings]
-                self._weld = weld(mesh.rest_points, moved_by, (weights, *mesh.modifier_masks))
+        chosen = self._places if values["weld"] else None
+        if chosen is not self._weld:
+            self._native, self._weld = None, chosen
+        bound, weights = rest_points, self._mask
         if weights is not None and values["invert_group"]:
             weights = 1.0 - weights
-        bound = rest_points
         if self._weld is not None:
             bound = bound[self._weld.first]
             weights = None if weights is None else weights[self._weld.first]
         arguments = {name: values[name] for name in BIND_PARAMETERS} | {"weights": weights}
         if self._native is None:
-            topology = mesh.topology if self._weld is None else self._weld.topology(mesh.topology)
+            topology = self._mesh.topology if self._weld is None else self._weld.topology(self._mesh.topology)
             self._native = sinew.DeltaMush(
                 bound, topology.face_offsets, topology.corner_vertices, topology.edges, **arguments
             )
@@ -64,3 +62,12 @@ class DeltaMush:
             self._native.bind(bound, **arguments)
         self._settings, self._rest_points = settings, rest_points
         return self._native
+
+    @cached_property
+    def _places(self) -> Weld | None:
+        """The weld of the mesh; None where no two vertices are one."""
+        mesh = self._mesh
+        if mesh.rest_points is None:
+            return None
+        moved_by = [each.entries.influences() for each in mesh.weightings]
+        return weld(mesh.rest_points, moved_by, (self._mask, *mesh.modifier_masks))

@@ -46,22 +46,24 @@ class Weld:
     def influences(self, influences: Influences) -> Influences:
         """Returns the influences of the places."""
         counts = influences.counts[self.first]
+        items = _items(influences.offsets[self.first], counts)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        items = np.repeat(influences.offsets[self.first] - offsets[:-1], counts) + np.arange(offsets[-1])
         return Influences(offsets, influences.bones[items], influences.weights[items])
 
     def rows_of_vertices(self, rows: np.ndarray) -> np.ndarray:
         """Returns the rows of all vertices, from rows of places that begin with the place, ascending."""
         of_place = rows[:, 0].astype(np.int64)
-        begins, counts = (
-            np.searchsorted(of_place, np.arange(len(self.first))),
-            np.bincount(of_place, minlength=len(self.first)),
-        )
-        counts = counts[self.places]
-        ends = np.cumsum(counts)
-        found = rows[np.repeat(begins[self.places] - ends + counts, counts) + np.arange(ends[-1])]
+        begins = np.searchsorted(of_place, np.arange(len(self.first)))[self.places]
+        counts = np.bincount(of_place, minlength=len(self.first))[self.places]
+        found = rows[_items(begins, counts)]
         found[:, 0] = np.repeat(np.arange(len(self.places)), counts)
         return found
+
+
+def _items(begins: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Returns the numbers of the items of several lists, one list after another."""
+    places = np.cumsum(counts) - counts
+    return np.repeat(begins - places, counts) + np.arange(counts.sum())
 
 
 def weld(

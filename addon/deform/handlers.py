@@ -110,10 +110,9 @@ def _end_event(depsgraph: bpy.types.Depsgraph, waiting: Changes | None) -> None:
     if waiting is not None:
         _keep_evaluated_shapes(waiting)
         session.refresh_between_steps(bpy.context)
-    for obj, state in current.pairs:
+    for _obj, state in current.pairs:
         state.evaluation.is_event_known = state.evaluation.was_tagged
-        with contextlib.suppress(ReferenceError):
-            state.note_shown(obj, depsgraph)
+    session.note_shown(depsgraph)
 
 
 def _read_changes(depsgraph: bpy.types.Depsgraph, original: events.Find, frame: bool) -> Changes:
@@ -202,7 +201,8 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     continue
                 if obj.data.name_full in seen or properties.of(obj).upstream_proxy is not None:
                     unread.append(obj)
-                    upstream_proxy.follow_points(obj)
+                    if not upstream_proxy.is_current(obj):
+                        upstream_proxy.follow_points(obj)
                 else:
                     new.meshes.add(obj.data.session_uid)
         if new.meshes or new.objects:

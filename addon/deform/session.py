@@ -203,9 +203,14 @@ def refresh(context: bpy.types.Context) -> None:
         # If no object waits, this evaluation only shows what was just changed: Sinew need not react to it.
         with contextlib.nullcontext() if waiting() else updates_suspended():
             context.view_layer.update()
-        for obj, state in current.pairs:
-            with contextlib.suppress(ReferenceError):
-                state.note_shown(obj, depsgraph)
+        note_shown(depsgraph)
+
+
+def note_shown(depsgraph: bpy.types.Depsgraph) -> None:
+    """Notes the meshes that viewports show, at the end of an event, or of an evaluation by Sinew."""
+    for obj, state in current.pairs:
+        with contextlib.suppress(ReferenceError):
+            state.note_shown(obj, depsgraph)
 
 
 def refresh_between_steps(context: bpy.types.Context) -> None:

@@ -107,12 +107,15 @@ class _Event:
         obj, changes = self.obj, self.changes
         if obj.data.session_uid not in changes.meshes or obj.data.is_editmode:
             return False
+        if upstream_proxy.is_current(obj):
+            return False
         if changes.frame and self.old.is_in_depsgraph:
             # Blender evaluates what handlers change, and Sinew deforms within that.
             upstream_proxy.follow_points(obj)
-        elif changes.frame and not upstream_proxy.is_current(obj):
+            return not upstream_proxy.is_current(obj)
+        if changes.frame:
             upstream_proxy.share_mesh(obj)
-        return not upstream_proxy.is_current(obj)
+        return True
 
     def _with_rest(self, facts: Facts) -> Facts:
         """Adds what decides what is read."""

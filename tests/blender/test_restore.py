@@ -26,6 +26,8 @@ def save(path: Path) -> Path:
 
 def content(path: Path) -> dict[str, object]:
     files.open_file(path, load_ui=True)
+    # Reading an attribute with a single value makes Blender 5.2 expand it.
+    whole_file.of_open_file("meshes")
     found = whole_file.of_open_file()
     # Last, because going to a frame writes animated values.
     return found | whole_file.evaluated(FRAMES)

@@ -33,7 +33,6 @@ VOLATILE = {
     "polygon_normals",
     "rna_type",
     "session_uid",
-    "storage_type",  # reading an attribute with a single value expands it in 5.2
     "spaces",  # 4.2 crashes when an editor's content is read
     "tag",
     "uv_sculpt",  # and when its brush is read
