@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import pytest
 import soak
 
 
-def test_nothing_grows():
-    assert soak.run(frames=300, threads=60) == []
+@pytest.mark.parametrize("frames", [100, pytest.param(1000, marks=pytest.mark.slow)])
+def test_nothing_grows(frames):
+    assert soak.run(frames, threads=60) == []

@@ -99,7 +99,8 @@ def test_coordinates_are_those_with_the_armature_modifier(rendered, route, name)
 @pytest.mark.parametrize("kind", ["SKIN", "REMESH", "SCREW", "NODES"])
 def test_modifiers_in_front_that_make_another_mesh(rendered, kind):
     """It has no mark, so it has to be deformed."""
-    obj, _armature = scenes.make_arm()
+    # Skin takes two seconds for each evaluation of the usual one.
+    obj, _armature = scenes.make_arm(sides=6, rings=9)
     if kind != "SKIN":
         obj.modifiers["Armature"].use_bone_envelopes = True
     modifier = scenes.put_in_front(obj, kind)

@@ -14,6 +14,23 @@ import scipy.linalg
 from scipy.spatial.transform import Rotation
 
 
+def remembered(function):
+    """Of a few matrices: many vertices have the same bones."""
+
+    @functools.lru_cache(maxsize=2000)
+    def by_content(*given):
+        result = function(*(np.frombuffer(content).reshape(size, size) for size, content in given))
+        for array in result if isinstance(result, tuple) else (result,):
+            array.flags.writeable = False
+        return result
+
+    def of(*matrices):
+        matrices = [np.ascontiguousarray(matrix, np.float64) for matrix in matrices]
+        return by_content(*((len(matrix), matrix.tobytes()) for matrix in matrices))
+
+    return functools.wraps(function)(of)
+
+
 def nearest_rotation(matrix):
     """The proper rotation nearest to the 3x3 `matrix` (polar decomposition)."""
     u, _, vt = np.linalg.svd(matrix)
@@ -24,6 +41,7 @@ def is_rigid(linear):
     return bool(np.allclose(linear.T @ linear, np.eye(3), rtol=0, atol=1e-5) and np.linalg.det(linear) > 0)
 
 
+@remembered
 def rotation_of_bone(posed_from_rest, rest_bone):
     """The rotation of a bone's motion, 3x3: of a scaled bone, that of its posed axes made orthonormal and
     right-handed, with Y kept and X as near as possible. Rest axes that are not quite orthonormal, as some of
@@ -67,6 +85,7 @@ def quaternion_by_blender(matrix):
     return multiple / np.linalg.norm(multiple)
 
 
+@remembered
 def quaternion(rotation):
     """The unit quaternion of `rotation`, of either sign: the eigenvector of Bar-Itzhack's matrix."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
@@ -160,12 +179,11 @@ def blended_motion(quaternions, translations, weights):
     return rotation(real / length), translation(real / length, dual / length), margin
 
 
-@functools.lru_cache(maxsize=1000)
-def logarithm(of_rotation):
-    """scipy's matrix logarithm of a 3x3 rotation (as bytes), and the 3x3 matrix that makes the last column of
-    the rigid 4x4 matrix's logarithm of its translation: the inverse of the exponential's integral over unit
-    time."""
-    angular = scipy.linalg.logm(np.frombuffer(of_rotation).reshape(3, 3)).real
+@remembered
+def logarithm(rotation):
+    """scipy's matrix logarithm of a 3x3 rotation, and the 3x3 matrix that makes the last column of the rigid
+    4x4 matrix's logarithm of its translation: the inverse of the exponential's integral over unit time."""
+    angular = scipy.linalg.logm(rotation).real
     block = np.zeros((6, 6))
     block[:3, :3], block[:3, 3:] = angular, np.eye(3)
     return angular, np.linalg.inv(scipy.linalg.expm(block)[:3, 3:])
@@ -176,7 +194,7 @@ def log(point, motions, rotations, weights):
     _, translations = rigid_terms(point, motions, rotations)
     total, margin = np.zeros((4, 4)), 1.0
     for rotated, translated, weight in zip(rotations, translations, weights, strict=True):
-        angular, by_translation = logarithm(np.ascontiguousarray(rotated).tobytes())
+        angular, by_translation = logarithm(rotated)
         total[:3, :3] += weight * angular
         total[:3, 3] += weight * (by_translation @ translated)
         margin = min(margin, abs(quaternion(rotated)[0]))
