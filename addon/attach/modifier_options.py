@@ -42,22 +42,21 @@ class ModifierOptions:
             modifier.use_multi_modifier,
         )
 
-    def weighting(self, obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> Weighting:
+    def weighting(self, group_names: list[str], weights: GroupWeights, bones: Bones) -> Weighting:
         """Returns what deforms the mesh: its groups that have a bone, or no groups where the modifier does
         not use them."""
-        names = [group.name for group in obj.vertex_groups]
-        bone_of_group = bones.of_groups(names) if self.use_vertex_groups else np.full(len(names), -1)
+        used = bones if self.use_vertex_groups else Bones.none()
+        bone_of_group = used.of_groups(group_names)
         return Weighting(bones, entries_of_bones(weights, bone_of_group), self.use_envelopes)
 
-    def mask_weights(self, obj: bpy.types.Object, weights: GroupWeights) -> np.ndarray | None:
+    def mask_weights(self, group_names: list[str], weights: GroupWeights) -> np.ndarray | None:
         """Returns float32 [vertices], the share of the deformation that each vertex gets; None for all of it.
 
         As in Blender, a mask is ignored if its group is missing or if the mesh has no weights.
         """
-        group = obj.vertex_groups.get(self.mask) if self.mask else None
-        if group is None or len(weights.groups) == 0:
+        if self.mask not in group_names or len(weights.groups) == 0:
             return None
-        mask = weights.of_group(group.index)
+        mask = weights.of_group(group_names.index(self.mask))
         return 1.0 - mask if self.invert_mask else mask
 
 

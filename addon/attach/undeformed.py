@@ -14,6 +14,9 @@ modifier stands one that marks each mesh that goes through the whole stack: one 
 
 from __future__ import annotations
 
+import fnmatch
+from collections.abc import Iterator
+
 import bpy
 
 from ..io import mesh_io
@@ -23,6 +26,11 @@ from . import node_group, properties, references, stack
 _MAKE_A_MESH = {
     *("MESH_SEQUENCE_CACHE", "OCEAN", "PARTICLE_INSTANCE", "REMESH", "SCREW", "SKIN", "VOLUME_TO_MESH"),
 }
+# These nodes give a mesh with weights that comes from elsewhere, or from an earlier evaluation.
+_OTHER_MESHES = {
+    *("GeometryNodeObjectInfo", "GeometryNodeCollectionInfo", "GeometryNodeBake"),
+    "GeometryNodeSimulationOutput",
+}
 
 
 def ensure(obj: bpy.types.Object) -> dict[str, object]:
@@ -31,7 +39,7 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
         _make_neutral(obj)
     _ensure_mark(obj)
     stack.position_own(obj)
-    can_mark = _can_mark(obj) and not _loses_marks(obj)
+    can_mark = _can_mark(obj) and not loses_marks(obj)
     keeps = properties.of(obj).adds_rest_position or not can_mark
     return {
         node_group.IS_MARKED: can_mark,
@@ -39,12 +47,38 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
     }
 
 
-def _loses_marks(obj: bpy.types.Object) -> bool:
+def loses_marks(obj: bpy.types.Object) -> bool:
     """Whether modifiers in front can make another mesh, without the attribute: then the mesh can not be told
-    from the undeformed one. Node groups pass attributes on where they pass on weights."""
-    kinds = {modifier.type for modifier in stack.upstream_changes(obj)}
+    from the undeformed one."""
+    changes = stack.upstream_changes(obj)
+    groups = [modifier.node_group for modifier in changes if modifier.type == "NODES"]
     by_envelopes = any(modifier.use_bone_envelopes for modifier in stack.armature_modifiers(obj))
-    return not kinds.isdisjoint(_MAKE_A_MESH) or (by_envelopes and "NODES" in kinds)
+    return (
+        not _MAKE_A_MESH.isdisjoint(modifier.type for modifier in changes)
+        or (by_envelopes and bool(groups))
+        or any(_loses_mark(node) for node in _nodes_of(groups))
+    )
+
+
+def _nodes_of(groups: list[bpy.types.NodeTree | None]) -> Iterator[bpy.types.Node]:
+    """Yields the nodes of groups and of all groups in them."""
+    known = set()
+    while groups:
+        group = groups.pop()
+        if group is not None and group not in known:
+            known.add(group)
+            yield from group.nodes
+            groups += [node.node_tree for node in group.nodes if node.bl_idname == "GeometryNodeGroup"]
+
+
+def _loses_mark(node: bpy.types.Node) -> bool:
+    """Other nodes pass the attribute on where they pass on weights."""
+    if node.bl_idname == "GeometryNodeRemoveAttribute":
+        name = node.inputs["Name"]
+        return name.is_linked or fnmatch.fnmatchcase(node_group.REST_POSITION, name.default_value)
+    return node.bl_idname in _OTHER_MESHES and any(
+        output.type == "GEOMETRY" and output.is_linked for output in node.outputs
+    )
 
 
 def _can_make(obj: bpy.types.Object) -> bool:

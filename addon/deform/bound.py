@@ -124,15 +124,17 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
         old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skin_stages))
         return replace(old, source=read_now)
     options = [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
-    masks = _masks(obj, read_now, groups)
+    masks = _masks(read_now, groups)
     stages = []
     before = () if old is None else old.skin_stack.skin_stages
     for option, its_bones, its_old in itertools.zip_longest(options, bones, before):
         if option is None:
             break
-        weighting = option.weighting(obj, read_now.weights, its_bones)
+        weighting = option.weighting(read_now.group_names, read_now.weights, its_bones)
         deformer = SkinDeformer(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
-        stages.append(SkinStage(deformer, option.mask_weights(obj, read_now.weights), option.multi))
+        stages.append(
+            SkinStage(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
+        )
     weighting = stages[0].deformer.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
@@ -215,15 +217,14 @@ def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> 
     )
 
 
-def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:
+def _masks(read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:
     """Returns float32 [vertices], 0 to 1, by the stage's name. As with Blender's modifiers, there is no mask
     for a missing group or for a mesh without weights."""
-    found = {stage: obj.vertex_groups.get(name) for stage, name in groups.items() if name}
-    has_weights = len(read_now.weights.groups) > 0
+    names, weights = read_now.group_names, read_now.weights
     return {
-        stage: read_now.weights.of_group(group.index)
-        for stage, group in found.items()
-        if group is not None and has_weights
+        stage: weights.of_group(names.index(name))
+        for stage, name in groups.items()
+        if name in names and len(weights.groups) > 0
     }
 
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import sinew
 
-from ..attach import attach, normals, properties, stack, upstream_proxy
+from ..attach import attach, normals, properties, stack, undeformed, upstream_proxy
 from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
 from ..core.skin_stack import NO_STAGES, SkinStageFrame
@@ -106,6 +106,7 @@ class Noted:
     visibility_keyed     for each Armature modifier, whether an animation switches it on and off
     state                what the artist can change about the object itself, from state_of()
     groups               the names of its vertex groups
+    loses_marks          as from undeformed.loses_marks()
     dependencies         the session_uid of everything that the shape depends on
     builtin_fingerprint  why its Armature modifiers deform it (small_meshes.fingerprint()); else empty
     data_versions        versions of the methods' vertex data, for each Armature modifier
@@ -121,6 +122,7 @@ class Noted:
     visibility_keyed: list[bool]
     state: list
     groups: list[str]
+    loses_marks: bool
     dependencies: set[int]
     builtin_fingerprint: list[str]
     data_versions: list[int]
@@ -140,6 +142,7 @@ class Noted:
             visibility_keyed=[is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)],
             state=state_of(obj),
             groups=obj.vertex_groups.keys(),
+            loses_marks=undeformed.loses_marks(obj),
             dependencies=own | set(bound.armatures),
             builtin_fingerprint=small_meshes.fingerprint(obj) if plan.uses_builtin else [],
             data_versions=bound.data_versions,
@@ -227,7 +230,8 @@ class SkinnedObject:
 
     def is_as_noted(self, obj: bpy.types.Object) -> bool:
         """Whether the object itself is as it was when the plan was applied."""
-        return self.noted.state == state_of(obj) and self.noted.groups == obj.vertex_groups.keys()
+        is_same = self.noted.state == state_of(obj) and self.noted.groups == obj.vertex_groups.keys()
+        return is_same and self.noted.loses_marks == undeformed.loses_marks(obj)
 
     def was_deformed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the last evaluation gave the object its shape."""

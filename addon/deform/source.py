@@ -24,6 +24,8 @@ from .changes import Changes
 class Source:
     """Read once, and again when it may be out of date.
 
+    group_names       of the vertex groups of the mesh that the Armature modifier gets: a node group can give
+                      it others than the object's
     points            float32 [vertices, 3], object space, without shape keys
     triangles         int32 [triangles, 3], of surface_points; None where no method needs them, as reading
                       them takes long
@@ -141,7 +143,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
 
     with_surface  with the triangles, and with the stored data that was computed from them
     """
-    names = [group.name for group in obj.vertex_groups]
+    names = _group_names(obj, depsgraph)
     from_upstream = properties.of(obj).upstream_proxy is not None
     mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_upstream else obj.data
     weights = mesh_io.read_group_weights(mesh)
@@ -184,10 +186,10 @@ def has_changed(
 
     touched  the object itself may have changed
     """
-    if touched and [g.name for g in obj.vertex_groups] != source.group_names:
-        return True
     helper = properties.of(obj).upstream_proxy
     if (helper is not None) != source.from_upstream:
+        return True
+    if touched and _group_names(obj, depsgraph) != source.group_names:
         return True
     if helper is not None:
         mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
@@ -201,6 +203,12 @@ def has_changed(
     if keys is not None and tuple(block.name for block in keys.key_blocks) != known.names:
         return True
     return mesh.session_uid in changes.meshes
+
+
+def _group_names(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
+    """Requires is_ready()."""
+    proxy = properties.of(obj).upstream_proxy
+    return (obj if proxy is None else proxy.evaluated_get(depsgraph)).vertex_groups.keys()
 
 
 def is_slider_moved(

@@ -82,7 +82,7 @@ def describe_in_file(obj: bpy.types.Object) -> RigFacts:
     bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
     weights = mesh_io.read_group_weights(obj.data)
     options = ModifierOptions.read(stack.armature_modifier(obj))
-    weighting = options.weighting(obj, weights, bones)
+    weighting = options.weighting(obj.vertex_groups.keys(), weights, bones)
     points = mesh_io.read_points(obj.data)
     return describe(obj, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
 

@@ -105,15 +105,81 @@ def test_modifiers_in_front_that_make_another_mesh(rendered, kind):
         obj.modifiers["Armature"].use_bone_envelopes = True
     modifier = scenes.put_in_front(obj, kind)
     if kind == "NODES":
-        modifier.node_group = bpy.data.node_groups.new("Cone", "GeometryNodeTree")
-        made = node_group.add(modifier.node_group, "GeometryNodeMeshCone")
-        modifier.node_group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        node_group.add(modifier.node_group, "NodeGroupOutput", {0: made})
+        modifier.node_group = _tree(lambda group, _source: node_group.add(group, "GeometryNodeMeshCone"))
     expected = rendered(obj)[0], scenes.final_points(obj)
     assert scenes.worst(expected[1], scenes.shapes(obj, [1])[0]) > 0.05
     scenes.add_sinew(obj, "lbs")
     got = rendered(obj)[0], scenes.final_points(obj)
     assert max(map(scenes.worst, got, expected)) <= 1e-5
+
+
+def _remove(group, source, name="rest_position"):
+    inputs = {"Geometry": source, "Name": name}
+    return node_group.add(group, "GeometryNodeRemoveAttribute", inputs)
+
+
+def _remove_by_pattern(group, source):
+    node = _remove(group, source, "rest*")
+    if hasattr(node, "pattern_mode"):  # before Blender 5.0
+        node.pattern_mode = "WILDCARD"
+    else:
+        node.inputs["Pattern Mode"].default_value = "Wildcard"
+    return node
+
+
+def _of_another_object(group, _source):
+    """With its vertex groups in another order."""
+    (obj,) = (each for each in bpy.data.objects if each.type == "MESH")
+    other = scenes.copied(obj, "Other")
+    other.modifiers.clear()
+    for vertex in other.data.vertices:
+        vertex.co.z *= 1.3
+    other.vertex_groups.active_index = 0
+    with bpy.context.temp_override(object=other):
+        bpy.ops.object.vertex_group_move(direction="DOWN")
+    assert other.vertex_groups.keys() != obj.vertex_groups.keys()
+    return node_group.add(group, "GeometryNodeObjectInfo", {"Object": other}).outputs["Geometry"]
+
+
+def _tree(make):
+    group = bpy.data.node_groups.new("Made", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    source = node_group.add(group, "NodeGroupInput")
+    node_group.add(group, "NodeGroupOutput", {0: make(group, source)})
+    return group
+
+
+@pytest.mark.parametrize("make", [_remove, _remove_by_pattern, _of_another_object])
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_node_groups_in_front_that_lose_the_mark(rendered, route, make):
+    """Also where the artist changes the group while Sinew is on."""
+    routes.force(route)
+    obj, _armature = scenes.make_arm(bones=3)
+    mask = obj.vertex_groups.new(name="Mask")
+    mask.add(range(len(obj.data.vertices)), 0.7, "REPLACE")
+    obj.modifiers["Armature"].vertex_group = mask.name
+    trees = [_tree(make), _tree(lambda group, source: source)]
+
+    def nested(group, source):
+        return node_group.add(group, "GeometryNodeGroup", {0: source}, node_tree=trees[0])
+
+    outer = _tree(nested)
+    scenes.put_in_front(obj, "NODES").node_group = outer
+
+    def shapes(tree):
+        outer.nodes["Group"].node_tree = tree
+        bpy.context.view_layer.update()
+        return rendered(obj)[0], scenes.final_points(obj)
+
+    expected = [shapes(tree) for tree in trees]
+    for number in (1, 0, 1, 0):
+        got = shapes(trees[number])
+        assert max(map(scenes.worst, got, expected[number])) <= 1e-5
+        if stack.sinew_modifier(obj) is not None:
+            routes.taken(obj, 0)
+        else:
+            scenes.add_sinew(obj, "lbs")
 
 
 def _in_viewport(obj):

@@ -347,7 +347,7 @@ class BlenderSide(Side):
         (modifier,) = armature_modifiers(obj)
         evaluated = modifier.object.evaluated_get(depsgraph)
         bones, weights = armature_io.read_bones(evaluated), mesh_io.read_group_weights(obj.data)
-        weighting = ModifierOptions.read(modifier).weighting(obj, weights, bones)
+        weighting = ModifierOptions.read(modifier).weighting(obj.vertex_groups.keys(), weights, bones)
         space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), evaluated)
         points = mesh_io.read_points(obj.data)
         points = points if space is None else transformed(points, space)

@@ -283,7 +283,7 @@ def read_edited(
     bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
     weights = mesh_io.read_group_weights(obj.data)
     points = _in_armature_space(obj, armature, obj.data, depsgraph)
-    return _weighting(obj, weights, bones), weights, points
+    return _weighting(obj, obj, weights, bones), weights, points
 
 
 def _read_part(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part:
@@ -291,20 +291,25 @@ def _read_part(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part:
     weighting, weights, points = read_edited(obj, depsgraph)
     bones = weighting.bones
     edited = influences = weighting.influences_over_joints(points)
-    evaluated = obj.evaluated_get(depsgraph).data
+    shown = obj.evaluated_get(depsgraph)
+    evaluated = shown.data
     if stack.upstream_changes(obj):
-        there = _weighting(obj, mesh_io.read_group_weights(evaluated), bones)
+        there = _weighting(obj, shown, mesh_io.read_group_weights(evaluated), bones)
         influences = there.influences_over_joints(_in_armature_space(obj, armature, evaluated, depsgraph))
     count = len(evaluated.vertices)
     return Part(obj, armature, weighting, weights, points, count, influences, PoseCheck(edited))
 
 
-def _weighting(obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> Weighting:
+def _weighting(
+    obj: bpy.types.Object, shown: bpy.types.Object, weights: GroupWeights, bones: Bones
+) -> Weighting:
+    """shown: the object whose mesh has the weights, evaluated or not."""
+    names = shown.vertex_groups.keys()
     modifier = stack.armature_modifier(obj)
     if modifier is not None:
-        return ModifierOptions.read(modifier).weighting(obj, weights, bones)
+        return ModifierOptions.read(modifier).weighting(names, weights, bones)
     # The parent type Armature deforms by groups, and by envelopes where there are none.
-    entries = entries_of_bones(weights, bones.of_groups([group.name for group in obj.vertex_groups]))
+    entries = entries_of_bones(weights, bones.of_groups(names))
     return Weighting(bones, entries, use_envelopes=True)
 
 
