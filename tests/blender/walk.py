@@ -134,6 +134,7 @@ class Outcome:
     steps: list[Step]
     fault: Fault | None = None
     said: list[str] = field(default_factory=list)
+    idle: set[Step] = field(default_factory=set)
     ran: Counter = field(default_factory=Counter)
     refused: Counter = field(default_factory=Counter)
     compared: int = 0
@@ -294,7 +295,8 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
             )
             theirs = blender.receive()
             claims = ours["claims"]
-            outcome.said.append(f"{step.operation}: {ours['said']}")
+            outcome.said.append(ours["said"])
+            outcome.idle |= {step} if ours["outcome"] == "nothing" else set()
             outcome.copies_follow &= step.operation in FOLLOWED
             outcome.copies_follow |= step.operation == "compare" and ours["outcome"] == "done"
             outcome.ran[step.operation] += ours["outcome"] == "done"
@@ -495,7 +497,7 @@ def shrink(pair: Pair, outcome: Outcome, seconds: float = 120.0) -> Outcome:
         tried = walk(pair, outcome.seed, some)
         return tried if tried.fault is not None and tried.fault.kind == outcome.fault.kind else None
 
-    done = [step for step, said in zip(steps, outcome.said, strict=False) if not said.endswith(": None")]
+    done = [step for step in steps if step not in outcome.idle]
     again = fails(done)
     if again is not None:
         best, steps = again, done[: again.fault.step + 1]
@@ -551,7 +553,7 @@ def save(pair: Pair, outcome: Outcome, keep: Path) -> Path:
     path = keep / f"walk-{outcome.seed}-{outcome.route}.py"
     said = [*outcome.said, *([""] * (len(outcome.steps) - len(outcome.said)))]
     lines = [
-        f"    walk.Step{dataclasses.astuple(step)},  # {text.partition(': ')[2]}"
+        f"    walk.Step{dataclasses.astuple(step)},  # {text}"
         for step, text in zip(outcome.steps, said, strict=True)
     ]
     path.write_text(

@@ -99,13 +99,13 @@ class Child:
             self.walker.chosen = ""
         operation = self.operations.OPERATIONS[name]
         self.walker.rendered, self.walker.rendered_by_library = {}, {}
-        outcome, said = "done", None
+        outcome = "done"
         try:
             said = operation.act(self.walker, numbers)
-            if said is None:
-                outcome = "nothing"
+        except self.operations.NothingError:
+            outcome, said = "nothing", name
         except Exception as error:
-            outcome, said = "refused", f"{type(error).__name__}: {error}"
+            outcome, said = "refused", f"{name}: {type(error).__name__}: {error}"
             if not isinstance(error, RuntimeError) and type(error).__name__ != "SinewError":
                 outcome = "failed"
         if outcome == "done" and name not in ("undo", "redo"):

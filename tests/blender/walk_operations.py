@@ -2,14 +2,14 @@
 """The operations of a walk. Each does the same to the file on both sides (walk_sides), depending on its
 random numbers and the file's content.
 
-An operation returns a description of what it did, or None if the file has nothing for it: choosing among
-nothing ends it.
+An operation raises NothingError if the file has nothing for it: choosing among nothing ends it.
 """
 
 from __future__ import annotations
 
 import os
 import random
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,7 +42,7 @@ TURN = 0.8
 class Operation:
     name: str
     weight: float
-    act: Callable[[Walker, random.Random], str | None]
+    act: Callable[[Walker, random.Random], str]
 
 
 class NothingError(Exception):
@@ -56,11 +56,21 @@ def operation(weight: float):
     """weight  its relative frequency"""
 
     def register(act: Callable) -> Callable:
-        def attempt(walker: Walker, r: random.Random) -> str | None:
-            try:
-                return act(walker, r)
-            except NothingError:
-                return None
+        def attempt(walker: Walker, r: random.Random) -> str:
+            """Returns what it chooses, but for samples and numbers from 0 to 1, as a script says it."""
+            walker.words = [act.__name__]
+
+            def noting(choose: Callable) -> Callable:
+                def choose_and_note(*given: object):
+                    chosen = choose(*given)
+                    walker.words.append(str(getattr(chosen, "name", chosen)))
+                    return chosen
+
+                return choose_and_note
+
+            r.choice, r.randrange = noting(r.choice), noting(r.randrange)
+            act(walker, r)
+            return shlex.join(walker.words)
 
         OPERATIONS[act.__name__] = Operation(act.__name__, weight, attempt)
         return act
@@ -82,6 +92,7 @@ class Walker:
             lambda *_arguments: None
         )
         self.chosen = ""
+        self.words: list[str] = []
         self.compared = False
         # Changed since the last undo step: Blender's own operators always push one.
         self.unpushed = False
@@ -169,7 +180,7 @@ class Walker:
         again = next((o for o in choices if o.name == self.chosen), None)
         chosen = self.one(r, choices)
         if again is not None and r.random() < 0.5:
-            chosen = again
+            chosen, self.words[-1] = again, again.name
         self.chosen = chosen.name
         return chosen
 
@@ -356,7 +367,7 @@ def _method(r: random.Random) -> str:
 
 
 @operation(6)
-def add(w: Walker, r: random.Random) -> str | None:
+def add(w: Walker, r: random.Random) -> None:
     obj = w.mesh(
         r,
         lambda o: (
@@ -375,19 +386,17 @@ def add(w: Walker, r: random.Random) -> str | None:
     if len(flags) > 1 and method is None:
         method = "lbs"
     w.side.add(obj, method, leave)
-    return f"Sinew on {obj.name}, {method or 'as the modifier'}{', leaving it where small' if leave else ''}"
 
 
 @operation(2)
-def remove(w: Walker, r: random.Random) -> str | None:
+def remove(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None and w.may_lose_sinew(o))
     w.object_mode()
     w.side.remove(obj)
-    return f"Sinew off {obj.name}"
 
 
 @operation(0.4)
-def remove_all(w: Walker, r: random.Random) -> str | None:
+def remove_all(w: Walker, r: random.Random) -> None:
     w.object_mode()
     w.side.end_comparison()
     # Includes objects outside the current view layer.
@@ -397,27 +406,24 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
             w.side.remove(obj)
         else:
             w.side.set_enabled(obj, False)
-    return "Sinew off all"
 
 
 @operation(6)
-def method(w: Walker, r: random.Random) -> str | None:
+def method(w: Walker, r: random.Random) -> None:
     obj, name = w.mesh(r, lambda o: w.side.has_sinew(o) and not w.side.is_method_keyed(o)), _method(r)
     w.side.set_method(obj, name)
-    return f"{obj.name} by {name}"
 
 
 @operation(5)
-def stages(w: Walker, r: random.Random) -> str | None:
+def stages(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, w.side.has_sinew)
     # Without them the shape is Blender's.
     number = r.randrange(1, len(STAGES)) if r.random() < 0.5 else 0
     w.side.set_stages(obj, number)
-    return f"{obj.name}: stages {STAGES[number] or 'off'}"
 
 
 @operation(0.5)
-def parameters(w: Walker, r: random.Random) -> str | None:
+def parameters(w: Walker, r: random.Random) -> None:
     """Parameters of methods: changes are visible where the method is used."""
     obj, value = w.mesh(r, w.side.has_sinew), r.choice(("nlerp", "slerp"))
     # Sinew evaluates immediately, and with it what was changed before.
@@ -427,18 +433,16 @@ def parameters(w: Walker, r: random.Random) -> str | None:
         obj.sinew.sdef.interpolation = value
     else:
         w.side.set_option(obj, "sdef.interpolation", value)
-    return f"{obj.name}: sdef by {value}"
 
 
 @operation(0.5)
-def compute_beside(w: Walker, r: random.Random) -> str | None:
+def compute_beside(w: Walker, r: random.Random) -> None:
     on = r.random() < 0.6
     w.side.compute_beside(on)
-    return f"what methods need is computed {'on a thread' if on else 'at once'}"
 
 
 @operation(1.5)
-def sdef_keys(w: Walker, r: random.Random) -> str | None:
+def sdef_keys(w: Walker, r: random.Random) -> None:
     """Data as mmd_tools stores it."""
     obj = w.editable(r)
     w.skip_if(obj.data.library is not None or obj.mode != "OBJECT" or w.users(obj.data) > 1)
@@ -450,22 +454,20 @@ def sdef_keys(w: Walker, r: random.Random) -> str | None:
         for point in block.data:
             point.co.z += r.uniform(-0.2, 0.2)
         block.mute = True
-    return f"SDEF's shape keys for {obj.name}"
 
 
 @operation(4)
-def enabled(w: Walker, r: random.Random) -> str | None:
+def enabled(w: Walker, r: random.Random) -> None:
     obj = w.with_sinew(r)
     on = not w.side.is_on(obj) or r.random() < 0.1
     w.side.set_enabled(obj, on)
-    return f"{obj.name} {'on' if on else 'off'}"
 
 
 VIEWS = ("viewport", "render")
 
 
 @operation(1.5)
-def icons(w: Walker, r: random.Random) -> str | None:
+def icons(w: Walker, r: random.Random) -> None:
     """Clicks on the icons of Sinew's and of the Armature modifier, then on those that bring Sinew back."""
     obj = w.mesh(
         r,
@@ -509,43 +511,38 @@ def icons(w: Walker, r: random.Random) -> str | None:
     for view in VIEWS:
         if deformers()[view] != "Sinew":
             click("Sinew", view)
-    return f"icons of {obj.name}: {', '.join(' '.join(each) for each in clicks)}"
 
 
 @operation(1)
-def rebind(w: Walker, r: random.Random) -> str | None:
+def rebind(w: Walker, r: random.Random) -> None:
     obj = w.with_sinew(r)
     w.side.rebind(obj)
-    return f"rebind {obj.name}"
 
 
 @operation(1)
-def scale_rule(w: Walker, r: random.Random) -> str | None:
+def scale_rule(w: Walker, r: random.Random) -> None:
     obj, number = w.with_sinew(r), r.randrange(3)
     if w.side.is_sinew:
         rules = [item.identifier for item in obj.sinew.bl_rna.properties["scale_rule"].enum_items]
         obj.sinew.scale_rule = rules[number]
     else:
         w.side.set_option(obj, "scale_rule", number)
-    return f"{obj.name}: scale rule {number}"
 
 
 @operation(1.5)
-def leave_small(w: Walker, r: random.Random) -> str | None:
+def leave_small(w: Walker, r: random.Random) -> None:
     obj, on = w.with_sinew(r), r.random() < 0.4
     w.side.set_option(obj, "leave_small", on)
-    return f"{obj.name}: {'left to Blender where faster' if on else 'never left to Blender'}"
 
 
 @operation(1.5)
-def give_normals(w: Walker, r: random.Random) -> str | None:
+def give_normals(w: Walker, r: random.Random) -> None:
     obj, who = w.with_sinew(r), r.choice(("AS_BLENDER", "AS_BLENDER", "SKINNED", "LEAVE"))
     w.side.set_option(obj, "normals", who)
-    return f"{obj.name}: normals {who}"
 
 
 @operation(3)
-def shade(w: Walker, r: random.Random) -> str | None:
+def shade(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.data.library is None and not o.data.is_editmode)
     mesh, what = obj.data, r.choice(("smooth", "smooth", "flat", "edges", "faces", "custom"))
     if what in ("smooth", "flat"):
@@ -557,18 +554,16 @@ def shade(w: Walker, r: random.Random) -> str | None:
             if r.random() < 0.2:
                 setattr(each, "use_edge_sharp" if what == "edges" else "use_smooth", r.random() < 0.5)
     mesh.update()
-    return f"shade {mesh.name}: {what}"
 
 
 @operation(2)
-def heat(w: Walker, r: random.Random) -> str | None:
+def heat(w: Walker, r: random.Random) -> None:
     obj, on, quantity = w.with_sinew(r), r.random() < 0.5, r.choice(("stretch", "distance", "bulge"))
     w.side.set_heat(obj, on, quantity)
-    return f"{obj.name}: heat map {quantity if on else 'off'}"
 
 
 @operation(1)
-def compare(w: Walker, r: random.Random) -> str | None:
+def compare(w: Walker, r: random.Random) -> None:
     obj = w.mesh(
         r,
         lambda o: (
@@ -586,20 +581,17 @@ def compare(w: Walker, r: random.Random) -> str | None:
     w.side.start_comparison([obj], methods)
     # Its copies share the mesh, which some operations refuse.
     w.compared = True
-    return f"compare {obj.name} by {', '.join(methods)}"
 
 
 @operation(1)
-def end_comparison(w: Walker, r: random.Random) -> str | None:
+def end_comparison(w: Walker, r: random.Random) -> None:
     w.side.end_comparison()
-    return "end of the comparison"
 
 
 @operation(0.4)
-def arrange_comparison(w: Walker, r: random.Random) -> str | None:
+def arrange_comparison(w: Walker, r: random.Random) -> None:
     how = r.choice(("SIDE", "OVERLAY"))
     w.side.arrange_comparison(how)
-    return f"comparison {how}"
 
 
 # --- Characters: settings for all meshes of an armature
@@ -627,35 +619,32 @@ def _has_its_armatures(obj: bpy.types.Object) -> bool:
 
 
 @operation(1.5)
-def character_method(w: Walker, r: random.Random) -> str | None:
+def character_method(w: Walker, r: random.Random) -> None:
     rig, name = _character(w, r), _method(r)
     w.skip_if(not w.select(rig))
     w.side.set_character_method(rig, name)
-    return f"the character of {rig.name} by {name}"
 
 
 @operation(1.5)
-def own_settings(w: Walker, r: random.Random) -> str | None:
+def own_settings(w: Walker, r: random.Random) -> None:
     rig = _character(w, r)
     obj = w.one(r, w.side.character(rig))
     w.skip_if(obj not in w.in_layer() or not w.select(obj))
     w.side.switch_own(rig, obj)
-    return f"{obj.name} {'keeps settings of its own' if w.side.is_own(obj) else 'follows its character'}"
 
 
 @operation(0.7)
-def preset(w: Walker, r: random.Random) -> str | None:
+def preset(w: Walker, r: random.Random) -> None:
     rig = _character(w, r)
     w.skip_if(not w.select(rig))
     w.side.use_preset(rig, w.folder)
-    return f"a preset for the character of {rig.name}"
 
 
 # --- Features that change the mesh
 
 
 @operation(1.5)
-def mend(w: Walker, r: random.Random) -> str | None:
+def mend(w: Walker, r: random.Random) -> None:
     """Findings of diagnostics in the weights."""
     obj, how, most = w.editable(r), r.choice(("limit", "limit", "normalize", "fill")), r.choice((1, 2, 3))
     w.skip_if(obj.mode != "OBJECT" or obj.data.is_editmode or obj.parent_type == "ARMATURE")
@@ -663,8 +652,7 @@ def mend(w: Walker, r: random.Random) -> str | None:
     w.skip_if(len(modifiers) != 1 or modifiers[0].object is None or modifiers[0].object.data.is_editmode)
     w.before_evaluation()
     bpy.context.view_layer.update()
-    found = w.side.mend(obj, how, most)
-    return f"mend {obj.name}: {found} by {how}" if found is not None else None
+    w.skip_if(w.side.mend(obj, how, most) is None)
 
 
 def _and_undo(w: Walker, r: random.Random, act: Callable[[], object]) -> None:
@@ -682,28 +670,24 @@ def _and_undo(w: Walker, r: random.Random, act: Callable[[], object]) -> None:
 
 
 @operation(0.5)
-def bake_to_bones(w: Walker, r: random.Random) -> str | None:
+def bake_to_bones(w: Walker, r: random.Random) -> None:
     obj, motion = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.choice(("keys", "pose"))
     w.skip_if(w.compared)
     is_alone = len(w.modifiers(obj)) == 1
-    name = obj.name
     _and_undo(w, r, lambda: w.side.bake_to_bones(obj, motion, is_alone))
-    return f"bake {name} to bones with {motion}, and undo"
 
 
 @operation(0.5)
-def corrective_key(w: Walker, r: random.Random) -> str | None:
+def corrective_key(w: Walker, r: random.Random) -> None:
     obj, driven = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.random() < 0.5
     w.skip_if(w.compared)
     rig = next((m.object for m in armature_modifiers(obj) if m.object is not None), None)
     bone = w.one_or_none(r, rig.pose.bones) if driven and rig is not None else None
-    name = obj.name
     _and_undo(w, r, lambda: w.side.add_corrective_key(obj, bone))
-    return f"a corrective shape key of {name}, and undo"
 
 
 @operation(0.5)
-def restart(w: Walker, r: random.Random) -> str | None:
+def restart(w: Walker, r: random.Random) -> None:
     frame = r.choice((None, r.randint(*FRAMES)))
     w.object_mode()
 
@@ -712,31 +696,28 @@ def restart(w: Walker, r: random.Random) -> str | None:
             bpy.context.scene.frame_set(frame)
 
     w.side.restart(between)
-    return f"the add-on off and on again, {'no frame' if frame is None else f'frame {frame}'} between"
 
 
 @operation(0.3)
-def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
+def delete_sinew_modifier(w: Walker, r: random.Random) -> None:
     # Blender's own button does not remove objects of a library from an override.
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None and w.may_lose_sinew(o))
     w.skip_if(not w.side.is_on(obj))
     w.side.delete_part(obj, "modifier")
-    return f"delete Sinew's modifier of {obj.name}"
 
 
 @operation(0.5)
-def delete_points(w: Walker, r: random.Random) -> str | None:
+def delete_points(w: Walker, r: random.Random) -> None:
     """What Sinew made for a mesh, and makes again."""
     obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.mode == "OBJECT" and o.data.library is None)
     part = r.choice(("attribute", "attribute", "driver", "nodes", "links", "sockets", "socket", "group"))
     w.skip_if(part != "attribute" and obj.override_library is not None)
     if w.side.is_sinew:
         w.side.delete_part(obj, part)
-    return f"delete Sinew's {part} of {obj.name}"
 
 
 @operation(1)
-def key_method(w: Walker, r: random.Random) -> str | None:
+def key_method(w: Walker, r: random.Random) -> None:
     obj = w.mesh(
         r,
         lambda o: (
@@ -750,57 +731,50 @@ def key_method(w: Walker, r: random.Random) -> str | None:
     frames = sorted(r.sample(range(1, 12), 2))
     w.side.key_method(obj, [(frames[0], r.choice(OF_BLENDER)), (frames[1], r.choice(OF_BLENDER))])
     w.this_frame()
-    return f"key the method of {obj.name} at {frames}"
 
 
 @operation(1)
-def unkey_method(w: Walker, r: random.Random) -> str | None:
+def unkey_method(w: Walker, r: random.Random) -> None:
     # A linked duplicate has the same keys, and on the other side a mark of its own.
     obj = w.mesh(r, lambda o: w.side.is_method_keyed(o) and not w.shares_action(o))
     name = r.choice(OF_BLENDER)
     w.skip_if(not w.side.has_sinew(obj))
     w.side.unkey_method(obj, name)
-    return f"no keys on the method of {obj.name}, {name}"
 
 
 # --- Time and poses
 
 
 @operation(10)
-def frame(w: Walker, r: random.Random) -> str | None:
+def frame(w: Walker, r: random.Random) -> None:
     number = r.randint(*FRAMES)
     bpy.context.scene.frame_set(number)
-    return f"frame {number}"
 
 
 @operation(2)
-def subframe(w: Walker, r: random.Random) -> str | None:
+def subframe(w: Walker, r: random.Random) -> None:
     number, part = r.randint(*FRAMES), r.random()
     bpy.context.scene.frame_set(number, subframe=part)
-    return f"frame {number + part:.2f}"
 
 
 @operation(2)
-def play(w: Walker, r: random.Random) -> str | None:
+def play(w: Walker, r: random.Random) -> None:
     first = bpy.context.scene.frame_current
     for number in range(first, first + 3):
         bpy.context.scene.frame_set(number)
-    return f"frames {first} to {first + 2}"
 
 
 @operation(1)
-def scrub(w: Walker, r: random.Random) -> str | None:
+def scrub(w: Walker, r: random.Random) -> None:
     frames = [r.randint(*FRAMES) for _step in range(5)]
     for number in frames:
         bpy.context.scene.frame_set(number)
-    return f"frames {', '.join(map(str, frames))}"
 
 
 @operation(0.7)
-def current_frame(w: Walker, r: random.Random) -> str | None:
+def current_frame(w: Walker, r: random.Random) -> None:
     number = r.randint(*FRAMES)
     bpy.context.scene.frame_current = number
-    return f"scene.frame_current = {number}"
 
 
 def _turn(r: random.Random) -> Euler:
@@ -808,26 +782,24 @@ def _turn(r: random.Random) -> Euler:
 
 
 @operation(6)
-def pose(w: Walker, r: random.Random) -> str | None:
+def pose(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     bone = w.one(r, rig.pose.bones)
     bone.rotation_mode = "XYZ"
     bone.rotation_euler = _turn(r)
     if r.random() < 0.3:
         bone.location = [r.uniform(-0.2, 0.2) for _axis in range(3)]
-    return f"pose {bone.name} of {rig.name}"
 
 
 @operation(0.5)
-def pose_scale(w: Walker, r: random.Random) -> str | None:
+def pose_scale(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     bone = w.one(r, rig.pose.bones)
     bone.scale = r.choice(((1, 1, 1), (1.3, 0.8, 1.1)))
-    return f"scale {bone.name} of {rig.name}: {tuple(bone.scale)}"
 
 
 @operation(2)
-def key_pose(w: Walker, r: random.Random) -> str | None:
+def key_pose(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     bone = w.one(r, rig.pose.bones)
     number = r.randint(*FRAMES)
@@ -835,28 +807,25 @@ def key_pose(w: Walker, r: random.Random) -> str | None:
     bone.rotation_euler = _turn(r)
     bone.keyframe_insert("rotation_euler", frame=number)
     w.this_frame()
-    return f"key {bone.name} of {rig.name} at {number}"
 
 
 @operation(0.6)
-def rest_position(w: Walker, r: random.Random) -> str | None:
+def rest_position(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     rig.data.pose_position = "REST" if rig.data.pose_position == "POSE" else "POSE"
-    return f"{rig.name} in {rig.data.pose_position} position"
 
 
 @operation(0.7)
-def clear_animation(w: Walker, r: random.Random) -> str | None:
+def clear_animation(w: Walker, r: random.Random) -> None:
     obj = w.one(r, [*w.armatures(), *(o for o in w.meshes() if not w.side.is_method_keyed(o))])
     if obj.type == "ARMATURE":
         obj.animation_data_clear()
     else:
         remove_curves(obj, "")
-    return f"clear the keys of {obj.name}"
 
 
 @operation(0.4)
-def push_action(w: Walker, r: random.Random) -> str | None:
+def push_action(w: Walker, r: random.Random) -> None:
     """Moves it into a strip, as for layers of animation."""
     rig = w.armature(r)
     animation = rig.animation_data
@@ -867,11 +836,10 @@ def push_action(w: Walker, r: random.Random) -> str | None:
         strip.action_slot = slot
     animation.action = None
     w.this_frame()
-    return f"the action of {rig.name} in a strip"
 
 
 @operation(0.7)
-def constrain_bone(w: Walker, r: random.Random) -> str | None:
+def constrain_bone(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     bone = w.one(r, rig.pose.bones)
     target = w.one(r, [a for a in w.armatures() if a != rig])
@@ -880,22 +848,21 @@ def constrain_bone(w: Walker, r: random.Random) -> str | None:
         or target is None
         or any(c.type == "COPY_ROTATION" for b in target.pose.bones for c in b.constraints)
     ):
-        return None
+        raise NothingError
     of_artist = [c for c in bone.constraints if c.type in ("COPY_ROTATION", "IK")]
     if of_artist:
         bone.constraints.remove(of_artist[0])
-        return f"take the constraint off {bone.name} of {rig.name}"
+        return
     other = w.one(r, target.pose.bones)
     constraint = bone.constraints.new("COPY_ROTATION")
     constraint.target, constraint.subtarget, constraint.influence = target, other.name, 0.5
-    return f"{bone.name} of {rig.name} copies half the rotation of {other.name} of {target.name}"
 
 
 # --- Inverse kinematics
 
 
 @operation(1.5)
-def ik_chain(w: Walker, r: random.Random) -> str | None:
+def ik_chain(w: Walker, r: random.Random) -> None:
     """A chain of bones starts or stops following a target."""
     rig = w.armature(r)
     w.skip_if(rig.override_library is not None or rig.data.is_editmode)
@@ -904,51 +871,46 @@ def ik_chain(w: Walker, r: random.Random) -> str | None:
     there = next((c for c in bone.constraints if c.type == "IK"), None)
     if there is not None:
         bone.constraints.remove(there)
-        return f"{bone.name} of {rig.name} follows no target"
+        return
     target = bpy.data.objects.new(w.new_name(TARGET), None)
     bpy.context.scene.collection.objects.link(target)
     target.location = place
     constraint = bone.constraints.new("IK")
     constraint.target, constraint.chain_count = target, length
-    return f"{bone.name} of {rig.name} follows {target.name}"
 
 
 @operation(2)
-def move_target(w: Walker, r: random.Random) -> str | None:
+def move_target(w: Walker, r: random.Random) -> None:
     target = w.one(r, [o for o in w.objects("EMPTY") if o.name.startswith(TARGET) and o.library is None])
     frame = r.choice((None, r.randint(*FRAMES)))
     place = [r.uniform(-1, 2) for _axis in range(3)]
     target.location = place
-    if frame is None:
-        return f"{target.name} moves"
-    target.keyframe_insert("location", frame=frame)
-    w.this_frame()
-    return f"{target.name} moves by a key at {frame}"
+    if frame is not None:
+        target.keyframe_insert("location", frame=frame)
+        w.this_frame()
 
 
 # --- Positions
 
 
 @operation(3)
-def move_object(w: Walker, r: random.Random) -> str | None:
+def move_object(w: Walker, r: random.Random) -> None:
     obj = w.one(r, [*w.meshes(), *w.armatures()])
     obj.location = [r.uniform(-1, 1) for _axis in range(3)]
     if r.random() < 0.3:
         obj.rotation_euler = _turn(r)
     if r.random() < 0.2:
         obj.scale = [r.uniform(0.7, 1.4) for _axis in range(3)]
-    return f"move {obj.name}"
 
 
 @operation(1)
-def key_object(w: Walker, r: random.Random) -> str | None:
+def key_object(w: Walker, r: random.Random) -> None:
     obj = w.one(r, [*w.meshes(), *w.armatures()])
     w.skip_if(obj.override_library is not None)
     for number in r.sample(range(1, 12), 2):
         obj.location = [r.uniform(-1, 1) for _axis in range(3)]
         obj.keyframe_insert("location", frame=number)
     w.this_frame()
-    return f"key the location of {obj.name}"
 
 
 # These keep the shape of a mesh without size; others depend on directions that it has not.
@@ -964,7 +926,7 @@ def _is_collapsed_once(obj: bpy.types.Object) -> bool:
 
 
 @operation(1)
-def no_size(w: Walker, r: random.Random) -> str | None:
+def no_size(w: Walker, r: random.Random) -> None:
     """A scale of 0 or one that is not finite, at a frame that comes after two others. What is shown then
     depends on neither of them."""
     obj = w.one(r, [o for o in (*w.meshes(), *w.armatures()) if o.override_library is None])
@@ -993,11 +955,10 @@ def no_size(w: Walker, r: random.Random) -> str | None:
             w.rendered[f"{each.name_full} in the render, without size"] = points
     obj.scale = before
     w.this_frame()
-    return f"scale of {obj.name} {scale} at {number}, after {others}"
 
 
 @operation(2)
-def parent(w: Walker, r: random.Random) -> str | None:
+def parent(w: Walker, r: random.Random) -> None:
     obj, rig = w.mesh(r), w.armature(r)
     kind = r.choice(("none", "OBJECT", "OBJECT", "BONE", "ARMATURE"))
     w.skip_if(obj.override_library is not None)
@@ -1006,16 +967,15 @@ def parent(w: Walker, r: random.Random) -> str | None:
         obj.parent_type = "OBJECT"
         # Blender by itself keeps the shape that a parent of type Armature made.
         obj.update_tag()
-        return f"{obj.name} without a parent"
+        return
     obj.parent_type = kind
     if kind == "BONE":
         bone = w.one_or_none(r, rig.data.bones)
         obj.parent_bone = bone.name if bone is not None else ""
-    return f"parent {obj.name} to {rig.name}, {kind}"
 
 
 @operation(1)
-def parent_as_artists_do(w: Walker, r: random.Random) -> str | None:
+def parent_as_artists_do(w: Walker, r: random.Random) -> None:
     """The command adds an Armature modifier to a mesh if none of its own points to the armature, such as
     those that Sinew has cleared."""
     obj, rig = w.mesh(r, lambda o: not w.side.has_sinew(o)), w.armature(r)
@@ -1025,7 +985,6 @@ def parent_as_artists_do(w: Walker, r: random.Random) -> str | None:
     bpy.ops.object.parent_set(type="ARMATURE")
     for modifier in armature_modifiers(obj)[before:]:
         w.side.set_preserve_volume(modifier, False)
-    return f"parent {obj.name} to {rig.name} with Armature Deform"
 
 
 # --- Weights
@@ -1044,23 +1003,22 @@ def _show_weights(obj: bpy.types.Object) -> None:
 
 
 @operation(8)
-def weights(w: Walker, r: random.Random) -> str | None:
+def weights(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.data.override_library is None)
     group = w.one(r, obj.vertex_groups)
     vertices = _vertices(w, r, obj)
     if r.random() < 0.3:
         group.remove(vertices)
         _show_weights(obj)
-        return f"take {len(vertices)} vertices of {obj.name} out of {group.name}"
+        return
     group.add(vertices, r.uniform(0.0, 1.0), r.choice(("REPLACE", "ADD", "SUBTRACT")))
     if r.random() < 0.2:
         obj.data.update()
     _show_weights(obj)
-    return f"weigh {len(vertices)} vertices of {obj.name} in {group.name}"
 
 
 @operation(3)
-def paint_weights(w: Walker, r: random.Random) -> str | None:
+def paint_weights(w: Walker, r: random.Random) -> None:
     obj = w.editable(r)
     w.skip_if(not obj.vertex_groups or not w.select(obj))
     w.push_undo()
@@ -1080,48 +1038,42 @@ def paint_weights(w: Walker, r: random.Random) -> str | None:
         bpy.ops.object.vertex_group_levels(group_select_mode="ACTIVE", offset=0.1)
     if r.random() < 0.7:
         bpy.ops.object.mode_set(mode="OBJECT")
-    return f"paint weights of {obj.name}: {what}, then {obj.mode}"
 
 
 @operation(2)
-def groups(w: Walker, r: random.Random) -> str | None:
+def groups(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.override_library is None)
     group, what = w.one_or_none(r, obj.vertex_groups), r.choice(("new", "rename", "delete", "move", "bone"))
     if what == "new" or group is None:
         made = obj.vertex_groups.new(name=w.new_name("group"))
         made.add(_vertices(w, r, obj), r.random(), "REPLACE")
         _show_weights(obj)
-        return f"group {made.name} of {obj.name}"
+        return
     if what == "rename":
         group.name = w.new_name("group")
         _show_weights(obj)
-        return f"rename a group of {obj.name} to {group.name}"
+        return
     if what == "bone":
         bones = [b.name for a in w.armatures() for b in a.data.bones]
         taken = {g.name for g in obj.vertex_groups}
-        name = w.one(r, [b for b in dict.fromkeys(bones) if b not in taken])
-        if name is None:
-            return None
-        group.name = name
+        group.name = w.one(r, [b for b in dict.fromkeys(bones) if b not in taken])
         _show_weights(obj)
-        return f"rename a group of {obj.name} to {name}"
+        return
     if what == "delete":
-        name = group.name
         obj.vertex_groups.remove(group)
         # Blender 4.2 by itself continues with the old groups.
         obj.data.update()
-        return f"delete group {name} of {obj.name}"
+        return
     w.skip_if(not w.select(obj))
     obj.vertex_groups.active_index = group.index
     bpy.ops.object.vertex_group_sort(sort_type="NAME")
-    return f"sort the groups of {obj.name}"
 
 
 # --- Meshes
 
 
 @operation(4)
-def edit_mesh(w: Walker, r: random.Random) -> str | None:
+def edit_mesh(w: Walker, r: random.Random) -> None:
     obj = w.editable(r)
     w.skip_if(not w.select(obj))
     what = r.choice(("move", "move", "delete", "extrude", "subdivide", "nothing"))
@@ -1148,76 +1100,67 @@ def edit_mesh(w: Walker, r: random.Random) -> str | None:
     bmesh.update_edit_mesh(obj.data)
     if r.random() < 0.75:
         bpy.ops.object.mode_set(mode="OBJECT")
-    return f"edit {obj.name}: {what}, then {obj.mode}"
 
 
 @operation(2)
-def leave_mode(w: Walker, r: random.Random) -> str | None:
+def leave_mode(w: Walker, r: random.Random) -> None:
     w.object_mode()
-    return "object mode"
 
 
 @operation(0.5)
-def sculpt_mode(w: Walker, r: random.Random) -> str | None:
+def sculpt_mode(w: Walker, r: random.Random) -> None:
     obj = w.editable(r)
     w.skip_if(not w.select(obj))
     w.push_undo()
     bpy.ops.object.mode_set(mode="SCULPT")
     if r.random() < 0.5:
         bpy.ops.object.mode_set(mode="OBJECT")
-    return f"{obj.name} in {obj.mode}"
 
 
 @operation(4)
-def move_vertices(w: Walker, r: random.Random) -> str | None:
+def move_vertices(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.data.library is None and not o.data.is_editmode)
     for index in _vertices(w, r, obj):
         obj.data.vertices[index].co += Vector([r.uniform(-0.1, 0.1) for _axis in range(3)])
     obj.data.update()
-    return f"move vertices of {obj.data.name} by a script"
 
 
 @operation(0.7)
-def rename_mesh(w: Walker, r: random.Random) -> str | None:
+def rename_mesh(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.data.library is None)
     obj.data.name = w.new_name("mesh")
-    return f"rename the mesh of {obj.name} to {obj.data.name}"
 
 
 @operation(0.8)
-def swap_mesh(w: Walker, r: random.Random) -> str | None:
+def swap_mesh(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.mode == "OBJECT" and o.override_library is None and not o.data.is_editmode)
     w.skip_if(obj.data.library is not None)
     mesh = obj.data.copy()
     mesh.name = w.new_name("mesh")
     obj.data = mesh
-    return f"{obj.name} has a mesh of its own, {mesh.name}"
 
 
 @operation(0.5)
-def share_mesh(w: Walker, r: random.Random) -> str | None:
+def share_mesh(w: Walker, r: random.Random) -> None:
     meshes = [
         o for o in w.meshes() if o.mode == "OBJECT" and o.override_library is None and not o.data.is_editmode
     ]
     w.skip_if(len(meshes) < 2 or not w.select(*r.sample(meshes, 2)))
     bpy.ops.object.make_links_data(type="OBDATA")
-    return "link the mesh to another object"
 
 
 @operation(0.4)
-def join(w: Walker, r: random.Random) -> str | None:
+def join(w: Walker, r: random.Random) -> None:
     """Joins an object that Sinew does not deform to another one."""
     others = [o for o in w.meshes() if not w.side.has_sinew(o) and o.override_library is None]
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
     other = w.one(r, [o for o in others if o != obj and w.users(o.data) == 1])
     w.skip_if(len(obj.data.vertices) > 200 or not w.select(other, obj))
-    name = other.name
     bpy.ops.object.join()
-    return f"join {name} into {obj.name}"
 
 
 @operation(0.4)
-def separate(w: Walker, r: random.Random) -> str | None:
+def separate(w: Walker, r: random.Random) -> None:
     """Separates a part of a mesh into a new object that keeps all of the old object's data."""
     obj = w.editable(r)
     w.skip_if(len(w.meshes()) > 6 or w.users(obj.data) > 1 or len(obj.data.vertices) < 20)
@@ -1233,22 +1176,20 @@ def separate(w: Walker, r: random.Random) -> str | None:
     bpy.ops.object.mode_set(mode="OBJECT")
     made = next(o for o in bpy.data.objects if o not in before and not w.side.may_react(o))
     made.name, made.data.name = w.new_name("object"), w.new_name("mesh")
-    return f"separate six faces of {obj.name} as {made.name}"
 
 
 @operation(0.2)
-def remesh(w: Walker, r: random.Random) -> str | None:
+def remesh(w: Walker, r: random.Random) -> None:
     """Another mesh without weights."""
     obj = w.editable(r)
     is_plain = w.users(obj.data) == 1 and obj.data.shape_keys is None
     w.skip_if(not is_plain or w.compared or not w.select(obj))
     obj.data.remesh_voxel_size = 0.15
     bpy.ops.object.voxel_remesh()
-    return f"remesh {obj.name}"
 
 
 @operation(0.3)
-def replace_mesh(w: Walker, r: random.Random) -> str | None:
+def replace_mesh(w: Walker, r: random.Random) -> None:
     """Changes it in all that have it, like scripts that update a mesh."""
     obj = w.editable(r)
     w.skip_if(obj.data.is_editmode or obj.mode != "OBJECT")
@@ -1257,22 +1198,20 @@ def replace_mesh(w: Walker, r: random.Random) -> str | None:
     old.user_remap(new)
     bpy.data.meshes.remove(old)
     new.name = w.new_name("mesh")
-    return f"replace the mesh of {obj.name} by {new.name}"
 
 
 @operation(0.5)
-def apply_transform(w: Walker, r: random.Random) -> str | None:
+def apply_transform(w: Walker, r: random.Random) -> None:
     obj = w.editable(r)
     w.skip_if(w.users(obj.data) > 1 or w.compared or not w.select(obj))
     # As the window offers where Sinew evaluates upstream modifiers separately: two objects have the mesh
     # then.
     bpy.ops.object.transform_apply(isolate_users=True)
     obj.data.name = w.new_name("mesh")
-    return f"apply the transform of {obj.name}"
 
 
 @operation(0.4)
-def apply_pose(w: Walker, r: random.Random) -> str | None:
+def apply_pose(w: Walker, r: random.Random) -> None:
     """Applied as the rest pose."""
     rig = w.armature(r)
     w.skip_if(rig.override_library is not None or rig.data.users > 1 or not w.select(rig))
@@ -1283,34 +1222,31 @@ def apply_pose(w: Walker, r: random.Random) -> str | None:
         # Blender gives those of bones other transforms, and evaluates these only when something else is
         # changed (seen on 4.2 and 5.2).
         child.update_tag()
-    return f"apply the pose of {rig.name} as its rest pose"
 
 
 @operation(0.3)
-def replace_armature_data(w: Walker, r: random.Random) -> str | None:
+def replace_armature_data(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     w.skip_if(rig.override_library is not None or rig.data.is_editmode)
     rig.data = rig.data.copy()
     rig.data.name = w.new_name("armature")
-    return f"{rig.name} has bones of its own"
 
 
 # --- Bones
 
 
 @operation(1.5)
-def rename_bone(w: Walker, r: random.Random) -> str | None:
+def rename_bone(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     w.skip_if(rig.override_library is not None)
     bone = w.one(r, rig.data.bones)
     # Blender also renames groups of the mesh, which a comparison's copies share.
     w.skip_if(w.compared)
-    old, bone.name = bone.name, w.new_name("bone")
-    return f"rename bone {old} to {bone.name}"
+    bone.name = w.new_name("bone")
 
 
 @operation(1)
-def edit_bones(w: Walker, r: random.Random) -> str | None:
+def edit_bones(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     w.skip_if(rig.override_library is not None or not w.select(rig))
     what = r.choice(("delete", "new", "move", "rename", "roll"))
@@ -1335,11 +1271,10 @@ def edit_bones(w: Walker, r: random.Random) -> str | None:
         bpy.context.view_layer.update()
     if r.random() < 0.8:
         bpy.ops.object.mode_set(mode="OBJECT")
-    return f"edit the bones of {rig.name}: {what}, then {rig.mode}"
 
 
 @operation(1.5)
-def bone_options(w: Walker, r: random.Random) -> str | None:
+def bone_options(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     w.skip_if(rig.override_library is not None)
     bone = w.one(r, rig.data.bones)
@@ -1352,7 +1287,6 @@ def bone_options(w: Walker, r: random.Random) -> str | None:
         bone.envelope_distance = r.uniform(0.05, 0.5)
     else:
         bone.use_inherit_rotation = not bone.use_inherit_rotation
-    return f"{what} of bone {bone.name}"
 
 
 # --- Modifiers
@@ -1417,7 +1351,7 @@ def _set_up(
 
 
 @operation(3)
-def add_modifier(w: Walker, r: random.Random) -> str | None:
+def add_modifier(w: Walker, r: random.Random) -> None:
     obj, rig = w.mesh(r), w.armature(r)
     kind, front = r.choice(KINDS), r.random() < 0.4
     w.skip_if(len(w.modifiers(obj)) > 5)
@@ -1432,33 +1366,30 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
         # Where both diagonals of a quad are as long, rounding would choose one.
         modifier.quad_method = "FIXED"
     _set_up(modifier, w, r, obj, rig)
-    name = modifier.name
     if front and obj.override_library is None:
         obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
     elif kind == "HOOK":
         # Blender puts it after modifiers that only deform, which Sinew's is not (docs/parity.md).
         obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
-    return f"{name} {'in front' if front else 'behind'} on {obj.name}"
 
 
 @operation(0.4)
-def hair(w: Walker, r: random.Random) -> str | None:
+def hair(w: Walker, r: random.Random) -> None:
     """Hair on a mesh. Its roots can be elsewhere behind Sinew, which has to say so; the mesh is the same."""
     obj = w.mesh(r, lambda o: w.is_editable(o) and o.mode == "OBJECT" and not o.data.is_editmode)
     source = r.choice(("VERT", "FACE"))
     there = next((m for m in w.modifiers(obj) if m.type == "PARTICLE_SYSTEM"), None)
     if there is not None:
         obj.modifiers.remove(there)
-        return f"no hair on {obj.name}"
+        return
     modifier = obj.modifiers.new(w.new_name("Hair"), "PARTICLE_SYSTEM")
     settings = modifier.particle_system.settings
     settings.type, settings.count, settings.emit_from = "HAIR", 5, source
     w.side.check_warned(obj, modifier)
-    return f"hair on {obj.name}, from {source}"
 
 
 @operation(0.4)
-def needs_original_mesh(w: Walker, r: random.Random) -> str | None:
+def needs_original_mesh(w: Walker, r: random.Random) -> None:
     """A modifier in front of which Sinew's can not be comes and goes, as for a sculpted character."""
     obj = w.mesh(r, lambda o: w.is_editable(o) and o.mode == "OBJECT" and not o.data.is_editmode)
     kind = r.choice(("MULTIRES", "SOFT_BODY"))
@@ -1468,44 +1399,37 @@ def needs_original_mesh(w: Walker, r: random.Random) -> str | None:
     obj.modifiers.remove(modifier)
     if w.side.has_sinew(obj):
         w.side.rebind(obj)
-    return f"{kind} on {obj.name}, and off it"
 
 
 @operation(2)
-def move_modifier(w: Walker, r: random.Random) -> str | None:
+def move_modifier(w: Walker, r: random.Random) -> None:
     """Moves it to just before or after another one of the artist's; Sinew's is not counted."""
     obj = w.mesh(r, lambda o: len(w.modifiers(o)) > 1 and o.override_library is None)
     w.skip_if(any(m.type in IN_FRONT for m in w.modifiers(obj)))
     here, there = r.sample(w.modifiers(obj), 2)
     names = [m.name for m in obj.modifiers]
     obj.modifiers.move(names.index(here.name), names.index(there.name))
-    order = [m.name for m in w.modifiers(obj)]
-    return f"modifiers of {obj.name}: {', '.join(order)}"
 
 
 @operation(1)
-def delete_modifier(w: Walker, r: random.Random) -> str | None:
+def delete_modifier(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None and w.may_lose_sinew(o))
     # Rarely the last Armature modifier, since few operations remain for an object without any.
     candidates = [m for m in w.modifiers(obj) if m.type != "ARMATURE" or r.random() < 0.3]
     modifier = w.one(r, candidates)
-    name = modifier.name
     if modifier.type == "ARMATURE":
         w.side.delete_part(obj, "armature modifier")
     obj.modifiers.remove(modifier)
-    return f"delete modifier {name} of {obj.name}"
 
 
 @operation(1)
-def rename_modifier(w: Walker, r: random.Random) -> str | None:
+def rename_modifier(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None)
-    modifier = w.one(r, w.modifiers(obj))
-    old, modifier.name = modifier.name, w.new_name("modifier")
-    return f"rename modifier {old} of {obj.name} to {modifier.name}"
+    w.one(r, w.modifiers(obj)).name = w.new_name("modifier")
 
 
 @operation(2)
-def toggle_modifier(w: Walker, r: random.Random) -> str | None:
+def toggle_modifier(w: Walker, r: random.Random) -> None:
     """Excludes those that Sinew has replaced, whose flags it stores."""
     obj = w.mesh(r)
     modifier = w.one(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE" or not w.side.has_sinew(obj)])
@@ -1513,11 +1437,10 @@ def toggle_modifier(w: Walker, r: random.Random) -> str | None:
     modifier.show_viewport = on
     if r.random() < 0.6:
         modifier.show_render = on
-    return f"{modifier.name} of {obj.name} {'on' if on else 'off'}"
 
 
 @operation(2)
-def armature_options(w: Walker, r: random.Random) -> str | None:
+def armature_options(w: Walker, r: random.Random) -> None:
     obj = w.skinned(r)
     modifier = w.one(r, armature_modifiers(obj))
     what = r.choice(("multi", "mask", "mask", "invert", "envelopes", "groups", "volume"))
@@ -1534,33 +1457,30 @@ def armature_options(w: Walker, r: random.Random) -> str | None:
         modifier.use_vertex_groups = not modifier.use_vertex_groups
     # In a mode of the modifier, Sinew controls it temporarily, and switching it has another meaning.
     elif obj.mode in {"EDIT", "SCULPT"} or obj.data.is_editmode:
-        return None
+        raise NothingError
     else:
         w.side.set_preserve_volume(modifier, not w.side.preserve_volume(modifier))
-    return f"{what} of {modifier.name} of {obj.name}"
 
 
 @operation(0.7)
-def key_modifier(w: Walker, r: random.Random) -> str | None:
+def key_modifier(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.override_library is None and not w.shares_action(o))
     modifier = w.one(r, [m for m in w.modifiers(obj) if m.type in ("CAST", "SMOOTH")])
     frames = sorted(r.sample(range(1, 12), 2))
     key(obj, modifier.path_from_id("factor"), [(frames[0], r.random()), (frames[1], r.random())])
     w.this_frame()
-    return f"key the factor of {modifier.name} of {obj.name} at {frames}"
 
 
 @operation(1)
-def another_armature(w: Walker, r: random.Random) -> str | None:
+def another_armature(w: Walker, r: random.Random) -> None:
     obj, rig = w.skinned(r), w.armature(r)
     w.skip_if(obj.override_library is not None)
     modifier = w.one(r, armature_modifiers(obj))
     modifier.object = rig
-    return f"{modifier.name} of {obj.name} has {rig.name}"
 
 
 @operation(0.7)
-def key_visibility(w: Walker, r: random.Random) -> str | None:
+def key_visibility(w: Walker, r: random.Random) -> None:
     obj = w.skinned(r)
     w.skip_if(obj.override_library is not None)
     modifier = w.one(r, armature_modifiers(obj))
@@ -1570,11 +1490,10 @@ def key_visibility(w: Walker, r: random.Random) -> str | None:
     for where in ("viewport", "render"):
         key(obj, path + where, values)
     w.this_frame()
-    return f"key the visibility of {modifier.name} of {obj.name}: {values}"
 
 
 @operation(0.5)
-def drive_visibility(w: Walker, r: random.Random) -> str | None:
+def drive_visibility(w: Walker, r: random.Random) -> None:
     """Sets or removes drivers by an armature's position. Not by a bone's: what follows a bone that was in
     edit mode, Blender does not update until something else changes."""
     obj, rig = w.skinned(r), w.armature(r)
@@ -1586,7 +1505,7 @@ def drive_visibility(w: Walker, r: random.Random) -> str | None:
         for path in paths:
             obj.driver_remove(path)
         modifier.show_viewport = modifier.show_render = True
-        return f"no driver on the visibility of {modifier.name} of {obj.name}"
+        return
     for path in paths:
         curve = obj.driver_add(path)
         driver = curve.driver
@@ -1601,11 +1520,10 @@ def drive_visibility(w: Walker, r: random.Random) -> str | None:
             curve.keyframe_points.remove(curve.keyframe_points[0])
         for x, value in ((-10.0, 0.0), (-0.3, 1.0)):
             curve.keyframe_points.insert(x, value).interpolation = "CONSTANT"
-    return f"the visibility of {modifier.name} of {obj.name} follows {rig.name}"
 
 
 @operation(0.5)
-def copy_modifiers(w: Walker, r: random.Random) -> str | None:
+def copy_modifiers(w: Walker, r: random.Random) -> None:
     meshes = [o for o in w.meshes() if o.override_library is None and not w.side.has_sinew(o)]
     source = w.mesh(r, lambda o: o.override_library is None and not w.side.is_method_keyed(o))
     target = w.one(r, [o for o in meshes if o != source])
@@ -1613,11 +1531,10 @@ def copy_modifiers(w: Walker, r: random.Random) -> str | None:
     w.skip_if(target.data.get(SHAPED) and any(m.type == "DECIMATE" for m in source.modifiers))
     bpy.ops.object.make_links_data(type="MODIFIERS")
     w.side.copied_modifiers(source, target)
-    return f"copy the modifiers of {source.name} to {target.name}"
 
 
 @operation(0.4)
-def apply_modifier(w: Walker, r: random.Random) -> str | None:
+def apply_modifier(w: Walker, r: random.Random) -> None:
     """Applies what deforms, Sinew's modifier or the Armature modifier, after upstream ones."""
     obj = w.mesh(
         r,
@@ -1644,11 +1561,10 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
     bpy.context.view_layer.update()
     w.side.apply(obj)
     obj.data.name, obj.data[SHAPED] = w.new_name("mesh"), True
-    return f"apply what deforms {obj.name}, and before it {', '.join(in_front) or 'nothing'}"
 
 
 @operation(0.4)
-def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
+def convert_to_mesh(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: w.is_editable(o) and w.may_lose_sinew(o) and not has_scaled_bones(o))
     w.skip_if(w.side.has_other_shape(obj) or not w.select(obj))
     w.before_evaluation()
@@ -1656,7 +1572,6 @@ def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
     obj = bpy.context.view_layer.objects.active
     obj.data.name, obj.data[SHAPED] = w.new_name("mesh"), True
     w.side.applied(obj)
-    return f"convert {obj.name} to a mesh"
 
 
 # --- Shape keys
@@ -1668,7 +1583,7 @@ def _keys(obj: bpy.types.Object) -> list[bpy.types.ShapeKey]:
 
 
 @operation(2)
-def add_shape_key(w: Walker, r: random.Random) -> str | None:
+def add_shape_key(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.mode == "OBJECT" and o.data.library is None and o.override_library is None)
     w.skip_if(len(_keys(obj)) > 3 or obj.data.is_editmode)
     if obj.data.shape_keys is None:
@@ -1677,43 +1592,39 @@ def add_shape_key(w: Walker, r: random.Random) -> str | None:
     for index in _vertices(w, r, obj):
         made.data[index].co += Vector([r.uniform(-0.2, 0.2) for _axis in range(3)])
     made.value = r.random()
-    return f"shape key {made.name} of {obj.name}"
 
 
 @operation(3)
-def shape_key_value(w: Walker, r: random.Random) -> str | None:
+def shape_key_value(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(_keys(o)))
     block = w.one(r, _keys(obj))
     block.value = r.random()
     if r.random() < 0.2:
         block.mute = not block.mute
-    return f"{block.name} of {obj.name}: {block.value:.2f}{', muted' if block.mute else ''}"
 
 
 @operation(1)
-def shape_key_points(w: Walker, r: random.Random) -> str | None:
+def shape_key_points(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.mode == "OBJECT" and o.data.library is None)
     w.skip_if(obj.data.is_editmode)
     block = w.one(r, _keys(obj))
     for index in _vertices(w, r, obj):
         block.data[index].co += Vector([r.uniform(-0.1, 0.1) for _axis in range(3)])
     obj.data.update()
-    return f"move points of {block.name} of {obj.name}"
 
 
 @operation(1)
-def key_shape_key(w: Walker, r: random.Random) -> str | None:
+def key_shape_key(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None)
     block = w.one(r, _keys(obj))
     for number in r.sample(range(1, 12), 2):
         block.value = r.random()
         block.keyframe_insert("value", frame=number)
     w.this_frame()
-    return f"key {block.name} of {obj.name}"
 
 
 @operation(0.7)
-def drive_shape_key(w: Walker, r: random.Random) -> str | None:
+def drive_shape_key(w: Walker, r: random.Random) -> None:
     """Sets or removes a driver by a bone, as for correctives."""
     obj, rig = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None), w.armature(r)
     bone = w.one(r, rig.pose.bones)
@@ -1722,7 +1633,7 @@ def drive_shape_key(w: Walker, r: random.Random) -> str | None:
     path = block.path_from_id("value")
     if animation is not None and any(d.data_path == path for d in animation.drivers):
         block.driver_remove("value")
-        return f"no driver on {block.name} of {obj.name}"
+        return
     driver = block.driver_add("value").driver
     driver.type = "SUM"
     variable = driver.variables.new()
@@ -1730,83 +1641,75 @@ def drive_shape_key(w: Walker, r: random.Random) -> str | None:
     target = variable.targets[0]
     target.id, target.bone_target = rig, bone.name
     target.transform_type, target.transform_space = "ROT_X", "LOCAL_SPACE"
-    return f"{block.name} of {obj.name} follows {bone.name} of {rig.name}"
 
 
 @operation(1)
-def delete_shape_key(w: Walker, r: random.Random) -> str | None:
+def delete_shape_key(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.mode == "OBJECT" and o.data.library is None)
     w.skip_if(obj.override_library is not None)
     if r.random() < 0.3:
         obj.shape_key_clear()
-        return f"delete all shape keys of {obj.name}"
-    obj.shape_key_remove(w.one(r, _keys(obj)))
-    return f"delete a shape key of {obj.name}"
+    else:
+        obj.shape_key_remove(w.one(r, _keys(obj)))
 
 
 @operation(1)
-def pin_shape_key(w: Walker, r: random.Random) -> str | None:
+def pin_shape_key(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(_keys(o)))
     obj.active_shape_key_index = r.randrange(len(obj.data.shape_keys.key_blocks))
     obj.show_only_shape_key = not obj.show_only_shape_key
-    return f"{obj.name}: {'pin' if obj.show_only_shape_key else 'no pin'}, {obj.active_shape_key.name}"
 
 
 @operation(0.4)
-def absolute_shape_keys(w: Walker, r: random.Random) -> str | None:
+def absolute_shape_keys(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None)
     keys = obj.data.shape_keys
     keys.use_relative = not keys.use_relative
     keys.eval_time = r.uniform(0.0, 20.0)
-    return f"{'relative' if keys.use_relative else 'absolute'} shape keys of {obj.name}"
 
 
 # --- Objects
 
 
 @operation(1)
-def rename_object(w: Walker, r: random.Random) -> str | None:
+def rename_object(w: Walker, r: random.Random) -> None:
     obj = w.one(r, [*w.meshes(), *w.armatures()])
     w.skip_if(obj.override_library is not None)
-    old, obj.name = obj.name, w.new_name("object")
-    return f"rename {old} to {obj.name}"
+    obj.name = w.new_name("object")
 
 
-def _delete(w: Walker, obj: bpy.types.Object, by_script: bool) -> str | None:
-    name = obj.name
+def _delete(w: Walker, obj: bpy.types.Object, by_script: bool) -> None:
     w.object_mode()
     if by_script:
         bpy.data.objects.remove(obj)
-        return f"remove {name} by a script"
-    w.skip_if(not w.select(obj))
-    bpy.ops.object.delete()
-    return f"delete {name}"
+    else:
+        w.skip_if(not w.select(obj))
+        bpy.ops.object.delete()
 
 
 @operation(0.6)
-def delete_object(w: Walker, r: random.Random) -> str | None:
+def delete_object(w: Walker, r: random.Random) -> None:
     obj, by_script = w.mesh(r), r.random() < 0.5
-    return _delete(w, obj, by_script) if len(w.meshes()) > 2 else None
+    w.skip_if(len(w.meshes()) <= 2)
+    _delete(w, obj, by_script)
 
 
 @operation(0.2)
-def delete_armature(w: Walker, r: random.Random) -> str | None:
+def delete_armature(w: Walker, r: random.Random) -> None:
     rig, by_script = w.armature(r), r.random() < 0.4
-    if len(w.armatures()) < 2 or w.compared:
-        # A comparison's copies keep it in the file.
-        return None
+    # A comparison's copies keep it in the file.
+    w.skip_if(len(w.armatures()) < 2 or w.compared)
     # So does being on an object with Sinew, if the command does not remove that from the file itself.
     by_script |= any(w.side.has_sinew(obj) for obj in w.objects("MESH"))
-    return _delete(w, rig, by_script)
+    _delete(w, rig, by_script)
 
 
 @operation(0.3)
-def unlink_armature(w: Walker, r: random.Random) -> str | None:
+def unlink_armature(w: Walker, r: random.Random) -> None:
     """It is then in no collection, as a deleted one is while Sinew knows it. Sinew has to say so. Undone, as
     Blender does not save such an armature where no other data has it."""
     rig = w.armature(r)
     w.skip_if(rig.override_library is not None or w.compared)
-    name = rig.name
 
     def act() -> None:
         bpy.context.view_layer.update()
@@ -1817,15 +1720,13 @@ def unlink_armature(w: Walker, r: random.Random) -> str | None:
         w.side.check_said_gone(meshes, rig)
 
     _and_undo(w, r, act)
-    return f"{name} in no collection, and undo"
 
 
 @operation(1.5)
-def duplicate(w: Walker, r: random.Random) -> str | None:
+def duplicate(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
     linked, by_script = r.random() < 0.4, r.random() < 0.4
     w.skip_if(len(w.meshes()) > 6)
-    name = obj.name
     if by_script:
         w.object_mode()
         made = obj.copy()
@@ -1840,19 +1741,16 @@ def duplicate(w: Walker, r: random.Random) -> str | None:
         bpy.context.scene.collection.objects.link(made)
     else:
         if not w.select(obj):
-            return None
+            raise NothingError
         bpy.ops.object.duplicate(linked=linked)
         made = bpy.context.view_layer.objects.active
     made.name = w.new_name("object")
     if not linked:
         made.data.name = w.new_name("mesh")
-    return (
-        f"duplicate {name} as {made.name}{', linked' if linked else ''}{', by a script' if by_script else ''}"
-    )
 
 
 @operation(0.5)
-def duplicate_armature(w: Walker, r: random.Random) -> str | None:
+def duplicate_armature(w: Walker, r: random.Random) -> None:
     rig, linked = w.armature(r), r.random() < 0.5
     w.skip_if(len(w.armatures()) > 4 or rig.override_library is not None)
     w.object_mode()
@@ -1863,21 +1761,19 @@ def duplicate_armature(w: Walker, r: random.Random) -> str | None:
     bpy.context.scene.collection.objects.link(made)
     made.name = w.new_name("object")
     made.location.y += 0.5
-    return f"duplicate {rig.name} as {made.name}"
 
 
 @operation(0.5)
-def single_user(w: Walker, r: random.Random) -> str | None:
+def single_user(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: w.users(o.data) > 1 and o.override_library is None)
     w.skip_if(not w.select(obj))
     bpy.ops.object.make_single_user(type="SELECTED_OBJECTS", object=True, obdata=True)
     obj = bpy.context.view_layer.objects.active
     obj.data.name = w.new_name("mesh")
-    return f"make {obj.name} single user"
 
 
 @operation(1.5)
-def hide(w: Walker, r: random.Random) -> str | None:
+def hide(w: Walker, r: random.Random) -> None:
     obj, how = w.one(r, [*w.meshes(), *w.armatures()]), r.choice(("viewport", "render", "eye", "eye"))
     if how == "eye":
         hidden = not obj.hide_get()
@@ -1889,11 +1785,10 @@ def hide(w: Walker, r: random.Random) -> str | None:
         hidden = not getattr(obj, name)
         w.object_mode()
         setattr(obj, name, hidden)
-    return f"{'hide' if hidden else 'show'} {obj.name} ({how})"
 
 
 @operation(1)
-def hide_collection(w: Walker, r: random.Random) -> str | None:
+def hide_collection(w: Walker, r: random.Random) -> None:
     layers = [c for c in bpy.context.view_layer.layer_collection.children if not c.name.startswith("Sinew")]
     layer, how = w.one(r, sorted(layers, key=lambda c: c.name)), r.choice(("exclude", "eye", "viewport"))
     w.object_mode()
@@ -1903,24 +1798,22 @@ def hide_collection(w: Walker, r: random.Random) -> str | None:
         layer.hide_viewport = not layer.hide_viewport
     else:
         layer.collection.hide_viewport = not layer.collection.hide_viewport
-    return f"{how} of collection {layer.name}"
 
 
 @operation(0.7)
-def move_to_collection(w: Walker, r: random.Random) -> str | None:
+def move_to_collection(w: Walker, r: random.Random) -> None:
     obj, collection = w.mesh(r), w.one(r, w.collections())
     w.skip_if(obj.mode != "OBJECT")
     if collection in list(obj.users_collection):
         if len([c for c in obj.users_collection if not c.name.startswith("Sinew")]) > 1:
             collection.objects.unlink(obj)
-            return f"{obj.name} out of {collection.name}"
-        return None
+            return
+        raise NothingError
     collection.objects.link(obj)
-    return f"{obj.name} into {collection.name}"
 
 
 @operation(0.5)
-def show_all(w: Walker, r: random.Random) -> str | None:
+def show_all(w: Walker, r: random.Random) -> None:
     w.object_mode()
     for layer in bpy.context.view_layer.layer_collection.children:
         if not layer.name.startswith("Sinew"):
@@ -1928,14 +1821,13 @@ def show_all(w: Walker, r: random.Random) -> str | None:
     for obj in [*w.meshes(), *w.armatures()]:
         obj.hide_set(False)
         obj.hide_viewport = False
-    return "show all"
 
 
 # --- Scenes
 
 
 @operation(0.5)
-def scene(w: Walker, r: random.Random) -> str | None:
+def scene(w: Walker, r: random.Random) -> None:
     w.object_mode()
     if len(bpy.data.scenes) == 1:
         made = bpy.data.scenes.new("Second")
@@ -1947,22 +1839,19 @@ def scene(w: Walker, r: random.Random) -> str | None:
         for obj in [*w.meshes(), *w.armatures()]:
             if r.random() < 0.7:
                 made.collection.objects.link(obj)
-        return "a second scene"
+        return
     other = next(s for s in bpy.data.scenes if s != bpy.context.scene)
     if r.random() < 0.3:
         other.frame_set(r.randint(*FRAMES))
-        frame = other.frame_current
-        w.this_scene()
-        return f"frame {frame} in scene {other.name}"
-    w.before_evaluation()
-    bpy.context.view_layer.update()
-    bpy.context.window.scene = other
+    else:
+        w.before_evaluation()
+        bpy.context.view_layer.update()
+        bpy.context.window.scene = other
     w.this_scene()
-    return f"scene {other.name}"
 
 
 @operation(0.2)
-def copy_scene(w: Walker, r: random.Random) -> str | None:
+def copy_scene(w: Walker, r: random.Random) -> None:
     """As the menu does, with all objects or copies of them."""
     whole = r.random() < 0.5
     w.skip_if(len(bpy.data.scenes) > 1 or (whole and len(w.objects("MESH")) > 5) or w.compared)
@@ -1974,11 +1863,10 @@ def copy_scene(w: Walker, r: random.Random) -> str | None:
     bpy.context.scene.name = "Second"
     # As a window does immediately.
     bpy.context.view_layer.update()
-    return f"a copy of the scene, {'with copies of all' if whole else 'linked'}"
 
 
 @operation(0.4)
-def view_layer(w: Walker, r: random.Random) -> str | None:
+def view_layer(w: Walker, r: random.Random) -> None:
     w.object_mode()
     layers = bpy.context.scene.view_layers
     if len(layers) == 1:
@@ -1990,14 +1878,13 @@ def view_layer(w: Walker, r: random.Random) -> str | None:
     bpy.context.window.view_layer = other
     # As a window does immediately.
     bpy.context.view_layer.update()
-    return f"view layer {other.name}"
 
 
 # --- Files
 
 
 @operation(5)
-def undo(w: Walker, r: random.Random) -> str | None:
+def undo(w: Walker, r: random.Random) -> None:
     steps = r.choice((1, 1, 2))
     w.push_undo()
     for _step in range(steps):
@@ -2006,29 +1893,24 @@ def undo(w: Walker, r: random.Random) -> str | None:
         if r.random() < 0.5:
             bpy.context.view_layer.update()
         bpy.ops.ed.redo()
-        return f"undo {steps}, redo"
-    return f"undo {steps}"
 
 
 @operation(2.5)
-def redo(w: Walker, r: random.Random) -> str | None:
+def redo(w: Walker, r: random.Random) -> None:
     w.push_undo()
     bpy.ops.ed.redo()
-    return "redo"
 
 
 @operation(1)
-def save(w: Walker, r: random.Random) -> str | None:
+def save(w: Walker, r: random.Random) -> None:
     w.this_frame()
     bpy.ops.wm.save_as_mainfile(filepath=str(w.folder / "walk.blend"))
-    return "save"
 
 
 @operation(0.5)
-def save_copy(w: Walker, r: random.Random) -> str | None:
+def save_copy(w: Walker, r: random.Random) -> None:
     w.this_frame()
     bpy.ops.wm.save_as_mainfile(filepath=str(w.folder / "copy.blend"), copy=True)
-    return "save a copy"
 
 
 def _read_keys_of_hidden() -> None:
@@ -2040,7 +1922,7 @@ def _read_keys_of_hidden() -> None:
 
 
 @operation(1)
-def save_and_load(w: Walker, r: random.Random) -> str | None:
+def save_and_load(w: Walker, r: random.Random) -> None:
     """Sometimes in the mode that an object is in. Others are then compared before it is left."""
     if r.random() < 0.6:
         w.object_mode()
@@ -2056,15 +1938,13 @@ def save_and_load(w: Walker, r: random.Random) -> str | None:
         if obj.visible_get() and obj.mode == "OBJECT" and not obj.data.is_editmode:
             w.rendered[f"{obj.name_full} in the render, opened"] = w.shown_points(obj)
     w.object_mode()
-    return f"save and open, in {', '.join(sorted(modes))}"
 
 
 @operation(0.5)
-def revert(w: Walker, r: random.Random) -> str | None:
+def revert(w: Walker, r: random.Random) -> None:
     w.skip_if(Path(bpy.data.filepath).name != "walk.blend")
     bpy.ops.wm.revert_mainfile()
     _read_keys_of_hidden()
-    return "revert"
 
 
 def _from_library(w: Walker, link: bool) -> list[bpy.types.Object]:
@@ -2086,48 +1966,43 @@ def _has_guest() -> bool:
 
 
 @operation(0.5)
-def append(w: Walker, r: random.Random) -> str | None:
+def append(w: Walker, r: random.Random) -> None:
     w.skip_if(len(w.meshes()) > 6)
     guest, rig = _from_library(w, link=False)
     guest.name, guest.data.name = w.new_name("object"), w.new_name("mesh")
     rig.name, rig.data.name = w.new_name("object"), w.new_name("armature")
-    return f"append {guest.name} and {rig.name}"
 
 
 @operation(0.4)
-def link(w: Walker, r: random.Random) -> str | None:
+def link(w: Walker, r: random.Random) -> None:
     w.skip_if(_has_guest())
     _from_library(w, link=True)
-    return "link Guest and Guest Rig"
 
 
 @operation(0.6)
-def override(w: Walker, r: random.Random) -> str | None:
+def override(w: Walker, r: random.Random) -> None:
     if not _has_guest():
         _from_library(w, link=True)
     guest = next((o for o in w.objects("MESH") if o.library is not None), None)
     w.skip_if(guest is None or guest not in w.in_layer())
     w.object_mode()
     guest.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
-    return f"override {guest.name}"
 
 
 @operation(0.5)
-def reload_library(w: Walker, r: random.Random) -> str | None:
+def reload_library(w: Walker, r: random.Random) -> None:
     w.skip_if(not bpy.data.libraries)
     w.object_mode()
     bpy.data.libraries[0].reload()
-    return "reload the library"
 
 
 @operation(0.7)
-def purge(w: Walker, r: random.Random) -> str | None:
+def purge(w: Walker, r: random.Random) -> None:
     bpy.data.orphans_purge(do_recursive=r.random() < 0.7)
-    return "purge orphans"
 
 
 @operation(1.5)
-def render(w: Walker, r: random.Random) -> str | None:
+def render(w: Walker, r: random.Random) -> None:
     w.object_mode()
     w.before_evaluation()
     w.rendered = {}
@@ -2137,9 +2012,8 @@ def render(w: Walker, r: random.Random) -> str | None:
         scene.frame_start, scene.frame_end = first, first + 1
         bpy.ops.render.render(animation=True)
         scene.frame_start, scene.frame_end = FRAMES
-        return f"render frames {first} and {first + 1}"
-    bpy.ops.render.render()
-    return "render"
+    else:
+        bpy.ops.render.render()
 
 
 def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: list[int]) -> None:
@@ -2161,7 +2035,7 @@ def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: 
 
 
 @operation(0.7)
-def export(w: Walker, r: random.Random) -> str | None:
+def export(w: Walker, r: random.Random) -> None:
     """The data that another program receives."""
     obj = w.mesh(r)
     w.skip_if(not w.select(obj))
@@ -2180,18 +2054,16 @@ def export(w: Walker, r: random.Random) -> str | None:
     lines = (line.split()[1:4] for line in path.read_text().splitlines() if line.startswith("v "))
     points = np.array(list(lines), dtype=np.float32).reshape(-1, 3)
     w.rendered = {f"{obj.name_full} in the render, exported": points}
-    return f"export {obj.name}"
 
 
 @operation(0.3)
-def safe_mode(w: Walker, r: random.Random) -> str | None:
+def safe_mode(w: Walker, r: random.Random) -> None:
     on = r.random() < 0.5
     w.side.set_safe(on)
-    return f"safe mode {'on' if on else 'off'}"
 
 
 @operation(1)
-def neighbour(w: Walker, r: random.Random) -> str | None:
+def neighbour(w: Walker, r: random.Random) -> None:
     """Another add-on's handler, called once, at a change of frame."""
     obj, when = w.mesh(r), r.choice(("frame_change_pre", "frame_change_post", "depsgraph_update_post"))
     what, number = (
@@ -2204,7 +2076,7 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
         or obj.mode != "OBJECT"
         or obj.data.library is not None
     ):
-        return None
+        raise NothingError
     modifier = w.one_or_none(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE"])
     w.skip_if(what in ("rename", "toggle", "delete") and modifier is None)
     name, vertices, new = obj.name, _vertices(w, r, obj), w.new_name("neighbour")
@@ -2233,11 +2105,10 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
             w.this_frame()
     if act in handlers:
         handlers.remove(act)
-    return f"another add-on in {when}: {what}, {name} {modifier_name}, frame {number}"
 
 
 @operation(0.5)
-def touch(w: Walker, r: random.Random) -> str | None:
+def touch(w: Walker, r: random.Random) -> None:
     obj, what = w.one(r, [*w.meshes(), *w.armatures()]), r.choice(("object", "data", "all"))
     if what == "object":
         obj.update_tag()
@@ -2245,45 +2116,40 @@ def touch(w: Walker, r: random.Random) -> str | None:
         obj.data.update_tag()
     else:
         obj.update_tag(refresh={"OBJECT", "DATA", "TIME"})
-    return f"tag {obj.name}: {what}"
 
 
 @operation(2)
-def update(w: Walker, r: random.Random) -> str | None:
+def update(w: Walker, r: random.Random) -> None:
     w.before_evaluation()
     bpy.context.view_layer.update()
-    return "view_layer.update()"
 
 
 @operation(0)
-def says(w: Walker, r: random.Random) -> str | None:
+def says(w: Walker, r: random.Random) -> None:
     """For scripts: what Sinew has to say about a mesh."""
     obj = w.mesh(r)
     if w.side.is_sinew and not any(str(word) in obj.sinew.error for word in r.words):
         raise ValueError(f"{obj.name}: says {obj.sinew.error!r}")
     r.words.clear()
-    return f"what is said about {obj.name}"
 
 
 # --- Faults that test_walk plants, to check that they are found; never chosen
 
 
 @operation(0)
-def plant_shape(w: Walker, r: random.Random) -> str | None:
+def plant_shape(w: Walker, r: random.Random) -> None:
     if w.side.is_sinew:
         bpy.data.objects["Arm"].data.vertices[0].co.z += 0.001
-    return "a vertex moved on one side"
 
 
 @operation(0)
-def plant_state(w: Walker, r: random.Random) -> str | None:
+def plant_state(w: Walker, r: random.Random) -> None:
     if w.side.is_sinew:
         bpy.data.objects["Arm"].modifiers["Armature"].show_render = False
-    return "a modifier switched off on one side"
 
 
 @operation(0)
-def plant_exception(w: Walker, r: random.Random) -> str | None:
+def plant_exception(w: Walker, r: random.Random) -> None:
     def fail(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
         bpy.app.handlers.frame_change_post.remove(fail)
         raise ValueError("planted")
@@ -2291,11 +2157,9 @@ def plant_exception(w: Walker, r: random.Random) -> str | None:
     if w.side.is_sinew:
         bpy.app.handlers.frame_change_post.append(fail)
         bpy.context.scene.frame_set(2)
-    return "an exception in a handler"
 
 
 @operation(0)
-def plant_crash(w: Walker, r: random.Random) -> str | None:
+def plant_crash(w: Walker, r: random.Random) -> None:
     if w.side.is_sinew:
         os.abort()
-    return "a crash"
