@@ -327,6 +327,7 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
 @pytest.mark.parametrize(
     ("name", "frames", "motion"), [("CesiumMan.glb", (0, 24, 48), "keys"), ("Fox.glb", (0, 41, 82), "pose")]
 )
+@pytest.mark.slow
 @pytest.mark.once
 def test_other_rigs_play_elsewhere_to_the_stated_error(real_rig, tmp_path, name, frames, motion):
     path = real_rig(name)

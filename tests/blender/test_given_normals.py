@@ -9,6 +9,7 @@ import re
 import bpy
 import numpy as np
 import pytest
+import routes
 import scenes
 from sinew_addon.attach import normals, properties, stack
 from sinew_addon.core import opengl
@@ -25,6 +26,10 @@ needs_support = pytest.mark.skipif(
 
 
 pytestmark = pytest.mark.usefixtures("route")
+# For what reads the evaluated mesh, whose normals test_normals_of_every_frame_are_blenders compares by both.
+by_one_route_first = pytest.mark.parametrize(
+    "route", [routes.EVALUATION, pytest.param(routes.UPDATE, marks=pytest.mark.slow)], indirect=True
+)
 
 
 def smooth(obj):
@@ -488,6 +493,7 @@ def assert_same_pictures(obj, tmp_path, is_custom, step=0.0):
 
 
 @needs_support
+@by_one_route_first
 @pytest.mark.parametrize("engine", ["CYCLES", "CYCLES blurred", "BLENDER_WORKBENCH"])
 @pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
 def test_pictures_are_the_same(shading, engine, tmp_path):
@@ -535,6 +541,7 @@ EXPORTERS = {
 
 
 @needs_support
+@by_one_route_first
 @pytest.mark.parametrize("kind", EXPORTERS)
 @pytest.mark.parametrize("shading", SHADINGS, ids=lambda each: each.__name__)
 def test_exported_files_are_the_same(shading, kind, tmp_path):

@@ -62,7 +62,12 @@ class Child:
         self.shapes_of = walk_shapes
         self.errors = errors
         self.read_to = 0
-        self.side = walk_sides.SinewSide() if role == "sinew" else walk_sides.BlenderSide()
+        if role == "sinew":
+            import walk_with_sinew
+
+            self.side = walk_with_sinew.SinewSide()
+        else:
+            self.side = walk_sides.BlenderSide()
         self.side.prepare(safe=route == "safe")
         self.walker = walk_operations.Walker(self.side, folder)
         self.walker.before_evaluation = self.before_evaluation

@@ -22,8 +22,7 @@ from walk_sides import (
     METHODS,
     OF_BLENDER,
     STAGES,
-    BlenderSide,
-    SinewSide,
+    Side,
     animated_paths,
     armature_modifiers,
     has_scaled_bones,
@@ -81,7 +80,7 @@ def operation(weight: float):
 class Walker:
     """What operations choose from: the open file without what Sinew has added to it."""
 
-    def __init__(self, side: BlenderSide | SinewSide, folder: Path) -> None:
+    def __init__(self, side: Side, folder: Path) -> None:
         self.side = side
         self.folder = folder
         self.number = 0
