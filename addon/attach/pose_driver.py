@@ -61,6 +61,7 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
     variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
     if in_depsgraph:
+        _ensure_token(obj)
         path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
         armatures = dict.fromkeys(armature for armature, _path in poses)
         # Read through a property, as Blender does not wait for the driver's own object in transform
@@ -91,6 +92,16 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
     driver.expression = ""
     for number, variable in enumerate(variables):
         variable.add_to(driver, f"{_PREFIX}{number}")
+
+
+def _ensure_token(obj: bpy.types.Object) -> None:
+    """Gives it the token by which a request is known as its own: a duplicate has that of its original."""
+    settings = properties.of(obj)
+    if settings.token != obj.session_uid:
+        references.note(obj)
+        properties.store(settings, "token", obj.session_uid)
+        # Blender then copies it for the evaluation again.
+        obj.update_tag(refresh={"OBJECT"})
 
 
 def _reads(driver: bpy.types.Driver, variables: list[_Variable]) -> bool:

@@ -303,7 +303,9 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
     )
     helper: _hidden(bpy.props.BoolProperty, "Made by Sinew for another object")
-    token: bpy.props.StringProperty(description="Tells an upstream proxy from all others", options={"HIDDEN"})
+    token: bpy.props.IntProperty(
+        description="The object's session_uid, which its evaluated copies lack", options={"HIDDEN"}
+    )
     copied: bpy.props.PointerProperty(
         description="The object that this one is a comparison's copy of",
         type=bpy.types.Object,

@@ -8,8 +8,6 @@ Blender applies no modifier to a mesh with a second user, and other people's too
 
 from __future__ import annotations
 
-import uuid
-
 import bpy
 
 from ..core.errors import SinewError
@@ -210,7 +208,7 @@ def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
         copy.data = _copy_of_mesh(obj)
     properties.clear(copy)
     copy.add_rest_position_attribute = False
-    properties.of(copy).helper, properties.of(copy).token = True, uuid.uuid4().hex
+    properties.of(copy).helper, properties.of(copy).token = True, copy.session_uid
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)

@@ -32,12 +32,15 @@ class DepsgraphRequests:
     def __init__(self) -> None:
         # The object that each thread named last.
         self._requesting: dict[int, bpy.types.Object] = {}
-        # By the object's name, which its evaluated copies share. The dict is replaced, never changed, as
-        # other threads may be reading it.
-        self._objects: dict[str, SkinnedObject] = {}
+        self.set_objects({}, set())
 
-    def set_objects(self, objects: dict[str, SkinnedObject]) -> None:
-        self._objects = objects
+    def set_objects(self, objects: dict[int, SkinnedObject], names: set[str]) -> None:
+        """objects: by the token of their settings, which evaluated copies have, too.
+
+        names  of these: a duplicate that nobody has seen yet has the token of its original
+        """
+        # Replaced, never changed, as other threads may be reading it.
+        self._known = objects, names
 
     def object_requested(self, evaluated: bpy.types.Object) -> None:
         # Python does not know Blender's threads: for each call from one it would create a thread state and
@@ -50,8 +53,9 @@ class DepsgraphRequests:
         if evaluated is None or not (evaluated.is_evaluated and evaluated_mesh.is_evaluated):
             # Something other than the driver reads the property.
             return
-        skinned = self._objects.get(evaluated.name)
-        if skinned is None:
+        objects, names = self._known
+        skinned = objects.get(evaluated.sinew.token)
+        if skinned is None or evaluated.name not in names:
             return
         try:
             deform(evaluated, evaluated_mesh, skinned)

@@ -130,12 +130,13 @@ def _find_pairs(objects: list[bpy.types.Object]) -> None:
 
 def name_requests() -> None:
     """Names the objects for their requests as they are called now, before an evaluation."""
-    by_name = {}
+    states, names = {}, set()
     for obj, state in current.pairs:
         # The object may have been deleted since the list was made.
         with contextlib.suppress(ReferenceError):
-            by_name[obj.name] = state
-    requests.set_objects(by_name)
+            states[obj.session_uid] = state
+            names.add(obj.name)
+    requests.set_objects(states, names)
 
 
 def _forget_known(obj: bpy.types.Object) -> SkinnedObject | None:

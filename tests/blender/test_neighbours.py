@@ -108,6 +108,35 @@ def test_group_renamed_by_a_handler(arm, neighbour, rendered_points, event, is_f
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
+def test_names_swapped_by_a_handler(arm, neighbour, rendered_points):
+    other = scenes.copied(arm)
+    other.vertex_groups["bone.1"].add(range(80, 200), 0.2, "REPLACE")
+    expected = np.array([scenes.shapes(each, [10])[0] for each in (arm, other)])
+    tolerance = scenes.TOLERANCE * scenes.diagonal(arm)
+    assert scenes.worst(*expected) > 0.1
+    bpy.context.scene.frame_set(6)
+    names = arm.name, other.name
+
+    def act() -> None:
+        arm.name, other.name, arm.name = "swapped", names[0], names[1]
+
+    neighbour("frame_change_pre", act)
+    seen = []
+    monitor = bpy.app.handlers.frame_change_post
+    monitor.insert(0, lambda *_args: seen.extend(map(scenes.final_points, (arm, other))))
+    try:
+        bpy.context.scene.frame_set(10)
+    finally:
+        monitor.pop(0)
+    assert safe_mode.is_on() or scenes.worst(np.array(seen), expected) <= tolerance
+    shown = np.array([scenes.final_points(each) for each in (arm, other)])
+    assert scenes.worst(shown, expected) <= tolerance
+    bpy.context.scene.frame_set(6)
+    arm.name, other.name, arm.name = "swapped", *names
+    bpy.context.scene.frame_set(10)
+    assert scenes.worst(rendered_points(arm), expected[0]) <= tolerance
+
+
 def alone(_obj: bpy.types.Object) -> None:
     pass
 
