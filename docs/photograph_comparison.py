@@ -30,7 +30,7 @@ def human() -> bpy.types.Object:
 
 
 def copy(method: str) -> bpy.types.Object:
-    return next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.sinew.copied_for == method)
+    return next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.sinew.identity.method == method)
 
 
 def worst(place: int = 1) -> float:
@@ -135,7 +135,9 @@ def work(facts: dict[str, object]):
     yield
     press("ed.undo")
     yield
-    facts["after undo"] = sorted(obj.sinew.copied_for for obj in bpy.data.objects if obj.sinew.copied_for)
+    facts["after undo"] = sorted(
+        obj.sinew.identity.method for obj in bpy.data.objects if obj.sinew.identity.method
+    )
     facts["worst after undo"] = worst()
     saved = PICTURE.with_suffix(".blend")
     press("wm.save_as_mainfile", filepath=str(saved), copy=True)

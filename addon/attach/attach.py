@@ -123,7 +123,7 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
     try:
         _replace_modifiers(obj, method)
     except Exception as error:
-        parent_type = properties.of(obj).parent_type
+        parent_type = properties.of(obj).before.parent_type
         properties.clear(obj)
         for modifier in [m for m in obj.modifiers if m.name not in before]:
             obj.modifiers.remove(modifier)
@@ -148,13 +148,13 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
         _make_modifier_of_parent(obj)
     run = stack.armature_modifiers(obj)
     nodes = obj.modifiers.new("Sinew", "NODES")
-    settings.modifier_uid = nodes.persistent_uid
+    settings.stack.modifier_uid = nodes.persistent_uid
     nodes.show_expanded = False
     nodes.show_in_editmode = False
     _show(nodes, False, False)
     # Not to the end of the stack, where the artist may have pinned other modifiers.
     stack.move_behind(obj, nodes, run[-1])
-    settings.had_animation = obj.animation_data is not None
+    settings.before.had_animation = obj.animation_data is not None
     settings.method = method or method_of(run[0])
     properties.make_groups(settings)
     for modifier, replaced in replaced_modifiers(obj):
@@ -196,7 +196,7 @@ def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
     obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
     modifier.object = obj.parent
     modifier.use_bone_envelopes = True
-    properties.of(obj).parent_type = obj.parent_type
+    properties.of(obj).before.parent_type = obj.parent_type
     obj.parent_type = "OBJECT"
 
 
@@ -246,11 +246,11 @@ def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
         obj.modifiers.remove(nodes)
         if active is not None:
             obj.modifiers.active = active
-    if settings.parent_type:
+    if settings.before.parent_type:
         modifier = armature_modifier(obj)
         if modifier is not None:
             obj.modifiers.remove(modifier)
-        obj.parent_type = settings.parent_type
+        obj.parent_type = settings.before.parent_type
     point_store.remove(obj)
     if not any(
         other.data == obj.data and properties.has_sinew(other) for other in bpy.data.objects if other != obj
@@ -285,14 +285,14 @@ def switch(obj: bpy.types.Object, on: bool, is_alone: bool = False) -> None:
 def is_off(obj: bpy.types.Object) -> bool:
     """Whether its modifiers are as they have to be while Sinew is off."""
     settings = properties.of(obj)
-    return not settings.enabled and Situation(settings.situation) is Situation.OFF
+    return not settings.enabled and Situation(settings.stack.situation) is Situation.OFF
 
 
 def follow_icons(obj: bpy.types.Object) -> None:
     """Takes over what the artist or a tool did to the icons since they were set."""
     _follow_ended_keys(obj)
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
-    situation = Situation(settings.situation)
+    situation = Situation(settings.stack.situation)
     for name in VIEWS:
         view = _view(obj, name)
         before = icons.icons(view, situation)
@@ -328,14 +328,14 @@ def _follow_ended_keys(obj: bpy.types.Object) -> None:
             properties.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
         for name in VIEWS:
             properties.store(replaced, f"was_off_{name}", False)
-    _set_icons(obj, Situation(properties.of(obj).situation))
+    _set_icons(obj, Situation(properties.of(obj).stack.situation))
 
 
 def show(obj: bpy.types.Object) -> None:
     """Has Sinew deform it in both views, whatever was switched before."""
     for name in VIEWS:
         _store(obj, name, _view(obj, name).switched_on())
-    _set_icons(obj, Situation(properties.of(obj).situation))
+    _set_icons(obj, Situation(properties.of(obj).stack.situation))
 
 
 def deformer(obj: bpy.types.Object, name: str) -> Deformer:
@@ -363,11 +363,11 @@ def _view(obj: bpy.types.Object, name: str) -> icons.View:
     )
     # One that an animation switches may be on in any frame.
     shown = tuple(is_shown or _is_keyed(obj, *pair) for is_shown, pair in zip(shown, pairs, strict=True))
-    return icons.View(shown, forced, getattr(settings, f"hidden_{name}"), switched)
+    return icons.View(shown, forced, getattr(settings.stack, f"hidden_{name}"), switched)
 
 
 def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
-    properties.store(properties.of(obj), f"hidden_{name}", view.hidden)
+    properties.store(properties.of(obj).stack, f"hidden_{name}", view.hidden)
     pairs = replaced_modifiers(obj)
     none = (False,) * len(pairs)
     for pair, shown, forced, switched in zip(
@@ -398,7 +398,7 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
         smooth[name] = not situation.is_by_sinew or view.deformer is Deformer.ARMATURE
     undeformed.mark(obj, situation.is_by_sinew)
     corrective_smooth.switch(obj, **smooth)
-    properties.store(settings, "situation", situation.value)
+    properties.store(settings.stack, "situation", situation.value)
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:
@@ -411,7 +411,7 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
         properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0) == "dq"
         for number, (_modifier, replaced) in enumerate(pairs)
     ]
-    if settings.has_nearest_volume:
+    if settings.before.has_nearest_volume:
         before = [replaced.preserve_volume == replaced.was_nearest for _modifier, replaced in pairs]
         if nearest == before:
             return
@@ -422,26 +422,27 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
         properties.store(replaced, "preserve_volume", own)
         properties.store(replaced, "was_nearest", own == wanted)
         _preserve_volume(modifier, wanted)
-    properties.store(settings, "has_nearest_volume", True)
+    properties.store(settings.before, "has_nearest_volume", True)
 
 
 def restore_volume(obj: bpy.types.Object) -> None:
     """Gives the Armature modifiers the artist's own Preserve Volume again."""
     settings = properties.of(obj)
-    if not settings.has_nearest_volume:
+    if not settings.before.has_nearest_volume:
         return
     for replaced in settings.replaced_modifiers:
         modifier = stack.modifier_of(obj, replaced)
         # What the artist has switched since stays, too.
         if modifier is not None and not replaced.was_nearest:
             _preserve_volume(modifier, replaced.preserve_volume)
-    properties.store(settings, "has_nearest_volume", False)
+    properties.store(settings.before, "has_nearest_volume", False)
 
 
 def has_switched_volume(obj: bpy.types.Object) -> bool:
     """Whether one of the Armature modifiers has another Preserve Volume than the artist's at the moment."""
     settings = properties.of(obj)
-    return settings.has_nearest_volume and not all(each.was_nearest for each in settings.replaced_modifiers)
+    are_nearest = all(each.was_nearest for each in settings.replaced_modifiers)
+    return settings.before.has_nearest_volume and not are_nearest
 
 
 def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> None:
@@ -516,9 +517,9 @@ def _replaced_modifier(
         found = replaced_modifiers.add()
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
         found.visibility_is_keyed = is_visibility_animated(obj, modifier)
-        is_alone = Situation(properties.of(obj).situation) is Situation.ALONE
+        is_alone = Situation(properties.of(obj).stack.situation) is Situation.ALONE
         for name in VIEWS:
-            is_hidden = is_alone or getattr(properties.of(obj), f"hidden_{name}")
+            is_hidden = is_alone or getattr(properties.of(obj).stack, f"hidden_{name}")
             if is_hidden and not found.visibility_is_keyed:
                 _show_in(modifier, name, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True

@@ -29,7 +29,7 @@ def switch_off(obj: bpy.types.Object) -> None:
         block.mute = True
     for modifier in obj.modifiers:
         if modifier.type in _CACHES and (modifier.show_viewport or modifier.show_render):
-            kept = properties.of(obj).baked.add()
+            kept = properties.of(obj).before.baked.add()
             kept.name, kept.uid = modifier.name, modifier.persistent_uid
             kept.show_viewport, kept.show_render = modifier.show_viewport, modifier.show_render
             modifier.show_viewport = modifier.show_render = False
@@ -43,7 +43,7 @@ def switch_on(obj: bpy.types.Object) -> None:
             if name in keys.key_blocks:
                 keys.key_blocks[name].mute = False
         del keys[MUTED]
-    for kept in settings.baked:
+    for kept in settings.before.baked:
         for modifier in obj.modifiers:
             if modifier.persistent_uid == kept.uid:
                 modifier.show_viewport, modifier.show_render = kept.show_viewport, kept.show_render
@@ -51,7 +51,7 @@ def switch_on(obj: bpy.types.Object) -> None:
 
 def notes(obj: bpy.types.Object) -> list[str]:
     """Returns a sentence for what is switched off, and for what may have to be."""
-    keys, names = obj.data.shape_keys, [kept.name for kept in properties.of(obj).baked]
+    keys, names = obj.data.shape_keys, [kept.name for kept in properties.of(obj).before.baked]
     found = []
     if keys is not None and MUTED in keys:
         found.append(phrase("Its baked shape keys are muted; Remove unmutes them"))

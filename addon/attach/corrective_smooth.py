@@ -75,7 +75,7 @@ def _beyond_bounds(modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
 
 def _has_other_vertices(obj: bpy.types.Object) -> bool:
     """Whether upstream modifiers change the number of vertices."""
-    if properties.of(obj).upstream_proxy is None:
+    if properties.of(obj).storage.upstream_proxy is None:
         return False
     mesh = upstream_proxy.evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get())
     return mesh is not None and len(mesh.vertices) != len(obj.data.vertices)
@@ -90,7 +90,7 @@ def take_over(obj: bpy.types.Object) -> None:
     if reason:
         raise SinewError(f"{obj.name}: {reason}")
     modifier, settings = candidate(obj), properties.of(obj)
-    replaced = settings.replaced_smooth
+    replaced = settings.before.smooth
     for name, value in (
         ("name", modifier.name),
         ("uid", modifier.persistent_uid),
@@ -122,7 +122,7 @@ def stage_values(obj: bpy.types.Object) -> Mapping[str, Mapping[str, Any]]:
 
 def replaced_modifier(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
     """Returns the modifier that was taken over, even if it was moved and renamed; else one of its name."""
-    replaced = properties.of(obj).replaced_smooth
+    replaced = properties.of(obj).before.smooth
     smooths = [modifier for modifier in obj.modifiers if modifier.type == "CORRECTIVE_SMOOTH"]
     if not replaced.name:
         return None
@@ -132,7 +132,7 @@ def replaced_modifier(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifi
 
 def switch(obj: bpy.types.Object, viewport: bool, render: bool) -> None:
     """Gives the modifier that was taken over its own icons in these views, and switches it off in others."""
-    modifier, replaced = replaced_modifier(obj), properties.of(obj).replaced_smooth
+    modifier, replaced = replaced_modifier(obj), properties.of(obj).before.smooth
     if modifier is None:
         return
     for name, is_own in (("show_viewport", viewport), ("show_render", render)):

@@ -28,5 +28,5 @@ def remove() -> None:
 
 
 def _used_by_settings() -> set[bpy.types.Object | None]:
-    settings = [properties.of(obj) for obj in bpy.data.objects if properties.has_sinew(obj)]
-    return {helper for each in settings for helper in (each.point_buffer, each.upstream_proxy)}
+    storages = [properties.of(obj).storage for obj in bpy.data.objects if properties.has_sinew(obj)]
+    return {helper for each in storages for helper in (each.point_buffer, each.upstream_proxy)}

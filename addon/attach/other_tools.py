@@ -20,7 +20,7 @@ def notes(obj: bpy.types.Object) -> list[str]:
     if not properties.of(obj).replaces_modifiers:
         return []
     found, own = [], stack.own_modifiers(obj)
-    if Situation(properties.of(obj).situation) is Situation.ALONE:
+    if Situation(properties.of(obj).stack.situation) is Situation.ALONE:
         found.append(
             phrase("Switch Sinew off before other tools look for its Armature modifier: that is off")
         )

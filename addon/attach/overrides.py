@@ -15,9 +15,10 @@ from . import node_group, properties, stack
 def store(obj: bpy.types.Object) -> None:
     """Copies the settings of a skinned override to its point buffer."""
     settings = properties.of(obj)
-    if obj.override_library is not None and settings.point_buffer is not None:
-        properties.copy(settings, properties.of(settings.point_buffer))
-        properties.of(settings.point_buffer).helper = True
+    point_buffer = settings.storage.point_buffer
+    if obj.override_library is not None and point_buffer is not None:
+        properties.copy(settings, properties.of(point_buffer))
+        properties.of(point_buffer).identity.is_helper = True
 
 
 def restore() -> None:
@@ -29,4 +30,4 @@ def restore() -> None:
         point_buffer = node_group.get_input(nodes, "Points") if nodes is not None else None
         if isinstance(point_buffer, bpy.types.Object) and len(properties.of(point_buffer).replaced_modifiers):
             properties.copy(properties.of(point_buffer), properties.of(obj))
-            properties.of(obj).helper = False
+            properties.of(obj).identity.is_helper = False

@@ -17,13 +17,13 @@ from . import properties, references
 
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object:
-    settings = properties.of(obj)
-    if settings.point_buffer is None or settings.point_buffer.library is not None:
+    storage = properties.of(obj).storage
+    if storage.point_buffer is None or storage.point_buffer.library is not None:
         references.note(obj)
         name = f"{obj.name} Sinew points"
-        settings.point_buffer = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-        properties.of(settings.point_buffer).helper = True
-    return settings.point_buffer
+        storage.point_buffer = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+        properties.of(storage.point_buffer).identity.is_helper = True
+    return storage.point_buffer
 
 
 def write(point_buffer: bpy.types.Object, points: np.ndarray) -> None:
@@ -57,8 +57,8 @@ def is_in(depsgraph: bpy.types.Depsgraph, point_buffer: bpy.types.Object, with_p
 
 
 def remove(obj: bpy.types.Object) -> None:
-    settings = properties.of(obj)
-    point_buffer, settings.point_buffer = settings.point_buffer, None
+    storage = properties.of(obj).storage
+    point_buffer, storage.point_buffer = storage.point_buffer, None
     if point_buffer is not None and point_buffer.library is None:
         # Also removes the object that uses it.
         bpy.data.meshes.remove(point_buffer.data)

@@ -37,21 +37,20 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
 
     Raises SinewError where the modifiers before Sinew cannot be evaluated separately.
     """
-    settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
+    nodes = stack.sinew_modifier(obj)
     if in_buffer:
-        if settings.attribute:
+        if properties.of(obj).storage.attribute:
             remove_attributes(obj)
-            _forget_names(settings)
         made = upstream_proxy.ensure(obj)
         kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Upstream": made}
     else:
         upstream_proxy.remove(obj)
         point_buffer.remove(obj)
-        _ensure_attribute(obj)
-        _ensure_normals_attribute(obj, normals)
-        kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
+        attribute = _ensure_attribute(obj)
+        _ensure_normals_attribute(obj.data, normals_name(attribute), normals)
+        kind, inputs = node_group.ATTRIBUTE, {"Points": attribute}
         if normals:
-            inputs[node_group.NORMALS] = settings.normals_attribute
+            inputs[node_group.NORMALS] = normals_name(attribute)
     if normals:
         inputs[node_group.IN_RENDERS] = in_renders
     inputs |= undeformed.ensure(obj)
@@ -66,29 +65,30 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
     node_group.set_inputs(nodes, inputs)
 
 
-def _ensure_attribute(obj: bpy.types.Object) -> None:
-    settings, mesh = properties.of(obj), obj.data
-    if not settings.attribute:
-        settings.attribute = _free_attribute_name(mesh, ATTRIBUTE)
-    if not mesh_io.has_vectors(mesh, settings.attribute, "POINT"):
+def _ensure_attribute(obj: bpy.types.Object) -> str:
+    """Returns its name."""
+    storage, mesh = properties.of(obj).storage, obj.data
+    if not storage.attribute:
+        storage.attribute = _free_attribute_name(mesh)
+    if not mesh_io.has_vectors(mesh, storage.attribute, "POINT"):
         # Shown by an evaluation in which Sinew gave no points.
         rest = mesh_io.read_points(mesh)
-        mesh_io.write_vectors(mesh, settings.attribute, _marked(rest, rest))
+        mesh_io.write_vectors(mesh, storage.attribute, _marked(rest, rest))
+    return storage.attribute
 
 
-def _ensure_normals_attribute(obj: bpy.types.Object, domain: str) -> None:
+def normals_name(attribute: str) -> str:
+    """Returns the name of the attribute with the normals that belong to the points of another."""
+    return attribute.replace(ATTRIBUTE, NORMALS_ATTRIBUTE)
+
+
+def _ensure_normals_attribute(mesh: bpy.types.Mesh, name: str, domain: str) -> None:
     """Fills the attribute with zeros, which mean that Sinew gave no normals."""
-    settings, mesh = properties.of(obj), obj.data
     if not domain:
-        if settings.normals_attribute:
-            mesh_io.remove_attribute(mesh, settings.normals_attribute)
-            settings.normals_attribute = ""
-        return
-    if not settings.normals_attribute:
-        settings.normals_attribute = _free_attribute_name(mesh, NORMALS_ATTRIBUTE)
-    if not mesh_io.has_vectors(mesh, settings.normals_attribute, domain):
+        mesh_io.remove_attribute(mesh, name)
+    elif not mesh_io.has_vectors(mesh, name, domain):
         none = np.zeros((mesh_io.domain_size(mesh, domain), 3), dtype=np.float32)
-        mesh_io.write_vectors(mesh, settings.normals_attribute, none, domain)
+        mesh_io.write_vectors(mesh, name, none, domain)
 
 
 def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: np.ndarray) -> None:
@@ -100,7 +100,7 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: 
     stored = _marked(points, rest)
     if len(normals):
         stored = np.concatenate((stored, normals))
-    point_buffer.write(properties.of(obj).point_buffer, stored)
+    point_buffer.write(properties.of(obj).storage.point_buffer, stored)
 
 
 def set_rest_points(
@@ -128,7 +128,7 @@ def are_written(
 
     are_moved  the evaluation itself moves the points, so only the number is compared
     """
-    buffer = properties.of(obj).point_buffer
+    buffer = properties.of(obj).storage.point_buffer
     if buffer is None or len(buffer.data.vertices) != count:
         return False
     return point_buffer.is_in(depsgraph, buffer, with_points=not are_moved)
@@ -143,8 +143,9 @@ def are_applied(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarra
     settings, own = properties.of(obj), mesh_io.read_points(obj.data)
     if not settings.replaces_modifiers:
         return False
-    if settings.point_buffer is None:
-        is_gone = bool(settings.attribute) and mesh_io.find_attribute(obj.data, settings.attribute) is None
+    if settings.storage.point_buffer is None:
+        name = settings.storage.attribute
+        is_gone = bool(name) and mesh_io.find_attribute(obj.data, name) is None
         return is_gone and (shown is None or np.array_equal(shown, own))
     if rest is None or shown is None or rest.shape != own.shape or np.array_equal(rest, own):
         return False
@@ -167,13 +168,6 @@ def remove_point_attributes(obj: bpy.types.Object) -> None:
     vertices, and exports would contain them."""
     if not obj.data.is_editmode:
         remove_attributes(obj)
-        _forget_names(properties.of(obj))
-
-
-def _forget_names(settings: properties.SinewSettings) -> None:
-    for name in ("attribute", "normals_attribute"):
-        if getattr(settings, name):
-            setattr(settings, name, "")
 
 
 def remove(obj: bpy.types.Object) -> None:
@@ -185,9 +179,9 @@ def remove(obj: bpy.types.Object) -> None:
 
 def clear_references(obj: bpy.types.Object) -> None:
     """Clears all references to what Sinew made (references.py); ensure() makes them again."""
-    settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
+    nodes = stack.sinew_modifier(obj)
     pose_driver.remove(obj)
-    _forget_helpers(settings)
+    _forget_helpers(obj)
     if nodes is not None and nodes.node_group is not None:
         node_group.forget_helpers(nodes)
         nodes.node_group = None
@@ -205,9 +199,9 @@ def clear_references_to_itself(obj: bpy.types.Object) -> None:
         clear_references(obj)
 
 
-def _forget_helpers(settings: properties.SinewSettings) -> None:
-    settings.point_buffer = settings.upstream_proxy = None
-    settings.upstream_signature = ""
+def _forget_helpers(obj: bpy.types.Object) -> None:
+    storage = properties.of(obj).storage
+    storage.point_buffer = storage.upstream_proxy = None
 
 
 def unshare(objects: list[bpy.types.Object]) -> None:
@@ -215,31 +209,27 @@ def unshare(objects: list[bpy.types.Object]) -> None:
     ensure() gives each its own."""
     taken: set[str] = set()
     for obj in objects:
-        settings = properties.of(obj)
-        used = {
-            helper.name_full
-            for helper in (settings.point_buffer, settings.upstream_proxy)
-            if helper is not None
-        }
+        storage = properties.of(obj).storage
+        used = {each.name_full for each in (storage.point_buffer, storage.upstream_proxy) if each is not None}
         if used & taken and obj.is_editable:
-            _forget_helpers(settings)
+            _forget_helpers(obj)
         taken |= used
 
 
-def _free_attribute_name(mesh: bpy.types.Mesh, start: str) -> str:
-    name, number = start, 0
-    while mesh_io.find_attribute(mesh, name) is not None:
+def _free_attribute_name(mesh: bpy.types.Mesh) -> str:
+    name, number = ATTRIBUTE, 0
+    while any(mesh_io.find_attribute(mesh, each) is not None for each in (name, normals_name(name))):
         number += 1
-        name = f"{start}.{number:03d}"
+        name = f"{ATTRIBUTE}.{number:03d}"
     return name
 
 
 def remove_attributes(obj: bpy.types.Object) -> None:
     """Removes all of Sinew's attributes from the mesh: a mesh that was copied, or saved by an earlier Sinew,
     can have several."""
-    mesh = obj.data
-    if not mesh.is_editable:
-        return
-    for name in [attribute.name for attribute in mesh.attributes]:
+    mesh, storage = obj.data, properties.of(obj).storage
+    for name in [each.name for each in mesh.attributes] if mesh.is_editable else ():
         if name.startswith(_OWN_ATTRIBUTES):
             mesh_io.remove_attribute(mesh, name)
+    if storage.attribute:
+        storage.attribute = ""

@@ -21,9 +21,9 @@ import bpy
 
 from . import node_group, properties, references, stack
 
-PATH = "sinew.pose"
+PATH = "sinew.driver.pose"
 # The properties that the last two variables read.
-OBJECT_REQUEST_PATH, MESH_REQUEST_PATH = "sinew.request", "sinew_request"
+OBJECT_REQUEST_PATH, MESH_REQUEST_PATH = "sinew.driver.request", "sinew_request"
 WORLD_MATRIX = "matrix_world[0][0]"
 # Blender reads an object's dimensions only after its modifiers are evaluated (seen on 4.2 to 5.2).
 EVALUATED_SIZE = "dimensions[0]"
@@ -61,26 +61,29 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
     variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
     if in_depsgraph:
-        _ensure_token(obj)
         path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
         armatures = dict.fromkeys(armature for armature, _path in poses)
         # Read through a property, as Blender does not wait for the driver's own object in transform
         # variables.
         variables += [_Variable(each, WORLD_MATRIX) for each in (*armatures, obj)]
-        helpers = (properties.of(obj).upstream_proxy, properties.of(obj).point_buffer)
+        storage = properties.of(obj).storage
+        helpers = (storage.upstream_proxy, storage.point_buffer)
         variables += [_Variable(helper, EVALUATED_SIZE) for helper in helpers if helper is not None]
         if obj.data.shape_keys is not None:
             variables.append(_Variable(obj.data.shape_keys, "eval_time"))
         variables += [_Variable(obj, OBJECT_REQUEST_PATH), _Variable(obj.data, MESH_REQUEST_PATH)]
-    curve = _find(obj)
+    curve, identity = _find(obj), properties.of(obj).identity
     if curve is not None:
         # Blender does not evaluate a driver that is muted, or that failed once, as while its modifier had no
         # node group.
         is_valid = curve.is_valid and curve.driver.is_valid and not curve.mute
-        if curve.data_path == path and is_valid and _reads(curve.driver, variables):
+        # A duplicate has the token of its original.
+        is_own = identity.token == obj.session_uid
+        if is_own and curve.data_path == path and is_valid and _reads(curve.driver, variables):
             return
         _take_off(obj, curve)
     references.note(obj)
+    properties.store(identity, "token", obj.session_uid)
     curve = obj.driver_add(path)
     # The modifier maps any value of the variables to 0, so no frame changes the input. Assigning the
     # coefficients would make Blender also evaluate the object's keys, and revert what was moved without a
@@ -92,16 +95,6 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
     driver.expression = ""
     for number, variable in enumerate(variables):
         variable.add_to(driver, f"{_PREFIX}{number}")
-
-
-def _ensure_token(obj: bpy.types.Object) -> None:
-    """Gives it the token by which a request is known as its own: a duplicate has that of its original."""
-    settings = properties.of(obj)
-    if settings.token != obj.session_uid:
-        references.note(obj)
-        properties.store(settings, "token", obj.session_uid)
-        # Blender then copies it for the evaluation again.
-        obj.update_tag(refresh={"OBJECT"})
 
 
 def _reads(driver: bpy.types.Driver, variables: list[_Variable]) -> bool:
@@ -121,13 +114,14 @@ def remove(obj: bpy.types.Object) -> None:
 def _take_off(obj: bpy.types.Object, curve: bpy.types.FCurve) -> None:
     obj.animation_data.drivers.remove(curve)
     # Blender has written the driver's value there.
-    properties.of(obj).property_unset("pose")
+    properties.of(obj).driver.property_unset("pose")
+    properties.of(obj).identity.property_unset("token")
 
 
 def remove_empty_animation(obj: bpy.types.Object) -> None:
     """Removes the object's animation data if it is empty and did not exist before Sinew."""
     animation = obj.animation_data
-    if properties.of(obj).had_animation:
+    if properties.of(obj).before.had_animation:
         return
     if animation.action is None and not animation.drivers and not animation.nla_tracks:
         obj.animation_data_clear()

@@ -48,23 +48,22 @@ def has_known_methods(settings: SinewSettings) -> bool:
 
 @dataclass
 class Listeners:
-    """Functions that are called when settings change; set on registration, as they read settings
+    """Functions that are called when settings change or are read; set on registration, as they read settings
     themselves."""
 
-    method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
-    error_requested: Callable[[bpy.types.Object], str] | None = None
-    object_requested: Callable[[bpy.types.Object], None] | None = None
-    mesh_requested: Callable[[bpy.types.Mesh], None] | None = None
-    heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
-    twist_changed: Callable[[bpy.types.Context], None] | None = None
+    method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] = lambda _obj, _context: None
+    error_requested: Callable[[bpy.types.Object], str] = lambda _obj: ""
+    object_requested: Callable[[bpy.types.Object], None] = lambda _obj: None
+    mesh_requested: Callable[[bpy.types.Mesh], None] = lambda _mesh: None
+    heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] = lambda _obj, _context: None
+    twist_changed: Callable[[bpy.types.Context], None] = lambda _context: None
 
 
 listeners = Listeners()
 
 
 def _method_changed(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    if listeners.method_changed is not None:
-        listeners.method_changed(settings.id_data, context)
+    listeners.method_changed(settings.id_data, context)
 
 
 def _object_method_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
@@ -76,29 +75,27 @@ def _object_method_changed(settings: SinewSettings, context: bpy.types.Context) 
     _method_changed(settings, context)
 
 
-def _error(settings: SinewSettings) -> str:
-    return "" if listeners.error_requested is None else listeners.error_requested(settings.id_data)
-
-
-def _object_requested(settings: SinewSettings) -> float:
-    if listeners.object_requested is not None:
-        listeners.object_requested(settings.id_data)
-    return 0.0
-
-
-def _mesh_requested(mesh: bpy.types.Mesh) -> float:
-    if listeners.mesh_requested is not None:
-        listeners.mesh_requested(mesh)
-    return 0.0
-
-
 def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
-    if listeners.heat_changed is not None:
-        listeners.heat_changed(settings.id_data, context)
+    listeners.heat_changed(settings.id_data, context)
+
+
+def _error(settings: SinewSettings) -> str:
+    return listeners.error_requested(settings.id_data)
+
+
+def _requested(listener: str) -> Callable[[bpy.types.bpy_struct], float]:
+    """Returns a getter by which a driver requests points."""
+
+    def get(owner: bpy.types.bpy_struct) -> float:
+        getattr(listeners, listener)(owner.id_data)
+        return 0.0
+
+    return get
 
 
 # On a library override, Blender saves only properties with this flag.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
+_INSERTABLE = {"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
 SAME_METHOD = "SAME"
 
 
@@ -177,13 +174,87 @@ class SinewSwitchedOff(bpy.types.PropertyGroup):
     show_render: _hidden(bpy.props.BoolProperty, default=True)
 
 
-def _twist_changed(_bone: bpy.types.PoseBone, context: bpy.types.Context) -> None:
-    if listeners.twist_changed is not None:
-        listeners.twist_changed(context)
-
-
 STAGE_GROUPS = stage_settings.groups(_method_changed)
 METHOD_GROUPS = stage_settings.method_groups(_method_changed)
+
+
+class SinewIdentity(bpy.types.PropertyGroup):
+    """What the object is to Sinew."""
+
+    token: _hidden(
+        bpy.props.IntProperty, "The session_uid of the object, for its evaluated copies, which have none"
+    )
+    is_helper: _hidden(bpy.props.BoolProperty, "Made by Sinew for another object")
+    copied: _hidden(
+        bpy.props.PointerProperty,
+        "The object that this one is a comparison's copy of",
+        type=bpy.types.Object,
+    )
+    method: _hidden(
+        bpy.props.StringProperty, "The method that this copy is there to show; empty for all but copies"
+    )
+
+
+class SinewStack(bpy.types.PropertyGroup):
+    """Sinew's modifiers on the object, and their icons. The persistent_uid of each: they may have no node
+    group, and be renamed."""
+
+    modifier_uid: _hidden(bpy.props.IntProperty)
+    neutral_uid: _hidden(bpy.props.IntProperty, "The modifier that changes nothing (undeformed.py)")
+    mark_uid: _hidden(bpy.props.IntProperty, "The modifier that marks the mesh (undeformed.py)")
+    situation: _hidden(
+        bpy.props.StringProperty, "Who deformed it when the modifiers' icons were last set (core/icons.py)"
+    )
+    # The artist switched the icon of Sinew's modifier off.
+    hidden_viewport: _hidden(bpy.props.BoolProperty)
+    hidden_render: _hidden(bpy.props.BoolProperty)
+
+
+class SinewBefore(bpy.types.PropertyGroup):
+    """What Sinew restores when it is taken off."""
+
+    parent_type: _hidden(
+        bpy.props.StringProperty, "The object's parent type before Sinew made an Armature modifier of it"
+    )
+    had_animation: _hidden(bpy.props.BoolProperty, "The object had animation data, be it empty")
+    marks_rest: _hidden(bpy.props.BoolProperty, "Sinew has Blender add rest positions")
+    adds_rest_position: _hidden(
+        bpy.props.BoolProperty, "The artist's own choice of Add Rest Position while Sinew sets it"
+    )
+    has_nearest_volume: _hidden(
+        bpy.props.BoolProperty,
+        "The Armature modifiers have the Preserve Volume nearest to Sinew's method, not the "
+        "artist's own: in saved files, and in modes of tools that need them",
+    )
+    smooth: _hidden(bpy.props.PointerProperty, type=SinewSwitchedOff)
+    baked: bpy.props.CollectionProperty(type=SinewSwitchedOff, options={"HIDDEN"}, override=_INSERTABLE)
+
+
+class SinewStorage(bpy.types.PropertyGroup):
+    """Where the points are, and what Sinew deforms."""
+
+    attribute: _hidden(
+        bpy.props.StringProperty, "Attribute that holds the points; empty where the point buffer does"
+    )
+    point_buffer: _hidden(
+        bpy.props.PointerProperty,
+        "The object whose vertices are the deformed points (point_buffer.py)",
+        type=bpy.types.Object,
+    )
+    upstream_proxy: _hidden(
+        bpy.props.PointerProperty,
+        "The copy that has only the upstream modifiers (upstream_proxy.py)",
+        type=bpy.types.Object,
+    )
+
+
+class SinewDriver(bpy.types.PropertyGroup):
+    """What pose_driver's driver is on, or reads."""
+
+    pose: bpy.props.FloatProperty(options={"HIDDEN", "ANIMATABLE"}, description="Carries the driver")
+    request: bpy.props.FloatProperty(
+        get=_requested("object_requested"), options={"HIDDEN"}, description="Read to request points"
+    )
 
 
 class SinewSettings(bpy.types.PropertyGroup):
@@ -256,85 +327,18 @@ class SinewSettings(bpy.types.PropertyGroup):
         override=OVERRIDABLE,
     )
     replaced_modifiers: bpy.props.CollectionProperty(
-        type=SinewReplacedModifier, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
-    )
-    situation: _hidden(
-        bpy.props.StringProperty, "Who deformed it when the modifiers' icons were last set (core/icons.py)"
-    )
-    # The artist switched the icon of Sinew's modifier off.
-    hidden_viewport: _hidden(bpy.props.BoolProperty)
-    hidden_render: _hidden(bpy.props.BoolProperty)
-    has_nearest_volume: _hidden(
-        bpy.props.BoolProperty,
-        "The Armature modifiers have the Preserve Volume nearest to Sinew's method, not the "
-        "artist's own: in saved files, and in modes of tools that need them",
-    )
-    replaced_smooth: _hidden(bpy.props.PointerProperty, type=SinewSwitchedOff)
-    baked: bpy.props.CollectionProperty(
-        type=SinewSwitchedOff, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
-    )
-    neutral_uid: _hidden(bpy.props.IntProperty, "The modifier that changes nothing (undeformed.py)")
-    mark_uid: _hidden(bpy.props.IntProperty, "The modifier that marks the mesh (undeformed.py)")
-    marks_rest: _hidden(bpy.props.BoolProperty, "Sinew has Blender add rest positions")
-    adds_rest_position: _hidden(
-        bpy.props.BoolProperty, "The artist's own choice of Add Rest Position while Sinew sets it"
-    )
-    parent_type: _hidden(
-        bpy.props.StringProperty, "The object's parent type before Sinew made an Armature modifier of it"
-    )
-    attribute: _hidden(
-        bpy.props.StringProperty, "Attribute that holds the points; empty where the point buffer does"
-    )
-    normals_attribute: _hidden(
-        bpy.props.StringProperty, "Attribute that holds the normals; empty where none does"
-    )
-    point_buffer: _hidden(
-        bpy.props.PointerProperty,
-        "The object whose vertices are the deformed points (point_buffer.py)",
-        type=bpy.types.Object,
-    )
-    upstream_proxy: _hidden(
-        bpy.props.PointerProperty,
-        "The copy that has only the upstream modifiers (upstream_proxy.py)",
-        type=bpy.types.Object,
-    )
-    upstream_signature: bpy.props.StringProperty(
-        description="What the proxy was made from, as upstream_proxy.signature() returns it",
-        options={"HIDDEN"},
-    )
-    helper: _hidden(bpy.props.BoolProperty, "Made by Sinew for another object")
-    token: bpy.props.IntProperty(
-        description="The object's session_uid, which its evaluated copies lack", options={"HIDDEN"}
-    )
-    copied: bpy.props.PointerProperty(
-        description="The object that this one is a comparison's copy of",
-        type=bpy.types.Object,
-        options={"HIDDEN"},
-    )
-    copied_for: bpy.props.StringProperty(
-        description="The method that this copy is there to show; empty for all but copies", options={"HIDDEN"}
-    )
-    had_animation: _hidden(bpy.props.BoolProperty, "The object had animation data, be it empty, before Sinew")
-    pose: bpy.props.FloatProperty(
-        options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
-    )
-    request: bpy.props.FloatProperty(
-        get=_object_requested,
-        options={"HIDDEN"},
-        description="Read by pose_driver's driver, to request points",
+        type=SinewReplacedModifier, options={"HIDDEN"}, override=_INSERTABLE
     )
     error: bpy.props.StringProperty(
-        description="Why Sinew can not deform it; empty where it can", options={"HIDDEN"}, get=_error
-    )
-    modifier_uid: bpy.props.IntProperty(
-        description="The persistent_uid of Sinew's modifier, which has no node group while Blender deforms",
+        description="Why Sinew can not deform it; empty where it can",
         options={"HIDDEN"},
+        get=_error,
     )
 
     @property
     def replaces_modifiers(self) -> bool:
         """Whether Sinew deforms now, wherever the icons of its modifier say so."""
-        return Situation(self.situation).is_by_sinew
+        return Situation(self.stack.situation).is_by_sinew
 
     @property
     def mixed_method(self) -> str:
@@ -353,10 +357,22 @@ class SinewSettings(bpy.types.PropertyGroup):
 
 
 # A group of settings for each stage, and for each method that has parameters, by its name.
+SETTING_GROUPS = {**STAGE_GROUPS, **METHOD_GROUPS}
+# What only Sinew uses.
+_HIDDEN_GROUPS = {
+    "identity": SinewIdentity,
+    "stack": SinewStack,
+    "before": SinewBefore,
+    "storage": SinewStorage,
+    "driver": SinewDriver,
+}
 SinewSettings.__annotations__.update(
     {
-        name: bpy.props.PointerProperty(type=group, description=group.__doc__, override=OVERRIDABLE)
-        for name, group in (*STAGE_GROUPS.items(), *METHOD_GROUPS.items())
+        **{
+            name: bpy.props.PointerProperty(type=group, description=group.__doc__, override=OVERRIDABLE)
+            for name, group in SETTING_GROUPS.items()
+        },
+        **{name: _hidden(bpy.props.PointerProperty, type=each) for name, each in _HIDDEN_GROUPS.items()},
     }
 )
 
@@ -369,12 +385,12 @@ def has_sinew(obj: bpy.types.Object) -> bool:
     # Reading the settings of an object that has none would leave an empty group in the file.
     if obj.type != "MESH" or not obj.is_property_set("sinew"):
         return False
-    return len(obj.sinew.replaced_modifiers) > 0 and not obj.sinew.helper
+    return len(obj.sinew.replaced_modifiers) > 0 and not obj.sinew.identity.is_helper
 
 
 def is_helper(obj: bpy.types.Object) -> bool:
     """Whether Sinew made this object for another one."""
-    return obj.is_property_set("sinew") and obj.sinew.helper
+    return obj.is_property_set("sinew") and obj.sinew.identity.is_helper
 
 
 def shows_heat(obj: bpy.types.Object) -> bool:
@@ -384,7 +400,7 @@ def shows_heat(obj: bpy.types.Object) -> bool:
 
 def is_copy(obj: bpy.types.Object) -> bool:
     """Whether a comparison made this object, to show a method beside the original."""
-    return obj.is_property_set("sinew") and bool(obj.sinew.copied_for)
+    return obj.is_property_set("sinew") and bool(obj.sinew.identity.method)
 
 
 def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
@@ -420,7 +436,7 @@ def copy_groups(source: SinewSettings, target: SinewSettings, names: Iterable[st
 def make_groups(settings: SinewSettings) -> None:
     """Makes all groups of settings of the object, by reading them: Blender 5.2 cannot give a library override
     a group that its library lacks."""
-    for name in (*STAGE_GROUPS, *METHOD_GROUPS):
+    for name in (*SETTING_GROUPS, *_HIDDEN_GROUPS):
         getattr(settings, name)
 
 
@@ -455,8 +471,7 @@ def clear(obj: bpy.types.Object) -> None:
 FEATURE = Feature(
     (
         *(SinewReplacedModifier, SinewSwitchedOff),
-        *STAGE_GROUPS.values(),
-        *METHOD_GROUPS.values(),
+        *(*SETTING_GROUPS.values(), *_HIDDEN_GROUPS.values()),
         SinewSettings,
     ),
     {
@@ -470,7 +485,7 @@ FEATURE = Feature(
             min=0.0,
             max=1.0,
             subtype="FACTOR",
-            update=_twist_changed,
+            update=lambda _bone, context: listeners.twist_changed(context),
             override=OVERRIDABLE,
         ),
         "PoseBone.sinew_twist_curve": bpy.props.FloatProperty(
@@ -480,12 +495,12 @@ FEATURE = Feature(
             default=0.0,
             min=-1.0,
             max=1.0,
-            update=_twist_changed,
+            update=lambda _bone, context: listeners.twist_changed(context),
             override=OVERRIDABLE,
         ),
         # A property of meshes, so that its getter receives the evaluated mesh and nothing is stored.
         "Mesh.sinew_request": bpy.props.FloatProperty(
-            get=_mesh_requested,
+            get=_requested("mesh_requested"),
             options={"HIDDEN"},
             description="Read by pose_driver's driver, to request points",
         ),

@@ -9,7 +9,7 @@ from . import properties
 
 # Properties of properties.SinewSettings; all stages and parameters of methods are shared, too.
 SHARED = ("method", "scale_rule", "normals", "leave_small")
-GROUPS = {**properties.STAGE_GROUPS, **properties.METHOD_GROUPS}
+GROUPS = properties.SETTING_GROUPS
 
 
 def share(source: bpy.types.Object, target: bpy.types.Object) -> None:

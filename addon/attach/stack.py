@@ -55,7 +55,7 @@ def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
 def neutral_modifier(obj: bpy.types.Object) -> bpy.types.LaplacianDeformModifier | None:
     """Returns Sinew's modifier that changes nothing (undeformed.py), be it renamed; else one of its name."""
     found = [m for m in obj.modifiers if m.type == "LAPLACIANDEFORM" and not m.is_bind]
-    same = (m for m in found if m.persistent_uid == properties.of(obj).neutral_uid)
+    same = (m for m in found if m.persistent_uid == properties.of(obj).stack.neutral_uid)
     return next(same, None) or next((m for m in found if m.name.startswith("Sinew")), None)
 
 
@@ -63,7 +63,7 @@ def mark_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     """Returns Sinew's modifier that marks the mesh (undeformed.py), also without its node group."""
     nodes = [m for m in obj.modifiers if m.type == "NODES"]
     bare = [m for m in nodes if m.node_group is None]
-    same = (m for m in bare if m.persistent_uid == properties.of(obj).mark_uid)
+    same = (m for m in bare if m.persistent_uid == properties.of(obj).stack.mark_uid)
     named = (m for m in bare if m.name.startswith(MARK_NAME))
     return next(itertools.chain((m for m in nodes if node_group.is_stack_mark(m)), same, named), None)
 
@@ -82,7 +82,7 @@ def helping_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 def _is_ours(obj: bpy.types.Object, modifier: bpy.types.NodesModifier) -> bool:
     return modifier.name.startswith("Sinew") or (
-        properties.has_sinew(obj) and properties.of(obj).modifier_uid == modifier.persistent_uid
+        properties.has_sinew(obj) and properties.of(obj).stack.modifier_uid == modifier.persistent_uid
     )
 
 

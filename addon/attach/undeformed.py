@@ -40,7 +40,7 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
     _ensure_mark(obj)
     stack.position_own(obj)
     can_mark = _can_mark(obj) and not loses_marks(obj)
-    keeps = properties.of(obj).adds_rest_position or not can_mark
+    keeps = properties.of(obj).before.adds_rest_position or not can_mark
     return {
         node_group.IS_MARKED: can_mark,
         node_group.MARK_TO_REMOVE: "" if keeps else node_group.REST_POSITION,
@@ -95,12 +95,12 @@ def _make_neutral(obj: bpy.types.Object) -> None:
     neutral.vertex_group = obj.vertex_groups[0].name
     if made is not None:
         obj.vertex_groups.remove(made)
-    properties.of(obj).neutral_uid = neutral.persistent_uid
+    properties.of(obj).stack.neutral_uid = neutral.persistent_uid
 
 
 def _ensure_mark(obj: bpy.types.Object) -> None:
     mark = stack.mark_modifier(obj) or _new(obj, stack.MARK_NAME, "NODES")
-    properties.store(properties.of(obj), "mark_uid", mark.persistent_uid)
+    properties.store(properties.of(obj).stack, "mark_uid", mark.persistent_uid)
     group = node_group.get_or_make_stack_mark()
     if mark.node_group != group:
         references.note(obj)
@@ -121,13 +121,13 @@ def _new(obj: bpy.types.Object, name: str, kind: str) -> bpy.types.Modifier:
 
 def mark(obj: bpy.types.Object, is_marked: bool) -> None:
     """Switches Add Rest Position on, or back to what the artist chose, also meanwhile."""
-    settings, is_on = properties.of(obj), obj.add_rest_position_attribute
+    before, is_on = properties.of(obj).before, obj.add_rest_position_attribute
     is_marked = is_marked and _can_mark(obj)
-    if not settings.marks_rest and not is_marked:
+    if not before.marks_rest and not is_marked:
         return
-    own = is_on and (settings.adds_rest_position or not settings.marks_rest)
-    properties.store(settings, "adds_rest_position", own)
-    properties.store(settings, "marks_rest", is_marked)
+    own = is_on and (before.adds_rest_position or not before.marks_rest)
+    properties.store(before, "adds_rest_position", own)
+    properties.store(before, "marks_rest", is_marked)
     if is_on != (is_marked or own):
         obj.add_rest_position_attribute = is_marked or own
 

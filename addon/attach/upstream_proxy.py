@@ -51,6 +51,8 @@ _shared: set[int] = set()
 
 # Marks a proxy's own copy of the mesh.
 _COPY = "sinew_copy"
+# A custom property of a proxy: what it was made from, as signature() returns it.
+_MADE_FROM = "sinew_made_from"
 
 
 def is_needed(obj: bpy.types.Object) -> bool:
@@ -96,31 +98,27 @@ def check(obj: bpy.types.Object) -> None:
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     """Returns the copy, made again where the upstream modifiers or the mesh differ from its own."""
-    settings = properties.of(obj)
+    storage = properties.of(obj).storage
     if not is_needed(obj):
         remove(obj)
         return None
     check(obj)
-    wanted, shares = signature(obj), _has_to_share_mesh(obj)
-    if (
-        settings.upstream_proxy is None
-        or settings.upstream_signature != wanted
-        or shares_mesh(obj) != shares
-        or not is_current(obj)
-    ):
+    wanted, shares, proxy = signature(obj), _has_to_share_mesh(obj), storage.upstream_proxy
+    if proxy is None or proxy.get(_MADE_FROM) != wanted or shares_mesh(obj) != shares or not is_current(obj):
         # Never the old one with another mesh: see references.py.
         references.note(obj)
         remove(obj)
-        settings.upstream_proxy, settings.upstream_signature = _make(obj, shares), wanted
+        storage.upstream_proxy = _make(obj, shares)
+        storage.upstream_proxy[_MADE_FROM] = wanted
         if not is_current(obj):
             share_mesh(obj)
             return ensure(obj)
-    return settings.upstream_proxy
+    return storage.upstream_proxy
 
 
 def shares_mesh(obj: bpy.types.Object) -> bool:
     """Whether the object has a proxy, and that is a second user of its mesh."""
-    proxy = properties.of(obj).upstream_proxy
+    proxy = properties.of(obj).storage.upstream_proxy
     return proxy is not None and proxy.data == obj.data
 
 
@@ -140,25 +138,25 @@ def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
         or any(modifier.type in _READERS for modifier in stack.upstream(obj))
     ):
         return True
-    has_copy = properties.of(obj).upstream_proxy is not None and not shares_mesh(obj)
+    has_copy = properties.of(obj).storage.upstream_proxy is not None and not shares_mesh(obj)
     return not has_copy and mesh.users - mesh.use_fake_user - shares_mesh(obj) > 1
 
 
 def is_current(obj: bpy.types.Object) -> bool:
     """Whether the proxy's mesh, if it has one, is the object's."""
-    proxy = properties.of(obj).upstream_proxy
+    proxy = properties.of(obj).storage.upstream_proxy
     return proxy is None or proxy.data == obj.data or mesh_compare.are_alike(obj.data, proxy.data)
 
 
 def follow_points(obj: bpy.types.Object) -> None:
     """Gives the proxy's copy of the mesh, which is not current, the points of the mesh. Another add-on's
     handler can move these with each frame, also of a render."""
-    mesh_compare.write_points(obj.data, properties.of(obj).upstream_proxy.data)
+    mesh_compare.write_points(obj.data, properties.of(obj).storage.upstream_proxy.data)
 
 
 def remove(obj: bpy.types.Object) -> None:
-    settings = properties.of(obj)
-    copy, settings.upstream_proxy, settings.upstream_signature = settings.upstream_proxy, None, ""
+    storage = properties.of(obj).storage
+    copy, storage.upstream_proxy = storage.upstream_proxy, None
     if copy is not None and copy.library is None:
         remove_helper(copy)
 
@@ -179,10 +177,11 @@ def is_proxy(helper: bpy.types.Object) -> bool:
 
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
     """Returns the mesh that the Armature modifier gets; None as long as Blender has not evaluated it."""
-    proxy = properties.of(obj).upstream_proxy
+    proxy = properties.of(obj).storage.upstream_proxy
     evaluated = proxy.evaluated_get(depsgraph)
     # If it was just made at the address of a deleted object, Blender returns what was evaluated for that.
-    is_other = not isinstance(evaluated, bpy.types.Object) or evaluated.sinew.token != proxy.sinew.token
+    token = proxy.sinew.identity.token
+    is_other = not isinstance(evaluated, bpy.types.Object) or evaluated.sinew.identity.token != token
     if is_other or not evaluated.is_evaluated:
         return None
     # For a hidden object Blender may need only the transform, as a constraint's target: then it does not
@@ -208,7 +207,8 @@ def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
         copy.data = _copy_of_mesh(obj)
     properties.clear(copy)
     copy.add_rest_position_attribute = False
-    properties.of(copy).helper, properties.of(copy).token = True, copy.session_uid
+    identity = properties.of(copy).identity
+    identity.is_helper, identity.token = True, copy.session_uid
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)

@@ -223,13 +223,13 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
     except SinewError as error:
         log.error("%s", error)
         return True
-    settings = properties.of(obj)
+    settings, others = properties.of(obj), properties.of(origin)
     for name in shared_settings.SHARED:
-        shared_settings.assign(settings, name, getattr(properties.of(origin), name))
-    groups = (*shared_settings.GROUPS, "replaced_smooth")
-    properties.copy_groups(properties.of(origin), settings, groups)
+        shared_settings.assign(settings, name, getattr(others, name))
+    properties.copy_groups(others, settings, shared_settings.GROUPS)
+    properties.copy(others.before.smooth, settings.before.smooth)
     for name in VIEWS:
-        properties.store(settings, f"hidden_{name}", getattr(properties.of(origin), f"hidden_{name}"))
+        properties.store(settings.stack, f"hidden_{name}", getattr(others.stack, f"hidden_{name}"))
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
     return True
@@ -254,7 +254,7 @@ def _origin_of(
     def likeness(obj: bpy.types.Object) -> tuple[bool, bool, bool]:
         settings = properties.of(obj)
         return (
-            settings.point_buffer is not None and settings.point_buffer == buffer,
+            settings.storage.point_buffer is not None and settings.storage.point_buffer == buffer,
             obj == bpy.context.view_layer.objects.active,
             pointed <= set(settings.armatures),
         )

@@ -199,7 +199,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     new.objects.add(obj.session_uid)
                 if obj.data.name_full not in names:
                     continue
-                if obj.data.name_full in seen or properties.of(obj).upstream_proxy is not None:
+                if obj.data.name_full in seen or properties.of(obj).storage.upstream_proxy is not None:
                     unread.append(obj)
                     if not upstream_proxy.is_current(obj):
                         upstream_proxy.follow_points(obj)

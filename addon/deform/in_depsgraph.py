@@ -54,7 +54,7 @@ class DepsgraphRequests:
             # Something other than the driver reads the property.
             return
         objects, names = self._known
-        skinned = objects.get(evaluated.sinew.token)
+        skinned = objects.get(evaluated.sinew.identity.token)
         if skinned is None or evaluated.name not in names:
             return
         try:
@@ -121,7 +121,7 @@ def _leave_out(evaluated: bpy.types.Object, modifiers: pose.Modifiers) -> None:
     """
     names = {replaced.name for replaced, _armature in modifiers}
     for view in VIEWS:
-        if not getattr(evaluated.sinew, f"hidden_{view}"):
+        if not getattr(evaluated.sinew.stack, f"hidden_{view}"):
             shown = [getattr(m, f"show_{view}") and m.name not in names for m in evaluated.modifiers]
             evaluated.modifiers.foreach_set(f"show_{view}", shown)
 
@@ -146,11 +146,12 @@ def _memory_to_write(
         to_normals = _NO_NORMALS
         if count:
             domain = skinned.plan.normals.domain
-            to_normals = mesh_io.vectors_in(mesh, skinned.noted.normals_attribute, domain)
+            name = point_store.normals_name(skinned.noted.attribute)
+            to_normals = mesh_io.vectors_in(mesh, name, domain)
         if to_points is None or to_normals is None:
             return None
         return (to_points, to_normals) if (len(to_points), len(to_normals)) == (points, count) else None
-    buffer = settings.point_buffer
+    buffer = settings.storage.point_buffer
     # Blender does not always mark an evaluated object's data as evaluated, so the object itself is checked.
     if buffer is None or not buffer.is_evaluated:
         return None

@@ -147,7 +147,7 @@ def prepare_for_save() -> None:
         with _logging_failure("What the methods need is not in the file, and is computed again"):
             precomputing.store_in_meshes([(obj, session.state_of(obj)) for obj in objects])
         with _logging_failure("The file does not say that it uses Sinew"):
-            note.write([obj for obj in objects if properties.of(obj).has_nearest_volume])
+            note.write([obj for obj in objects if properties.of(obj).before.has_nearest_volume])
 
 
 @contextlib.contextmanager

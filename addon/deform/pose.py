@@ -153,7 +153,7 @@ def _taking_part(
             if is_keyed
             else icons.takes_part(
                 getattr(replaced, f"show_{name}"),
-                getattr(evaluated.sinew, f"hidden_{name}"),
+                getattr(evaluated.sinew.stack, f"hidden_{name}"),
                 getattr(replaced, f"switched_{name}"),
             )
             for (replaced, _armature), is_keyed in zip(modifiers, are_keyed, strict=False)

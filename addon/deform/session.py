@@ -333,7 +333,7 @@ def waiting() -> set[tuple[int, int]]:
     """Returns the objects that wait for Blender to evaluate their upstream proxy, each by its session_uid and
     that of the proxy, which may be made anew meanwhile."""
     return {
-        (obj.session_uid, uid(properties.of(obj).upstream_proxy))
+        (obj.session_uid, uid(properties.of(obj).storage.upstream_proxy))
         for obj in objects_with_sinew(Changes())
         if plan_of(obj).state is State.WAITING_UPSTREAM and properties.of(obj).replaces_modifiers
     }

@@ -100,7 +100,6 @@ class Noted:
 
     modifier             the name of Sinew's modifier, by which it is found again
     attribute            the mesh's point attribute; empty where the point buffer has the points
-    normals_attribute    the mesh's attribute with the normals; empty where there is none
     normals_domain       the normals that drew the mesh, as from normals.domain_of()
     mesh_users           the number of users of the mesh; with several, another could read while Sinew writes
     visibility_keyed     for each Armature modifier, whether an animation switches it on and off
@@ -116,7 +115,6 @@ class Noted:
     mode: str
     modifier: str
     attribute: str
-    normals_attribute: str
     normals_domain: str
     mesh_users: int
     visibility_keyed: list[bool]
@@ -129,14 +127,13 @@ class Noted:
 
     @classmethod
     def of(cls, obj: bpy.types.Object, plan: Plan, bound: Bound) -> Noted:
-        settings, mesh = properties.of(obj), obj.data
-        own = {obj.session_uid, mesh.session_uid, uid(mesh.shape_keys), uid(settings.upstream_proxy)}
+        storage, mesh = properties.of(obj).storage, obj.data
+        own = {obj.session_uid, mesh.session_uid, uid(mesh.shape_keys), uid(storage.upstream_proxy)}
         return cls(
             name=obj.name,
             mode=obj.mode,
             modifier=stack.sinew_modifier(obj).name,
-            attribute=settings.attribute,
-            normals_attribute=settings.normals_attribute,
+            attribute=storage.attribute,
             normals_domain=normals.domain_of(mesh),
             mesh_users=mesh.users,
             visibility_keyed=[is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)],
@@ -271,7 +268,7 @@ def state_of(obj: bpy.types.Object) -> list:
         obj.instance_type,
         keys is None or keys.use_relative,
     ]
-    if settings.upstream_proxy is not None:
+    if settings.storage.upstream_proxy is not None:
         state.append(upstream_proxy.signature(obj))
     state += [armature.mode for armature in settings.armatures]
     # Adding an animation has no event of its own.

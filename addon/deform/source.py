@@ -133,7 +133,7 @@ class Source:
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
     """Returns False until Blender has evaluated the upstream proxy: it was just made, or Sinew was off and
     nothing needed it."""
-    if properties.of(obj).upstream_proxy is None:
+    if properties.of(obj).storage.upstream_proxy is None:
         return True
     return was_on and upstream_proxy.evaluated_mesh(obj, depsgraph) is not None
 
@@ -144,7 +144,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     with_surface  with the triangles, and with the stored data that was computed from them
     """
     names = _group_names(obj, depsgraph)
-    from_upstream = properties.of(obj).upstream_proxy is not None
+    from_upstream = properties.of(obj).storage.upstream_proxy is not None
     mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_upstream else obj.data
     weights = mesh_io.read_group_weights(mesh)
     points = mesh_io.read_points(mesh)
@@ -186,7 +186,7 @@ def has_changed(
 
     touched  the object itself may have changed
     """
-    helper = properties.of(obj).upstream_proxy
+    helper = properties.of(obj).storage.upstream_proxy
     if (helper is not None) != source.from_upstream:
         return True
     if touched and _group_names(obj, depsgraph) != source.group_names:
@@ -207,7 +207,7 @@ def has_changed(
 
 def _group_names(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
     """Requires is_ready()."""
-    proxy = properties.of(obj).upstream_proxy
+    proxy = properties.of(obj).storage.upstream_proxy
     return (obj if proxy is None else proxy.evaluated_get(depsgraph)).vertex_groups.keys()
 
 
@@ -229,7 +229,7 @@ def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Deps
 
     Requires is_ready().
     """
-    if properties.of(obj).upstream_proxy is not None:
+    if properties.of(obj).storage.upstream_proxy is not None:
         return _upstream_points(upstream_proxy.evaluated_mesh(obj, depsgraph), source)
     return _keyed_points(obj.evaluated_get(depsgraph), obj.data.evaluated_get(depsgraph), source)
 
@@ -240,7 +240,7 @@ def evaluated_points(
     """The same from evaluated data alone; None where its vertices are not those that were read."""
     if not source.from_upstream:
         return _keyed_points(evaluated, evaluated_mesh, source)
-    upstream = evaluated.sinew.upstream_proxy
+    upstream = evaluated.sinew.storage.upstream_proxy
     if upstream is None or not upstream.is_evaluated or len(upstream.data.vertices) != len(source.points):
         return None
     return _upstream_points(upstream.data, source)

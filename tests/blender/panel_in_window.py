@@ -150,7 +150,7 @@ def copies_in_view() -> bool:
     region = next(region for region in area.regions if region.type == "WINDOW")
     sidebar = next(region for region in area.regions if region.type == "UI")
     depsgraph = main_window().view_layer.depsgraph
-    copies = [obj for obj in bpy.data.objects if obj.is_property_set("sinew") and obj.sinew.copied_for]
+    copies = [obj for obj in bpy.data.objects if obj.is_property_set("sinew") and obj.sinew.identity.method]
     for copy in copies:
         evaluated = copy.evaluated_get(depsgraph)
         for corner in evaluated.bound_box:
@@ -175,7 +175,7 @@ def comparison_by_clicks() -> Iterator[None]:
     window.press("RET", LOG_MATRIX)
     yield from window.wait(4)
     state = scene().sinew_comparison
-    compared = sorted({obj.sinew.copied_for for obj in state.collection.objects})
+    compared = sorted({obj.sinew.identity.method for obj in state.collection.objects})
     check("compared", compared, ["dq", "lbs", "log"])
     check("copies in view", copies_in_view())
     with window.in_view3d("WINDOW"):

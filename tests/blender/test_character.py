@@ -114,10 +114,7 @@ def _items(name: str) -> list[str]:
 def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
     """Settings that are added to a mesh must be added here, too."""
     of_a_mesh = (
-        "enabled heat error is_own replaced_modifiers situation hidden_viewport hidden_render baked "
-        "has_nearest_volume replaced_smooth parent_type attribute normals_attribute point_buffer "
-        "modifier_uid marks_rest neutral_uid mark_uid adds_rest_position upstream_proxy upstream_signature "
-        "helper token copied copied_for had_animation pose request rna_type name"
+        "enabled heat error is_own replaced_modifiers identity stack before storage driver rna_type name"
     )
     names = set(properties.SinewSettings.bl_rna.properties.keys()) - {*of_a_mesh.split()}
     assert names == set(character.SinewCharacter.bl_rna.properties.keys()) - {

@@ -37,9 +37,9 @@ def state() -> comparison_state.SinewComparison:
 def copies(obj: bpy.types.Object) -> dict[str, bpy.types.Object]:
     """The copies of one object, by method."""
     return {
-        properties.of(copy).copied_for: copy
+        properties.of(copy).identity.method: copy
         for copy in comparison_state.copies_of(state())
-        if properties.of(copy).copied == obj
+        if properties.of(copy).identity.copied == obj
     }
 
 

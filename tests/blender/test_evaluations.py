@@ -321,7 +321,7 @@ def test_a_frame_writes_into_the_evaluated_mesh_alone():
     """Not into the mesh itself, of which it is a copy; state_of() returns the same shape."""
     obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(1)
-    attribute = obj.data.attributes[properties.of(obj).attribute]
+    attribute = obj.data.attributes[properties.of(obj).storage.attribute]
     stored = vectors_of(attribute)
     bpy.context.scene.frame_set(7)
     ((_obj, state),) = scenes.states_of(obj)

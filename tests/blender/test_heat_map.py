@@ -150,7 +150,7 @@ def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     bpy.ops.sinew.add()
     choose("bulge")
     bpy.ops.sinew.heat_map()
-    assert properties.of(first).point_buffer != properties.of(second).point_buffer
+    assert properties.of(first).storage.point_buffer != properties.of(second).storage.point_buffer
     bent, straight = shown_colours(first), shown_colours(second)
     assert np.ptp(bent, axis=0).max() > 0.1
     assert np.ptp(straight, axis=0).max() < 1e-3
@@ -271,7 +271,7 @@ def test_a_duplicate_has_colours_of_its_own():
     properties.of(twin).heat = False
     bpy.context.scene.frame_set(7)
     assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
-    buffers = [properties.of(each).point_buffer for each in (obj, twin)]
+    buffers = [properties.of(each).storage.point_buffer for each in (obj, twin)]
     assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in buffers] == [True, False]
 
 
@@ -283,7 +283,7 @@ def test_colours_wait_for_a_point_buffer_that_is_empty():
     before = shown_colours(obj)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     pairs = session.states_of([obj], depsgraph)
-    properties.of(obj).point_buffer.data.clear_geometry()
+    properties.of(obj).storage.point_buffer.data.clear_geometry()
     heat_map.update(pairs, depsgraph)
     session.rebind(obj, bpy.context)
     bpy.context.view_layer.update()

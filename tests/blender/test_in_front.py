@@ -77,7 +77,7 @@ def test_exporters_do_not_find_the_proxy(tmp_path):
     obj.parent = armature
     scenes.put_in_front(obj, "MIRROR", "Mirror")
     scenes.add_sinew(obj)
-    assert properties.of(obj).upstream_proxy is not None
+    assert properties.of(obj).storage.upstream_proxy is not None
     bpy.ops.export_scene.gltf(filepath=str(tmp_path / "arm.gltf"), export_format="GLTF_SEPARATE")
     nodes = json.loads((tmp_path / "arm.gltf").read_text())["nodes"]
     assert [node["name"] for node in nodes if "mesh" in node] == ["Arm"]
@@ -186,7 +186,7 @@ def test_a_proxy_at_the_address_of_a_deleted_object(route):
     scenes.put_in_front(obj)
     bpy.context.view_layer.update()
     bpy.app.handlers.depsgraph_update_post.remove(delete)
-    assert properties.of(obj).upstream_proxy.as_pointer() in addresses, "nothing is tested"
+    assert properties.of(obj).storage.upstream_proxy.as_pointer() in addresses, "nothing is tested"
     shown = scenes.final_points(obj)
     properties.of(obj).enabled = False
     expected = scenes.final_points(obj)
@@ -286,7 +286,7 @@ def test_the_proxy_follows_the_mesh(edit, route):
         assert after.shape != before.shape or scenes.worst(after, before) > 1e-3, "nothing is tested"
         later = scenes.shapes(obj, FRAMES)
         if has_sinew:
-            assert properties.of(obj).upstream_proxy.data != obj.data
+            assert properties.of(obj).storage.upstream_proxy.data != obj.data
             attach.remove(obj)
         assert [mesh.name for mesh in bpy.data.meshes if mesh.users == 1] == [obj.data.name]
         bpy.data.batch_remove([obj, obj.data])
@@ -314,7 +314,7 @@ def test_a_mesh_that_another_addon_moves_with_each_frame(event, route):
     scenes.add_sinew(obj, "lbs")
     getattr(bpy.app.handlers, event).append(move)
     shown = scenes.shapes(obj, FRAMES)
-    proxy = properties.of(obj).upstream_proxy
+    proxy = properties.of(obj).storage.upstream_proxy
     assert (proxy.data == obj.data) == (route == routes.UPDATE)
     properties.of(obj).enabled = False
     expected = scenes.shapes(obj, FRAMES)
@@ -329,7 +329,7 @@ def test_a_mesh_that_does_not_equal_its_copy_is_shared():
     scenes.put_in_front(obj, "MIRROR")
     scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(8)
-    proxy = properties.of(obj).upstream_proxy
+    proxy = properties.of(obj).storage.upstream_proxy
     assert proxy is not None
     assert proxy.data == obj.data or not np.isnan(mesh_io.read_group_weights(obj.data).weights).any()
 

@@ -129,8 +129,10 @@ def test_settings_are_copied_whole():
     properties.copy(settings, properties.of(other))
     copied = properties.of(other)
     assert [s.name for s in copied.replaced_modifiers] == [s.name for s in settings.replaced_modifiers]
-    for name in ("method", "leave_small", "scale_rule", "enabled", "situation", "hidden_render"):
+    for name in ("method", "leave_small", "scale_rule", "enabled"):
         assert getattr(copied, name) == getattr(settings, name)
+    for name in ("situation", "hidden_render", "modifier_uid"):
+        assert getattr(copied.stack, name) == getattr(settings.stack, name)
 
 
 def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
@@ -160,7 +162,7 @@ def test_remove_from_a_duplicate_after_the_original_is_deleted():
     other = scenes.copied(obj, linked=True)
     other.modifiers.clear()
     scenes.add_sinew(obj, "dq")
-    assert properties.of(obj).point_buffer is not None
+    assert properties.of(obj).storage.point_buffer is not None
     properties.of(obj).enabled = False
     copy = scenes.copied(obj, linked=True)
     bpy.context.view_layer.update()

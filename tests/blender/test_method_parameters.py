@@ -122,7 +122,7 @@ def test_a_comparison_has_it():
     obj.sinew.sdef.interpolation = "slerp"
     bpy.ops.sinew.compare(methods={"lbs", "sdef"})
     bpy.context.view_layer.update()
-    copy = next(each for each in bpy.context.scene.objects if properties.of(each).copied_for == "sdef")
+    copy = next(each for each in bpy.context.scene.objects if properties.of(each).identity.method == "sdef")
     tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
     # It is next to the original.
     moved = scenes.final_points(copy) - found["slerp"]

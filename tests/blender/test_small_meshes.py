@@ -261,7 +261,7 @@ def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
     before = set(obj.data.attributes.keys())
     properties.of(obj).leave_small = False
     expected = scenes.shapes(obj, FRAMES)
-    assert set(obj.data.attributes.keys()) == before | {properties.of(obj).attribute}
+    assert set(obj.data.attributes.keys()) == before | {properties.of(obj).storage.attribute}
     properties.of(obj).leave_small = True
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
     assert set(obj.data.attributes.keys()) == before

@@ -46,7 +46,7 @@ def _link_data():
     with bpy.context.temp_override(active_object=arm, object=arm, selected_editable_objects=[cube, arm]):
         bpy.ops.object.make_links_data("EXEC_DEFAULT", True, type="OBDATA")
     assert cube.data == arm.data
-    assert properties.of(arm).point_buffer is not None
+    assert properties.of(arm).storage.point_buffer is not None
 
 
 def _make_keys_absolute():
@@ -55,7 +55,7 @@ def _make_keys_absolute():
     bpy.ops.wm.context_toggle("EXEC_DEFAULT", True, data_path=path)
     arm = bpy.data.objects["Arm"]
     assert not arm.data.shape_keys.use_relative
-    assert properties.of(arm).upstream_proxy is not None
+    assert properties.of(arm).storage.upstream_proxy is not None
 
 
 def test_undo_of_sculpt_mode():
@@ -77,7 +77,7 @@ def test_undo_of_sculpt_mode():
         obj = bpy.data.objects["Arm"]
         is_sculpted = obj.mode == "SCULPT"
         assert obj.modifiers["Armature"].use_deform_preserve_volume == is_sculpted
-        assert properties.of(obj).has_nearest_volume == is_sculpted
+        assert properties.of(obj).before.has_nearest_volume == is_sculpted
         assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
@@ -382,7 +382,8 @@ def test_undo_that_takes_another_object_for_the_object(helper):
     assert scenes.worst(scenes.final_points(arm), shape) <= 1e-6
     np.testing.assert_array_equal(scenes.rest_points(arm), mesh)
     settings = properties.of(arm)
-    assert arm not in (settings.point_buffer, settings.upstream_proxy, settings.copied, *settings.armatures)
+    helpers = (settings.storage.point_buffer, settings.storage.upstream_proxy)
+    assert arm not in (*helpers, settings.identity.copied, *settings.armatures)
     attach.remove(arm)
     assert arm == bpy.data.objects.get("Arm")
 

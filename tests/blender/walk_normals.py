@@ -31,7 +31,7 @@ def faults(obj: bpy.types.Object, mesh: bpy.types.Mesh, points: np.ndarray) -> l
     if properties.of(obj).normals == properties.SKINNED_NORMALS:
         return []
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    proxy = properties.of(obj).upstream_proxy
+    proxy = properties.of(obj).storage.upstream_proxy
     upstream = None if proxy is None else upstream_proxy.evaluated_mesh(obj, depsgraph)
     source = upstream or obj.data
     shown, own = mesh_io.read_shading(mesh), mesh_io.read_shading(source)

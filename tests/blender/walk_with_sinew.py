@@ -108,7 +108,7 @@ class SinewSide(Side):
 
     def preserve_volume(self, modifier: bpy.types.Modifier) -> bool:
         obj = modifier.id_data
-        if self.has_sinew(obj) and obj.sinew.has_nearest_volume:
+        if self.has_sinew(obj) and obj.sinew.before.has_nearest_volume:
             kept = obj.sinew.replaced_modifiers.get(modifier.name)
             if kept is not None and not kept.was_nearest:
                 return kept.preserve_volume
@@ -153,7 +153,7 @@ class SinewSide(Side):
 
     def click(self, obj: bpy.types.Object, which: str, view: str, deformers: dict[str, str]) -> None:
         own, (armature,) = self.own_modifier(obj), armature_modifiers(obj)
-        if obj.sinew.situation == "alone":
+        if obj.sinew.stack.situation == "alone":
             # The Armature modifier's icon is off while Sinew deforms: other clicks come to the same. Switched
             # off again, it brings Sinew back.
             setattr(armature, f"show_{view}", deformers[view] == "Armature")
@@ -381,9 +381,9 @@ class SinewSide(Side):
     def copies(self) -> list[tuple[bpy.types.Object, str, str]]:
         """The copies of comparisons: object, original's name, method."""
         return [
-            (obj, obj.sinew.copied.name_full, obj.sinew.copied_for)
+            (obj, obj.sinew.identity.copied.name_full, obj.sinew.identity.method)
             for obj in bpy.data.objects
-            if properties.is_copy(obj) and obj.sinew.copied is not None
+            if properties.is_copy(obj) and obj.sinew.identity.copied is not None
         ]
 
     def left_over(self) -> list[str]:

@@ -35,6 +35,7 @@ VOLATILE = {
     "session_uid",
     "spaces",  # 4.2 crashes when an editor's content is read
     "tag",
+    "token",  # of Sinew's settings: a session_uid, while its driver is there
     "uv_sculpt",  # and when its brush is read
     "vertex_normals",
     # Of a UV map, like edge_selection and pin. Reading one creates an attribute and so moves the map, whose
@@ -216,7 +217,7 @@ class _Walk:
 
     def custom(self, data: bpy.types.bpy_struct, path: str) -> None:
         try:
-            items = list(data.items())
+            items = [(key, value) for key, value in data.items() if key != "token"]
         except (AttributeError, TypeError):
             return
         for name, value in items:
@@ -226,7 +227,7 @@ class _Walk:
 def _plain(value: object) -> object:
     """A custom property without the addresses in Blender's text for it."""
     if hasattr(value, "to_dict"):
-        return {name: _plain(item) for name, item in value.items()}
+        return {name: _plain(item) for name, item in value.items() if name != "token"}
     if hasattr(value, "to_list"):
         return value.to_list()
     return [_plain(item) for item in value] if isinstance(value, list) else value

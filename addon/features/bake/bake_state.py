@@ -60,7 +60,7 @@ def take_off(obj: bpy.types.Object) -> None:
     """Takes Sinew off an object whose shape is in a bake from now on; the Armature modifiers stay as they
     were, and anything that the bake already includes is switched off."""
     # A deforming parent would deform the baked shape again.
-    properties.of(obj).parent_type = ""
+    properties.of(obj).before.parent_type = ""
     smooth = corrective_smooth.replaced_modifier(obj)
     attach.take_off(obj)
     if smooth is not None:

@@ -122,7 +122,7 @@ def is_on() -> bool:
 
 def originals(state: comparison_state.SinewComparison) -> list[bpy.types.Object]:
     """Returns the compared objects, without those that the artist has deleted."""
-    found = {properties.of(copy).copied: None for copy in comparison_state.copies_of(state)}
+    found = {properties.of(copy).identity.copied: None for copy in comparison_state.copies_of(state)}
     return [obj for obj in found if obj is not None and obj.users_collection]
 
 
@@ -137,7 +137,7 @@ def end(context: bpy.types.Context) -> None:
         if state is not None and scene.library is None:
             collections += [(scene, state.collection)] if state.collection is not None else []
             scene.property_unset("sinew_comparison")
-    compared = {properties.of(copy).copied for copy in copies} - {None}
+    compared = {properties.of(copy).identity.copied for copy in copies} - {None}
     _remove_copies(copies)
     for scene, collection in collections:
         _remove_collection(scene, collection)
@@ -202,7 +202,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     copy.hide_select = True
     copy.color = (*COLOURS[characters.method_names().index(method) % len(COLOURS)], 1.0)
     settings = properties.of(copy)
-    settings.copied, settings.copied_for = obj, method
+    settings.identity.copied, settings.identity.method = obj, method
     if method != characters.BLENDER and attach.armature_of(copy) is not None:
         attach.add(copy, method)
         if original is not None:
@@ -222,9 +222,9 @@ def _take_sinew_off(copy: bpy.types.Object) -> None:
         return
     _use_own_actions(copy)
     # The referenced objects belong to the original.
-    settings = properties.of(copy)
-    settings.point_buffer = settings.upstream_proxy = None
-    settings.attribute = ""
+    storage = properties.of(copy).storage
+    storage.point_buffer = storage.upstream_proxy = None
+    storage.attribute = ""
     # Otherwise Blender 5.2 counts them as used even after the modifier is removed.
     nodes = stack.sinew_modifier(copy)
     if nodes is not None:

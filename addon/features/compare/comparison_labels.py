@@ -33,7 +33,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
         return []
     groups: dict[str, list[bpy.types.Object]] = {}
     for copy in comparison_state.copies_of(state):
-        groups.setdefault(properties.of(copy).copied_for, []).append(copy)
+        groups.setdefault(properties.of(copy).identity.method, []).append(copy)
     found = []
     originals = comparison.originals(state)
     if originals:

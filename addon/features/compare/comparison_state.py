@@ -85,7 +85,7 @@ def copies_of(state: SinewComparison) -> list[bpy.types.Object]:
 
 def methods_of(state: SinewComparison) -> list[str]:
     """Returns the methods that have copies, in the table's order."""
-    there = {properties.of(obj).copied_for for obj in copies_of(state)}
+    there = {properties.of(obj).identity.method for obj in copies_of(state)}
     return [name for name in characters.method_names() if name in there]
 
 
@@ -94,7 +94,7 @@ def arrange(state: SinewComparison) -> None:
     methods = methods_of(state)
     shown = shown_methods(state)
     for copy in copies_of(state):
-        method = properties.of(copy).copied_for
+        method = properties.of(copy).identity.method
         place = 1 + methods.index(method) if state.arrangement == SIDE_BY_SIDE else 1
         offset_nodes.set_offset(copy, tuple(place * state.spacing * x for x in state.axis))
         # Hidden per view layer, as the copies' own flag would make Blender rebuild its depsgraph.

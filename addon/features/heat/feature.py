@@ -31,7 +31,6 @@ def _end() -> None:
         if obj.type == "MESH":
             heat_nodes.remove_applied(obj.data)
         properties.clear(obj)
-    properties.listeners.heat_changed = None
 
 
 def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:

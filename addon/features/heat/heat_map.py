@@ -54,7 +54,7 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
 
 def _has_points(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
     """Whether its point buffer is filled: that of a copied object is not, until the copy is deformed."""
-    buffer = properties.of(obj).point_buffer
+    buffer = properties.of(obj).storage.point_buffer
     return buffer is not None and len(buffer.data.vertices) == len(skinned.bound.source.points)
 
 

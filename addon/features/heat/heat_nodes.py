@@ -38,7 +38,7 @@ def remove_unused_material() -> None:
 
 def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
     """Stores float32 [vertices, 3], linear, in the point buffer, and has Blender evaluate it."""
-    mesh = properties.of(obj).point_buffer.data
+    mesh = properties.of(obj).storage.point_buffer.data
     mesh_io.write_vectors(mesh, COLOURS, colours)
     mesh.update_tag()
 
@@ -55,13 +55,13 @@ def write_to_mesh(mesh: bpy.types.Mesh, colours: np.ndarray) -> None:
 
 
 def has_colours(obj: bpy.types.Object) -> bool:
-    point_buffer = properties.of(obj).point_buffer
+    point_buffer = properties.of(obj).storage.point_buffer
     return point_buffer is not None and mesh_io.find_attribute(point_buffer.data, COLOURS) is not None
 
 
 def remove_colours(obj: bpy.types.Object) -> None:
     if has_colours(obj):
-        mesh_io.remove_attribute(properties.of(obj).point_buffer.data, COLOURS)
+        mesh_io.remove_attribute(properties.of(obj).storage.point_buffer.data, COLOURS)
 
 
 def remove_applied(mesh: bpy.types.Mesh) -> None:

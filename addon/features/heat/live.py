@@ -139,7 +139,7 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
     for obj, skinned in pairs:
         mesh = (
             obj.data
-            if properties.of(obj).upstream_proxy is None
+            if properties.of(obj).storage.upstream_proxy is None
             else upstream_proxy.evaluated_mesh(obj, depsgraph)
         )
         shown = skinned.shown
