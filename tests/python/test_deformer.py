@@ -31,10 +31,6 @@ def assert_agrees(method, rig, extent, reference=None):
     assert errors.max() < TOLERANCE, f"worst error {errors.max():.2e} of the size of the scene"
 
 
-def test_methods_have_a_reference():
-    assert set(METHODS) | WITHOUT == set(reference.METHODS)
-
-
 def test_methods_say_what_they_are():
     rows = sinew.methods()
     assert len({row.number for row in rows}) == len({row.name for row in rows}) == len(rows)
@@ -83,8 +79,7 @@ def test_stages_say_what_they_are():
 
 @every_method
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
-@pytest.mark.parametrize("extent", [0.01, 1.0, 100.0])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("extent", "seed"), [(0.01, 0), (1.0, 1), (100.0, 2)])
 def test_agrees_with_the_reference(method, scaled, extent, seed):
     assert_agrees(method, random_rig(seed, extent=extent, scaled=scaled), extent)
 
@@ -141,13 +136,6 @@ def test_few_weights_many_scales(method):
     for factor in (1e-30, 1e-3, 7.0, 3.4e38):
         scaled = rig.with_(weights=(rig.weights * np.float32(factor)).astype(np.float32))
         assert_agrees(method, scaled, 1.0, expected)
-
-
-@every_method
-def test_rest_pose_is_unchanged_to_the_bit(method):
-    rig = random_rig(25, extent=100.0)
-    identity = np.tile(np.eye(4, dtype=np.float32), (15, 1, 1))
-    np.testing.assert_array_equal(rig.with_motions(identity).deform(method), rig.rest_points)
 
 
 @every_method
@@ -223,15 +211,6 @@ def test_bone_numbers_mean_nothing(method):
         rest_bones=rig.rest_bones[order],
     )
     np.testing.assert_array_equal(renumbered.deform(method), rig.deform(method))
-
-
-@every_method
-@pytest.mark.parametrize("vertices", [0, 1, 4095, 4096, 4097, 8193, 20000])
-def test_threads_change_no_bit(method, vertices):
-    rig = random_rig(33, vertices=vertices, most_influences=4, scaled=True)
-    expected = rig.deform(method, threads=1)
-    for threads in (None, 2, 3, 8, 10**30):
-        np.testing.assert_array_equal(rig.deform(method, threads=threads), expected)
 
 
 @every_method
@@ -331,17 +310,6 @@ def test_linear_blend_is_the_default():
 
 
 @every_method
-def test_set_rest_points_equals_a_new_deformer(method):
-    rig = random_rig(36, scaled=True)
-    other = (rig.rest_points * np.float32(0.5) + np.float32(1.0)).astype(np.float32)
-    deformer = rig.deformer(method)
-    assert deformer.set_rest_points(other) is None
-    np.testing.assert_array_equal(
-        deformer.deform(rig.transforms), rig.with_(rest_points=other).deform(method)
-    )
-
-
-@every_method
 def test_input_is_copied(method):
     rig = random_rig(37, scaled=True)
     arrays = [array.copy() for array in (*rig.mesh, rig.rest_bones)]
@@ -352,20 +320,6 @@ def test_input_is_copied(method):
     for array in arrays:
         array[...] = 0
     np.testing.assert_array_equal(deformer.deform(rig.transforms), rig.deform(method))
-
-
-@every_method
-def test_bones_from_model_equals_doing_it_by_hand(method):
-    rig = random_rig(38, scaled=True)
-    bones_from_model = random_motion(np.random.default_rng(39), 2.0) @ np.diag([2.0, 0.5, -1.5, 1.0])
-    points = rig.deform(method, bones_from_model=bones_from_model.astype(np.float32))
-    other = rig.with_(
-        rest_points=transform(bones_from_model, rig.rest_points.astype(np.float64)).astype(np.float32),
-        centres=transform(bones_from_model, rig.centres.astype(np.float64)).astype(np.float32),
-    )
-    _, margins = other.reference(method)
-    expected = transform(np.linalg.inv(bones_from_model), other.deform(method).astype(np.float64))
-    np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=10 * TOLERANCE)
 
 
 @every_method
@@ -519,7 +473,9 @@ CALLS = {
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize(
+    "name", [name if name == "Deformer" else pytest.param(name, marks=pytest.mark.slow) for name in CALLS]
+)
 def test_a_child_forked_while_others_call_goes_on(tmp_path, name):
     """The child has none of the threads that are inside calls here, and must not wait for them."""
     program = tmp_path / "fork.py"

@@ -3,7 +3,6 @@
 
 import copy
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,6 @@ from sinew_addon.core.errors import SinewError
 from smith_2013 import paper
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-EXPERIMENTS = DOCS.parent / "experiments"
 CONTENT = json.loads((DOCS / "results.json").read_text(encoding="utf-8"))
 
 
@@ -22,18 +20,6 @@ def content():
 
 def test_the_page_is_what_its_numbers_make_of_it(content):
     assert (DOCS / "results.md").read_text(encoding="utf-8") == paper.page(content)
-
-
-def test_its_plots_are_there():
-    pytest.importorskip("matplotlib")
-    named = set(re.findall(r"\]\((results-\w+\.svg)\)", paper.page(CONTENT)))
-    plots = paper.plots(CONTENT)
-    assert named == plots.keys()
-    for name, text in plots.items():
-        kept = (DOCS / name).read_text(encoding="utf-8")
-        # Releases of matplotlib differ slightly in positions; the words are the same.
-        assert re.findall(r"<text[^>]*>([^<]*)<", kept) == re.findall(r"<text[^>]*>([^<]*)<", text)
-        assert len(kept) < 100_000
 
 
 def test_incomplete_reports_make_no_page(content, tmp_path):
