@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 # Nothing that one test computes is visible to another.
@@ -44,6 +45,21 @@ LONG_TERM = {
 # Run a second time with Sinew's default for small meshes, except for tests marked by_sinew.
 BOTH_WAYS = {"test_changes", "test_editing", "test_in_front", "test_moved_modifiers", "test_several_views"}
 REAL_RIGS = ("human.blend", "CesiumMan.glb", "Fox.glb")
+
+
+# In the first tier, the newest Blender runs all of some cases, and each other one every second of them.
+IS_NEWEST = not os.environ.get("SINEW_NOT_NEWEST")
+
+
+def halved(cases: Iterable) -> list:
+    """Cases of which older Blenders leave every second one, each others, to the second tier."""
+    left = 2 if IS_NEWEST else 1 - bpy.app.version[1] % 2
+    return [
+        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.slow)
+        if number % 2 == left
+        else case
+        for number, case in enumerate(cases)
+    ]
 
 
 _exit_status = 0

@@ -100,8 +100,7 @@ def pose_anew(rig):
             bone.keyframe_insert("rotation_euler", frame=frame)
 
 
-@pytest.mark.parametrize(("method", "share"), [(METHOD, 0.25), ("cor", 0.35)])
-@pytest.mark.parametrize("scaled", [False, True])
+@pytest.mark.parametrize(("method", "share", "scaled"), [(METHOD, 0.25, False), ("cor", 0.35, True)])
 def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, scaled, method, share):
     obj, path = arm
     rig = obj.modifiers["Armature"].object

@@ -174,7 +174,11 @@ SETUPS = [
     ("set_up", "skinned"),
     [
         *((set_up, False) for set_up in SETUPS),
-        *((set_up, True) for set_up in (plain, mirrored_in_front, two_modifiers)),
+        (plain, True),
+        *(
+            pytest.param(set_up, True, marks=pytest.mark.slow)
+            for set_up in (mirrored_in_front, two_modifiers)
+        ),
     ],
 )
 def test_rigs(set_up, skinned):
@@ -223,8 +227,7 @@ def test_a_full_scene_is_as_it_was(tmp_path):
     assert [line for line in changed if not line.startswith("objects[Bare [props.blend]]")] == []
 
 
-@pytest.mark.parametrize("skinned", [False, True], ids=["plain", "skinned"])
-@pytest.mark.parametrize("set_up", [plain, mirrored_in_front], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(("set_up", "skinned"), [(plain, False), (mirrored_in_front, True)])
 def test_save_and_reopen(tmp_path, set_up, skinned):
     obj, armature = scenes.make_arm()
     set_up(obj, armature)

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import halved
 
 BEGIN = """
 import bpy, numpy as np
@@ -87,11 +88,18 @@ print("at its end")
 """
 
 
-@pytest.mark.parametrize("event", ["depsgraph_update_post", "frame_change_post"])
+# Deleted beside nothing of Sinew, then beside a skinned mesh.
 @pytest.mark.parametrize(
-    "parts",
-    [(DELETE, ADD, DELETE, COMPARE), (ADD, RENAME, COMPARE)],
-    ids=["beside nothing of Sinew, and beside a skinned mesh", "a skinned mesh renamed"],
+    ("event", "parts"),
+    halved(
+        [
+            ("depsgraph_update_post", (ADD, RENAME, COMPARE)),
+            ("depsgraph_update_post", (DELETE, ADD, DELETE, COMPARE)),
+            ("frame_change_post", (DELETE, ADD, DELETE, COMPARE)),
+            ("frame_change_post", (ADD, RENAME, COMPARE)),
+        ]
+    ),
+    ids=["rename-update", "delete-update", "delete-frame", "rename-frame"],
 )
 def test_others_delete_before_sinew_is_called(parts, event, tmp_path):
     script = tmp_path / "script.py"

@@ -3,19 +3,17 @@
 
 from __future__ import annotations
 
-import os
-
 import bpy
 import fuzz_parity
 import pytest
 import routes
 import scenes
+from conftest import IS_NEWEST
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session, small_meshes
 
 # The newest Blender runs the first 100 rigs, each other one 40 different ones: all of them must have the same
 # shapes (docs/parity.md), and together they check more rigs.
-IS_NEWEST = not os.environ.get("SINEW_NOT_NEWEST")
 RIGS = 100 if IS_NEWEST else 40
 FIRST = 0 if IS_NEWEST else RIGS * (10 * bpy.app.version[0] + bpy.app.version[1])
 # `./dev test` runs these many of them, `./dev test --all` the rest, too. Of fewer, one rig decides what share

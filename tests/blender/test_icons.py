@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import routes
 import scenes
+from conftest import halved
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.icons import Deformer
 from sinew_addon.ui import state_text
@@ -191,7 +192,9 @@ def by_route(request):
 
 
 @pytest.mark.parametrize(
-    ("prepare", "by_route"), [(_in_front, "evaluation"), (_with_keys, "update")], indirect=["by_route"]
+    ("prepare", "by_route"),
+    halved([(_in_front, "evaluation"), (_with_keys, "update")]),
+    indirect=["by_route"],
 )
 @pytest.mark.usefixtures("by_route")
 def test_clicks_among_everything_else(prepare, rendered_points, tmp_path):

@@ -68,6 +68,7 @@ def assert_equal_to_reference(
     assert scenes.worst(found[decided], expected[decided]) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_a_real_rig(method, real_rig):
     files.open_file(real_rig("human.blend"))

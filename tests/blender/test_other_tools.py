@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from conftest import halved
 from sinew_addon.attach import other_tools, properties, stack
 from sinew_addon.deform import safe_mode
 from sinew_addon.jobs.tasks import preflight
@@ -416,8 +417,7 @@ def outcome(tool: Callable, obj: bpy.types.Object, folder: Path) -> Seen:
         return {"error": str(error)}
 
 
-@pytest.mark.parametrize("prepare", MESHES)
-@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize(("tool", "prepare"), halved((tool, prepare) for tool in TOOLS for prepare in MESHES))
 def test_a_tool(tool, prepare, tmp_path):
     if (tool, prepare) == ("Collada", with_front_and_keys):
         pytest.skip("Blender's exporter then leaves another shape, without Sinew, too (4.2, 4.5)")

@@ -4,12 +4,11 @@ Blender without Sinew. Each caused a fault once. walk_script says how they are w
 
 from __future__ import annotations
 
-import os
-
 import bpy
 import pytest
 import walk
 import walk_script
+from conftest import IS_NEWEST
 
 CASES = {
     # Frames and poses
@@ -240,7 +239,6 @@ ON_BOTH_ROUTES = (
 )
 WAYS = (("evaluation", False), ("evaluation", True), ("update", False))
 # In the first tier, the newest Blender runs all of them by one way, each other one every second of them.
-IS_NEWEST = not os.environ.get("SINEW_NOT_NEWEST")
 NAMES = list(CASES) if IS_NEWEST else list(CASES)[bpy.app.version[1] % 2 :: 2]
 QUICK = {(name, *WAYS[0]) for name in NAMES} | {(name, *WAYS[-1]) for name in ON_BOTH_ROUTES}
 EVERY = [(name, *way) for way in WAYS for name in CASES]

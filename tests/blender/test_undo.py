@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import routes
 import scenes
+from conftest import halved
 from sinew_addon.attach import attach, node_group, properties, stack
 from sinew_addon.deform import session
 
@@ -322,8 +323,11 @@ def _opened_again(tmp_path, edit):
     bpy.ops.ed.undo_push(message="opened")
 
 
-@pytest.mark.parametrize("edit", _EDITS, ids=lambda each: each.__name__)
-@pytest.mark.parametrize("route", routes.ROUTES)
+@pytest.mark.parametrize(
+    ("edit", "route"),
+    halved([(edit, route) for route in routes.ROUTES for edit in _EDITS]),
+    ids=lambda each: getattr(each, "__name__", each),
+)
 def test_shapes_after_undo_and_redo(route, edit, tmp_path):
     routes.force(route)
     _opened_again(tmp_path, edit)
