@@ -26,13 +26,6 @@ def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
     feature.before_export(export_settings)
 
 
-def glTF2_post_export_callback(_export_settings: dict) -> None:  # noqa: N802
-    """Called after an export that did not fail."""
-    from .features.gltf import export
-
-    export.end()
-
-
 def glTF2ExportUserExtension() -> object:  # noqa: N802
     """Blender takes this function for a class, and calls the returned object's functions during an export."""
     from .features.gltf import export

@@ -518,9 +518,11 @@ def _replaced_modifier(
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
         found.visibility_is_keyed = is_visibility_animated(obj, modifier)
         is_alone = Situation(properties.of(obj).stack.situation) is Situation.ALONE
-        for name in VIEWS:
-            is_hidden = is_alone or getattr(properties.of(obj).stack, f"hidden_{name}")
-            if is_hidden and not found.visibility_is_keyed:
+        for name in () if found.visibility_is_keyed else VIEWS:
+            if getattr(properties.of(obj).stack, f"hidden_{name}"):
+                # Whoever added it while Sinew is hidden means it to deform.
+                setattr(found, f"switched_{name}", getattr(modifier, f"show_{name}"))
+            elif is_alone:
                 _show_in(modifier, name, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
     properties.store(found, "name", modifier.name)

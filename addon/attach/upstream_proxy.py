@@ -97,23 +97,31 @@ def check(obj: bpy.types.Object) -> None:
 
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """Returns the copy, made again where the upstream modifiers or the mesh differ from its own."""
+    """Returns the copy, made again where the upstream modifiers differ from its own, or set_outdated() said
+    that the mesh does: comparing meshes takes long."""
     storage = properties.of(obj).storage
     if not is_needed(obj):
         remove(obj)
         return None
     check(obj)
     wanted, shares, proxy = signature(obj), _has_to_share_mesh(obj), storage.upstream_proxy
-    if proxy is None or proxy.get(_MADE_FROM) != wanted or shares_mesh(obj) != shares or not is_current(obj):
+    if proxy is None or proxy.get(_MADE_FROM) != wanted or shares_mesh(obj) != shares:
         # Never the old one with another mesh: see references.py.
         references.note(obj)
         remove(obj)
         storage.upstream_proxy = _make(obj, shares)
         storage.upstream_proxy[_MADE_FROM] = wanted
-        if not is_current(obj):
+        if not shares and not mesh_compare.is_good_copy(obj.data, storage.upstream_proxy.data):
             share_mesh(obj)
             return ensure(obj)
     return storage.upstream_proxy
+
+
+def set_outdated(obj: bpy.types.Object) -> None:
+    """Has ensure() make the copy again."""
+    proxy = properties.of(obj).storage.upstream_proxy
+    if proxy is not None:
+        proxy[_MADE_FROM] = ""
 
 
 def shares_mesh(obj: bpy.types.Object) -> bool:

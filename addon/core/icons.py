@@ -122,7 +122,9 @@ def follow(view: View, situation: Situation, now: Icons) -> View:
     if now.sinew and not before.sinew:
         return view.switched_on()
     if before.sinew and not now.sinew:
-        return replace(view, hidden=True, switched=())
+        # A tool that hides all but some Armature modifiers means these to deform.
+        is_choice = any(now.modifiers) and now.modifiers != before.modifiers
+        return replace(view, hidden=True, switched=now.modifiers if is_choice else ())
     if not any(view.shown) and any(now.modifiers):
         return view.switched_on(now.modifiers)
     if situation is Situation.ALONE:

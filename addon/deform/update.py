@@ -59,6 +59,8 @@ class _Event:
     changes: Changes
 
     def __post_init__(self) -> None:
+        # Whether the upstream proxy's copy of the mesh has to be made again; None before it was compared.
+        self.is_copy_outdated: bool | None = None
         self.known = Known(self.old, is_bound=self.skinned is not None)
         self.bound_before = None if self.skinned is None else self.skinned.bound
         self.was_on = properties.of(self.obj).replaces_modifiers
@@ -89,7 +91,7 @@ class _Event:
             is_due=skinned.needs_apply,
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
-            is_other=skinned.noted.mode != apply_plan.mode_of(obj) or self._is_copy_outdated(),
+            is_other=skinned.noted.mode != apply_plan.mode_of(obj) or self._find_outdated_copy(),
             is_untouched=skinned.is_untouched_by(changes),
         )
         if facts.calls_for_plan or facts.is_untouched:
@@ -102,20 +104,19 @@ class _Event:
         has_shape = skinned.was_deformed(obj, self.depsgraph) and obj.data.session_uid not in changes.touched
         return replace(facts, has_shape=has_shape and not self._have_bones_changed())
 
-    def _is_copy_outdated(self) -> bool:
+    def _find_outdated_copy(self) -> bool:
         """Whether the upstream proxy's copy of the mesh has to be made again."""
         obj, changes = self.obj, self.changes
         if obj.data.session_uid not in changes.meshes or obj.data.is_editmode:
             return False
-        if upstream_proxy.is_current(obj):
-            return False
-        if changes.frame and self.old.is_in_depsgraph:
+        self.is_copy_outdated = not upstream_proxy.is_current(obj)
+        if self.is_copy_outdated and changes.frame and self.old.is_in_depsgraph:
             # Blender evaluates what handlers change, and Sinew deforms within that.
             upstream_proxy.follow_points(obj)
-            return not upstream_proxy.is_current(obj)
-        if changes.frame:
+            self.is_copy_outdated = not upstream_proxy.is_current(obj)
+        elif self.is_copy_outdated and changes.frame:
             upstream_proxy.share_mesh(obj)
-        return True
+        return self.is_copy_outdated
 
     def _with_rest(self, facts: Facts) -> Facts:
         """Adds what decides what is read."""
@@ -194,6 +195,10 @@ class _Event:
         if new.is_read:
             _check_modifiers(self.obj, self.changes)
             new = self._full_plan()
+        if not new.uses_builtin and self.is_copy_outdated is None:
+            self.is_copy_outdated = not upstream_proxy.is_current(self.obj)
+        if self.is_copy_outdated:
+            upstream_proxy.set_outdated(self.obj)
         apply_plan.apply(self.obj, self.old, new)
         self.known = replace(self.known, plan=new, is_planned=True)
 

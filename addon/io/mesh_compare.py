@@ -33,26 +33,35 @@ _VALUES = {
 def are_alike(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
     """Whether modifiers make the same of both: their points, faces, attributes, weights, materials and shape
     keys, but for the values of the keys. Neither is in edit mode."""
-    return (
-        all(mine == its for mine, its in zip(_facts(mesh), _facts(copy), strict=True))
-        and all(
-            np.array_equal(mine, its, equal_nan=mine.dtype.kind == "f")
-            for mine, its in zip(_arrays(mesh), _arrays(copy), strict=True)
-        )
-        and mesh_io.read_group_weights(mesh).equals(_weights_of(copy))
-    )
+    if not _are_alike_but_for_weights(mesh, copy):
+        return False
+    if copy.session_uid not in _weights:
+        _note_weights(copy, mesh_io.read_group_weights(copy))
+    return mesh_io.read_group_weights(mesh).equals(_weights[copy.session_uid])
+
+
+def is_good_copy(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
+    """The same for a copy that was just made of the mesh: their weights are the same, if they are numbers."""
+    weights = mesh_io.read_group_weights(mesh)
+    _note_weights(copy, weights)
+    return weights.equals(weights) and _are_alike_but_for_weights(mesh, copy)
 
 
 # Those of copies, by session_uid. Nobody changes them, and reading them takes longer than all else.
 _weights: dict[int, GroupWeights] = {}
 
 
-def _weights_of(copy: bpy.types.Mesh) -> GroupWeights:
-    if copy.session_uid not in _weights:
-        if len(_weights) > 15:
-            _weights.clear()
-        _weights[copy.session_uid] = mesh_io.read_group_weights(copy)
-    return _weights[copy.session_uid]
+def _note_weights(copy: bpy.types.Mesh, weights: GroupWeights) -> None:
+    if len(_weights) > 15:
+        _weights.clear()
+    _weights[copy.session_uid] = weights
+
+
+def _are_alike_but_for_weights(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
+    return all(mine == its for mine, its in zip(_facts(mesh), _facts(copy), strict=True)) and all(
+        np.array_equal(mine, its, equal_nan=mine.dtype.kind == "f")
+        for mine, its in zip(_arrays(mesh), _arrays(copy), strict=True)
+    )
 
 
 def _facts(mesh: bpy.types.Mesh) -> Iterator[object]:

@@ -322,6 +322,24 @@ def test_a_mesh_that_another_addon_moves_with_each_frame(event, route):
     assert scenes.worst(shown, expected) <= 1e-5
 
 
+def test_an_edit_reads_weights_no_oftener_than_it_must(monkeypatch):
+    """Reading them takes longer than all else: to find the edit, for the new copy, after its evaluation, and
+    of what upstream made of them."""
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.put_in_front(obj, "MIRROR")
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(8)
+    read, names = mesh_io.read_group_weights, []
+    monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: names.append(mesh.name) or read(mesh))
+    weight(obj)
+    bpy.context.view_layer.update()
+    assert len(names) <= 4, names
+    monkeypatch.undo()
+    got = scenes.final_points(obj)
+    attach.remove(obj)
+    assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
+
+
 def test_a_mesh_that_does_not_equal_its_copy_is_shared():
     """Weights that are no numbers equal nothing: Sinew would copy the mesh again and again."""
     obj, _armature = scenes.make_arm(bones=3)

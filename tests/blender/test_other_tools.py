@@ -114,6 +114,21 @@ def hidden(modifiers: list[bpy.types.Modifier]) -> Iterator[None]:
         modifier.show_viewport = True
 
 
+def shown_keys(obj: bpy.types.Object) -> Seen:
+    """The evaluated mesh, and with each of its shape keys pinned."""
+    bpy.context.view_layer.update()
+    found: Seen = {"shown": evaluated(obj)}
+    keys = obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
+    obj.show_only_shape_key = True
+    for number, key in enumerate(keys):
+        value, key.value, obj.active_shape_key_index = key.value, 1.0, number
+        bpy.context.view_layer.update()
+        found[f"shown {key.name}"] = evaluated(obj)
+        key.value = value
+    obj.show_only_shape_key, obj.active_shape_key_index = False, 0
+    return found
+
+
 def make_active(obj: bpy.types.Object) -> None:
     for each in bpy.context.scene.objects:
         each.select_set(each == obj)
@@ -280,6 +295,20 @@ def apply_all(obj: bpy.types.Object, _folder: Path) -> Seen:
     return seen_of(obj)
 
 
+def rest_position(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """godot-blender-exporter, iqm: the armature shows its rest position meanwhile."""
+    obj.parent.data.pose_position = "REST"
+    found = shown_keys(obj)
+    obj.parent.data.pose_position = "POSE"
+    return found | seen_of(obj)
+
+
+def hidden_in_rest_position(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """collada-exporter, mmd_tools: the Armature modifiers are hidden, too."""
+    with hidden(skins_of(obj)):
+        return {**shown_keys(obj), **rest_position(obj, _folder)}
+
+
 def convert(obj: bpy.types.Object, _folder: Path) -> Seen:
     make_active(obj)
     bpy.ops.object.convert(target="MESH")
@@ -308,6 +337,29 @@ def apply_armature(obj: bpy.types.Object, _folder: Path) -> Seen:
         bpy.ops.pose.armature_apply()
         bpy.ops.object.mode_set(mode="OBJECT")
         obj.modifiers.new("Armature", "ARMATURE").object = armature
+    return seen_of(obj)
+
+
+def cats(obj: bpy.types.Object, _folder: Path) -> Seen:
+    """Apply as Rest Pose: an Armature modifier of its own is applied, or shown alone over each shape key."""
+    armature, keys = obj.parent, obj.data.shape_keys
+    make_active(obj)
+    if keys is None:
+        obj.modifiers.new("Apply", "ARMATURE").object = armature
+        bpy.ops.object.modifier_move_to_index(modifier="Apply", index=0)
+        bpy.ops.object.modifier_apply(modifier="Apply")
+    else:
+        with hidden([m for m in obj.modifiers if m.show_viewport]):
+            obj.modifiers.new("Apply", "ARMATURE").object = armature
+            shapes = shown_keys(obj)
+            obj.modifiers.remove(obj.modifiers["Apply"])
+        obj.data.vertices.foreach_set("co", shapes["shown Basis"].ravel())
+        for key in keys.key_blocks:
+            key.data.foreach_set("co", shapes[f"shown {key.name}"].ravel())
+    make_active(armature)
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.pose.armature_apply()
+    bpy.ops.object.mode_set(mode="OBJECT")
     return seen_of(obj)
 
 
@@ -349,15 +401,22 @@ def rigify(obj: bpy.types.Object, folder: Path) -> Seen:
 
 
 def auto_rig_pro(obj: bpy.types.Object, folder: Path) -> Seen:
-    """Exports a copy: all modifiers but the Armature modifier are applied, where there are no shape keys."""
-    new = copy_of(obj)
+    """Exports copies, with other names of bones: all modifiers but the Armature modifier are applied, where
+    there are no shape keys."""
+    new, armature = copy_of(obj), copy_of(obj.parent)
+    new.parent = armature
+    for modifier in skins_of(new):
+        modifier.object = armature
+    for bone in armature.data.bones:
+        bone.name = f"Game {bone.name}"
     make_active(new)
     if new.data.shape_keys is None:
         for modifier in list(new.modifiers):
             if modifier.type != "ARMATURE" and modifier.show_viewport:
                 bpy.ops.object.modifier_apply(modifier=modifier.name)
+    armature.select_set(True)
     bpy.ops.export_scene.fbx(filepath=str(folder / "arm.fbx"), use_selection=True)
-    bpy.data.objects.remove(new)
+    bpy.data.batch_remove([new, armature])
     return seen_of(obj, "left") | read_again(bpy.ops.import_scene.fbx, folder / "arm.fbx")
 
 
@@ -377,7 +436,10 @@ TOOLS = {
     "Apply All": apply_all,
     "Convert": convert,
     "Convert, hidden": convert_hidden,
+    "Rest position": rest_position,
+    "Rest position, hidden": hidden_in_rest_position,
     "Apply the Armature modifier": apply_armature,
+    "Cats": cats,
     "Join": join,
     "Data Transfer": data_transfer,
     "Rigify": rigify,

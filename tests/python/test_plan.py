@@ -155,6 +155,15 @@ def test_the_order_of_clicks(clicks, deformer):
     assert icons(view, Situation.OFF) == Icons(False, (True,))
 
 
+def test_a_tool_that_hides_all_but_one_armature_modifier_gets_that_one():
+    view, situation = View((True, True)), Situation.SINEW
+    view = follow(view, situation, Icons(False, (False, True)))
+    assert view.deformer is Deformer.ARMATURE
+    assert icons(view, situation) == Icons(False, (False, True))
+    view = follow(view, situation, Icons(True, (True, True)))
+    assert view == View((True, True))
+
+
 @pytest.mark.parametrize(
     ("situation", "clicks", "deformer"),
     [

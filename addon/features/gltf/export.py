@@ -4,18 +4,21 @@ application-specific vertex attributes (glTF 2.0, 3.7.2.1: names that begin with
 method's vertex data.
 
 Meshes have these attributes only during an export, as the exporter splits vertices at seams, and copies
-attributes to the right ones. They are made when it calls before an export, and removed at its end.
+attributes to the right ones. They are made when it calls before an export, and removed when it has read all.
 """
 
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from types import FrameType
 from typing import Any
 
 import bpy
 import numpy as np
 
 from ...attach import properties, stage_settings
+from ...attach.updates import may_change_file
 from ...core.errors import SinewError
 from ...core.spaces import transformed
 from ...deform import session
@@ -129,7 +132,7 @@ def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str
     for sentence in _current.left_out:
         settings["log"].warning(sentence)
     if not bpy.app.background:
-        # An exporter that fails does not announce its end. Without a window, the next export and saving do.
+        # An exporter that fails while it reads does not announce its end.
         bpy.app.timers.register(end, first_interval=0.0)
 
 
@@ -163,6 +166,22 @@ def end() -> None:
                 mesh_io.remove_attribute(mesh, name)
 
 
+def end_if_failed(*_: Any) -> None:
+    """Called with each evaluation, as no timer runs without a window."""
+    if _current.meshes and may_change_file() and not _is_exporting():
+        end()
+
+
+def _is_exporting() -> bool:
+    """Whether the exporter is among the callers: it evaluates frames."""
+    frame: FrameType | None = sys._getframe()
+    while frame is not None:
+        if str(frame.f_globals.get("__name__")).startswith("io_scene_gltf2"):
+            return True
+        frame = frame.f_back
+    return False
+
+
 def written() -> dict[str, dict[str, Any]]:
     """The extras of the last export, by the names of objects."""
     return dict(_current.written)
@@ -174,7 +193,7 @@ def left_out() -> list[str]:
 
 
 class GltfExtension:
-    """The functions that the exporter calls while it reads meshes."""
+    """The functions that the exporter calls while it reads meshes, and when it has read all."""
 
     def gather_attribute_keep(self, attribute: Any, _settings: dict[str, Any]) -> None:
         """Keeps attributes that begin with an underscore: all or only these, as the artist chose."""
@@ -193,3 +212,7 @@ class GltfExtension:
         for primitive in gltf_mesh.primitives:
             for name in (CENTRE, SHARE):
                 primitive.attributes.pop(name, None)
+
+    def gather_gltf_hook(self, *_: Any) -> None:
+        """Called before anything is written, which can fail."""
+        end()

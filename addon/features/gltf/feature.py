@@ -65,7 +65,7 @@ def _end() -> None:
 FEATURE = Feature(
     (SinewGltf,),
     {"Scene.sinew_gltf": bpy.props.PointerProperty(type=SinewGltf)},
-    subscriptions=((subscribers.saving, export.end),),
+    subscriptions=((subscribers.saving, export.end), (subscribers.deformed, export.end_if_failed)),
     begin=_begin,
     end=_end,
 )
