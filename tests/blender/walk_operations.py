@@ -365,6 +365,12 @@ def _method(r: random.Random) -> str:
     return r.choice(OF_BLENDER if r.random() < 0.5 else METHODS[len(OF_BLENDER) :])
 
 
+def _is_behind_hair(obj: bpy.types.Object) -> bool:
+    """Sinew refuses this."""
+    kinds = [modifier.type for modifier in obj.modifiers]
+    return "PARTICLE_SYSTEM" in kinds[: kinds.index("ARMATURE")]
+
+
 @operation(6)
 def add(w: Walker, r: random.Random) -> None:
     obj = w.mesh(
@@ -373,6 +379,7 @@ def add(w: Walker, r: random.Random) -> None:
             o.parent_type != "ARMATURE"
             and not w.side.has_sinew(o)
             and any(m.object for m in armature_modifiers(o))
+            and not _is_behind_hair(o)
         ),
     )
     method, leave = r.choice((None, _method(r))), r.random() < 0.15

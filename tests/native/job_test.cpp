@@ -101,6 +101,21 @@ TEST(BackgroundJob, says_when_it_has_ended) {
     background.rethrow();
 }
 
+TEST(BackgroundJob, leaves_the_threads_of_parallel_for_to_frames) {
+    std::atomic<bool> works{false};
+    const BackgroundJob background(2, true, [&](Job& job) {
+        job.for_each(1u << 30, 1, [&](std::size_t, std::size_t) { works = true; });
+    });
+    while (!works) std::this_thread::yield();
+    std::atomic<int> inside{0};
+    parallel_for(2 * 4096, 2, [&](std::size_t, std::size_t) {
+        ++inside;
+        // Waits for ever if no other thread comes.
+        while (inside < 2) std::this_thread::yield();
+    });
+    EXPECT_EQ(inside, 2);
+}
+
 TEST(BackgroundJob, keeps_what_its_work_threw) {
     const BackgroundJob background(1, true, [](Job&) { throw std::runtime_error("enough"); });
     ASSERT_TRUE(background.wait_for(kPatience));

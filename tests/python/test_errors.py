@@ -2,6 +2,9 @@
 """Protects errors: each names the argument, what was expected and what was given, and changes nothing.
 test_fuzz_bindings.py tries any arguments; here each check has a row."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sinew
@@ -95,13 +98,17 @@ CALLS = {
     "Normals": (sinew.Normals, {"vertex_count": 4, **FACES}),
     "compute": (lambda **given: sinew.Normals(4, **FACES).compute(**given), {"points": SHEET}),
     "SkinnedNormals": (lambda **given: sinew.SkinnedNormals(BINDING, **given), {"normals": POINTS}),
+    "deform_skinned": (
+        lambda **given: sinew.SkinnedNormals(BINDING, POINTS).deform(**given)[1],
+        {"bone_transforms": bones()},
+    ),
     "deform_normals": (lambda **given: sinew.SkinnedNormals(BINDING, POINTS).deform_normals(**given), POSE),
     "centres": (
         lambda **given: sinew.centres_of_rotation(**given).result(),
         {**SKIN, "triangles": [[0, 1, 0]]},
     ),
     "moments": (
-        lambda radius: sinew.direct_delta_mush(**SKIN, triangles=[[0, 1, 0]], radius=radius).result(),
+        lambda **given: sinew.direct_delta_mush(**SKIN, triangles=[[0, 1, 0]], **given).result(),
         {"radius": 1.0},
     ),
     "vertex data": (lambda **given: sinew.Deformer(**SKIN, **given), {"vertex_data": {"cor": POINTS}}),
@@ -229,10 +236,6 @@ ROWS = [
     ("deform", "out", np.zeros((4, 3), np.float32)[::2], OUT, "one that is not C-contiguous"),
     ("deform", "out", READ_ONLY, OUT, "a read-only array"),
     ("deform", "out", [[0, 0, 0], [0, 0, 0]], OUT, f"{INTS} [2, 3]"),
-    ("deform", "threads", -3, THREADS, "-3"),
-    ("deform", "threads", -(10**30), THREADS, "a negative one"),
-    ("deform", "threads", np.float32(2), THREADS, "float32"),
-    ("deform", "threads", "2", THREADS, "str"),
     ("deform", "bones_from_model", np.eye(3, dtype=np.float32), AFFINE, "float32 [3, 3]"),
     ("deform", "bones_from_model", spoilt(bones()[0], (2, 3), NAN), FINITE, "NaN or infinity"),
     ("deform", "bones_from_model", spoilt(bones()[0], (1, 1), 0), INVERTIBLE, "one of determinant 0"),
@@ -251,7 +254,6 @@ ROWS = [
     ("limit", "strength", 1.5, "of bulge_limit.strength a finite number from 0 to 1", "1.5"),
     ("limit", "strength", "much", "of bulge_limit.strength a finite number from 0 to 1", "'much'"),
     ("limit", "form", "hard", "of bulge_limit.form one of continuous, kim_han", "'hard'"),
-    ("limit", "threads", -1, THREADS, "-1"),
     ("TwistSpread", "twists", np.zeros((1, 3), int), "int32 [twists, 4]", f"{np.dtype(int)} [1, 3]"),
     ("TwistSpread", "twists", [[0, 0, 2, 0]] * 2, "bones from 0 to 2 - 1", "2 at twist 0"),
     ("TwistSpread", "twists", [[0, 0, 1, 0]] * 2, "each bone at most once", "bone 0 at twist 1 again"),
@@ -302,7 +304,6 @@ ROWS = [
     ("centres", "triangles", [0, 1, 2], "int32 [triangles, 3]", f"{INTS} [3]"),
     ("centres", "triangles", np.zeros((2, 3)), "int32 [triangles, 3]", "float64 [2, 3]"),
     ("centres", "triangles", [[0, 1, 2]], "numbers of vertices, below 2", "2 at triangle 0"),
-    ("centres", "threads", 1.5, THREADS, "float"),
     ("vertex data", "vertex_data", [1], "None or a dict of arrays by names of methods", f"{INTS} [1]"),
     ("vertex data", "vertex_data", {"dq": POINTS[:, :0]}, "that of methods that need it", "that of dq"),
     ("vertex data", "vertex_data", {"cor": POINTS[:, :2]}, "of cor float32 [vertices, 3]", "float32 [2, 2]"),
@@ -377,6 +378,32 @@ if "ddm" in {method.name for method in sinew.methods()}:
             ([MOMENTS] * 2, "rows of ddm in ascending order of vertices and bones", "another order in row 1"),
         )
     ]
+
+
+# Every call that takes `threads`.
+THREADED = (
+    *("deform", "limit", "spread", "mush", "compute", "deform_skinned", "deform_normals"),
+    *("centres", "moments"),
+)
+
+
+@pytest.mark.parametrize("name", THREADED)
+def test_threads_mean_the_same_everywhere(name):
+    call, good = CALLS[name]
+    expected = call(**good)
+    for threads in (None, 0, 1, np.int64(4), np.uint8(2), True, 10**30):
+        np.testing.assert_array_equal(call(**good, threads=threads), expected)
+    for wrong, got in (
+        *((-3, "-3"), (-(10**30), "a negative one"), (np.int8(-1), "-1"), (1.5, "float")),
+        *((np.float32(2), "float32"), ("2", "str"), ([1], "list of int64 [1]")),
+    ):
+        with pytest.raises(ValueError, match=f"^threads: expected {THREADS}, got {re.escape(got)}$"):
+            call(**good, threads=wrong)
+
+
+def test_each_call_with_threads_is_among_these():
+    stub = Path(__file__).parents[2] / "native" / "python" / "sinew" / "_native" / "__init__.pyi"
+    assert stub.read_text(encoding="utf-8").count("threads: typing.SupportsIndex") == len(THREADED)
 
 
 @pytest.mark.parametrize(("name", "argument", "value", "wanted", "got"), ROWS)
