@@ -6,6 +6,7 @@ from __future__ import annotations
 import atexit
 import logging
 import sys
+from contextlib import ExitStack
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -16,49 +17,48 @@ from . import native
 if TYPE_CHECKING:
     from .attach.feature import Feature
 
-_registered: list[type] = []
-_has_ended = False
+_to_undo = ExitStack()
 
 
 def register() -> None:
-    if native.load_error() is not None:
-        # Properties need the list of methods: without the library only the reason is shown, and Sinew's data
-        # in files stays untouched.
-        from .ui import sidebar
+    """Takes back what it did if it fails."""
+    global _to_undo
+    atexit.unregister(_end)
+    atexit.register(_end)
+    with ExitStack() as steps:
+        if native.load_error() is None:
+            _register_all(steps)
+        else:
+            # Properties need the list of methods: without the library only the reason is shown, and Sinew's
+            # data in files stays untouched.
+            from .ui import sidebar
 
-        _register_classes((sidebar.SINEW_PT_unavailable,))
-        return
+            _register_class(steps, sidebar.SINEW_PT_unavailable)
+        _to_undo = steps.pop_all()
+
+
+def unregister() -> None:
+    _to_undo.close()
+
+
+def _register_all(steps: ExitStack) -> None:
     from .deform import lifecycle
 
     # The order of the panels.
     parts, features = _parts(), _features()
     for each in (*parts, *features):
-        _register_classes(each.classes)
-    for part in parts:
-        part.register()
-    lifecycle.register()
-    for feature in features:
-        feature.register()
+        for cls in each.classes:
+            _register_class(steps, cls)
+    for each in (*parts, lifecycle.FEATURE, *features):
+        each.register()
+        steps.callback(each.unregister)
+    steps.callback(lifecycle.leave_open_file)
     lifecycle.adopt_open_file()
-    atexit.unregister(_end)
-    atexit.register(_end)
 
 
-def unregister() -> None:
-    if _has_ended:
-        # Blender as a module unregisters its extensions only after _end().
-        return
-    if hasattr(bpy.types.Object, "sinew"):
-        from .deform import lifecycle
-
-        lifecycle.leave_open_file()
-        for feature in reversed(_features()):
-            feature.unregister()
-        lifecycle.unregister()
-        for part in reversed(_parts()):
-            part.unregister()
-    while _registered:
-        bpy.utils.unregister_class(_registered.pop())
+def _register_class(steps: ExitStack, cls: type) -> None:
+    bpy.utils.register_class(cls)
+    steps.callback(bpy.utils.unregister_class, cls)
 
 
 def _parts() -> tuple[Feature, ...]:
@@ -108,26 +108,17 @@ def _end() -> None:
     """Called at the end of Python. Blender unregisters its extensions before; with bpy as a module nobody
     does, and a Python handler, class or command that is still registered then crashes Blender 4.2 and hangs
     4.5."""
-    global _has_ended
-    # If Blender has unregistered it, its types are gone by now.
+    # If Blender has unregistered it, its types are gone by now, and nothing is left to undo.
     try:
-        if _registered:
-            unregister()
+        unregister()
     except Exception:
         # What is still registered crashes Blender, so the handlers, at least, go.
         logging.getLogger("sinew").exception("Sinew did not end as it should")
         for functions in map(bpy.app.handlers.__getattribute__, dir(bpy.app.handlers)):
             if isinstance(functions, list):
                 functions[:] = [each for each in functions if not each.__module__.startswith(__package__)]
-    _has_ended = True
     # Blender 4.2 keeps a reference to each registered property group class, which keeps the names of its
     # module. Blender as a module ends when `bpy` is freed, and crashes if it never is.
     for name, module in list(sys.modules.items()):
         if name == __package__ or name.startswith(f"{__package__}."):
             vars(module).pop("bpy", None)
-
-
-def _register_classes(classes: tuple[type, ...]) -> None:
-    for cls in classes:
-        bpy.utils.register_class(cls)
-        _registered.append(cls)

@@ -4,7 +4,8 @@
 import re
 from fnmatch import fnmatchcase
 
-# Path separators and drives, characters that file names cannot have, and text that unquote() would change.
+# Path separators and drives, control characters, and text that unquote() would change. Other colons stay, as
+# in "mixamorig:Body", a key of an archive that is typed; programs that unpack one on Windows replace them.
 _NOT_IN_FILE_NAMES = re.compile(r"[/\\\x00-\x1f\x7f]|^\.+$|[. ]$|(?<=^[A-Za-z]):|%(?=[0-9A-Fa-f]{2})")
 # Devices of Windows, whatever follows a dot.
 _DEVICE = re.compile(

@@ -14,6 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..attach import note, overrides, point_store, properties, references, undeformed
+from ..attach.feature import Feature
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, phase, updates_suspended
 from ..core.precompute import precomputations
@@ -61,7 +62,7 @@ def after_step(_may_react: bool) -> None:
 @_handler
 def before_loading(_may_react: bool) -> None:
     """Every reference becomes invalid."""
-    precomputing.end()
+    precomputations.cancel_all()
     phase.is_saving = False
     session.forget()
     notify(subscribers.loading)
@@ -253,18 +254,29 @@ _HANDLERS = {
 }
 
 
-_SUBSCRIPTIONS = (
-    (subscribers.precomputation_requested, precompute_watch.begin),
-    (subscribers.before_removal, session.forget_object),
-)
-
-
-def register() -> None:
+def _begin() -> None:
     precomputing.begin()
-    for functions, function in _SUBSCRIPTIONS:
-        functions.append(function)
     handlers.register()
     events.subscribe_all(_HANDLERS)
+
+
+def _end() -> None:
+    # Nobody will want what runs.
+    precomputations.cancel_all()
+    if bpy.app.timers.is_registered(precompute_watch.check):
+        bpy.app.timers.unregister(precompute_watch.check)
+    events.unsubscribe_all(_HANDLERS)
+    handlers.unregister()
+
+
+FEATURE = Feature(
+    subscriptions=(
+        (subscribers.precomputation_requested, precompute_watch.begin),
+        (subscribers.before_removal, session.forget_object),
+    ),
+    begin=_begin,
+    end=_end,
+)
 
 
 def adopt_open_file() -> None:
@@ -283,13 +295,3 @@ def leave_open_file() -> None:
     """Leaves the file as a saved one is: the Armature modifiers deform."""
     prepare_for_save()
     note.remove()
-
-
-def unregister() -> None:
-    precomputing.end()
-    for functions, function in _SUBSCRIPTIONS:
-        functions.remove(function)
-    if bpy.app.timers.is_registered(precompute_watch.check):
-        bpy.app.timers.unregister(precompute_watch.check)
-    events.unsubscribe_all(_HANDLERS)
-    handlers.unregister()

@@ -71,7 +71,7 @@ def stop() -> None:
 
 
 def resume() -> None:
-    precomputing.forget_stopped()
+    precomputations.stopped.clear()
     _refresh()
 
 

@@ -148,11 +148,6 @@ def waiting() -> Iterator[None]:
         precomputations.waits = before
 
 
-def forget_stopped() -> None:
-    """What the artist stopped may start again."""
-    precomputations.stopped.clear()
-
-
 def begin() -> None:
     """Called on registration."""
     precomputations.waits = bpy.app.background
@@ -163,11 +158,6 @@ def open_cache() -> None:
     """Opens the cache in the folder that the environment or else the preferences name."""
     folder = _cache_folder()
     precomputations.cache = None if folder is None else FileCache(folder, CACHE_BYTES)
-
-
-def end() -> None:
-    """Cancels what runs, as nobody will want it."""
-    precomputations.cancel_all()
 
 
 def _needed(obj: bpy.types.Object, skinned: SkinnedObject) -> list[tuple[bpy.types.Object, VertexData, str]]:

@@ -22,7 +22,8 @@ from ..attach import (
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
 from ..core.errors import SinewError
-from . import after_update, apply_plan, events, precomputing, undo
+from ..core.precompute import precomputations
+from . import after_update, apply_plan, events, undo
 from .bound import uid
 from .changes import GONE, Changes
 from .in_depsgraph import DepsgraphRequests
@@ -247,7 +248,7 @@ def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Reads mesh, weights and bones of the object again, also after an error, and switches it on."""
     _forget_known(obj)
-    precomputing.forget_stopped()
+    precomputations.stopped.clear()
     settings = properties.of(obj)
     if not settings.enabled:
         settings.enabled = True  # refreshes

@@ -30,6 +30,22 @@ bpy.context.scene.frame_set(5)
 UNREGISTER = """
 sinew_addon.unregister()
 """
+FAIL_TO_REGISTER = """
+import bpy
+import sinew_addon
+from sinew_addon import registration
+from sinew_addon.attach.feature import Feature
+
+def fail():
+    raise RuntimeError
+
+features = registration._features()
+registration._features = lambda: (*features, Feature(begin=fail))
+try:
+    sinew_addon.register()
+except RuntimeError:
+    registration._features = lambda: features
+"""
 
 
 @pytest.mark.parametrize(
@@ -39,8 +55,10 @@ sinew_addon.unregister()
         (REGISTER, UNREGISTER, REGISTER, UNREGISTER),
         (REGISTER, USE, HEAT),
         (REGISTER, USE, HEAT, UNREGISTER),
+        (FAIL_TO_REGISTER,),
+        (FAIL_TO_REGISTER, REGISTER, USE, UNREGISTER),
     ],
-    ids=["registered", "registered again", "in use", "used"],
+    ids=["registered", "registered again", "in use", "used", "failed", "failed, then in use"],
 )
 def test_a_script_ends_with_status_0(parts, tmp_path):
     script = tmp_path / "script.py"
