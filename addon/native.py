@@ -48,10 +48,15 @@ def _age_error(library: ModuleType) -> str | None:
     if not missing and (not own or _numbers(found) >= _numbers(own)):
         return None
     what = f" lacks {', '.join(missing)}, and" if missing else ""
-    place = Path(library.__file__ or "").parent
+    named = f"The library sinew {found or 'of no version'} in {Path(library.__file__ or '').parent}{what}"
+    if found == own:
+        return (
+            f"{named} is of another build. Blender keeps it where the same version is installed again: remove "
+            "the extension Sinew, restart Blender, and install it"
+        )
     return (
-        f"The library sinew {found or 'of no version'} in {place}{what} is older than this extension "
-        f"({own or 'of no version'}): install the one that comes with it, and restart Blender"
+        f"{named} is older than this extension ({own or 'of no version'}): install the one that comes with "
+        "it, and restart Blender"
     )
 
 

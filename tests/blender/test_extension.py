@@ -7,6 +7,7 @@ import ast
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -293,8 +294,11 @@ sys.exit(cli.main(["methods"]))
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ("sinew.__version__ = '0.0.9'", "The library sinew 0.0.9 in "),
-        ("del sinew.BulgeLimit, sinew.stages", " lacks BulgeLimit, stages, and is older than this extension"),
+        ("sinew.__version__ = '0.0.9'", "sinew 0.0.9 in .* is older than this extension .*: install the one"),
+        (
+            "del sinew.BulgeLimit, sinew.stages",
+            " lacks BulgeLimit, stages, and is of another build. .*: remove the extension Sinew, restart",
+        ),
     ],
 )
 @pytest.mark.once
@@ -304,8 +308,7 @@ def test_an_older_library_is_named_in_one_sentence(change, sentence):
     )
     assert result.returncode == 1, result.stdout + result.stderr
     assert "Traceback" not in result.stderr
-    assert sentence in result.stderr
-    assert "install the one that comes with it" in result.stderr
+    assert re.search(sentence, result.stderr)
 
 
 def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tmp_path):
