@@ -51,8 +51,8 @@ def _age_error(library: ModuleType) -> str | None:
     named = f"The library sinew {found or 'of no version'} in {Path(library.__file__ or '').parent}{what}"
     if found == own:
         return (
-            f"{named} is of another build. Blender keeps it where the same version is installed again: remove "
-            "the extension Sinew, restart Blender, and install it"
+            f"{named} is of another build. Blender keeps it where the same version is installed again: "
+            "remove the extension Sinew, restart Blender, and install it"
         )
     return (
         f"{named} is older than this extension ({own or 'of no version'}): install the one that comes with "
