@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 
-import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -228,74 +227,6 @@ def test_one_view_layer_has_it_for_its_position_alone():
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-def move_points(obj):
-    for points in (obj.data.vertices, obj.data.shape_keys.key_blocks["Basis"].data):
-        for point in points:
-            point.co.x += 0.1 * point.co.z
-
-
-def move_key(obj):
-    for point in obj.data.shape_keys.key_blocks["Key"].data:
-        point.co.y += 0.3
-
-
-def weight(obj):
-    obj.vertex_groups["bone.1"].add(range(0, len(obj.data.vertices), 3), 0.7, "ADD")
-
-
-def fewer_faces(obj):
-    made = bmesh.new()
-    made.from_mesh(obj.data)
-    bmesh.ops.delete(made, geom=list(made.faces)[:20], context="FACES")
-    made.to_mesh(obj.data)
-    made.free()
-
-
-def set_key(obj):
-    """Over its animation: as long as the frame stays, the artist's value holds."""
-    obj.data.shape_keys.key_blocks["Key"].value = 0.3
-
-
-def mute_key(obj):
-    obj.data.shape_keys.key_blocks["Key"].mute = True
-
-
-def mask(obj):
-    """An attribute that the modifier in front reads."""
-    obj.vertex_groups.new(name="front").add([0, 5, 9], 1.0, "REPLACE")
-    obj.modifiers["Front"].vertex_group = "front"
-
-
-@pytest.mark.parametrize("edit", [move_points, move_key, weight, fewer_faces, set_key, mute_key, mask])
-def test_the_proxy_follows_the_mesh(edit, route):
-    """It has a mesh of its own, so that the artist's has one user."""
-
-    def shown(has_sinew: bool) -> tuple[np.ndarray, ...]:
-        obj, _armature = scenes.make_arm(bones=3)
-        scenes.key_shape(obj)
-        scenes.put_in_front(obj, "SOLIDIFY")
-        if has_sinew:
-            scenes.add_sinew(obj, "lbs")
-        bpy.context.scene.frame_set(8)
-        assert obj.data.users == 1
-        before = scenes.final_points(obj)
-        edit(obj)
-        obj.data.update_tag()
-        bpy.context.view_layer.update()
-        after = scenes.final_points(obj)
-        assert after.shape != before.shape or scenes.worst(after, before) > 1e-3, "nothing is tested"
-        later = scenes.shapes(obj, FRAMES)
-        if has_sinew:
-            assert properties.of(obj).storage.upstream_proxy.data != obj.data
-            attach.remove(obj)
-        assert [mesh.name for mesh in bpy.data.meshes if mesh.users == 1] == [obj.data.name]
-        bpy.data.batch_remove([obj, obj.data])
-        return after, *later
-
-    for mine, its in zip(shown(has_sinew=True), shown(has_sinew=False), strict=True):
-        assert scenes.worst(mine, its) <= 1e-5
-
-
 @pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
 def test_a_mesh_that_another_addon_moves_with_each_frame(event, route):
     if event == "frame_change_post" and route == routes.UPDATE:
@@ -331,7 +262,7 @@ def test_an_edit_reads_weights_no_oftener_than_it_must(monkeypatch):
     bpy.context.scene.frame_set(8)
     read, names = mesh_io.read_group_weights, []
     monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: names.append(mesh.name) or read(mesh))
-    weight(obj)
+    obj.vertex_groups["bone.1"].add(range(0, len(obj.data.vertices), 3), 0.7, "ADD")
     bpy.context.view_layer.update()
     assert len(names) <= 4, names
     monkeypatch.undo()

@@ -13,6 +13,7 @@ from sinew_addon.features.pages import render
 from smith_2013 import figures as report_figures
 from smith_2013 import meshes
 
+pytestmark = pytest.mark.once
 SIZE = 96
 
 

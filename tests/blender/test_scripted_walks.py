@@ -164,6 +164,11 @@ CASES = {
     "absolute_shape_keys Arm; frame 11",
     "a parent that deforms": "parent Arm Rig ARMATURE; frame 6; parent Arm none; add Arm; "
     "parent Arm Rig ARMATURE; frame 11; enabled Arm; frame 6; enabled Arm; remove Arm",
+    "its mesh changes": "add_shape_key Arm; key_shape_key Arm 1 11; add_modifier Arm SOLIDIFY; add Arm; "
+    "frame 6; move_vertices Arm; shape_key_points Arm; weights Arm lower; shape_key_value Arm 0.7 0.9; "
+    "shape_key_value Arm 0.7 0.1; edit_mesh Arm delete 0.3; frame 11",
+    "its mesh without shape keys changes": "add_modifier Arm MASK lower; add Arm; frame 6; "
+    "weights Arm lower; move_vertices Arm; frame 9; edit_mesh Arm delete 0.3; frame 11",
     "it comes, changes and goes": "add Arm; add_modifier Arm SUBSURF; frame 7; "
     "toggle_modifier Arm 'Subsurf 1'; add_modifier Arm CAST; frame 6; delete_modifier Arm 'Cast 2' 0.9; "
     "toggle_modifier Arm 'Subsurf 1'; frame 7; toggle_modifier Arm 'Subsurf 1'; frame 6; remove_all",

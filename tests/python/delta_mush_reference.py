@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The stage `delta_mush` in float64 numpy: Blender's Corrective Smooth (Mancewicz, Derksen, Rijpkema, Wilson
-2014), one vertex or corner at a time, with angles by Blender's polynomial."""
+2014), one vertex or corner at a time, as the golden set defines it, for any mesh and options."""
+
+import sys
+from pathlib import Path
 
 import numpy as np
 
-EPSILON = 10 * np.finfo(np.float32).eps
+sys.path.append(str(Path(__file__).resolve().parents[1] / "golden"))
+from stages import EPSILON, angle, smoothed
 
 
 def corners_of(faces):
@@ -18,26 +22,6 @@ def boundary_of(faces, edges):
     for vertex, _, following in corners_of(faces):
         count[frozenset((vertex, following))] += 1
     return sorted({v for edge, number in count.items() if number == 1 for v in edge})
-
-
-def smoothed(points, edges, factors, iterations, smooth_type):
-    """One iteration. factors: for each vertex."""
-    points, (a, b) = np.array(points, np.float64), np.asarray(edges).reshape(-1, 2).T
-    valence = np.bincount(np.concatenate([a, b]), minlength=len(points))
-    for _ in range(iterations):
-        along = points[b] - points[a]
-        lengths = np.linalg.norm(along, axis=1) if smooth_type == "length_weighted" else np.ones(len(along))
-        total, weight = np.zeros_like(points), np.zeros(len(points))
-        for ends, sign in ((a, 1.0), (b, -1.0)):
-            np.add.at(total, ends, sign * lengths[:, None] * along)
-            np.add.at(weight, ends, lengths)
-        if smooth_type == "length_weighted":
-            divisor = weight * valence
-            moves = divisor > EPSILON
-            points[moves] += (2 * factors / np.where(moves, divisor, 1))[moves, None] * total[moves]
-        else:
-            points += (factors / np.maximum(valence, 1))[:, None] * total
-    return points
 
 
 def amount(rest, edges, factor, radius, smooth_type, most=1000):
@@ -58,13 +42,6 @@ def amount(rest, edges, factor, radius, smooth_type, most=1000):
     some = squared > 0.0
     factors[some] = np.minimum(wanted / (iterations * squared[some]), factor)
     return iterations, factors
-
-
-def angle(cosine):
-    """Blender's polynomial for acos."""
-    m = min(abs(cosine), 1.0)
-    size = np.sqrt(1 - m) * (1.5707963267 + m * (-0.213300989 + m * (0.077980478 + m * -0.02164095)))
-    return np.pi - size if cosine < 0 else size
 
 
 def unit(vector):
@@ -98,7 +75,8 @@ def delta_mush(  # noqa: PLR0913 - as the library's
     """mesh: (rest points, faces as lists of vertices, edges). rounding: added to smoothed points, to see
     its effect; the directions of edges are then rounded to float32, too."""
     rest, faces, edges = mesh
-    rest = np.asarray(rest, np.float64)
+    rest, points = np.asarray(rest, np.float64), np.asarray(points, np.float64)
+    edges = np.asarray(edges).reshape(-1, 2)
     factors = np.full(len(rest), float(factor))
     if radius > 0.0:
         iterations, factors = amount(rest, edges, factor, radius, smooth_type)
