@@ -255,7 +255,7 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
     assert not out.exists()
 
 
-@pytest.mark.parametrize("engine", ["auto", "cycles"])
+@pytest.mark.parametrize("engine", ["auto", pytest.param("cycles", marks=pytest.mark.slow)])
 def test_compare_draws_a_sheet(tmp_path, engine):
     from PIL import Image
 
