@@ -90,11 +90,3 @@ def test_what_has_no_weights_is_filled_from_the_border_inwards():
     assert rows[2] == pytest.approx({0: 0.5, 1: 0.5})
     lonely = np.array([(8, 9)], dtype=np.int32)
     assert mender(dense).filled([8, 9], lonely, 4) == {}
-
-
-def test_mirroring_swaps_the_groups_of_the_sides():
-    dense = np.zeros((VERTICES, GROUPS), dtype=np.float32)
-    dense[0], dense[1, 4] = (0.7, 0.0, 0.3, 0.0, 0.5), 0.9
-    got = mender(dense, masks=(4,)).mirrored({1: 0, 2: 3}, [1, 0, 2, 3, 4])
-    assert got.keys() == {1}, "a source without weights gives none"
-    assert got[1] == pytest.approx({4: 0.9, 1: 0.7, 2: 0.3})
