@@ -518,11 +518,12 @@ def _replaced_modifier(
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
         found.visibility_is_keyed = is_visibility_animated(obj, modifier)
         is_alone = Situation(properties.of(obj).stack.situation) is Situation.ALONE
+        nodes = sinew_modifier(obj)
         for name in () if found.visibility_is_keyed else VIEWS:
             if getattr(properties.of(obj).stack, f"hidden_{name}"):
                 # Whoever added it while Sinew is hidden means it to deform.
                 setattr(found, f"switched_{name}", getattr(modifier, f"show_{name}"))
-            elif is_alone:
+            elif is_alone and nodes is not None and getattr(nodes, f"show_{name}"):
                 _show_in(modifier, name, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
     properties.store(found, "name", modifier.name)

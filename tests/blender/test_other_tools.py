@@ -518,7 +518,7 @@ def test_it_is_said_before(tmp_path):
     assert other_tools.notes(obj) == []
 
 
-def test_it_is_said_where_the_armature_modifier_is_off(monkeypatch):
+def test_it_is_said_where_the_armature_modifier_is_off(monkeypatch, tmp_path):
     """After the update, Blender would compute it in each frame if it was on."""
     monkeypatch.setattr(safe_mode, "_forced", True)
     obj = make(plain, has_sinew=True)
@@ -527,3 +527,7 @@ def test_it_is_said_where_the_armature_modifier_is_off(monkeypatch):
     assert other_tools.notes(obj) == [said]
     properties.of(obj).enabled = False
     assert len(skins_of(obj)) == 1
+    # A tool that hides all modifiers and adds its own gets that one's shape all the same.
+    expected = cats(make(with_keys, has_sinew=False), tmp_path)
+    got = cats(make(with_keys, has_sinew=True), tmp_path)
+    assert scenes.worst(got[" key Key"], expected[" key Key"]) <= 1e-5
