@@ -103,6 +103,7 @@ def _of_lists() -> Iterator[tuple[str, str]]:
     for criterion in suggestion.CRITERIA:
         yield criterion.label, "CRITERIA"
         yield criterion.text, "CRITERIA"
+        yield criterion.praise, "CRITERIA"
     for mend in mending.ALL.values():
         yield mend.label, "mending"
         yield mend.description, "mending"

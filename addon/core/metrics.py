@@ -21,7 +21,7 @@ import numpy as np
 from .influences import Influences
 from .rig import Bones
 from .rotations import rotated, rotations_of
-from .surface import Surface
+from .surface import Parts, Surface
 from .vectors import cross, dots
 
 
@@ -134,6 +134,7 @@ class Summary:
     distance_rms: float
     volume: float
     volume_change: float
+    limb_change: float
     area: float
     area_change: float
     area_rms: float
@@ -236,6 +237,13 @@ class Skin:
         offset = from_head - share.clip(0.0, 1.0) * along
         return np.sqrt(dots(offset, offset))
 
+    @cached_property
+    def limbs(self) -> Parts:
+        """The triangles that follow each bone: that of two of their corners, or of one where all differ."""
+        of_vertices = np.full(self.surface.vertex_count, -1)
+        of_vertices[self.weighted] = self.heaviest
+        return Parts.of(self.surface, np.sort(of_vertices[self.surface.triangles], axis=1)[:, 1])
+
     def rotated_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """float32 [3, triangles]: normals, of any length, rotated by the bones of their corners.
 
@@ -282,6 +290,11 @@ class Pose:
         """float32 [3, triangles]: rest normals rotated by the bones."""
         return self.skin.rotated_normals(self.rest.normals, self.frame.rotations)
 
+    @cached_property
+    def rest_limbs(self) -> np.ndarray:
+        """float64 [limbs]: their volumes at rest."""
+        return self.skin.limbs.volumes(self.rest.points)
+
 
 class Shape:
     """A surface at given points; each property is computed once, when it is first read.
@@ -319,7 +332,7 @@ class Shape:
         # Relative to the mean: far from the origin, the terms of a small mesh would be large and cancel.
         points = self.points - self.points.mean(axis=1, keepdims=True)
         inside = np.einsum("ij,ij->", points.take(self.surface.corners[0], axis=1), self.normals)
-        return (float(inside) + self.surface.caps.volume(points)) / 6.0
+        return (float(inside) + float(self.surface.caps.volumes(points).sum())) / 6.0
 
     @cached_property
     def area(self) -> float:
@@ -363,6 +376,14 @@ class Measured:
         return dots(self.shape.normals, self._pose.rotated_normals) < 0.0
 
     @cached_property
+    def limb_change(self) -> float:
+        """The volume that limbs lose or gain, as a part of all; NaN where they have none at rest."""
+        at_rest = self._pose.rest_limbs
+        change = float(np.abs(self._pose.skin.limbs.volumes(self.shape.points) - at_rest).sum())
+        whole = float(np.abs(at_rest).sum())
+        return change / whole if whole > 0.0 else float("nan")
+
+    @cached_property
     def stretch(self) -> np.ndarray:
         """float64 [edges]"""
         return _ratios(self.shape.lengths, self.rest.lengths)
@@ -385,6 +406,7 @@ class Measured:
         "distance_rms": lambda m: _rms(m.distance),
         "volume": lambda m: m.shape.volume,
         "volume_change": lambda m: _change(m.shape.volume, m.rest.volume),
+        "limb_change": lambda m: m.limb_change,
         "area": lambda m: m.shape.area,
         "area_change": lambda m: _change(m.shape.area, m.rest.area),
         "area_min": lambda m: float(m.area_ratios.min(initial=1.0)),

@@ -15,7 +15,7 @@ from .errors import SinewError
 from .heat import HeatScale
 from .html import render
 from .plots import colour_of, line_plot
-from .suggestion import CRITERIA, Suggestion
+from .suggestion import MEASURED, Suggestion
 
 # Title, unit, and entries of the summaries. A plot has a line for each method and entry.
 PLOTS = (
@@ -76,11 +76,9 @@ def page(comparison: Comparison, sheets: Sequence[Sheet], note: str = "") -> str
 def _suggestion(comparison: Comparison) -> Suggestion:
     suggestion = Suggestion(comparison.methods, comparison.frames, comparison.rest.diagonal)
     for method in comparison.methods:
-        for criterion in CRITERIA:
-            if criterion.entry:
-                values = comparison.values(method, criterion.entry)
-                for frame, value in zip(comparison.frames, values, strict=True):
-                    suggestion.add(method, criterion.name, value, frame)
+        for name, entry in MEASURED.items():
+            for frame, value in zip(comparison.frames, comparison.values(method, entry), strict=True):
+                suggestion.add(method, name, value, frame)
     return suggestion
 
 

@@ -1,41 +1,98 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which method is best at what, over some frames. No measure says which shape looks best."""
+"""Which method suits a character, over some frames, and which is best at what."""
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+
+from .phrases import Phrase, phrase
 
 
 @dataclass(frozen=True)
 class Criterion:
     """What a method can be good at.
 
-    name   for programs
-    label  for people
-    entry  of a metrics.Summary, or "" for what is counted separately; the nearer to 0 the better
-    unit   "share", "length" or "count"
-    text   one sentence
+    name    for programs
+    label   for people
+    entry   of a metrics.Summary, or "" for what is counted separately; the nearer to 0 the better
+    unit    "share", "length" or "count"
+    weight  in the choice of the recommended method: what the eye sees first counts most
+    praise  what the best method does
+    text    one sentence
     """
 
     name: str
     label: str
     entry: str
     unit: str
+    weight: float
+    praise: str
     text: str
 
 
 CRITERIA = (
-    Criterion("stretch", "Stretch", "stretch_rms", "share", "How evenly edges keep their length (RMS)"),
-    Criterion("volume", "Volume", "volume_change", "share", "How far the volume is from that at rest"),
-    Criterion("bulge", "Bulge", "bulge_worst", "length", "How far a vertex leaves or nears its bone's axis"),
-    Criterion("flips", "Flips", "flipped_area", "share", "How much of the surface is folded over"),
     Criterion(
-        "crossings", "Crossings", "", "count", "How many triangles cross others that they do not at rest"
+        "stretch",
+        "Stretch",
+        "stretch_rms",
+        "share",
+        0.5,
+        "stretches least",
+        "How evenly edges keep their length (RMS)",
+    ),
+    Criterion(
+        "volume",
+        "Volume",
+        "limb_change",
+        "share",
+        2.0,
+        "keeps volume best",
+        "How much volume the limbs lose or gain, each by itself",
+    ),
+    Criterion(
+        "bulge",
+        "Bulge",
+        "bulge_worst",
+        "length",
+        2.0,
+        "bulges least",
+        "How far a vertex leaves or nears its bone's axis",
+    ),
+    Criterion(
+        "flips",
+        "Flips",
+        "flipped_area",
+        "share",
+        1.0,
+        "folds over least",
+        "How much of the surface is folded over",
+    ),
+    Criterion(
+        "crossings",
+        "Crossings",
+        "",
+        "count",
+        1.0,
+        "crosses itself least",
+        "How many triangles cross others that they do not at rest",
     ),
 )
+# Scores that differ by less are equal: the first in the list of methods is recommended.
+AS_GOOD = 0.03
+LONGEST, BULGE = "longest", "bulge"
+"""LONGEST: the longest edge, as a part of its length at rest, by which torn shapes are found."""
+MEASURED = {**{c.name: c.entry for c in CRITERIA if c.entry}, LONGEST: "stretch_max"}
+"""Entries of a metrics.Summary, by the names in Suggestion.worst."""
+# A method is torn whose worst value is so many times the median of all.
+TORN = {LONGEST: 2.0, BULGE: 3.0}
+# Shorter edges are no tears, whatever the others are.
+LEAST_TEAR = 2.0
 # Values that differ by less are equally good: as a share of the best, and absolutely.
 SAME_PART = 0.02
 SAME = {"share": 1e-4, "length": 1e-4, "count": 0.5}
+# Smaller values are hardly seen, so they count little in the choice of the recommended method.
+SEEN = {"share": 1e-2, "length": 5e-3, "count": 20.0}
 
 
 @dataclass(frozen=True)
@@ -66,33 +123,90 @@ class Suggestion:
         if value == value and (known is None or abs(value) > abs(known.value)):
             self.worst[method, criterion] = Worst(value, frame)
 
+    @property
+    def torn(self) -> dict[str, Phrase]:
+        """The methods that are far from the others, each with the reason: they are best at nothing."""
+        found: dict[str, Phrase] = {}
+        for name, times in TORN.items():
+            values = {m: abs(self.worst[m, name].value) for m in self.methods if (m, name) in self.worst}
+            usual = statistics.median(values.values()) if len(values) > 2 else math.inf
+            for method, value in values.items():
+                if value <= times * usual or (name == LONGEST and value < LEAST_TEAR):
+                    continue
+                text = (
+                    "an edge has {times} times its length"
+                    if name == LONGEST
+                    else "it bulges {times} times as far"
+                )
+                text = text if math.isfinite(value) else "its shape is not finite"
+                number = f"{value if name == LONGEST else value / usual:.3g}"
+                found.setdefault(method, phrase(text, times=number))
+        return found if len(found) < len(self.methods) else {}
+
     def best(self, criterion: Criterion) -> list[str]:
         """Returns the methods that are best at it; empty where all are equally good, or it was not
         measured."""
-        values = {
-            m: abs(self.worst[m, criterion.name].value) for m in self.methods if self._has(m, criterion)
-        }
+        values = self._values(criterion)
         if not values:
             return []
-        least = SAME[criterion.unit] * (self.diagonal if criterion.unit == "length" else 1.0)
         best = min(values.values())
-        chosen = [m for m, value in values.items() if value <= best + max(SAME_PART * best, least)]
+        chosen = [
+            m
+            for m, value in values.items()
+            if value <= best + max(SAME_PART * best, self._of_unit(SAME, criterion))
+        ]
         return chosen if len(chosen) < len(values) else []
 
-    def order(self, criterion: Criterion) -> list[str]:
-        """Returns the methods, the best at it first; those without a value last."""
-        worst = {m: self.worst[m, criterion.name].value for m in self.methods if self._has(m, criterion)}
-        return sorted(self.methods, key=lambda method: abs(worst.get(method, math.inf)))
+    @property
+    def recommended(self) -> str:
+        """The method whose values are smallest beside the medians of those that are not torn; empty where all
+        are equally good."""
+        scores = dict.fromkeys(self.methods, 0.0)
+        for criterion in CRITERIA:
+            values, least = self._values(criterion), self._of_unit(SEEN, criterion)
+            usual = statistics.median(values.values()) if values else 0.0
+            for method, value in values.items():
+                scores[method] += criterion.weight * math.log((value + least) / (usual + least))
+        for method in self.torn:
+            del scores[method]
+        if not any(self.best(criterion) for criterion in CRITERIA):
+            return ""
+        least = min(scores.values())
+        return next(method for method, score in scores.items() if score <= least + AS_GOOD)
 
     @property
-    def text(self) -> str:
-        """One sentence about which methods are best at what."""
-        best = [
-            f"{criterion.label.lower()}: {', '.join(self.methods[method] for method in self.best(criterion))}"
-            for criterion in CRITERIA
-            if self.best(criterion)
-        ]
-        return f"Best at {'; '.join(best)}." if best else "All methods are equally good here."
+    def reason(self) -> Phrase:
+        """Why the recommended method is, in its two strongest points."""
+        best_at = [criterion for criterion in CRITERIA if self.recommended in self.best(criterion)]
+        best_at.sort(key=lambda criterion: -criterion.weight)
+        praises = [phrase(criterion.praise) for criterion in best_at] or [phrase("good at all measures")]
+        if len(praises) == 1:
+            return praises[0]
+        return phrase("{first} and {second}", first=praises[0], second=praises[1])
+
+    def order(self, criterion: Criterion) -> list[str]:
+        """Returns the methods, the best at it first; then those that are torn; those without a value last."""
+        torn, known = self.torn, {m: w.value for (m, name), w in self.worst.items() if name == criterion.name}
+        return sorted(self.methods, key=lambda m: (m not in known, m in torn, abs(known.get(m, 0.0))))
+
+    @property
+    def text(self) -> Phrase:
+        """One sentence: the recommended method and why."""
+        if not self.recommended:
+            return phrase("All methods are equally good here")
+        return phrase("{method}: {why}", method=phrase(self.methods[self.recommended]), why=self.reason)
+
+    def _values(self, criterion: Criterion) -> dict[str, float]:
+        """The magnitudes of the methods that are not torn."""
+        torn = self.torn
+        return {
+            m: abs(self.worst[m, criterion.name].value)
+            for m in self.methods
+            if m not in torn and self._has(m, criterion)
+        }
+
+    def _of_unit(self, values: Mapping[str, float], criterion: Criterion) -> float:
+        return values[criterion.unit] * (self.diagonal if criterion.unit == "length" else 1.0)
 
     def _has(self, method: str, criterion: Criterion) -> bool:
         return (method, criterion.name) in self.worst

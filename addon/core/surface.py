@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .vectors import cross
+from .vectors import cross, dots
 
 
 @dataclass(frozen=True)
@@ -124,16 +124,62 @@ class Caps:
         numbers, holes = np.unique(holes, return_inverse=True)
         return cls(starts, stops, vertices, holes, holes[first], len(numbers))
 
-    def volume(self, points: np.ndarray) -> float:
-        """Six times the volume that the fans add, for float64 points [3, vertices]."""
+    def volumes(self, points: np.ndarray) -> np.ndarray:
+        """float64 [holes]: six times the volume that each fan adds, for float64 points [3, vertices]."""
         if self.count == 0:
-            return 0.0
+            return np.zeros(0)
         sizes = np.bincount(self.holes, minlength=self.count)
         centres = np.stack(
             [np.bincount(self.holes, axis[self.vertices], self.count) / sizes for axis in points]
         )
         a, b, c = points[:, self.stops], points[:, self.starts], centres[:, self.hole_of]
-        return float(np.einsum("ij,ij->", a, cross(b, c)))
+        return np.bincount(self.hole_of, dots(a, cross(b, c)), self.count)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Parts of a surface, each closed by fans where it ends.
+
+    surface   of all parts, which share no vertices
+    vertices  int64 [vertices], the numbers of its vertices in the whole surface
+    part_of   int64 [triangles], from 0
+    """
+
+    surface: Surface
+    vertices: np.ndarray
+    part_of: np.ndarray
+
+    @classmethod
+    def of(cls, whole: Surface, numbers: np.ndarray) -> Parts:
+        """numbers: int [triangles], the part of each triangle of the whole; -1 for none."""
+        taken = numbers >= 0
+        _numbers, part_of = np.unique(numbers[taken], return_inverse=True)
+        first_of_part = part_of[:, None].astype(np.int64) * whole.vertex_count
+        keys, corners = np.unique(first_of_part + whole.triangles[taken], return_inverse=True)
+        vertices = keys % whole.vertex_count
+        at_same_place = keys
+        if whole.coincident is not None:
+            at_same_place = keys - vertices + whole.coincident[vertices]
+        _keys, first, index = np.unique(at_same_place, return_index=True, return_inverse=True)
+        no_edges = np.empty((0, 2), np.int32)
+        return cls(Surface(len(keys), corners.reshape(-1, 3), no_edges, first[index]), vertices, part_of)
+
+    @cached_property
+    def _part_of_hole(self) -> np.ndarray:
+        caps, of_vertices = self.surface.caps, np.zeros(len(self.vertices), np.int64)
+        of_vertices[self.surface.triangles] = self.part_of[:, None]
+        result = np.zeros(caps.count, np.int64)
+        result[caps.holes] = of_vertices[caps.vertices]
+        return result
+
+    def volumes(self, points: np.ndarray) -> np.ndarray:
+        """float64 [parts], for points [3, vertices] of the whole surface."""
+        own = points.take(self.vertices, axis=1)
+        own -= own.mean(axis=1, keepdims=True) if len(self.vertices) else 0.0
+        a, b, c = (own.take(corner, axis=1) for corner in self.surface.corners)
+        count = int(self.part_of.max(initial=-1)) + 1
+        inside = np.bincount(self.part_of, dots(a, cross(b, c)), count)
+        return (inside + np.bincount(self._part_of_hole, self.surface.caps.volumes(own), count)) / 6.0
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:

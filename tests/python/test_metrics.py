@@ -7,8 +7,8 @@ import sinew
 import trimesh
 from rigs import about, random_motion, transform
 from sinew_addon.core.influences import Influences
-from sinew_addon.core.metrics import METRICS, FrameOfRig, Gauge, Shape, volume
-from sinew_addon.core.surface import Surface, coincident_vertices, joined
+from sinew_addon.core.metrics import METRICS, FrameOfRig, Gauge, Measured, Shape, volume
+from sinew_addon.core.surface import Parts, Surface, coincident_vertices, joined
 
 SIDES, RINGS, RADIUS, LENGTH = 24, 81, 0.25, 2.0
 IDENTITY = np.eye(4)
@@ -214,6 +214,36 @@ def test_faces_that_wind_against_each_other_are_counted():
     faces[7] = faces[7, ::-1]
     surface = Surface(len(mesh.vertices), faces, np.empty((0, 2), np.int32))
     assert surface.clash_count == 3
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_parts_are_slices(tube, is_cut):
+    """Of a tube, whose rings, and so the fans, are flat. Also where triangles share no vertices."""
+    points, triangles = tube.rest + np.array([7, 8, 9]), tube.surface.triangles
+    middles = tube.rest[triangles][:, :, 0].mean(axis=1)
+    numbers = np.where(middles < -0.5, 4, np.where(middles < 0.75, 9, -1))
+    if is_cut:
+        points, triangles = (
+            points[triangles.ravel()],
+            np.arange(triangles.size, dtype=np.int32).reshape(-1, 3),
+        )
+    surface = Surface(len(points), triangles, np.empty((0, 2), np.int32), coincident_vertices(points))
+    area = SIDES / 2 * RADIUS**2 * np.sin(2 * np.pi / SIDES)
+    np.testing.assert_allclose(
+        Parts.of(surface, numbers).volumes(points.T), [0.5 * area, 1.25 * area], rtol=1e-9
+    )
+    assert Parts.of(surface, np.full(len(triangles), -1)).volumes(points.T).size == 0
+
+
+def test_what_one_limb_gains_does_not_make_up_for_another(tube):
+    """One half of a tube is made thicker by what the other loses."""
+    measured = tube.measure("lbs", IDENTITY)
+    assert measured.limb_change == pytest.approx(0.0, abs=1e-7)
+    points = tube.rest.copy()
+    points[:, 1:] *= np.where(points[:, :1] < 0.0, np.sqrt(0.8), np.sqrt(1.2))
+    measured = Measured(measured._pose, Shape(tube.surface, points), None)
+    assert abs(measured.entry("volume_change")) < 0.01
+    assert measured.entry("limb_change") == pytest.approx(0.2, rel=0.03)
 
 
 def test_several_meshes_are_measured_as_one():

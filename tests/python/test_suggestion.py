@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects which method is best by which criterion."""
+"""Protects which method is recommended, and which is best by which criterion."""
 
 import math
 
 import pytest
-from sinew_addon.core.suggestion import CRITERIA, Suggestion
+from sinew_addon.core.suggestion import CRITERIA, LONGEST, Suggestion
 
 BY_NAME = {criterion.name: criterion for criterion in CRITERIA}
 
@@ -32,6 +32,42 @@ def test_equal_methods_are_all_best_or_none():
     assert suggestion(stretch=[[0.1], [0.15], [50.0]]).best(BY_NAME["stretch"]) == ["a"]
 
 
+@pytest.mark.parametrize("measure", [LONGEST, "bulge"])
+@pytest.mark.parametrize("value", [50.0, math.inf])
+def test_what_is_torn_is_best_at_nothing(measure, value):
+    made = suggestion(
+        **{measure: [[3.0], [3.1], [value]]}, volume=[[0.3], [0.2], [0.01]], flips=[[0.1], [0.1], [0.0]]
+    )
+    assert list(made.torn) == ["c"]
+    assert ("finite" in made.torn["c"]) == math.isinf(value)
+    assert made.best(BY_NAME["volume"]) == ["b"]
+    assert made.order(BY_NAME["volume"]) == ["b", "a", "c"]
+    assert made.recommended == "b"
+
+
+def test_short_edges_and_two_methods_are_not_torn():
+    assert suggestion(**{LONGEST: [[1.01], [1.01], [1.9]]}).torn == {}
+    assert suggestion(**{LONGEST: [[3.0], [90.0]]}).torn == {}
+
+
+def test_one_method_is_recommended_by_what_the_eye_sees_first():
+    made = suggestion(
+        stretch=[[0.1], [0.2], [0.2]],
+        volume=[[0.2], [0.02], [0.04]],
+        bulge=[[0.3], [0.1], [0.2]],
+        crossings=[[900], [700], [800]],
+    )
+    assert made.recommended == "b"
+    assert made.text == "Method B: keeps volume best and bulges least"
+    # Two volumes of a thousandth look alike.
+    assert suggestion(volume=[[0.002], [0.001], [0.002]], bulge=[[0.1], [0.2], [0.1]]).recommended == "a"
+    # Of two that are as good, the first.
+    made = suggestion(
+        volume=[[0.2], [0.1], [0.2]], bulge=[[0.1], [0.2], [0.2]], stretch=[[0.3], [0.3], [0.1]]
+    )
+    assert made.text.startswith(f"{made.methods[made.recommended]}: ")
+
+
 @pytest.mark.parametrize(("difference", "best"), [(1e-4, []), (1e-3, ["a"])])
 def test_lengths_are_relative_to_the_diagonal(difference, best):
     made = suggestion(bulge=[[0.0], [difference], [difference]])
@@ -42,7 +78,8 @@ def test_criteria_that_are_not_measured_have_no_best():
     made = suggestion(volume=[[math.nan], [math.nan], [math.nan]])
     assert made.worst == {}
     assert made.best(BY_NAME["volume"]) == made.best(BY_NAME["crossings"]) == []
-    assert made.text == "All methods are equally good here."
+    assert made.text == "All methods are equally good here"
+    assert made.recommended == ""
 
 
 def test_methods_are_sorted_with_unmeasured_ones_last():
@@ -50,10 +87,3 @@ def test_methods_are_sorted_with_unmeasured_ones_last():
     assert made.order(BY_NAME["volume"]) == ["c", "a", "b"]
     assert made.order(BY_NAME["stretch"]) == ["b", "a", "c"]
     assert made.order(BY_NAME["crossings"]) == ["a", "b", "c"]
-
-
-def test_one_sentence_names_the_best():
-    made = suggestion(
-        stretch=[[0.2], [0.1], [0.3]], flips=[[0.2], [0.1], [0.3]], volume=[[0.1], [0.2], [0.3]]
-    )
-    assert made.text == "Best at stretch: Method B; volume: Method A; flips: Method B."

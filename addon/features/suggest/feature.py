@@ -24,8 +24,7 @@ MOST_BEST = 3
 class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     bl_label = "Suggest a Method"
     bl_description = (
-        "Measure what every method would make of the frames, and say which is best at what. The method stays "
-        "as it is"
+        "Measure what every method would make of the frames, and recommend one. The method stays as it is"
     )
     bl_options = {"REGISTER"}
     saying = "Sinew measures every method"
@@ -77,11 +76,17 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
         suggestion = suggest.suggestions.get(context.scene.session_uid)
         if suggestion is None:
             return
+        used = {properties.of(obj).method for obj in sinew_targets(context)}
+        if suggestion.recommended:
+            _draw_method(layout, suggestion, suggestion.recommended, used)
+        draw_text(layout, context, tr(suggestion.text), icon="SOLO_ON" if suggestion.recommended else "INFO")
+        for method, why in suggestion.torn.items():
+            text = tr("{method} tears here: {why}", method=tr(suggestion.methods[method]), why=tr(why))
+            draw_text(layout, context, text, icon="ERROR")
         count = len(suggestion.frames)
         draw_text(
             layout, context, counted(count, "The worst of {count} frame", "The worst of {count} frames")
         )
-        used = {properties.of(obj).method for obj in sinew_targets(context)}
         criterion = next((c for c in CRITERIA if c.name == _View.measure), None)
         text = "Best at Each Measure" if criterion is None else criterion.label
         layout.operator_menu_enum("sinew.suggestions_by", "measure", text=text, icon="SORTSIZE")

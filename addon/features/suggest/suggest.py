@@ -9,7 +9,7 @@ from mathutils.bvhtree import BVHTree
 
 from ...attach import properties
 from ...core.metrics import Measured, Shape
-from ...core.suggestion import CRITERIA, Suggestion
+from ...core.suggestion import LONGEST, MEASURED, Suggestion
 from ...ui import stepped
 from ..heat import live
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
@@ -68,9 +68,10 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
 
 
 def _add(suggestion: Suggestion, method: str, frame: float, measured: Measured) -> None:
-    for criterion in CRITERIA:
-        if criterion.entry:
-            suggestion.add(method, criterion.name, measured.entry(criterion.entry), frame)
+    for name, entry in MEASURED.items():
+        suggestion.add(method, name, measured.entry(entry), frame)
+    if not np.isfinite(measured.shape.points).all():
+        suggestion.add(method, LONGEST, np.inf, frame)
 
 
 def _crossings(shape: Shape) -> set[tuple[int, int]]:
