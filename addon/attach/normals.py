@@ -22,7 +22,7 @@ from ..io import mesh_io
 from ..io.animation_paths import is_animated, is_visibility_animated
 from . import node_group, properties, stack, upstream_proxy
 
-# False: Sinew leaves normals of the setting As Blender to Blender, which computes them when they are read.
+# False: Sinew leaves normals of the setting By Sinew to Blender, which computes them when they are read.
 are_used = True
 # The node Set Mesh Normal can set free normals.
 ARE_SUPPORTED = bpy.app.version >= (4, 5)

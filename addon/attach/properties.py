@@ -296,14 +296,14 @@ class SinewSettings(bpy.types.PropertyGroup):
         name="Normals",
         description="Who computes the normals that the mesh is drawn with (Blender 4.5 and later)",
         items=[
-            (AS_BLENDER, "As Blender", "Sinew computes them with the points: the same, in less time", 0),
+            (AS_BLENDER, "By Sinew", "Computed with the points: Blender's own, in less time", 0),
             (
                 SKINNED_NORMALS,
                 "Skinned",
                 "Those of the rest pose move with the skin, as in game engines; imported ones are kept",
                 2,
             ),
-            (LEAVE_NORMALS, "Leave to Blender", "Blender computes them whenever they are read", 1),
+            (LEAVE_NORMALS, "By Blender", "Computed whenever they are read", 1),
         ],
         default=AS_BLENDER,
         options=set(),

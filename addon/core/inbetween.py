@@ -60,7 +60,7 @@ METHODS = {
         ),
         Method(
             "dib",
-            "Screw, keys blended iteratively",
+            "Screw, smooth on splines",
             "The screw between two keys; on a spline, all keys blended iteratively. DIB of dual quaternions",
             8,
         ),
@@ -72,7 +72,7 @@ METHODS = {
         ),
         Method(
             "matrix_log",
-            "Logarithms, not the shortest way",
+            "Log-matrix, rigid",
             "Logarithms of matrices: dependent on the rest pose. Log-matrix blending",
             3,
         ),

@@ -79,7 +79,7 @@ CRITERIA = (
     ),
 )
 # Scores that differ by less are equal: the first in the list of methods is recommended.
-AS_GOOD = 0.03
+AS_GOOD = 0.2
 LONGEST, BULGE = "longest", "bulge"
 """LONGEST: the longest edge, as a part of its length at rest, by which torn shapes are found."""
 MEASURED = {**{c.name: c.entry for c in CRITERIA if c.entry}, LONGEST: "stretch_max"}
@@ -179,7 +179,7 @@ class Suggestion:
         """Why the recommended method is, in its two strongest points."""
         best_at = [criterion for criterion in CRITERIA if self.recommended in self.best(criterion)]
         best_at.sort(key=lambda criterion: -criterion.weight)
-        praises = [phrase(criterion.praise) for criterion in best_at] or [phrase("good at all measures")]
+        praises = [phrase(criterion.praise) for criterion in best_at] or [phrase("is good at all measures")]
         if len(praises) == 1:
             return praises[0]
         return phrase("{first} and {second}", first=praises[0], second=praises[1])

@@ -7,22 +7,40 @@ import bpy
 
 from ..attach import attach, behind_nodes, properties, stage_settings
 from ..deform import session
-from . import character, operators, precomputing, state_text
+from ..deform.plan import State
+from . import character, operators, precomputing, state_text, stepped
 from .presets import SINEW_PT_method_presets
-from .settings_layout import draw_method, draw_stages
-from .sidebar import Sidebar, characters, draw_text, names_text
+from .settings_layout import draw_method, draw_parameters, draw_stages
+from .sidebar import Sidebar, characters, draw_text, names_text, shortened
 from .translations import counted, tr
 
 # Characters' widths that a panel's header takes beside its label and what stands on its right.
 MARGIN = 4
+# Those of the buttons there.
+BUTTONS = 14
+
+
+class SINEW_MT_character(bpy.types.Menu):
+    bl_label = "Character"
+    bl_description = "What one seldom does with a character"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.operator("sinew.rebind", icon="FILE_REFRESH")
+        self.layout.operator("sinew.remove", text="Remove Sinew", icon="X")
 
 
 class SINEW_PT_main(Sidebar, bpy.types.Panel):
     bl_label = "Sinew"
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
-        if operators.has_sinew_targets(context):
-            SINEW_PT_method_presets.draw_panel_header(self.layout)
+        layout, meshes = self.layout, operators.targets(context)
+        has_sinew = any(properties.has_sinew(obj) for obj in meshes)
+        if meshes:
+            room = characters(context) - len(self.bl_label) - MARGIN - (BUTTONS if has_sinew else 0)
+            layout.label(text=_title(context, meshes, max(room, 8)), translate=False)
+        if has_sinew:
+            SINEW_PT_method_presets.draw_panel_header(layout)
+            layout.menu(SINEW_MT_character.__name__, text="", icon="DOWNARROW_HLT")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -39,9 +57,11 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
         if waits:
             text = tr("{wait}: until then nothing can be changed", wait=tr(waits))
             draw_text(layout, context, text, icon="INFO")
+            if not context.scene.render.use_lock_interface:
+                text = "Lock Interface, in the menu Render, keeps Blender from reading what a render changes"
+                draw_text(layout, context, text, icon="INFO")
         column = layout.column()
         column.enabled = not waits
-        _draw_title(column, context, meshes)
         _draw_add(column, context, meshes)
         skinned = character.find_meshes(context)
         lead = character.lead(context)
@@ -49,16 +69,12 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
             _draw_character(column, context, skinned, lead)
 
 
-def _draw_title(
-    layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]
-) -> None:
-    """Shows whose settings these are."""
+def _title(context: bpy.types.Context, meshes: list[bpy.types.Object], room: int) -> str:
+    """Whose settings these are, in so many characters."""
     names = [armature.name for armature in operators.armatures(context)] or [meshes[0].name]
     text = names_text(names, most=2)
-    if len(meshes) > 1:
-        text += f" \u00b7 {tr('{count} meshes', count=len(meshes))}"
-    icon = "OUTLINER_OB_ARMATURE" if len(meshes) > 1 else "OUTLINER_OB_MESH"
-    layout.label(text=text, icon=icon, translate=False)
+    longer = f"{text} \u00b7 {tr('{count} meshes', count=len(meshes))}"
+    return longer if len(meshes) > 1 and len(longer) <= room else shortened(text, room)
 
 
 def _draw_add(layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]) -> None:
@@ -85,14 +101,19 @@ def _draw_character(
     shared = character.of(context.scene)
     # For a single mesh its own settings, which can have keys.
     settings = properties.of(lead) if len(meshes) == 1 else shared
-    row = layout.row(align=True)
-    row.prop(shared, "enabled", text=state_text.switch_text(meshes), toggle=True)
-    row.operator("sinew.rebind", icon="FILE_REFRESH")
-    row.operator("sinew.remove", icon="X")
-    layout.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")
     column = layout.column()
     column.active = shared.enabled
-    draw_method(column, settings, lead)
+    draw_method(column, settings)
+    row = layout.row(align=True)
+    row.prop(shared, "enabled", text=state_text.switch_text(meshes), toggle=True)
+    row.operator("sinew.compare", text="Compare\u2026")
+    if not stepped.draw_progress(row, "sinew.suggest"):
+        row.operator("sinew.suggest", text="Suggest")
+    if any(session.plan_of(obj).state is State.REFUSED for obj in meshes):
+        layout.operator("sinew.rebind", icon="FILE_REFRESH")
+    column = layout.column()
+    column.active = shared.enabled
+    draw_parameters(column, settings, lead)
     followers = [properties.of(obj) for obj in meshes if not properties.of(obj).is_own]
     methods = {tr(properties.method_label(settings.method)) for settings in followers}
     if len(methods) > 1:
@@ -101,9 +122,6 @@ def _draw_character(
         draw_text(column, context, text, icon="INFO")
     state_text.draw_character(layout, context, meshes)
     precomputing.draw(layout, [(obj, session.state_of(obj)) for obj in meshes if properties.of(obj).enabled])
-    if not context.scene.render.use_lock_interface:
-        text = "Lock Interface Before Rendering"
-        layout.prop(context.scene.render, "use_lock_interface", text=text, icon="INFO")
 
 
 def stages_text(names: Sequence[str], room: int) -> str:
@@ -136,4 +154,4 @@ class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
         draw_stages(layout, context, settings, lead)
 
 
-CLASSES = (SINEW_PT_main, SINEW_PT_stages)
+CLASSES = (SINEW_MT_character, SINEW_PT_main, SINEW_PT_stages)

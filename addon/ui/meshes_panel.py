@@ -6,7 +6,7 @@ import bpy
 from ..attach import properties
 from ..deform import session
 from . import character, operators, state_text
-from .settings_layout import draw_method, draw_stages
+from .settings_layout import draw_method, draw_parameters, draw_stages
 from .sidebar import Sidebar, characters, draw_text, shortened
 from .translations import tr
 
@@ -86,7 +86,8 @@ def _draw_details(
     column = layout.column()
     column.active = settings.enabled
     if settings.is_own and not is_alone:
-        draw_method(column, settings, obj)
+        draw_method(column, settings)
+        draw_parameters(column, settings, obj)
         draw_stages(column, context, settings, obj, only=obj.name)
     _draw_further_modifiers(column, settings)
     _draw_facts(column, obj)

@@ -70,6 +70,9 @@ class SinewPreferences(bpy.types.AddonPreferences):
         _draw_variable(layout, context, precomputing.VARIABLE)
         layout.prop(self, "safe_mode")
         _draw_variable(layout, context, safe_mode.VARIABLE)
+        layout.prop(
+            context.scene.render, "use_lock_interface", text="Lock Interface in Renders of This Scene"
+        )
         menus.draw_shortcuts(self.layout, context)
 
 

@@ -14,12 +14,19 @@ from .translations import tr
 MOST_LEFT_OUT = 4
 
 
-def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
-    """Draws the method, and the parameters of all methods in use.
+def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    row = layout.split(factor=0.25)
+    row.label(text="Method")
+    row.prop(settings, "method", text="")
+
+
+def draw_parameters(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object
+) -> None:
+    """Draws the parameters of all methods in use.
 
     obj  whose settings these are; for a character, its lead
     """
-    layout.prop(settings, "method", text="")
     for name in method_needs.methods_of(obj):
         for parameter in properties.METHODS[name].parameters:
             layout.prop(getattr(settings, name), parameter.id)

@@ -11,6 +11,7 @@ from ..core.errors import SinewError
 from ..deform import characters, precompute_watch, session
 from ..io import pose_io
 from .operators import Acting
+from .sidebar import redraw
 from .translations import tr
 
 # The window redraws in between: rarely enough to cost little, often enough for Esc.
@@ -79,6 +80,8 @@ class Stepped(Acting):
         if share is None:
             return self._finished(context)
         context.window_manager.progress_update(share)
+        _running[self.bl_idname] = share
+        redraw()
         text = tr("{doing}: {share} (Esc stops)", doing=tr(self.saying), share=f"{share:.0%}")
         show_progress(context.workspace, text, share)
         return {"RUNNING_MODAL"}
@@ -107,6 +110,7 @@ class Stepped(Acting):
 
     def _end(self, context: bpy.types.Context) -> None:
         manager = context.window_manager
+        _running.clear()
         manager.event_timer_remove(self._timer)
         manager.progress_end()
         clear_progress(context.workspace)
@@ -173,6 +177,19 @@ def kept_frame(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object]) ->
         if moved:
             bpy.context.view_layer.update()
             session.refresh(bpy.context)
+
+
+# The share that is done, by the operator's name; Blender runs one at a time.
+_running: dict[str, float] = {}
+
+
+def draw_progress(layout: bpy.types.UILayout, operator: str) -> bool:
+    """Draws how far it is, in the place of its button. Returns False where it does not run."""
+    if operator not in _running:
+        return False
+    share = _running[operator]
+    layout.progress(factor=share, text=f"{share:.0%}", translate=False)
+    return True
 
 
 # In units of a button's width.

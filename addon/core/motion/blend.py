@@ -27,10 +27,10 @@ TRAVEL, IN_PLACE, KEYED = "travel", "in_place", "keyed"
 METHODS = {
     method.name: method
     for method in (
-        Method("dlb", "Dual Quaternions (recommended)", "Normalised sum: rigid, nearly a screw. DLB", 6),
+        Method("dlb", "Dual Quaternions (recommended)", "Rigid; bones swing nearly along screws. DLB", 6),
         Method("sclerp", "Screw", "The screw between two, at an even pace; of more as DIB. ScLERP", 7),
         Method("dib", "Screw of Many", "Dual quaternions blended iteratively, evenly. DIB", 8),
-        Method("qv_nlerp", "Quaternion and Vector", "Normalised sum of rotations, mean location: rigid", 4),
+        Method("qv_nlerp", "Quaternion and Vector", "Rigid; rotation and location blended apart. Nlerp", 4),
         Method("qv_slerp", "Quaternion and Vector, Even", "Mean rotation on the sphere, mean location", 5),
         Method("matrix_polar", "Matrix Made Rigid", "Mean matrix, brought back to the nearest rotation", 2),
         Method("matrix_log", "Log-Matrix", "Mean of logarithms: rigid, dependent on the rest pose", 3),

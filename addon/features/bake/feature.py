@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes: an operator."""
+"""Bakes: an operator, and the panel of what plays without Sinew."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +13,8 @@ from ...core.frames import parse_frames
 from ...core.helper_bones import KEYS, POSE, SCALED_KEYS, HelperOptions
 from ...deform import characters
 from ...ui import stepped
-from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.operators import OfSkinned, OnSinewObjects, sinew_targets
+from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from . import bake, bake_apart, bake_bones, bake_state
 
@@ -137,4 +138,15 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
         return bake.start(meshes, self.kind, frames, target, self.overwrite, helpers)
 
 
-FEATURE = Feature((SINEW_OT_bake,))
+class SINEW_PT_bake(Sidebar, OfSkinned, bpy.types.Panel):
+    bl_label = "Bake and Export"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")
+        draw_text(layout, context, "A bake into this file takes Sinew off", icon="INFO")
+        layout.operator("sinew.corrective_key", icon="SHAPEKEY_DATA")
+
+
+FEATURE = Feature((SINEW_OT_bake, SINEW_PT_bake))

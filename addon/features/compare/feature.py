@@ -6,7 +6,6 @@ import numpy as np
 
 from ...attach import attach, properties
 from ...attach.feature import Feature
-from ...core.comparison import USUAL_METHODS
 from ...core.errors import SinewError
 from ...deform import characters
 from ...ui import operators
@@ -76,7 +75,7 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
         description="Show a copy of the character under each of these",
         items=METHOD_ITEMS,
         options={"ENUM_FLAG"},
-        default=set(USUAL_METHODS),
+        default={"lbs", "dq", "cor"},
     )
     # Clicking an enum flag would clear all others.
     choices: bpy.props.CollectionProperty(
@@ -181,14 +180,16 @@ class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
 class SINEW_PT_comparison(Sidebar, bpy.types.Panel):
     bl_label = "Compare"
 
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return comparison.is_on()
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         state = comparison_state.of_scene(context.scene)
         if state is None:
-            layout.operator("sinew.compare", text="Compare…", icon="MOD_ARRAY")
-            if comparison.is_on():
-                draw_text(layout, context, "Another scene shows a comparison", icon="INFO")
-                layout.operator("sinew.end_comparison", icon="X")
+            draw_text(layout, context, "Another scene shows a comparison", icon="INFO")
+            layout.operator("sinew.end_comparison", icon="X")
             return
         _draw_arrangement(layout, context, state)
         if state.collection is not None:

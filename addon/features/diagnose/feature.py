@@ -52,7 +52,8 @@ class SINEW_OT_check_frames(operators.OnDeformed, stepped.Stepped, bpy.types.Ope
 
 def _report(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
     kinds = sum(len(diagnose.of(obj).findings) for obj in _checkable(context))
-    operator.report({"INFO"}, tr("{count} kinds of faults", count=kinds) if kinds else "Nothing found")
+    text = counted(kinds, "{count} kind of fault", "{count} kinds of faults") if kinds else "Nothing found"
+    operator.report({"INFO"}, text)
     return {"FINISHED"}
 
 

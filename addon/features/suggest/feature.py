@@ -65,21 +65,23 @@ class _View:
     measure = BEST
 
 
-class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
+class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
     bl_label = "Suggest"
-    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene.session_uid in suggest.suggestions and operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.active = operators.are_any_on(context)
-        layout.operator_menu_enum("sinew.suggest", "over", text="Measure All Methods", icon="VIEWZOOM")
-        suggestion = suggest.suggestions.get(context.scene.session_uid)
-        if suggestion is None:
-            return
+        suggestion = suggest.suggestions[context.scene.session_uid]
         used = {properties.of(obj).method for obj in sinew_targets(context)}
         if suggestion.recommended:
             _draw_method(layout, suggestion, suggestion.recommended, used)
-        draw_text(layout, context, tr(suggestion.text), icon="SOLO_ON" if suggestion.recommended else "INFO")
+            draw_text(layout, context, tr("It {why}", why=tr(suggestion.reason)), icon="SOLO_ON")
+        else:
+            draw_text(layout, context, tr(suggestion.text), icon="INFO")
         for method, why in suggestion.torn.items():
             text = tr("{method} tears here: {why}", method=tr(suggestion.methods[method]), why=tr(why))
             draw_text(layout, context, text, icon="ERROR")
@@ -95,6 +97,7 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
         else:
             draw_text(layout, context, criterion.text)
             _draw_order(layout, context, suggestion, criterion, used)
+        layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
 
 
 def _draw_best(
@@ -146,7 +149,7 @@ def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None
         return tr("none")
     if criterion.unit == "count":
         return f"{worst.value:,.0f}"
-    return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")
+    return units.text(scene, criterion.unit, worst.value)
 
 
 FEATURE = Feature(

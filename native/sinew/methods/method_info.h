@@ -91,7 +91,7 @@ enum class MethodGroup {
 /// The heading of a group in menus.
 [[nodiscard]] constexpr std::string_view label_of(MethodGroup group) noexcept {
     constexpr std::string_view kLabels[] = {"Blender's", "Volume Keeping", "For Crude Weights", "For MMD",
-                                            "From the Report"};
+                                            "Experimental"};
     return kLabels[static_cast<std::size_t>(group)];
 }
 
