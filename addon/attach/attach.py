@@ -111,7 +111,8 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
     """
     if properties.has_sinew(obj):
         if method is not None:
-            use_one_method(obj, method)
+            # For all Armature modifiers.
+            properties.of(obj).method = method
         return
     check_can_add(obj)
     with updates_suspended():
@@ -132,14 +133,11 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
         if not isinstance(error, RuntimeError):
             raise
         # Blender refuses an operation with such an error, and gives the reason.
-        raise SinewError(f"{obj.name}: Sinew can not be added to its modifiers: {_reason(error)}") from error
+        reason = str(error).strip().removeprefix("Error: ")
+        raise SinewError(f"{obj.name}: Sinew can not be added to its modifiers: {reason}") from error
     finally:
         if active is not None:
             obj.modifiers.active = active
-
-
-def _reason(error: RuntimeError) -> str:
-    return str(error).strip().removeprefix("Error: ")
 
 
 def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
@@ -198,11 +196,6 @@ def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
     modifier.use_bone_envelopes = True
     properties.of(obj).before.parent_type = obj.parent_type
     obj.parent_type = "OBJECT"
-
-
-def use_one_method(obj: bpy.types.Object, method: str) -> None:
-    """Sets `method` for all Armature modifiers that Sinew replaces."""
-    properties.of(obj).method = method
 
 
 def remove(obj: bpy.types.Object) -> None:
@@ -271,8 +264,11 @@ def switch(obj: bpy.types.Object, on: bool, is_alone: bool = False) -> None:
         restore_volume(obj)
         adopt_pointers(obj)
         _note_keyed_visibility(obj)
+        # Where an animation switches Sinew's modifier off, Armature modifiers that are on would deform.
+        nodes = sinew_modifier(obj)
+        is_alone = is_alone or (nodes is not None and is_visibility_animated(obj, nodes))
         # Tools for weights find the deforming bones through Armature modifiers that are on.
-        is_alone = (is_alone or _is_icon_animated(obj)) and obj.mode != "WEIGHT_PAINT"
+        is_alone = is_alone and obj.mode != "WEIGHT_PAINT"
         _set_icons(obj, Situation.ALONE if is_alone else Situation.SINEW)
         return
     if settings.replaces_modifiers:
@@ -461,7 +457,10 @@ def _note_keyed_visibility(obj: bpy.types.Object) -> None:
                 properties.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
         # While the object is hidden, no animation sets icons that Sinew has switched off.
         elif obj.visible_get():
-            _restore_unkeyed_visibility(obj, modifier, replaced)
+            # Where one sets only the other icon, this one is restored.
+            for name in VIEWS:
+                if not is_animated(obj, modifier, f"show_{name}"):
+                    _show_in(modifier, name, getattr(replaced, f"show_{name}"))
         if obj.visible_get():
             properties.store(replaced, "visibility_is_keyed", True)
 
@@ -485,15 +484,6 @@ def was_off(obj: bpy.types.Object) -> bool:
     """Whether the Armature modifiers were off in both views before Sinew."""
     kept = properties.of(obj).replaced_modifiers
     return any(replaced.was_off_viewport and replaced.was_off_render for replaced in kept)
-
-
-def _restore_unkeyed_visibility(
-    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
-) -> None:
-    """Restores an icon that is not animated where an animation sets the other one from now on."""
-    for name in VIEWS:
-        if not is_animated(obj, modifier, f"show_{name}"):
-            _show_in(modifier, name, getattr(replaced, f"show_{name}"))
 
 
 def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:
@@ -551,7 +541,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
     again."""
     settings = properties.of(obj)
     follow_icons(obj)
-    position_modifier(obj)
+    stack.position_own(obj)
     kept = settings.replaced_modifiers
     names = [replaced.name for _modifier, replaced in replaced_modifiers(obj)]
     if [replaced.name for replaced in kept] == names:
@@ -571,21 +561,6 @@ def follow_stack(obj: bpy.types.Object) -> None:
     for name, method in _methods(settings).items():
         if method != methods[name]:
             kept[name].method = methods[name]
-
-
-def position_modifier(obj: bpy.types.Object) -> None:
-    """Moves Sinew's modifier behind the Armature modifiers that it replaces: it sets each vertex to its point
-    regardless of the modifiers before it. In front of them or between them, even one that is off would
-    decide what a Multi Modifier mixes with."""
-    if sinew_modifier(obj) is not None:
-        stack.position_own(obj)
-
-
-def _is_icon_animated(obj: bpy.types.Object) -> bool:
-    """Whether an animation sets the icon of Sinew's modifier. Where it is off, the Armature modifiers would
-    deform if they were on."""
-    nodes = sinew_modifier(obj)
-    return nodes is not None and is_visibility_animated(obj, nodes)
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:

@@ -11,31 +11,6 @@ import bpy
 from ..core.phrases import phrase
 from . import stack
 
-# Behind these alone, Blender knows that the mesh is only deformed.
-_ONLY_DEFORM = {
-    "ARMATURE",
-    "CAST",
-    "CLOTH",
-    "COLLISION",
-    "CORRECTIVE_SMOOTH",
-    "CURVE",
-    "DISPLACE",
-    "HOOK",
-    "LAPLACIANDEFORM",
-    "LAPLACIANSMOOTH",
-    "LATTICE",
-    "MESH_CACHE",
-    "MESH_DEFORM",
-    "PARTICLE_SYSTEM",
-    "SHRINKWRAP",
-    "SIMPLE_DEFORM",
-    "SMOOTH",
-    "SURFACE",
-    "SURFACE_DEFORM",
-    "WARP",
-    "WAVE",
-}
-
 
 def warnings(obj: bpy.types.Object) -> list[str]:
     """Returns a sentence for each downstream modifier that acts otherwise with Sinew than without."""
@@ -44,10 +19,12 @@ def warnings(obj: bpy.types.Object) -> list[str]:
 
 def _changed(obj: bpy.types.Object) -> Iterator[bpy.types.Modifier]:
     """Yields the downstream modifiers in front of which Sinew's is the first that does more than deform."""
-    if any(modifier.type not in _ONLY_DEFORM for modifier in stack.upstream(obj) if stack.is_on(modifier)):
+    if any(
+        modifier.type not in stack.ONLY_DEFORM for modifier in stack.upstream(obj) if stack.is_on(modifier)
+    ):
         return
     for modifier in filter(stack.is_on, stack.downstream(obj)):
-        if modifier.type not in _ONLY_DEFORM:
+        if modifier.type not in stack.ONLY_DEFORM:
             return
         yield modifier
 

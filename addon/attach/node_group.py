@@ -102,10 +102,6 @@ def get_or_make_stack_mark() -> bpy.types.NodeTree:
     return group
 
 
-def is_stack_mark(modifier: bpy.types.NodesModifier) -> bool:
-    return modifier.node_group is not None and modifier.node_group.get(MARK) == STACK_MARK
-
-
 def note_structure(group: bpy.types.NodeTree) -> None:
     """Called when a group is complete."""
     group[_MADE_OF] = _structure(group)
@@ -276,7 +272,9 @@ def add(
     for name, value in settings.items():
         setattr(node, name, value)
     for name, value in (inputs or {}).items():
-        socket = node.inputs[name] if isinstance(name, int) else enabled_socket(node.inputs, name)
+        # A node can have several sockets of one name, one for each data type.
+        named = (each for each in node.inputs if each.name == name and each.enabled)
+        socket = node.inputs[name] if isinstance(name, int) else next(named)
         if isinstance(value, bpy.types.Node):
             value = next(output for output in value.outputs if output.enabled)
         if isinstance(value, bpy.types.NodeSocket):
@@ -446,8 +444,3 @@ def same_count(
         count = add(group, "FunctionNodeIntegerMath", {0: count, 1: more})
     inputs = {"A": count, "B": of_buffer["Point Count"]}
     return add(group, "FunctionNodeCompare", inputs, data_type="INT", operation="EQUAL")
-
-
-def enabled_socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
-    """Returns the enabled socket of a node that has several sockets of that name, one for each data type."""
-    return next(socket for socket in sockets if socket.name == name and socket.enabled)

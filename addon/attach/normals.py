@@ -36,26 +36,9 @@ HARMLESS_DOWNSTREAM = {
     "VERTEX_WEIGHT_PROXIMITY",
 }
 # Upstream, these keep faces, sharp edges and custom normals: they move points at most.
-_KEEPS_SHADING = {
-    "ARMATURE",
-    "CAST",
-    "CORRECTIVE_SMOOTH",
-    "CURVE",
-    "DISPLACE",
-    "HOOK",
-    "LAPLACIANDEFORM",
-    "LAPLACIANSMOOTH",
-    "LATTICE",
-    "MESH_DEFORM",
-    "SHRINKWRAP",
-    "SIMPLE_DEFORM",
-    "SMOOTH",
-    "SURFACE_DEFORM",
-    "UV_PROJECT",
-    "UV_WARP",
-    "WARP",
-    "WAVE",
-}
+_KEEPS_SHADING = {"UV_PROJECT", "UV_WARP"} | stack.ONLY_DEFORM.difference(
+    ("CLOTH", "COLLISION", "MESH_CACHE", "PARTICLE_SYSTEM", "SURFACE")
+)
 # These make the same faces and sharp edges whatever the points are, but other custom normals.
 _KEEPS_FACES = {"ARRAY", "MASK", "MIRROR", "SOLIDIFY", "SUBSURF"}
 # Modifiers and constraints that read another object's normals or copy its attributes, and their properties

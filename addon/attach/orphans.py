@@ -15,7 +15,8 @@ def remove() -> None:
     Blender's user counts cannot be trusted: they are too high after it has deleted several copies at once,
     and in 5.2 after a modifier was removed whose inputs name an object.
     """
-    used = _used_by_settings()
+    storages = [properties.of(obj).storage for obj in bpy.data.objects if properties.has_sinew(obj)]
+    used = {helper for each in storages for helper in (each.point_buffer, each.upstream_proxy)}
     helpers = {
         obj
         for obj in bpy.data.objects
@@ -25,8 +26,3 @@ def remove() -> None:
         for helper in [h for h, users in bpy.data.user_map(subset=helpers).items() if not users]:
             upstream_proxy.remove_helper(helper)
     node_group.remove_unused()
-
-
-def _used_by_settings() -> set[bpy.types.Object | None]:
-    storages = [properties.of(obj).storage for obj in bpy.data.objects if properties.has_sinew(obj)]
-    return {helper for each in storages for helper in (each.point_buffer, each.upstream_proxy)}

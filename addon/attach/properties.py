@@ -27,17 +27,14 @@ def method_label(name: str) -> str:
     return METHODS[name].label if name in METHODS else "a method of a newer Sinew"
 
 
-def method_description(name: str) -> str:
-    return (
-        "What Blender's modifier does, as its options say" if name == BLENDER else METHODS[name].description
-    )
-
-
 def method_choices() -> list[tuple[str, str, str, str, int]]:
     """Returns the Armature modifier and all methods, as items of an enum property. The stored number stays
     that of the method, even if the list of methods changes."""
-    numbers = {BLENDER: 0, **{name: method.number + 1 for name, method in METHODS.items()}}
-    return [(n, method_label(n), method_description(n), "NONE", number) for n, number in numbers.items()]
+    blender = "What Blender's modifier does, as its options say"
+    return [
+        (BLENDER, method_label(BLENDER), blender, "NONE", 0),
+        *((name, m.label, m.description, "NONE", m.number + 1) for name, m in METHODS.items()),
+    ]
 
 
 def has_known_methods(settings: SinewSettings) -> bool:
@@ -174,8 +171,8 @@ class SinewSwitchedOff(bpy.types.PropertyGroup):
     show_render: _hidden(bpy.props.BoolProperty, default=True)
 
 
-STAGE_GROUPS = stage_settings.groups(_method_changed)
-METHOD_GROUPS = stage_settings.method_groups(_method_changed)
+STAGE_GROUPS = stage_settings.groups("Stage", stage_settings.STAGES, _method_changed)
+METHOD_GROUPS = stage_settings.groups("Method", stage_settings.METHODS, _method_changed)
 
 
 class SinewIdentity(bpy.types.PropertyGroup):

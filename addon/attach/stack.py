@@ -31,6 +31,30 @@ LEFT_OUT_IN_PAINT = {
 
 # Blender permits no modifier that does more than deform in front of these, and puts a new one in front of it.
 NEED_ORIGINAL_MESH = {"MULTIRES", "SOFT_BODY"}
+# Behind these alone, Blender knows that the mesh is only deformed.
+ONLY_DEFORM = {
+    "ARMATURE",
+    "CAST",
+    "CLOTH",
+    "COLLISION",
+    "CORRECTIVE_SMOOTH",
+    "CURVE",
+    "DISPLACE",
+    "HOOK",
+    "LAPLACIANDEFORM",
+    "LAPLACIANSMOOTH",
+    "LATTICE",
+    "MESH_CACHE",
+    "MESH_DEFORM",
+    "PARTICLE_SYSTEM",
+    "SHRINKWRAP",
+    "SIMPLE_DEFORM",
+    "SMOOTH",
+    "SURFACE",
+    "SURFACE_DEFORM",
+    "WARP",
+    "WAVE",
+}
 MARK_NAME = "Sinew Stack Mark"
 
 
@@ -62,10 +86,11 @@ def neutral_modifier(obj: bpy.types.Object) -> bpy.types.LaplacianDeformModifier
 def mark_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     """Returns Sinew's modifier that marks the mesh (undeformed.py), also without its node group."""
     nodes = [m for m in obj.modifiers if m.type == "NODES"]
+    marks = (m for m in nodes if m.node_group and m.node_group.get(node_group.MARK) == node_group.STACK_MARK)
     bare = [m for m in nodes if m.node_group is None]
     same = (m for m in bare if m.persistent_uid == properties.of(obj).stack.mark_uid)
     named = (m for m in bare if m.name.startswith(MARK_NAME))
-    return next(itertools.chain((m for m in nodes if node_group.is_stack_mark(m)), same, named), None)
+    return next(itertools.chain(marks, same, named), None)
 
 
 def own_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -148,7 +173,9 @@ def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
 
 
 def position_own(obj: bpy.types.Object) -> None:
-    """Moves Sinew's modifiers behind the Armature modifiers that it replaces."""
+    """Moves Sinew's modifiers behind the Armature modifiers that it replaces: it sets each vertex to its
+    point regardless of the modifiers before it. In front of them or between them, even one that is off would
+    decide what a Multi Modifier mixes with."""
     run = armature_modifiers(obj)
     if any(modifier.type in NEED_ORIGINAL_MESH for modifier in downstream(obj)):
         return

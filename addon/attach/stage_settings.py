@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import bpy
@@ -23,19 +23,24 @@ OFF = "OFF"
 _OVERRIDE = {"LIBRARY_OVERRIDABLE"}
 
 
-def as_stored(value: parameters.Value) -> parameters.Value:
-    """Converts a value of a command or a job file to the property's value."""
-    return OFF if value == parameters.OFF else value
-
-
-def groups(update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]) -> dict[str, type]:
-    """Returns a property group class for each stage, by its name. `update` is called at each change."""
-    return {name: _group("Stage", stage, update) for name, stage in STAGES.items()}
-
-
-def method_groups(update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]) -> dict[str, type]:
-    """Returns the same for each method that has parameters."""
-    return {name: _group("Method", method, update) for name, method in METHODS.items()}
+def groups(
+    kind: str,
+    owners: Mapping[str, sinew.Method | sinew.Stage],
+    update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None],
+) -> dict[str, type]:
+    """Returns a property group class for each of STAGES or METHODS, by its name. `update` is called at each
+    change."""
+    return {
+        name: type(
+            f"Sinew{kind}{name.title().replace('_', '')}",
+            (bpy.types.PropertyGroup,),
+            {
+                "__doc__": owner.description,
+                "__annotations__": {each.id: _property(each, update) for each in owner.parameters},
+            },
+        )
+        for name, owner in owners.items()
+    }
 
 
 def method_values(settings: bpy.types.PropertyGroup, methods: Iterable[str]) -> dict[str, parameters.Value]:
@@ -49,17 +54,6 @@ def method_values(settings: bpy.types.PropertyGroup, methods: Iterable[str]) -> 
         if name in METHODS
         for each in METHODS[name].parameters
     }
-
-
-def _group(kind: str, owner: sinew.Method | sinew.Stage, update: Callable) -> type:
-    return type(
-        f"Sinew{kind}{owner.name.title().replace('_', '')}",
-        (bpy.types.PropertyGroup,),
-        {
-            "__doc__": owner.description,
-            "__annotations__": {each.id: _property(each, update) for each in owner.parameters},
-        },
-    )
 
 
 def is_on(settings: bpy.types.PropertyGroup, name: str) -> bool:

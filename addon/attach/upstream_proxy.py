@@ -172,15 +172,12 @@ def remove(obj: bpy.types.Object) -> None:
 def remove_helper(helper: bpy.types.Object) -> None:
     """Removes a proxy or a point buffer, with its mesh. A mesh that a proxy shares is the artist's, who may
     still want it."""
-    mesh, is_own = helper.data, not is_proxy(helper) or bool(helper.data.get(_COPY))
+    # A proxy follows its object, which point buffers do not.
+    mesh, is_proxy = helper.data, len(helper.constraints) > 0
+    is_own = not is_proxy or bool(mesh.get(_COPY))
     bpy.data.objects.remove(helper)
     if is_own and mesh.users == 0:
         bpy.data.meshes.remove(mesh)
-
-
-def is_proxy(helper: bpy.types.Object) -> bool:
-    """Whether a helper is a proxy: it follows its object, which point buffers do not."""
-    return len(helper.constraints) > 0
 
 
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
@@ -237,16 +234,11 @@ def _copy_of_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
         copy.shape_keys.animation_data_clear()
         values = [key.path_from_id("value") for key in keys.key_blocks]
         for path in {*values, "eval_time", *animated_paths(keys)}:
-            variable = _driver(copy.shape_keys, path).variables.new()
-            target = variable.targets[0]
+            driver = copy.shape_keys.driver_add(path).driver
+            driver.type = "SUM"
+            target = driver.variables.new().targets[0]
             target.id_type, target.id, target.data_path = "KEY", keys, path
     return copy
-
-
-def _driver(owner: bpy.types.ID, path: str) -> bpy.types.Driver:
-    driver = owner.driver_add(path).driver
-    driver.type = "SUM"
-    return driver
 
 
 def _clear_parent(copy: bpy.types.Object) -> None:

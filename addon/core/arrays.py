@@ -1,9 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Comparison of arrays that may be None."""
 
+from dataclasses import dataclass, fields
+from typing import Self
+
 import numpy as np
 
 
 def are_equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
     """Whether both are None, or both have the same shape and numbers."""
     return a is b or (a is not None and b is not None and np.array_equal(a, b))
+
+
+@dataclass(frozen=True)
+class OfArrays:
+    """A record whose fields are arrays, or None."""
+
+    def equals(self, other: Self) -> bool:
+        return all(are_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))

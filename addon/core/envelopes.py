@@ -4,16 +4,16 @@
 Based on what Blender's Armature modifier does with Bone Envelopes and Envelope Multiply.
 """
 
-from dataclasses import dataclass, fields
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 
+from .arrays import OfArrays
 from .influences import Entries
 
 
 @dataclass(frozen=True)
-class Envelopes:
+class Envelopes(OfArrays):
     """The envelopes of all bones at rest, in armature space.
 
     heads, tails              float32 [bones, 3]
@@ -30,9 +30,6 @@ class Envelopes:
     distances: np.ndarray
     weights: np.ndarray
     multiply: np.ndarray
-
-    def equals(self, other: Self) -> bool:
-        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
 
     def reach(self, points: np.ndarray, bones: np.ndarray) -> np.ndarray:
         """float64 [n] in 0..1: the weight of points[i] ([n, 3], armature space) in the envelope of

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arrays import OfArrays
+
 # A vertex whose weights have this sum or less is not deformed (Blender's Armature modifier).
 SMALLEST_WEIGHT_SUM = np.float32(1e-4)
 
 
 @dataclass(frozen=True)
-class GroupWeights:
+class GroupWeights(OfArrays):
     """The vertex groups of a mesh as Blender stores them.
 
     counts   int32 [vertices], entries of each vertex
@@ -29,13 +31,6 @@ class GroupWeights:
     def none(cls, vertices: int) -> GroupWeights:
         empty = np.empty(0, dtype=np.int32)
         return cls(np.zeros(vertices, dtype=np.int32), empty, empty.astype(np.float32))
-
-    def equals(self, other: GroupWeights) -> bool:
-        return (
-            np.array_equal(self.counts, other.counts)
-            and np.array_equal(self.groups, other.groups)
-            and np.array_equal(self.weights, other.weights)
-        )
 
     def of_group(self, group: int) -> np.ndarray:
         """float32 [vertices]: each vertex's weight in one group, 0 where it is not in the group."""

@@ -2,12 +2,12 @@
 """The shading of a mesh, and its normals."""
 
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 import sinew
 
-from .arrays import are_equal
+from .arrays import OfArrays
 from .stage_mesh import Topology
 
 # The library's names of domains by Blender's.
@@ -15,7 +15,7 @@ _DOMAINS: dict[str, Literal["vertex", "corner"]] = {"POINT": "vertex", "CORNER":
 
 
 @dataclass(frozen=True)
-class Shading:
+class Shading(OfArrays):
     """What the normals of a mesh depend on, apart from its points and faces; None where it is not set.
 
     sharp_edges  bool [edges]
@@ -26,13 +26,6 @@ class Shading:
     sharp_edges: np.ndarray | None = None
     sharp_faces: np.ndarray | None = None
     custom: np.ndarray | None = None
-
-    def equals(self, other: Self) -> bool:
-        return (
-            are_equal(self.sharp_edges, other.sharp_edges)
-            and are_equal(self.sharp_faces, other.sharp_faces)
-            and are_equal(self.custom, other.custom)
-        )
 
 
 class SurfaceNormals:

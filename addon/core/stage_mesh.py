@@ -8,12 +8,13 @@ from typing import Self
 import numpy as np
 import sinew
 
+from .arrays import OfArrays
 from .rig import Weighting
 from .spaces import transformed
 
 
 @dataclass(frozen=True)
-class Topology:
+class Topology(OfArrays):
     """Faces and edges of a mesh.
 
     face_offsets     int32 [faces + 1], the first corner of each face, then the end
@@ -24,13 +25,6 @@ class Topology:
     face_offsets: np.ndarray
     corner_vertices: np.ndarray
     edges: np.ndarray
-
-    def equals(self, other: Self) -> bool:
-        return (
-            np.array_equal(self.face_offsets, other.face_offsets)
-            and np.array_equal(self.corner_vertices, other.corner_vertices)
-            and np.array_equal(self.edges, other.edges)
-        )
 
 
 @dataclass(frozen=True)

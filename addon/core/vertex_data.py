@@ -32,7 +32,8 @@ class Provider:
 
     what        its name, for people
     version     part of the hash: raised when the same mesh gives other data
-    start       takes rest points, influences, triangles, and by name `gives_way` and `parameters`
+    start       takes rest points, the arrays of influences, triangles, and by name `gives_way` and
+                `parameters`
     parameters  ids of the method's parameters, all numbers, that the data depends on
     welds       it has a parameter `weld`, and its rows begin with their vertex
     """
@@ -44,25 +45,9 @@ class Provider:
     welds: bool = False
 
 
-def _centres(
-    points: np.ndarray, own: Influences, triangles: np.ndarray, *, gives_way: bool
-) -> sinew.Precomputation:
-    return sinew.centres_of_rotation(
-        points, own.offsets, own.bones, own.weights, triangles, gives_way=gives_way
-    )
-
-
-def _moments(
-    points: np.ndarray, own: Influences, triangles: np.ndarray, *, radius: float, gives_way: bool
-) -> sinew.Precomputation:
-    return sinew.direct_delta_mush(
-        points, own.offsets, own.bones, own.weights, triangles, radius, gives_way=gives_way
-    )
-
-
 _ALL = {
-    "cor": Provider("centres of rotation", 1, _centres),
-    "ddm": Provider("smoothed weights", 2, _moments, ("radius", "weld"), welds=True),
+    "cor": Provider("centres of rotation", 1, sinew.centres_of_rotation),
+    "ddm": Provider("smoothed weights", 2, sinew.direct_delta_mush, ("radius", "weld"), welds=True),
 }
 # A build may lack one of them.
 PROVIDERS = {name: provider for name, provider in _ALL.items() if name in METHODS}
@@ -287,7 +272,8 @@ class VertexData:
             points, influences = points[entry.weld.first], entry.weld.influences(influences)
             triangles = entry.weld.triangles(triangles)
         entry.key = _key(method, provider.version, values, points, influences, triangles)
-        entry.start = partial(provider.start, points, influences, triangles, **values)
+        arrays = (points, influences.offsets, influences.bones, influences.weights, triangles)
+        entry.start = partial(provider.start, *arrays, **values)
         found = self._stored.get(entry.key)
         if found is None:
             found = precomputations.find(entry.key)

@@ -93,19 +93,20 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         is_given_up = wanted.state in (State.OFF, State.REFUSED)
         is_same = old.state is wanted.state and not properties.of(obj).replaces_modifiers
         if attach.is_off(obj) or (wanted.state is State.REFUSED and is_same):
-            attach.position_modifier(obj)
+            stack.position_own(obj)
             return
         attach.switch(obj, wanted.state is State.ASIDE, wanted.after_update)
         if wanted.state is State.ASIDE:
             attach.restore_builtin(obj)
-        attach.position_modifier(obj)
+        stack.position_own(obj)
         attach.adopt_pointers(obj)
         if is_given_up:
             point_store.remove_point_attributes(obj)
             upstream_proxy.remove(obj)
         elif obj.mode not in ARMATURE_MODIFIER_MODES:
             point_store.remove(obj)
-        if wanted.state is State.EDITING and _shows_nearest_volume(obj):
+        is_shown = mode_of(obj) in ARMATURE_MODIFIER_MODES and attach.deforms(obj)
+        if wanted.state is State.EDITING and is_shown and small_meshes.has_builtin_shape(obj):
             attach.use_nearest_volume(obj)
         else:
             attach.restore_volume(obj)
@@ -154,13 +155,6 @@ def apply_resumed(obj: bpy.types.Object, was_on: bool, is_alone: bool) -> None:
 def mode_of(obj: bpy.types.Object) -> str:
     """Returns its mode. Edit mode counts also where another object with the same mesh is in it."""
     return "EDIT" if obj.data.is_editmode else obj.mode
-
-
-def _shows_nearest_volume(obj: bpy.types.Object) -> bool:
-    """Whether its mode uses the Armature modifiers, and these can give the shape that Sinew is set to, by
-    Preserve Volume."""
-    is_used = mode_of(obj) in ARMATURE_MODIFIER_MODES and attach.deforms(obj)
-    return is_used and small_meshes.has_builtin_shape(obj)
 
 
 def has_lost_modifier(obj: bpy.types.Object, plan: Plan) -> bool:

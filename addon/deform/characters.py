@@ -51,7 +51,9 @@ def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy
 
 def show(meshes: list[bpy.types.Object]) -> None:
     """Makes meshes of the scene visible, with the collections that they are in."""
-    _show_layers(bpy.context.view_layer.layer_collection)
+    for layer in _layers(bpy.context.view_layer.layer_collection):
+        layer.exclude = layer.hide_viewport = False
+        layer.collection.hide_viewport = layer.collection.hide_render = False
     for obj in meshes:
         obj.hide_viewport = False
         obj.hide_render = False
@@ -156,11 +158,12 @@ def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> 
     attach.add(obj, method)
     # What the caller asks for overrides keys in the file.
     setting_animation.remove_keys(obj, "sinew.method")
-    attach.use_one_method(obj, method)
+    properties.of(obj).method = method
     for name, value in values.items():
         owner, _dot, own_name = name.partition(".")
         setting_animation.remove_keys(obj, f"sinew.{name}")
-        setattr(getattr(properties.of(obj), owner), own_name, stage_settings.as_stored(value))
+        stored = stage_settings.OFF if value == parameters.OFF else value
+        setattr(getattr(properties.of(obj), owner), own_name, stored)
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
 
@@ -243,7 +246,7 @@ def whole_views(
 
 def final_points(obj: bpy.types.Object) -> np.ndarray:
     """Vertices of the final evaluated mesh, object space, float32 [vertices, 3]."""
-    return mesh_io.read_points(_evaluated_mesh(obj))
+    return mesh_io.read_points(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data)
 
 
 def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
@@ -254,18 +257,6 @@ def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
         matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
         parts.append(transformed_axes(final_points(obj), matrix))
     return np.concatenate(parts, axis=1).T
-
-
-def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
-    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-
-
-def _show_layers(layer: bpy.types.LayerCollection) -> None:
-    for each in _layers(layer):
-        each.exclude = False
-        each.hide_viewport = False
-        each.collection.hide_viewport = False
-        each.collection.hide_render = False
 
 
 def _layers(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:

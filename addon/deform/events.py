@@ -98,11 +98,7 @@ def finder(event: str, function: Callable) -> Find:
     Blender frees at once what a handler deletes, but goes on listing its evaluated copy. The `original` of
     that is a dangling pointer, and reading it can crash Blender.
     """
-    return _by_name if others_precede(event, function) else _at_once
-
-
-def _at_once(evaluated: bpy.types.ID) -> bpy.types.ID:
-    return evaluated.original
+    return _by_name if others_precede(event, function) else lambda evaluated: evaluated.original
 
 
 def _by_name(evaluated: bpy.types.ID) -> bpy.types.ID | None:

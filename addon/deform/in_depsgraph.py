@@ -90,7 +90,8 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     memory = _memory_to_write(settings, mesh, skinned)
     if memory is None:
         return "its mesh changed"
-    if skinned.evaluation.is_shown(mesh):
+    evaluation = skinned.evaluation
+    if evaluation.mesh_shown == mesh.as_pointer():
         _leave_out(evaluated, modifiers)
     out, normals = memory
     _note_unannounced_change(out, skinned)
@@ -104,7 +105,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         bound.write_normals(out, rest_points, skinned.plan.normals, normals)
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)
-    skinned.evaluation.succeed(mesh)
+    evaluation.mesh, evaluation.skip_reason, evaluation.failures_in_a_row = mesh.as_pointer(), "", 0
     number, taken = skinned.shown.number + 1, 1000.0 * (time.perf_counter() - started)
     skinned.shown = Shown(frames, rest_points, values, out[0].tobytes(), number, taken)
     # An animation can choose a method whose data has not been requested yet.

@@ -404,8 +404,10 @@ def _update(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Chan
     _forget_known(obj)
     if isinstance(found, Plan):
         current.plans[obj.session_uid] = found
-        if found.state is State.REFUSED:
-            _tell(obj, found.reason)
+        # Each error is reported once.
+        if found.state is State.REFUSED and current.told.get(obj.session_uid) != found.reason:
+            log.error("%s", found.reason)
+            current.told[obj.session_uid] = found.reason
     else:
         current.skinned[obj.session_uid] = found
         current.told.pop(obj.session_uid, None)
@@ -431,17 +433,11 @@ def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
     return refused
 
 
-def _tell(obj: bpy.types.Object, error: str) -> None:
-    """Reports an error once."""
-    if current.told.get(obj.session_uid) != error:
-        log.error("%s", error)
-        current.told[obj.session_uid] = error
-
-
 def _follow_removal(obj: bpy.types.Object, plan: Plan, changes: Changes) -> bool:
     """Whether the object has lost Sinew's modifier; Sinew is then taken off it."""
     state = state_of(obj)
-    if not _is_named(obj, changes) and (state is None or state.is_attached(obj)):
+    are_listed = changes.structure or obj.session_uid in changes.objects or not changes.complete
+    if not are_listed and (state is None or state.is_attached(obj)):
         return False
     if not (obj.is_editable and may_change_file()):
         return False
@@ -455,11 +451,6 @@ def _follow_removal(obj: bpy.types.Object, plan: Plan, changes: Changes) -> bool
     _forget_known(obj)
     current.objects = None
     return True
-
-
-def _is_named(obj: bpy.types.Object, changes: Changes) -> bool:
-    """Whether the object's modifiers may have changed."""
-    return changes.structure or obj.session_uid in changes.objects or not changes.complete
 
 
 def _remove_groups_taken_apart(changes: Changes) -> None:

@@ -71,12 +71,6 @@ class Evaluation:
     failure: str = ""
     failures_in_a_row: int = 0
 
-    def begin_anew(self) -> Evaluation:
-        """Returns the record for a new start; earlier failures still count."""
-        return Evaluation(
-            failures=self.failures, failure=self.failure, failures_in_a_row=self.failures_in_a_row
-        )
-
     def fail(self, error: Exception) -> None:
         if isinstance(error, SinewError):
             self.user_error = error
@@ -85,13 +79,6 @@ class Evaluation:
     def note_failure(self, failure: str) -> None:
         self.skip_reason = self.failure = failure
         self.failures += 1
-
-    def is_shown(self, mesh: bpy.types.Mesh) -> bool:
-        """Whether it is the evaluated mesh of a viewport, not of a render or an exporter."""
-        return self.mesh_shown == mesh.as_pointer()
-
-    def succeed(self, mesh: bpy.types.Mesh) -> None:
-        self.mesh, self.skip_reason, self.failures_in_a_row = mesh.as_pointer(), "", 0
 
 
 @dataclass(frozen=True)
@@ -179,7 +166,11 @@ class SkinnedObject:
         with self.lock:
             if bound.is_of_another_stack(self.bound):
                 self.shown = Shown(number=self.shown.number)
-                self.evaluation = self.evaluation.begin_anew()
+                # Earlier failures still count.
+                old = self.evaluation
+                self.evaluation = Evaluation(
+                    failures=old.failures, failure=old.failure, failures_in_a_row=old.failures_in_a_row
+                )
             self.bound = bound
 
     @property

@@ -27,7 +27,9 @@ def known_before(
     """
     depsgraph = bpy.context.view_layer.depsgraph
     is_seen = depsgraph is not None and depsgraph.as_pointer() == depsgraph_seen
-    if not is_seen or _steps_replace_all():
+    # An experimental preference, which may go: Blender reads everything anew with each step.
+    replaces_all = getattr(bpy.context.preferences.experimental, "use_undo_legacy", False)
+    if not is_seen or replaces_all:
         return {}
     known = {}
     for obj, state in pairs:
@@ -36,11 +38,6 @@ def known_before(
             if _is_known(obj, state, depsgraph):
                 known[obj.session_uid] = state
     return known
-
-
-def _steps_replace_all() -> bool:
-    """Whether Blender reads everything anew with each step: an experimental preference, which may go."""
-    return getattr(bpy.context.preferences.experimental, "use_undo_legacy", False)
 
 
 def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 
 import bpy
 
-from ..attach import attach, properties
+from ..attach import properties
 from ..attach.feature import Feature
 from ..attach.shared_settings import GROUPS, SHARED, assign
 from ..attach.subscribers import subscribers
@@ -39,7 +39,7 @@ def set_method(context: bpy.types.Context, method: str) -> None:
     for the character."""
     with session.changing(context):
         for obj in followers(context):
-            attach.use_one_method(obj, method)
+            properties.of(obj).method = method
 
 
 class _Known:

@@ -819,7 +819,7 @@ def shape_of(
 
     Raises routes.NotBySinewError.
     """
-    attach.use_one_method(obj, method)
+    obj.sinew.method = method
     # Changes the pose and restores it, so that the shape is computed again.
     before = [bone.location.copy() for bone in armature.pose.bones]
     for bone in armature.pose.bones:

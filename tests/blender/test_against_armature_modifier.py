@@ -193,6 +193,6 @@ def test_modes_in_which_blenders_tools_need_the_modifier(mode):
     assert scenes.worst(final_points_in_any_mode(obj), expected) == 0.0
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
-    attach.use_one_method(obj, "lbs")
+    obj.sinew.method = "lbs"
     assert scenes.worst(scenes.final_points(obj), shown) <= 1e-6
     assert stack.sinew_modifier(obj).show_viewport

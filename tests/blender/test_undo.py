@@ -208,7 +208,7 @@ def _armature(arm):
 
 
 def _method(arm):
-    attach.use_one_method(arm, "lbs")
+    arm.sinew.method = "lbs"
 
 
 def _removed(arm):

@@ -131,7 +131,7 @@ class SinewSide(Side):
             session.forget()
 
     def set_method(self, obj: bpy.types.Object, method: str) -> None:
-        attach.use_one_method(obj, method)
+        obj.sinew.method = method
 
     def set_stages(self, obj: bpy.types.Object, number: int) -> None:
         """Like a user who clicks: first, what is on is switched off."""

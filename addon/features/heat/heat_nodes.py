@@ -23,12 +23,7 @@ _KIND = 15
 
 def group_of(obj: bpy.types.Object) -> bpy.types.NodeTree | None:
     """Returns the group for an object that shows a heat map; None for others."""
-    return get_or_make() if properties.of(obj).heat else None
-
-
-def get_or_make() -> bpy.types.NodeTree:
-    """Returns the group that takes points and colours from a point buffer."""
-    return node_group.find(_KIND) or _make()
+    return (node_group.find(_KIND) or _make()) if properties.of(obj).heat else None
 
 
 def remove_unused_material() -> None:
@@ -77,6 +72,7 @@ def remove_applied(mesh: bpy.types.Mesh) -> None:
 
 
 def _make() -> bpy.types.NodeTree:
+    """Returns a group that takes points and colours from a point buffer."""
     points = node_group.get_or_make(POINT_BUFFER)
     inputs = {
         item.name: (item.socket_type, item.description)
