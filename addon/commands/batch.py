@@ -8,7 +8,7 @@ import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Collection, Generator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -89,7 +89,9 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     if out is None:
         raise WrongUse("no --out: name a folder for the copies")
     out = Path(os.path.abspath(out))
-    jobs = plan_jobs(inputs, out, _lines_given() if STANDARD_INPUT in inputs else ())
+    # Paths in standard input need not be valid text.
+    lines = map(os.fsdecode, sys.stdin.buffer) if STANDARD_INPUT in inputs else ()
+    jobs = plan_jobs(inputs, out, lines)
     given = Settings(
         include=tuple(args.include) if args.include else None,
         exclude=tuple(args.exclude) if args.exclude else None,
@@ -210,11 +212,6 @@ class _Workers:
             raise WrongUse(f"--memory: expected a size such as 4GiB, got {text!r}")
         power = " KMGT".index(found[2].upper() or " ")
         return int(float(found[1]) * (1024 if found[3] else 1000) ** power)
-
-
-def _lines_given() -> Iterator[str]:
-    """Returns the lines of standard input; paths need not be valid text."""
-    return map(os.fsdecode, sys.stdin.buffer)
 
 
 def _processors() -> int:

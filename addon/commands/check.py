@@ -94,14 +94,10 @@ def line_of(report: dict) -> str:
     if report["problems"]:
         text = "; ".join(report["problems"])
     elif report["needs_sinew"]:
-        text = f"ok: {_deformed(report)}"
+        meshes, methods = report["meshes"], sorted({mesh["method"] for mesh in report["meshes"]})
+        plural = "" if len(meshes) == 1 else "es"
+        text = f"ok: Sinew deforms {len(meshes)} mesh{plural} by {', '.join(methods)}"
     else:
         text = "ok: does not need Sinew"
     notes = f" ({'; '.join(report['notes'])})" if report["notes"] else ""
     return f"{report['file']}: {text}{notes}"
-
-
-def _deformed(report: dict) -> str:
-    meshes = report["meshes"]
-    methods = ", ".join(sorted({mesh["method"] for mesh in meshes}))
-    return f"Sinew deforms {len(meshes)} mesh{'' if len(meshes) == 1 else 'es'} by {methods}"

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import math
-import statistics
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Self
@@ -132,12 +131,6 @@ class Comparison:
             if is_new and len(chosen) < count and self.shows(worst.measure, worst.value):
                 chosen.append(worst.frame)
         return sorted(chosen) or self.frames[:1]
-
-    def median_time(self, method: str) -> float:
-        return statistics.median(self.times[method])
-
-    def median_own_time(self, method: str) -> float:
-        return statistics.median(self.own[method])
 
     def to_csv(self) -> str:
         """Returns a row for each frame and method, with the entries of Summary and the times as columns."""

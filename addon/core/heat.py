@@ -100,7 +100,8 @@ class HeatScale:
         methods   for each method its summaries; outliers of a single method are clipped
         diagonal  of the rest shape: the range of lengths is at least a ten thousandth of it
         """
-        return cls._up_to(metric, [_largest(metric, summaries) for summaries in methods], diagonal)
+        of_each = [[value for each in own for value in each.extremes(metric.name)] for own in methods]
+        return cls._up_to(metric, [_magnitude(metric, values) for values in of_each], diagonal)
 
     @classmethod
     def over_values(cls, metric: Metric, least: float, most: float, diagonal: float) -> Self:
@@ -174,10 +175,6 @@ class HeatScale:
         if self.metric.scale == "log":
             return np.geomspace(self.low, self.high, count).tolist()
         return np.linspace(self.low, self.high, count).tolist()
-
-
-def _largest(metric: Metric, summaries: Sequence[Summary]) -> float:
-    return _magnitude(metric, [value for summary in summaries for value in summary.extremes(metric.name)])
 
 
 def _magnitude(metric: Metric, values: Sequence[float]) -> float:

@@ -40,7 +40,9 @@ def sampled(poses: np.ndarray, joints: Joints, count: int, seed: int) -> np.ndar
     rng = np.random.default_rng(seed)
     relative = _relative(poses, joints)
     split = sinew.affine.split_scale(relative, np.identity(4))
-    least, most = _range(_vectors(split.rigid), joints.limits)
+    # The shorter rotations, as axis times angle.
+    vectors = np.asarray(sinew.affine.to_twist(split.rigid))[..., :3]
+    least, most = _range(vectors, joints.limits)
     chosen = np.arange(count) % len(poses)
     rotations = _matrices(rng.uniform(least, most, (count, *least.shape)))
     moved = np.array(split.rigid)[chosen]
@@ -76,11 +78,6 @@ def _range(vectors: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndar
     least = np.where(has_limits, limits[:, :, 0], least - more)
     most = np.where(has_limits, limits[:, :, 1], most + more)
     return np.clip(least, -_MOST, _MOST), np.clip(most, -_MOST, _MOST)
-
-
-def _vectors(rigid: np.ndarray) -> np.ndarray:
-    """float64 [.., 3]: the shorter rotation, as axis times angle."""
-    return np.asarray(sinew.affine.to_twist(rigid))[..., :3]
 
 
 def _matrices(vectors: np.ndarray) -> np.ndarray:

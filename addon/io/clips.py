@@ -14,6 +14,7 @@ from ..core.errors import SinewError
 from ..core.inbetween import Poses
 from ..core.motion.clip import Clip, Rig
 from . import actions, files, pose_io
+from .animation_paths import players
 
 
 def _import_bvh(path: str) -> None:
@@ -243,8 +244,7 @@ def _actions_of(obj: bpy.types.Object) -> list[bpy.types.Action]:
     animation = obj.animation_data
     if animation is None:
         return []
-    strips = [strip for track in animation.nla_tracks for strip in track.strips]
-    found = [player.action for player in (animation, *strips) if player.action is not None]
+    found = [player.action for player in players(animation) if player.action is not None]
     return [action for action in dict.fromkeys(found) if _playing(obj, action)]
 
 

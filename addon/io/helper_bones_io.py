@@ -194,7 +194,8 @@ def write_weights(
     names           of all bones
     slots, weights  [vertices, n]: indices into `names`, -1 for none, and their weights
     """
-    new = [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in _used(names, slots)]
+    used = [names[bone] for bone in np.unique(slots[slots >= 0])]
+    new = [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in used]
     index = {group.name: group.index for group in new}
     group_of = np.array([index.get(name, -1) for name in names])
     before = mesh_io.read_group_weights(obj.data)
@@ -213,10 +214,6 @@ def write_weights(
         row.update({int(group_of[bone]): float(v) for bone, v in zip(own, values, strict=True) if bone >= 0})
         rows[vertex] = row
     mesh_io.write_group_weights(obj, rows)
-
-
-def _used(names: Sequence[str], slots: np.ndarray) -> list[str]:
-    return [names[bone] for bone in np.unique(slots[slots >= 0])]
 
 
 @contextmanager

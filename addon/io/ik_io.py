@@ -39,10 +39,6 @@ def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) 
     return sorted(trees, key=lambda tree: len(armature.pose.bones[tree.bones[0]].parent_recursive))
 
 
-def constraints_of(armature: bpy.types.Object, tree: Tree) -> list[bpy.types.Constraint]:
-    return [armature.pose.bones[bone].constraints[name] for bone, name in tree.constraints]
-
-
 def set_muted(armature: bpy.types.Object, names: Collection[tuple[str, str]], mute: bool) -> None:
     """Mutes or unmutes constraints. Missing ones are skipped."""
     for bone, name in names:
@@ -156,7 +152,8 @@ def _tree(armature: bpy.types.Object, pairs: list[tuple[bpy.types.PoseBone, bpy.
 
 def _check(armature: bpy.types.Object, tree: Tree) -> None:
     """Raises SinewError for anything that would silently be lost or wrong."""
-    for constraint, (bone, _name) in zip(constraints_of(armature, tree), tree.constraints, strict=True):
+    for bone, own_name in tree.constraints:
+        constraint = armature.pose.bones[bone].constraints[own_name]
         stretched = [name for name in tree.bones if armature.pose.bones[name].ik_stretch > 0.0]
         if constraint.use_stretch and stretched:
             raise SinewError(

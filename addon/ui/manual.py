@@ -63,12 +63,7 @@ def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
     return PAGE.as_uri(), tuple((pattern, f"#{section}") for pattern, section in _SECTIONS.items())
 
 
-def _begin() -> None:
-    bpy.utils.register_manual_map(manual_map)
-
-
-def _end() -> None:
-    bpy.utils.unregister_manual_map(manual_map)
-
-
-FEATURE = Feature(begin=_begin, end=_end)
+FEATURE = Feature(
+    begin=lambda: bpy.utils.register_manual_map(manual_map),
+    end=lambda: bpy.utils.unregister_manual_map(manual_map),
+)

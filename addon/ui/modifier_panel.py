@@ -30,12 +30,7 @@ def _draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
         draw_text(box, context, other_tools.APPLYING, icon="INFO")
 
 
-def _begin() -> None:
-    getattr(bpy.types, PANEL).prepend(_draw)
-
-
-def _end() -> None:
-    getattr(bpy.types, PANEL).remove(_draw)
-
-
-FEATURE = Feature(begin=_begin, end=_end)
+FEATURE = Feature(
+    begin=lambda: getattr(bpy.types, PANEL).prepend(_draw),
+    end=lambda: getattr(bpy.types, PANEL).remove(_draw),
+)

@@ -28,6 +28,7 @@ from ...core.spaces import transformed
 from ...core.stages import ORDER
 from ...deform import characters, session
 from ...io import actions
+from ...io.animation_paths import players
 from . import comparison_state, offset_nodes
 
 # One for each method, in their order: a colour-blind-safe set (Okabe and Ito, 2008), and three that differ as
@@ -238,7 +239,7 @@ def _use_own_actions(copy: bpy.types.Object) -> None:
     animation = copy.animation_data
     if animation is None:
         return
-    for player in (animation, *(strip for track in animation.nla_tracks for strip in track.strips)):
+    for player in players(animation):
         curves = actions.all_curves(player.action, actions.slot_of(player))
         if any(curve.data_path.startswith("sinew.") for curve in curves):
             handle = actions.handle_of(actions.slot_of(player))

@@ -37,7 +37,9 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
     found = []
     originals = comparison.originals(state)
     if originals:
-        text = tr("Original: {method}", method=_method_label(originals[0]))
+        by_sinew = session.plan_of(originals[0]).is_read
+        method = properties.of(originals[0]).method if by_sinew else characters.BLENDER
+        text = tr("Original: {method}", method=tr(properties.method_label(method)))
         found.append((text, (1.0, 1.0, 1.0), originals))
     for method in comparison_state.shown_methods(state):
         copies = groups.get(method, [])
@@ -46,12 +48,6 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
     depsgraph = context.evaluated_depsgraph_get()
     placed = [(text, colour, _top(objects, context, depsgraph)) for text, colour, objects in found]
     return [label for label in placed if label[2] is not None]
-
-
-def _method_label(obj: bpy.types.Object) -> str:
-    settings = properties.of(obj)
-    by_sinew = session.plan_of(obj).is_read
-    return tr(properties.method_label(settings.method if by_sinew else characters.BLENDER))
 
 
 def _top(

@@ -39,16 +39,18 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
     subject = live.measure(shown, settings.other, depsgraph)
     if subject is None:
         return
+    choices = settings.quantity, settings.range, settings.length, settings.ratio
     # The object, not its id: an id could be reused after the object is gone.
-    inputs = (subject.measured, *_choices(settings))
-    if _equal(inputs, _last.get(scene)) and all(heat_nodes.has_colours(obj) for obj, _state in shown):
+    known, *known_choices = _last.get(scene, (None,))
+    is_same = known is subject.measured and tuple(known_choices) == choices
+    if is_same and all(heat_nodes.has_colours(obj) for obj, _state in shown):
         return
     values = _values(subject, settings.quantity)
     scale = scale_of(settings, subject.measured, values)
     colours = scale.linear_colours(values)
     for (obj, _state), own in zip(shown, subject.split(colours), strict=True):
         heat_nodes.write_colours(obj, own)
-    _last[scene] = inputs
+    _last[scene] = (subject.measured, *choices)
     heat_legend.contents[scene] = heat_legend.Content(scale, _title(settings, shown))
 
 
@@ -74,14 +76,6 @@ def scale_of(settings: SinewMeasures, measured: Measured, values: np.ndarray) ->
     if settings.range == measures.PER_FRAME or not settings.end:
         return HeatScale.over_values(metric, least, most, diagonal)
     return HeatScale.fixed(metric, getattr(settings, settings.end), least, most)
-
-
-def _choices(settings: SinewMeasures) -> tuple:
-    return settings.quantity, settings.range, settings.length, settings.ratio
-
-
-def _equal(inputs: tuple, last: tuple | None) -> bool:
-    return last is not None and inputs[0] is last[0] and inputs[1:] == last[1:]
 
 
 def _title(settings: SinewMeasures, shown: live.Pairs) -> str:
