@@ -63,7 +63,7 @@ def read(
         space, back = armature_io.bones_from_model(evaluated, armature), None
         if space is None:
             space, back = SAME_SPACE, armature_io.model_from_bones(evaluated, armature)
-            if not np.isfinite(back).all():
+            if not armature_io.is_usable(back):
                 frames.append(None)
                 continue
         pose = _finite(armature_io.read_pose(armature, stage.deformer.bones), stage.deformer.bones)

@@ -147,8 +147,8 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     from_upstream = properties.of(obj).storage.upstream_proxy is not None
     mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_upstream else obj.data
     weights = mesh_io.read_group_weights(mesh)
-    points = mesh_io.read_points(mesh)
-    mesh_points = mesh_io.read_points(obj.data) if from_upstream else points
+    points = _finite(mesh_io.read_points(mesh))
+    mesh_points = _finite(mesh_io.read_points(obj.data)) if from_upstream else points
     keys = None if from_upstream else mesh_io.read_shape_keys(obj, weights)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
     if len(mesh_points) != len(points):
@@ -246,8 +246,15 @@ def evaluated_points(
     return _upstream_points(upstream.data, source)
 
 
+def _finite(points: np.ndarray) -> np.ndarray:
+    """Returns the points, with the origin in place of those that are not finite: these would stop all
+    others."""
+    is_finite = np.isfinite(points)
+    return points if is_finite.all() else np.where(is_finite.all(axis=1, keepdims=True), points, 0.0)
+
+
 def _upstream_points(mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
-    points = mesh_io.read_points(mesh)
+    points = _finite(mesh_io.read_points(mesh))
     if not np.array_equal(points, source.points):
         source.points = points
     return source.points
@@ -259,9 +266,10 @@ def _keyed_points(evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, s
     values = mesh_io.read_key_values(evaluated_mesh.shape_keys)
     if source.mixed_points is None or not np.array_equal(values, source.key_values):
         source.key_values = values
-        source.mixed_points = source.shape_keys.mix(values)
+        source.mixed_points = _finite(source.shape_keys.mix(values))
     if evaluated.show_only_shape_key:
-        pinned = mesh_io.read_pinned_points(evaluated_mesh.shape_keys, evaluated.active_shape_key_index)
+        keys = evaluated_mesh.shape_keys
+        pinned = _finite(mesh_io.read_pinned_points(keys, evaluated.active_shape_key_index))
         if not np.array_equal(pinned, source.mixed_points):
             source.mixed_points = pinned
             # NaN equals nothing: leaving the pin mixes again, whatever the values are.

@@ -177,19 +177,28 @@ def bones_from_model(
     evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object
 ) -> np.ndarray | None:
     """Returns float64 [4, 4], from the mesh object's space to armature space; None where there is none, as a
-    scale is 0 or a value is not finite."""
+    scale is 0, not finite or too large."""
     mesh_world, armature_world = evaluated_mesh.matrix_world, evaluated_armature.matrix_world
     if not armature_world.determinant():
         return None
     if mesh_world == armature_world:
         return SAME_SPACE
+    mesh, armature = _read(mesh_world), _read(armature_world)
+    if not (is_usable(mesh) and is_usable(armature)):
+        return None
     if mesh_world.determinant():
-        space = np.linalg.inv(_read(armature_world)) @ _read(mesh_world)
+        space = np.linalg.inv(armature) @ mesh
     elif _MESH_HAS_INVERSE:
         space = np.linalg.inv(model_from_bones(evaluated_mesh, evaluated_armature))
     else:
         return None
-    return space if np.isfinite(space).all() else None
+    return space if is_usable(space) else None
+
+
+def is_usable(matrix: np.ndarray) -> bool:
+    """Whether products with other matrices are finite in float32. Blender stores infinity as the largest
+    number."""
+    return bool((np.abs(matrix) < 1e38).all())
 
 
 def model_from_bones(evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object) -> np.ndarray:

@@ -104,6 +104,34 @@ def test_a_lattice_in_front_follows_both_objects():
     assert_equal_to_modifier(obj, FRAMES)
 
 
+@pytest.mark.parametrize("method", ["lbs", "cor"])
+@pytest.mark.parametrize("kind", ["LATTICE", "ARMATURE"])
+def test_a_scale_that_is_not_finite_counts_for_its_frame_alone(kind, method, route):
+    obj, armature = scenes.make_arm(bones=3)
+    spoilt = armature
+    if kind == "LATTICE":
+        spoilt = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
+        bpy.context.scene.collection.objects.link(spoilt)
+        scenes.put_in_front(obj, kind).object = spoilt
+    else:
+        second = armature.copy()
+        bpy.context.scene.collection.objects.link(second)
+        obj.modifiers.new("Second", kind).object = second
+    scenes.add_sinew(obj, method)
+    expected, found = scenes.shapes(obj, [5]), []
+    for frame in (2, 8):
+        spoilt.scale.y = 1.0
+        bpy.context.scene.frame_set(frame)
+        spoilt.scale.y = float("inf")
+        bpy.context.scene.frame_set(9)
+        found.append(scenes.final_points(obj))
+    assert not properties.of(obj).error
+    assert np.isfinite(found).all()
+    np.testing.assert_array_equal(*found)
+    spoilt.scale.y = 1.0
+    assert scenes.worst(scenes.shapes(obj, [5]), expected) <= 1e-6
+
+
 def test_number_of_vertices_that_changes_in_front():
     obj = arm_with("BUILD", frame_start=1, frame_duration=12)
     expected = [scenes.shapes(obj, [frame])[0] for frame in (2, 5, 8)]

@@ -47,6 +47,8 @@ CASES = {
     "frame 11",
     "without size, in a parent": "add Arm; parent Arm Rig OBJECT; no_size Rig 1 6 1 11; "
     "no_size Arm 0 6 1 11",
+    "without size, of two armatures": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; "
+    "no_size Rig 3 6 1 11; no_size 'Other Rig' 3 6 1 11; frame 11",
     "without size, by methods of Sinew's": "add Arm 0.9 qv; no_size Arm 1 6 1 11; method Arm 0.9 cor; "
     "no_size Arm 0 5 1 11; method Arm 0.9 ddm; no_size Rig 1 5 1 11; method Arm 0.9 dib; "
     "no_size Rig 0 5 1 11",
