@@ -261,6 +261,29 @@ def test_blender_computes_normals_where_other_objects_read_them(name):
     np.testing.assert_array_equal(given, left)
 
 
+@needs_support
+def test_an_input_that_names_the_object_later_is_noticed():
+    """A script sets it: Blender then lists no more than the object whose modifier it is."""
+    obj, _armature = make(sharp)
+    group = bpy.data.node_groups.new("Reader", "GeometryNodeTree")
+    group.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    group.nodes.new("NodeGroupOutput")
+    other = add_other()
+    modifier = other.modifiers.new("Reader", "NODES")
+    modifier.node_group = group
+    bpy.context.view_layer.update()
+    assert has_given(obj)
+    identifier = group.interface.items_tree["Object"].identifier
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, identifier).value = obj
+    else:
+        modifier[identifier] = obj
+    other.update_tag()
+    bpy.context.view_layer.update()
+    assert not has_given(obj)
+
+
 def give_lattice(modifier):
     """A modifier that moves its points in every frame."""
     lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
