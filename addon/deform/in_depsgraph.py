@@ -18,6 +18,7 @@ import sinew
 from ..attach import point_store, properties
 from ..core.icons import VIEWS
 from ..io import mesh_io
+from ..io.animation_paths import is_visibility_animated
 from . import pose, source
 from .plan import State
 from .skinned_object import Shown, SkinnedObject
@@ -120,7 +121,12 @@ def _leave_out(evaluated: bpy.types.Object, modifiers: pose.Modifiers) -> None:
 
     Exporters evaluate for themselves, and find them as they are: USD writes a skin where one is on.
     """
-    names = {replaced.name for replaced, _armature in modifiers}
+    # An animation that was just added decides from now on.
+    names = {
+        replaced.name
+        for replaced, _armature in modifiers
+        if not is_visibility_animated(evaluated, evaluated.modifiers[replaced.name])
+    }
     for view in VIEWS:
         if not getattr(evaluated.sinew.stack, f"hidden_{view}"):
             shown = [getattr(m, f"show_{view}") and m.name not in names for m in evaluated.modifiers]

@@ -127,6 +127,7 @@ CASES = {
     "pose Rig lower; update; frame 3",
     "a keyed modifier renamed while it is off": "key_visibility Arm 3 9 0.0; add Arm; rename_modifier Arm; "
     "frame 11; frame 6",
+    "a driver while Sinew is on": "add Arm dq; frame 8; drive_visibility Arm Rig Armature; frame 6",
     "added while keys hide the first": "add_modifier Arm ARMATURE Rig 0.9; "
     "key_visibility Arm Armature 2 10 0.0; frame 3; add Arm; frame 10; frame 11; frame 4",
     "a render of a hidden mesh": "add Arm dq; key_method Arm 5 11 dq; hide Arm viewport; weights Arm lower; "

@@ -179,13 +179,18 @@ class SinewSide(Side):
                 raise ValueError(f"{obj.name}: {'a' if is_warned else 'no'} warning about {modifier.name}")
 
     def check_refused(self, obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
-        if modifier not in stack.downstream(obj) or not (obj.visible_get() and obj.sinew.enabled):
+        if modifier not in stack.downstream(obj) or not obj.visible_get():
             return
-        bpy.context.view_layer.update()
-        said = obj.sinew.error
-        if not self.has_sinew(obj):
+        if self.has_sinew(obj):
+            if not obj.sinew.enabled:
+                return
+            bpy.context.view_layer.update()
+            said = obj.sinew.error
+        else:
+            # Reading the settings would make them.
             try:
                 attach.add(obj)
+                said = ""
             except SinewError as error:
                 said = str(error)
         if f"in front of {modifier.name} Blender permits" not in said:
