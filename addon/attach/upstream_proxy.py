@@ -80,7 +80,8 @@ def check(obj: bpy.types.Object) -> None:
             f"{obj.name}: its first Armature modifier is a Multi Modifier, and its parent deforms it as well "
             "(parent type Armature); switch Multi Modifier off, or parent it by type Object"
         )
-    changes = stack.upstream_changes(obj)
+    # A parent deforms before all modifiers.
+    changes = [] if first is None else stack.upstream_changes(obj)
     if first is not None and first.use_multi_modifier and changes:
         ahead = list(obj.modifiers)[list(obj.modifiers).index(first) - 1]
         if ahead == changes[-1] and ahead.type in _MIXED_BY_MULTI_MODIFIERS:

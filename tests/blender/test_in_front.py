@@ -221,6 +221,22 @@ def test_a_proxy_at_the_address_of_a_deleted_object(route):
     assert scenes.worst(shown, expected) <= 1e-5
 
 
+@pytest.mark.parametrize("kind", ["CLOTH", "PARTICLE_SYSTEM", "SOFT_BODY"])
+def test_a_simulation_behind_a_parent_that_deforms(kind):
+    obj, armature = scenes.make_arm()
+    obj.modifiers.clear()
+    deforming_parent(obj, armature)
+    obj.modifiers.new("Behind", kind)
+    expected = scenes.shapes(obj, FRAMES)
+    if kind == "SOFT_BODY":
+        with pytest.raises(SinewError, match="in front of Behind Blender permits only"):
+            attach.add(obj, "lbs")
+    else:
+        scenes.add_sinew(obj, "lbs")
+        assert properties.has_sinew(obj)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
 def test_a_simulation_in_front_is_refused_with_a_sentence():
     arm_with("CLOTH")
     bpy.context.view_layer.update()
