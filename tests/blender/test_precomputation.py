@@ -38,10 +38,10 @@ class Gate:
     def open(self) -> None:
         self.is_open = True
 
-    def __call__(self, points, influences, triangles, gives_way):
+    def __call__(self, *arrays, gives_way):
         self.count += 1
         self.gives_way = gives_way
-        return BehindGate(self, self._start(points, influences, triangles, gives_way=gives_way))
+        return BehindGate(self, self._start(*arrays, gives_way=gives_way))
 
 
 class BehindGate:
