@@ -78,7 +78,7 @@ CRITERIA = (
         "How many triangles cross others that they do not at rest",
     ),
 )
-# Scores that differ by less are equal: the first in the list of methods is recommended.
+# Scores that differ by less are equal: the first method that is best at something is recommended.
 AS_GOOD = 0.2
 LONGEST, BULGE = "longest", "bulge"
 """LONGEST: the longest edge, as a part of its length at rest, by which torn shapes are found."""
@@ -172,7 +172,9 @@ class Suggestion:
         if not any(self.best(criterion) for criterion in CRITERIA):
             return ""
         least = min(scores.values())
-        return next(method for method, score in scores.items() if score <= least + AS_GOOD)
+        as_good = [method for method, score in scores.items() if score <= least + AS_GOOD]
+        best = {method for criterion in CRITERIA for method in self.best(criterion)}
+        return next((method for method in as_good if method in best), as_good[0])
 
     @property
     def reason(self) -> Phrase:
