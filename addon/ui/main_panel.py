@@ -16,8 +16,8 @@ from .translations import counted, tr
 
 # Characters' widths that a panel's header takes beside its label and what stands on its right.
 MARGIN = 4
-# Those of the buttons there.
-BUTTONS = 14
+# The same with two buttons.
+BUTTONS = MARGIN + 14
 
 
 class SINEW_MT_character(bpy.types.Menu):
@@ -33,11 +33,11 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
     bl_label = "Sinew"
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
-        layout, meshes = self.layout, operators.targets(context)
-        has_sinew = any(properties.has_sinew(obj) for obj in meshes)
-        if meshes:
-            room = characters(context) - len(self.bl_label) - MARGIN - (BUTTONS if has_sinew else 0)
-            layout.label(text=_title(context, meshes, max(room, 8)), translate=False)
+        # Drawn while the panel is closed, too: finding all meshes takes long in a large scene.
+        has_sinew = operators.has_sinew_targets(context)
+        layout, meshes = self.layout, character.known_meshes(context) if has_sinew else []
+        room = characters(context) - len(self.bl_label) - (BUTTONS if has_sinew else MARGIN)
+        layout.label(text=_title(context, meshes, max(room, 8)), translate=False)
         if has_sinew:
             SINEW_PT_method_presets.draw_panel_header(layout)
             layout.menu(SINEW_MT_character.__name__, text="", icon="DOWNARROW_HLT")
@@ -70,8 +70,11 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
 
 
 def _title(context: bpy.types.Context, meshes: list[bpy.types.Object], room: int) -> str:
-    """Whose settings these are, in so many characters."""
-    names = [armature.name for armature in operators.armatures(context)] or [meshes[0].name]
+    """Whose settings these are, in so many characters.
+
+    meshes  that have Sinew
+    """
+    names = [obj.name for obj in operators.armatures(context) or meshes[:1]]
     text = names_text(names, most=2)
     longer = f"{text} \u00b7 {tr('{count} meshes', count=len(meshes))}"
     return longer if len(meshes) > 1 and len(longer) <= room else shortened(text, room)

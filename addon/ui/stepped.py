@@ -80,7 +80,7 @@ class Stepped(Acting):
         if share is None:
             return self._finished(context)
         context.window_manager.progress_update(share)
-        _running[self.bl_idname] = share
+        _running[type(self).bl_idname] = share
         redraw()
         text = tr("{doing}: {share} (Esc stops)", doing=tr(self.saying), share=f"{share:.0%}")
         show_progress(context.workspace, text, share)

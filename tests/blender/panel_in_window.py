@@ -32,6 +32,7 @@ ADD, METHOD, SWITCH = (880, 125), (930, 128), (812, 151)
 # Headers of panels while all are closed; what Diagnostics has below its own.
 HEADER, DIAGNOSTICS = (850, 97), (850, 181)
 CHECK, MEND = (830, 238), (835, 389)
+SUGGEST_BUTTON = (970, 151)
 # The header of Suggest, and the recommended method.
 SUGGEST, BEST = (850, 125), (880, 156)
 # The height of the status bar in pixels.
@@ -214,7 +215,15 @@ def share_shown() -> float:
     return 0.0 if draw.__closure__ is None else inspect.getclosurevars(draw).nonlocals.get("share", 0.0)
 
 
+def letters_differ(first: str, second: str, place: tuple[int, int]) -> bool:
+    """Whether two photographs have other letters around a position."""
+    change = np.abs(pixels_of(first) - pixels_of(second)).max(axis=2)
+    rows = len(change) - place[1]
+    return bool(change[rows - 8 : rows + 8, place[0] - 30 : place[0] + 30].max() > 0.3)
+
+
 def progress_in_the_status_bar() -> Iterator[None]:
+    """And in the button."""
     with window.in_view3d():
         bpy.ops.sinew.suggest("INVOKE_DEFAULT", over="SCENE")
     yield from window.until(lambda: share_shown() > 0.02, "progress")
@@ -224,6 +233,7 @@ def progress_in_the_status_bar() -> Iterator[None]:
     window.photograph(FOLDER / "stopped.png")
     check("a progress bar", filled("progress") > 100)
     check("none after Esc", (filled("stopped"), share_shown()), (0, 0.0))
+    check("progress in the button", letters_differ("progress", "stopped", SUGGEST_BUTTON))
 
 
 def choose(method: str) -> None:
