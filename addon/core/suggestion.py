@@ -5,6 +5,7 @@ import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from .phrases import Phrase, phrase
 
@@ -80,19 +81,36 @@ CRITERIA = (
 )
 # Scores that differ by less are equal: the first method that is best at something is recommended.
 AS_GOOD = 0.2
-LONGEST, BULGE = "longest", "bulge"
-"""LONGEST: the longest edge, as a part of its length at rest, by which torn shapes are found."""
+LONGEST = "longest"
+"""The longest edge, as a part of its length at rest, by which torn shapes are found."""
 MEASURED = {**{c.name: c.entry for c in CRITERIA if c.entry}, LONGEST: "stretch_max"}
 """Entries of a metrics.Summary, by the names in Suggestion.worst."""
-# A method is torn whose worst value is so many times the median of all.
-TORN = {LONGEST: 2.0, BULGE: 3.0}
-# Shorter edges are no tears, whatever the others are.
-LEAST_TEAR = 2.0
 # Values that differ by less are equally good: as a share of the best, and absolutely.
 SAME_PART = 0.02
 SAME = {"share": 1e-4, "length": 1e-4, "count": 0.5}
 # Smaller values are hardly seen, so they count little in the choice of the recommended method.
 SEEN = {"share": 1e-2, "length": 5e-3, "count": 20.0}
+
+
+@dataclass(frozen=True)
+class Tear:
+    """By what a method is torn.
+
+    times  its worst value is more than so many times the median of all
+    least  and at least this, of the unit
+    text   one sentence, with the value, and how many times the median it is
+    """
+
+    times: float
+    least: float
+    unit: str
+    text: str
+
+
+TEARS = {
+    LONGEST: Tear(2.0, 2.0, "share", "an edge has {value:.3g} times its length"),
+    "bulge": Tear(3.0, SEEN["length"], "length", "it bulges {beside:.3g} times as far"),
+}
 
 
 @dataclass(frozen=True)
@@ -103,7 +121,7 @@ class Worst:
 
 @dataclass
 class Suggestion:
-    """The worst values of each method.
+    """The worst values of each method, and what follows from them, once all are added.
 
     methods   name -> label, in order
     frames    that were measured
@@ -123,24 +141,17 @@ class Suggestion:
         if value == value and (known is None or abs(value) > abs(known.value)):
             self.worst[method, criterion] = Worst(value, frame)
 
-    @property
+    @cached_property
     def torn(self) -> dict[str, Phrase]:
         """The methods that are far from the others, each with the reason: they are best at nothing."""
         found: dict[str, Phrase] = {}
-        for name, times in TORN.items():
-            values = {m: abs(self.worst[m, name].value) for m in self.methods if (m, name) in self.worst}
+        for name, tear in TEARS.items():
+            values, least = self._magnitudes(name), self._scaled(tear.least, tear.unit)
             usual = statistics.median(values.values()) if len(values) > 2 else math.inf
             for method, value in values.items():
-                if value <= times * usual or (name == LONGEST and value < LEAST_TEAR):
-                    continue
-                text = (
-                    "an edge has {times} times its length"
-                    if name == LONGEST
-                    else "it bulges {times} times as far"
-                )
-                text = text if math.isfinite(value) else "its shape is not finite"
-                number = f"{value if name == LONGEST else value / usual:.3g}"
-                found.setdefault(method, phrase(text, times=number))
+                if value > tear.times * usual and value >= least:
+                    text = tear.text if math.isfinite(value) else "its shape is not finite"
+                    found.setdefault(method, phrase(text, value=value, beside=value / max(usual, least)))
         return found if len(found) < len(self.methods) else {}
 
     def best(self, criterion: Criterion) -> list[str]:
@@ -150,20 +161,17 @@ class Suggestion:
         if not values:
             return []
         best = min(values.values())
-        chosen = [
-            m
-            for m, value in values.items()
-            if value <= best + max(SAME_PART * best, self._of_unit(SAME, criterion))
-        ]
+        most = best + max(SAME_PART * best, self._scaled(SAME[criterion.unit], criterion.unit))
+        chosen = [method for method, value in values.items() if value <= most]
         return chosen if len(chosen) < len(values) else []
 
-    @property
+    @cached_property
     def recommended(self) -> str:
         """The method whose values are smallest beside the medians of those that are not torn; empty where all
         are equally good."""
         scores = dict.fromkeys(self.methods, 0.0)
         for criterion in CRITERIA:
-            values, least = self._values(criterion), self._of_unit(SEEN, criterion)
+            values, least = self._values(criterion), self._scaled(SEEN[criterion.unit], criterion.unit)
             usual = statistics.median(values.values()) if values else 0.0
             for method, value in values.items():
                 scores[method] += criterion.weight * math.log((value + least) / (usual + least))
@@ -188,8 +196,8 @@ class Suggestion:
 
     def order(self, criterion: Criterion) -> list[str]:
         """Returns the methods, the best at it first; then those that are torn; those without a value last."""
-        torn, known = self.torn, {m: w.value for (m, name), w in self.worst.items() if name == criterion.name}
-        return sorted(self.methods, key=lambda m: (m not in known, m in torn, abs(known.get(m, 0.0))))
+        known = self._magnitudes(criterion.name)
+        return sorted(self.methods, key=lambda m: (m not in known, m in self.torn, known.get(m, 0.0)))
 
     @property
     def text(self) -> Phrase:
@@ -198,17 +206,13 @@ class Suggestion:
             return phrase("All methods are equally good here")
         return phrase("{method}: {why}", method=phrase(self.methods[self.recommended]), why=self.reason)
 
+    def _magnitudes(self, name: str) -> dict[str, float]:
+        """The worst values by method, without their signs."""
+        return {m: abs(self.worst[m, name].value) for m in self.methods if (m, name) in self.worst}
+
     def _values(self, criterion: Criterion) -> dict[str, float]:
-        """The magnitudes of the methods that are not torn."""
-        torn = self.torn
-        return {
-            m: abs(self.worst[m, criterion.name].value)
-            for m in self.methods
-            if m not in torn and self._has(m, criterion)
-        }
+        """The same of the methods that are not torn."""
+        return {m: value for m, value in self._magnitudes(criterion.name).items() if m not in self.torn}
 
-    def _of_unit(self, values: Mapping[str, float], criterion: Criterion) -> float:
-        return values[criterion.unit] * (self.diagonal if criterion.unit == "length" else 1.0)
-
-    def _has(self, method: str, criterion: Criterion) -> bool:
-        return (method, criterion.name) in self.worst
+    def _scaled(self, value: float, unit: str) -> float:
+        return value * (self.diagonal if unit == "length" else 1.0)

@@ -50,6 +50,11 @@ def test_short_edges_and_two_methods_are_not_torn():
     assert suggestion(**{LONGEST: [[3.0], [90.0]]}).torn == {}
 
 
+def test_rounding_is_no_bulge():
+    assert suggestion(bulge=[[0.0], [0.0], [1e-6]]).torn == {}
+    assert suggestion(bulge=[[0.0], [0.0], [0.1]]).torn == {"c": "it bulges 10 times as far"}
+
+
 def test_one_method_is_recommended_by_what_the_eye_sees_first():
     made = suggestion(
         stretch=[[0.1], [0.2], [0.2]],
