@@ -44,16 +44,15 @@ orange longer. "Numbers" below has numbers, beside those at rest and those of an
 button once more to end it.
 
 6  SEE BOTH
-Open the panel "Compare", click "Compare\u2026", choose "Linear Blend" and OK: a copy stands beside. Alt \
-Shift F flips between the two. "End Comparison" takes it away.
+Click "Compare\u2026" in the tab, choose "Linear Blend" and OK: a copy stands beside. Alt Shift F flips \
+between the two. In the panel "Compare" that is there now, "End Comparison" takes it away.
 
 7  LET IT CHOOSE
-Open the panel "Suggest" and click "Measure All Methods": every one is measured over the frames, and the \
-best are marked.
+Click "Suggest": every method is measured over the frames. A panel recommends one, and says why.
 
 8  TAKE IT ALONG
-"Bake\u2026" in the tab writes what you see for a Blender or an engine without Sinew, as caches or as \
-helper bones. With "Motion" on "Pose", helper bones follow any animation.
+"Bake\u2026" in the panel "Bake and Export" writes what you see for a Blender or an engine without Sinew, \
+as caches or as helper bones. With "Motion" on "Pose", helper bones follow any animation.
 
 Every button has a tooltip, and "Online Manual" in its right-click menu.
 """

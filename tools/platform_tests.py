@@ -37,13 +37,7 @@ NATIVE: dict[str, list[str | Path]] = {
 # Tests of the checkout, its documents and its tools, which do not depend on the platform: ./dev test runs
 # them.
 CHECKOUT_TESTS = (
-    *(
-        "test_documented",
-        "test_layering",
-        "test_locks",
-        "test_platforms",
-        "test_release",
-    ),
+    *("test_documented", "test_layering", "test_locks", "test_platforms", "test_release"),
     *("test_sbom", "test_site", "test_snippets", "test_stub", "test_wheel", "test_workflows"),
 )
 # Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands, batches

@@ -54,7 +54,8 @@ def shown() -> dict[str, str]:
 
 
 def _of_classes() -> Iterator[tuple[str, str]]:
-    for cls in registration._registered:
+    parts = (*registration._parts(), *registration._features())
+    for cls in (cls for part in parts for cls in part.classes):
         base = next(each for each in TYPES if issubclass(cls, each))
         rna = cls.bl_rna
         if base is bpy.types.Operator:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import sinew_addon
+from conftest import REPOSITORY
 from sinew_addon.ui import translations
 
 LANGUAGES = list(translations.LANGUAGES)
@@ -38,6 +39,14 @@ def test_texts_are_given_the_values_that_they_name():
                 wrong += [f"{path}:{node.lineno}: {text}" for text in texts if names_in_braces(text) != given]
     assert count > 50
     assert wrong == []
+
+
+def test_the_texts_of_all_classes_are_found(monkeypatch):
+    """By the tool that brings the languages up to date."""
+    monkeypatch.syspath_prepend(REPOSITORY / "tools")
+    import texts
+
+    assert {"Add Sinew", "Dual Quaternion", "keeps volume best"} <= texts.shown().keys()
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
