@@ -47,7 +47,7 @@ def test_names_do_not_steer_a_terminal(tmp_path):
     obj.name = "\x1b]0;owned\x07\x1b[2J"
     file = tmp_path / "arm.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
-    for command in (("check", file), ("points", file, "--method", "blender", "--frames", "1",
+    for command in (("info", file), ("check", file), ("points", file, "--method", "blender", "--frames", "1",
                     "--out", tmp_path / "o.npz")):  # fmt: skip
         ours, theirs = pty.openpty()
         process = start_sinew(*command, stdout=theirs, stderr=theirs)
