@@ -3,9 +3,9 @@
 depends on, since Sinew's records of an object outlive a step.
 
 Blender keeps an object that is the same in both steps, and what the object refers to. If a test of the first
-kind fails, the process usually crashes. Blender (4.2 to 5.2) also crashes by itself, rarely: in undo, where it
-reads the scene into the memory of an object that was deleted after the step (as in
-point_store.clear_references_to_itself). Then bpy.ops.ed.undo is the last call of the traceback.
+kind fails, the process usually crashes. Blender (4.2 to 5.2) also crashes by itself, rarely: where undo reads
+the scene into the memory of an object that was deleted after the step, as in
+point_store.clear_references_to_itself(). Then bpy.ops.ed.undo is the last call of the traceback.
 """
 
 import bmesh
