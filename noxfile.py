@@ -352,9 +352,9 @@ def demo(_words: list[str]) -> int:
     say("re-skinning blend_files/ with quaternion-vector skinning")
     call(".venv/bin/sinew reskin blend_files --method qv --out build/demo --overwrite", must=True)
     say("drawing a wrist under three methods, turned by half a turn, where they differ most")
-    sheet = ROOT / "build/demo/comparison.png"
-    output_of(".venv/bin/sinew compare blend_files/wrist.blend --frame 24 --out", sheet)
-    print(f"Re-skinned files: {sheet.parent}/*.blend\nComparison sheet: {sheet}")
+    page = ROOT / "build/demo/wrist.html"
+    output_of(".venv/bin/sinew compare blend_files/wrist.blend --frames 24 --out", page.parent)
+    print(f"Re-skinned files: {page.parent}/*.blend\nComparison: {page}")
     return 0
 
 

@@ -16,8 +16,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+
+import sinew as library
+from PIL import Image, ImageDraw, ImageFont
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 BLEND_FILES = REPOSITORY / "blend_files"
@@ -50,13 +53,36 @@ def sinew(*words: str | Path) -> None:
     subprocess.run([SINEW, *words], check=True, stdout=subprocess.DEVNULL)
 
 
-def draw_sheet(target: Path) -> None:
-    name, methods, frame, size, settings = SHEETS[target.name]
+def sheet(name: str, methods: str, frame: int, size: int, settings: Sequence[str] = ()) -> Image.Image:
+    """The pictures of methods side by side: whole, and where they differ most."""
     options = [word for setting in settings for word in ("--set", setting)]
-    sinew(
-        *("compare", find(name), "--methods", methods, "--frame", str(frame), "--size", str(size), *options),
-        *("--out", target),
-    )
+    labels = {method.name: method.label for method in library.methods()}
+    font, margin = ImageFont.load_default(size=20), 16
+    with tempfile.TemporaryDirectory() as place:
+        sinew(
+            *("compare", find(name), "--methods", methods, "--frames", str(frame), "--size", str(size)),
+            *(*options, "--out", place),
+        )
+        pictures = Path(place, Path(name).stem, "pictures")
+        names = (f"{frame}", f"distance-{frame}-close-clay")
+        columns = [
+            [Image.open(pictures / f"{method}-{end}.png").convert("RGBA") for end in names]
+            for method in methods.split(",")
+        ]
+    wide = max(picture.width for column in columns for picture in column) + margin
+    high = 20 + 2 * margin + sum(picture.height + margin for picture in columns[0])
+    drawn = Image.new("RGB", (wide * len(columns) + margin, high), (38, 40, 44))
+    for number, (method, column) in enumerate(zip(methods.split(","), columns, strict=True)):
+        x, y = margin + number * wide, 20 + 2 * margin
+        ImageDraw.Draw(drawn).text((x, margin), labels[method], font=font, fill=(232, 232, 232))
+        for picture in column:
+            drawn.paste(picture, (x + (wide - margin - picture.width) // 2, y), picture)
+            y += picture.height + margin
+    return drawn
+
+
+def draw_sheet(target: Path) -> None:
+    sheet(*SHEETS[target.name]).save(target)
 
 
 def photograph(page: Path, target: Path, width: int, height: int) -> None:

@@ -13,7 +13,6 @@ import argparse
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,6 @@ from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parent / "docs"
-SINEW = Path(sys.executable).with_name("sinew")
 # Pixels, as extensions.blender.org asks for them.
 ICON, PICTURE = (256, 256), (1920, 1080)
 BACKGROUND, BONE, FIBRES = "#262626", "#f2ead8", ("#8c2f24", "#b5402f", "#d9583d", "#ee7f55")
@@ -65,24 +63,10 @@ def draw_icon(path: Path) -> None:
 
 def draw_top(path: Path) -> None:
     """Three methods beside each other."""
-    wrist = HERE.parent / "blend_files/wrist.blend"
-    with tempfile.TemporaryDirectory() as folder:
-        sheet = Path(folder, "sheet.png")
-        words = [
-            "compare",
-            wrist,
-            "--methods",
-            "lbs,dq,cor",
-            "--frame",
-            "24",
-            "--size",
-            "620",
-            "--out",
-            sheet,
-        ]
-        subprocess.run([SINEW, *words], check=True, stdout=subprocess.DEVNULL)
-        with Image.open(sheet) as drawn:
-            fitted(drawn.convert("RGB")).save(path, quality=90)
+    sys.path.insert(0, str(DOCS))
+    from draw_sheets import sheet
+
+    fitted(sheet("wrist.blend", "lbs,dq,cor", 24, 620)).save(path, quality=90)
 
 
 def fitted(drawn: Image.Image) -> Image.Image:

@@ -14,9 +14,8 @@ from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.html import require_jinja
 from ..core.names import as_file_name
-from ..core.output import file_to_write, folder_to_write, write_text
+from ..core.output import folder_to_write, write_text
 from ..core.page import page
-from . import sheet
 from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
 
@@ -29,7 +28,7 @@ HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
     "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
     "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and "
-    "the pictures. With --out SHEET.png it draws one frame of one file into one picture instead."
+    "the pictures."
 )
 
 
@@ -46,9 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METHOD",
         help="what distances are measured to (default: %(default)s, the file's Armature modifier)",
     )
-    parser.add_argument(
-        "--frames", "--frame", help="such as 1,12,40-48 (default: the file's frame range; a sheet needs one)"
-    )
+    parser.add_argument("--frames", help="such as 1,12,40-48 (default: the file's frame range)")
     add_object(parser)
     parser.add_argument(
         "--pictures",
@@ -64,17 +61,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="how many bones a vertex may have before it is reported (default: %(default)s)",
     )
-    parser.add_argument("--size", type=pixels, help="pixels of each picture (default: 480; 640 in a sheet)")
+    parser.add_argument(
+        "--size", type=pixels, default=480, help="pixels of each picture (default: %(default)s)"
+    )
     add_engine(parser)
     parser.add_argument(
-        "--out", required=True, type=_folder_or_sheet, metavar="DIR", help="a folder, or SHEET.png"
+        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the pages"
     )
     add_set(parser)
-
-
-def _folder_or_sheet(given: str) -> Path:
-    is_sheet = Path(given).suffix.lower() in sheet.PICTURES
-    return file_to_write(given, (".png",)) if is_sheet else folder_to_write(given)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -84,8 +78,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     characters.check_methods([*methods, args.reference])
     characters.set_parameters(args.set)
-    if args.out.suffix.lower() in sheet.PICTURES:
-        return sheet.run(args, methods, console)
     require_jinja()
     frames = parse_frames(args.frames) if args.frames is not None else None
     _check_names(args.files)
@@ -139,7 +131,7 @@ def _compare(
     write_text(folder / "metrics.json", comparison.to_json())
     sheets = []
     if engine is not None:
-        studio = render.Studio(scene, subject.meshes, engine, args.size or 480)
+        studio = render.Studio(scene, subject.meshes, engine, args.size)
         illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
         illustrator.plan(args.pictures)
         count = illustrator.picture_count

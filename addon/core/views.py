@@ -62,17 +62,6 @@ def of_one_size(views: Sequence[View]) -> list[View]:
     return [replace(view, **largest) for view in views]
 
 
-def most_different_vertex(meshes: Sequence[np.ndarray]) -> int | None:
-    """The vertex at which the methods differ most; None where they do not differ.
-
-    meshes  one [vertices, 3] for each method, of the same topology
-    """
-    first = meshes[0]
-    difference = np.max([np.linalg.norm(points - first, axis=1) for points in meshes], axis=0)
-    diagonal = float(np.linalg.norm(np.ptp(first, axis=0)))
-    return int(difference.argmax()) if difference.max(initial=0.0) > 1e-4 * diagonal else None
-
-
 def close_view(points: np.ndarray, targets: np.ndarray) -> View:
     """Returns a view close to all of `targets` [n, 3], from the direction in which the fewest of `points` [m,
     3] are in front.

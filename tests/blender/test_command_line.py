@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import scenes
 import sinew
-from conftest import REPOSITORY
 from program import run_program, run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.cli import make_parser
@@ -213,28 +212,17 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["points", path, "--method", "dq", "--frames", "one", "--out", out], "expected frames"),
         (["points", path, *one, "--object", "Leg", "--out", out], "no mesh called 'Leg'"),
         (["compare", path, "--methods", "lbs,x", "--out", tmp_path], "expected one of"),
-        (["compare", path, "--frame", "1,2", "--out", tmp_path / "a.png"], "expected one frame"),
-        (["compare", path, "--frame", "1", "--out", tmp_path / "a.jpg"], "ending in .png"),
-        (["compare", path, path, "--frame", "1", "--out", tmp_path / "a.png"], "a sheet shows one file"),
         (["compare", path, "--frames", "9-3", "--out", tmp_path], "backwards"),
         (["compare", path, "--frames", "1,nan", "--out", tmp_path], "expected -1048574 to 1048574"),
         (["compare", path, "--frames", "1-10000000", "--out", tmp_path], "expected -1048574 to 1048574"),
         (["compare", path, "--frames", "", "--out", tmp_path], "expected frames"),
         (["compare", path, "--out", path], "is a file"),
-        (["compare", path, "--frame", "1", "--out", path / "a.png"], "is a file"),
-        (["render", path, *one, "--out", path / "golden"], "is a file"),
         (["compare", path, "--reference", "best", "--out", tmp_path], "expected one of"),
         (["compare", path, "--pictures", "-1", "--out", tmp_path], "expected 0 or more"),
         (["compare", path, "--influences", "-1", "--out", tmp_path], "expected 0 or more"),
         (["compare", path, "--size", "10", "--out", tmp_path], "expected 64 to 4096"),
         (["compare", path, tmp_path / path.name, "--out", tmp_path], "would both be written"),
         (["compare", tmp_path / "no.blend", "--out", tmp_path], "no such file"),
-        (["render", path, "--out", tmp_path], "are needed"),
-        (["render", path, "--tolerance", "-1", "--out", tmp_path], "a percentage"),
-        (["render", path, "--against", tmp_path / "none", "--out", tmp_path / "o"], "make golden pictures"),
-        (["render", path, "--against", tmp_path, "--out", tmp_path], "would replace the golden pictures"),
-        (["render", path, *one, "--own-look", "--out", tmp_path / "o"], "no camera"),
-        (["render", path, *one, "--size", "9", "--out", tmp_path / "o"], "64 to 4096"),
         (["info", tmp_path / "no.blend"], "no such file"),
     ]
     of_files = {
@@ -244,8 +232,6 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         "is a folder",
         "no mesh is deformed",
         "no mesh called 'Leg'",
-        "make golden pictures",
-        "no camera",
     }
     for arguments, sentence in cases:
         result = run_sinew(*arguments, status=1 if sentence in of_files else 2)
@@ -253,25 +239,6 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         assert len(complaints) == 1, result.stderr
         assert sentence in complaints[0]
     assert not out.exists()
-
-
-@pytest.mark.parametrize("engine", ["auto", pytest.param("cycles", marks=pytest.mark.slow)])
-def test_compare_draws_a_sheet(tmp_path, engine):
-    from PIL import Image
-
-    out = tmp_path / "sheet.png"
-    rig = REPOSITORY / "blend_files" / "wrist.blend"
-    options = ("--methods", "blender,lbs,dq", "--frame", 24, "--size", 128, "--engine", engine)
-    run_sinew("compare", rig, *options, "--out", out)
-    with Image.open(out) as image:
-        pixels = np.asarray(image.convert("L"), dtype=np.float64)
-    assert pixels.shape[1] > 3 * 128
-    cell = 128 + 16
-    columns = [pixels[-128 - 16 : -16, 16 + i * cell : 16 + i * cell + 128] for i in range(3)]
-    for column in columns:
-        assert column.std() > 5, "an empty picture"
-    assert np.abs(columns[0] - columns[1]).mean() < 1.0, "lbs is not the Armature modifier"
-    assert np.abs(columns[1] - columns[2]).mean() > 3.0, "the methods look the same"
 
 
 def test_glb_files_are_read(real_rig, tmp_path):

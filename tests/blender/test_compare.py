@@ -1,17 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare` and `sinew render`: their numbers, findings and pictures, for files with known results."""
+"""`sinew compare`: its numbers, findings and pictures, for files with known results."""
 
 from __future__ import annotations
 
 import csv
 import json
-import os
 import re
-import subprocess
-import sys
-import tomllib
 from html import unescape
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -167,84 +162,3 @@ def test_a_page_holds_its_pictures(tmp_path):
     colours = opaque_pixels(tmp_path / "wrist" / "pictures" / "dq-distance-24-close.png")
     yellow = (colours[:, 0] > 150) & (colours[:, 1] > 150) & (colours[:, 2] < 110)
     assert yellow.mean() > 0.02
-
-
-def test_golden_pictures(tmp_path):
-    _obj, armature = scenes.make_arm()
-    path = save(tmp_path / "arm.blend")
-    run_sinew(
-        "render", path, "--method", "dq", "--frames", "1,11", "--size", 128, "--out", tmp_path / "golden"
-    )
-    assert {p.name for p in (tmp_path / "golden").iterdir()} == {"0001.png", "0011.png", "render.json"}
-    # All methods keep the rest pose; frame 11 is bent.
-    result = run_sinew(
-        *("render", path, "--method", "lbs", "--against", tmp_path / "golden", "--out", tmp_path / "now"),
-        status=1,
-    )
-    assert "1 of 2 pictures within" in result.stdout
-    assert {p.name for p in (tmp_path / "now").glob("*.difference.png")} == {"0011.difference.png"}
-    assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
-    percent = float(re.search(r"\b11\b.*?(\d+\.\d+) %", result.stdout).group(1))
-    assert 0.5 < percent < 50.0
-    # The golden camera is used: larger motion at one frame does not change the framing of others.
-    for frame, scale in ((1, 1.0), (11, 3.0)):
-        armature.pose.bones[1].scale = (scale, scale, scale)
-        armature.pose.bones[1].keyframe_insert("scale", frame=frame)
-    save(path)
-    result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
-    assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
-    assert "1 of 2 pictures within" in result.stdout
-    (tmp_path / "golden" / "0011.png").write_bytes(b"no picture")
-    result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
-    assert "0011.png: can not be read as a picture" in result.stderr
-
-
-def run_pytest(folder, *options):
-    # The installed plugin would be loaded a second time under its own name.
-    environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
-    command = [sys.executable, "-m", "pytest", "-p", "sinew_addon.pytest_plugin", "-p", "no:cacheprovider"]
-    return subprocess.run(
-        [*command, "-q", "--rootdir", str(folder), *options, str(folder)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-
-
-@pytest.mark.slow
-@newest_only
-def test_the_example_of_a_repository_of_rigs(tmp_path):
-    page = (REPOSITORY / "docs" / "render-tests.md").read_text(encoding="utf-8")
-    layout, tests = re.findall(r"```(?:text|python)\n(.*?)```", page, re.DOTALL)
-    for folder in ("rigs", "tests"):
-        (tmp_path / folder).mkdir()
-    _obj, armature = scenes.make_arm()
-    for name in re.findall(r"\w+\.blend", layout):
-        save(tmp_path / "rigs" / name)
-    (tmp_path / "tests" / "test_rigs.py").write_text(tests)
-    without = run_pytest(tmp_path)
-    assert without.returncode == 1
-    assert "no golden pictures; make them with pytest --sinew-update" in without.stdout
-    made = run_pytest(tmp_path, "--sinew-update")
-    assert made.returncode == 0, made.stdout
-    pictures = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.png"))
-    golden = "tests/golden"
-    assert pictures == [f"{golden}/hero/0001.png", f"{golden}/hero/0011.png", f"{golden}/sidekick/0011.png"]
-    assert all(Path(path).parent.name + "/" in layout for path in pictures)
-    assert "0001.png, 0011.png" in layout
-    scenes.key_pose(armature, 60.0)
-    save(tmp_path / "rigs" / "sidekick.blend")
-    compared = run_pytest(tmp_path)
-    assert "1 failed, 1 passed" in compared.stdout, compared.stdout
-    assert "test_rig[sidekick]" in compared.stdout
-    assert "0011.difference.png" in compared.stdout
-
-
-def test_pytest_is_told_of_the_fixture():
-    project = tomllib.loads((REPOSITORY / "addon" / "pyproject.toml").read_text(encoding="utf-8"))
-    assert project["project"]["entry-points"]["pytest11"] == {"sinew": "sinew_addon.pytest_plugin"}
-    from sinew_addon import pytest_plugin
-
-    assert callable(pytest_plugin.sinew_render)

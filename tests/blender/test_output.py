@@ -48,11 +48,6 @@ WRITERS = {
         ("compare", "FILE", "--frames", "1,6", "--pictures", "1", "--size", "64", "--out", OUT),
         "out",
     ),
-    "compare sheet": (("compare", "FILE", "--frame", "6", "--size", "64", "--out", OUT), "sheet.png"),
-    "render": (
-        ("render", "FILE", "--method", "dq", "--frames", "1,6", "--size", "64", "--out", OUT),
-        "out",
-    ),
 }
 
 
@@ -244,7 +239,6 @@ def test_standard_output_on_a_full_disk(arguments, inputs):
         ("reskin", "LONG", "--method", "dq", "--out", "OUT"),
         ("points", "FILE", "--method", "dq", "--frames", "1", "--out", "LONG.npz"),
         ("reskin", "FILE", "--method", "dq", "--out", "LONG"),
-        ("render", "FILE", "--against", "FILE/x", "--out", "OUT"),
         ("inbetween", "FILE/x", "--method", "dlb", "--out", "OUT"),
     ],
 )
@@ -338,39 +332,16 @@ def test_names_that_blender_would_fill_in(inputs, tmp_path):
     file = tmp_path / name
     file.write_bytes(inputs["FILE"].read_bytes())
     out = tmp_path / "o{scene_name}ut ##"
-    run_sinew("render", file, "--method", "dq", "--frames", "6", "--size", "64", "--out", out)
-    assert all_in(out) == ["0006.png", "render.json"]
     run_sinew("compare", file, "--frames", "1,6", "--size", "64", "--pictures", "1", "--out", out)
     assert (out / f"{file.stem}.html").exists()
     assert [path for path in (out / file.stem / "pictures").iterdir() if path.suffix == ".png"]
     assert all_in(tmp_path) == sorted([name, out.name, *(f"{out.name}/{path}" for path in all_in(out))])
 
 
-def test_no_two_frames_have_one_picture(inputs, tmp_path):
-    out = tmp_path / "out"
-    run_sinew(
-        *("render", inputs["FILE"], "--method", "dq", "--size", "64", "--out", out),
-        *("--frames", "6,6.5,6.501,6.999,-2.25"),
-    )
-    assert len(list(out.glob("*.png"))) == 5
-
-
-@pytest.mark.once
-def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
-    picture = tmp_path / "0006.png"
-    picture.write_bytes(b"rendered for days")
-    command = ("render", inputs["FILE"], "--method", "dq", "--frames", "6", "--size", "64", "--out", tmp_path)
-    assert "0006.png" in complaint(run_sinew(*command, status=1).stderr)
-    assert picture.read_bytes() == b"rendered for days"
-    picture.unlink()
-    run_sinew(*command)
-    run_sinew(*command)
-
-
 @pytest.mark.once
 def test_the_wrong_ending():
-    with pytest.raises(WrongUse, match=r"expected a name ending in \.png"):
-        output.file_to_write("sheet.jpg", (".png",))
+    with pytest.raises(WrongUse, match=r"expected a name ending in \.npz"):
+        output.file_to_write("points.npy", (".npz",))
 
 
 @pytest.mark.once

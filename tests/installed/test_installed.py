@@ -139,16 +139,3 @@ def cluster():
             process.terminate()
         for process in started:
             process.wait(timeout=30)
-
-
-def test_the_pytest_plugin():
-    folder = HERE / "rigs"
-    folder.mkdir()
-    (folder / "test_rig.py").write_text(
-        "def test_rig(sinew_render):\n"
-        f"    sinew_render({str(RIG)!r}, 'golden', method='dq', frames='24', size=64)\n"
-    )
-    command = (sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", folder, folder)
-    assert "no golden pictures" in run(*command, status=1).stdout
-    run(*command, "--sinew-update")
-    assert "1 passed" in run(*command).stdout
