@@ -22,9 +22,11 @@ from .console import Console
 from .outcome import Outcome, conclude, of_each
 
 if TYPE_CHECKING:
+    import bpy
+
     from ..features.bake.bake_state import Started
 
-SUMMARY = "write what Sinew deforms as shape keys, point caches, Alembic, USD, glTF or helper bones"
+SUMMARY = "write what Sinew deforms as shape keys, point caches, Alembic, USD or helper bones"
 HELP = """\
 Writes Sinew's deformation of every armature-deformed mesh as data that plays without it. Inputs are never
 written to. A folder stands for all .blend files below it.
@@ -33,7 +35,6 @@ shape-keys  a .blend with one shape key a frame and keyed values
 mdd, pc2    a .blend with a Mesh Cache modifier for each mesh, and its caches in a folder beside
 alembic     an .abc of the final meshes, with UVs and materials
 usd         a .usdc of the same
-gltf        a .glb of the same, the frames as morph targets
 bones       a .blend whose armatures have helper bones with keys, and meshes with weights of all bones: linear
             blending, as every engine and glTF and FBX files have it, comes as near as the errors say;
             with --motion pose they have constraints instead, and follow other animation, too
@@ -44,7 +45,11 @@ shapes move in straight lines."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_copies(parser)
-    parser.add_argument("--method", required=True, type=method, help="a method of `sinew methods`")
+    parser.add_argument(
+        "--method",
+        type=method,
+        help="a method of `sinew methods`, for all meshes (default: each as the file has it)",
+    )
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
     parser.add_argument("--step", type=count, default=1, metavar="N", help="every Nth of the frames")
@@ -68,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--motion",
         choices=MOTIONS,
         default=KEYS,
-        help="bones: helper bones have keys (default), of scale too, or follow the pose by constraints",
+        help="bones: helper bones have keys (default), or follow the pose by constraints",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, with the errors of bones")
     add_set(parser)
@@ -107,9 +112,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             for sentence in report.sentences(outcome.unit):
                 console.note(f"{outcome.job.target}: {sentence}")
     columns = ("meshes", "frames")
-    return conclude(
-        console, outcomes, columns, lambda o: (str(o.meshes), str(o.frames)), f"baked with {args.method}"
-    )
+    return conclude(console, outcomes, columns, lambda o: (str(o.meshes), str(o.frames)), "baked")
 
 
 def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, console: Console) -> None:
@@ -117,7 +120,7 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
 
     from ..attach import attach
     from ..deform import characters
-    from ..features.bake import bake, bake_apart, bake_bones
+    from ..features.bake import bake, bake_apart, bake_bones, bake_export
     from ..io import files
 
     source, target = outcome.job.source, outcome.job.target
@@ -129,13 +132,15 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
     outcome.left_out += [
         f"{obj.name} is not in the scene {scene.name}" for obj in other_scenes if obj not in meshes
     ]
-    characters.set_parameters(args.set)
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     # Hidden objects are baked as well, and hidden again in the copy.
     with characters.shown(meshes):
-        errors = characters.use_methods([(obj, args.method) for obj in meshes])
-        outcome.left_out += [str(error) for error in errors if error is not None]
-        taken = [obj for obj, error in zip(meshes, errors, strict=True) if error is None]
+        taken = []
+        for obj, error in zip(meshes, _use_method(meshes, args), strict=True):
+            if error is None:
+                taken.append(obj)
+            else:
+                outcome.left_out.append(str(error))
         if not taken:
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
         try:
@@ -145,7 +150,10 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
             raise SinewError(f"{source}: {error}") from None
         # An exporter writes all frames in one call, which cannot be interrupted and can crash on a full disk:
         # so it runs in a separate process.
-        shares = bake_apart.sample(started) if isinstance(started, bake_apart.Export) else started.sample()
+        if isinstance(started, bake_export.SceneExport):
+            shares = bake_apart.sample(started)
+        else:
+            shares = started.sample()
         with (
             _whole_or_nothing(started, source),
             console.bar(f"Baking {source.name}", len(chosen)) as show,
@@ -164,6 +172,22 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
     outcome.meshes, outcome.frames = len(taken), len(chosen)
     if isinstance(started, bake_bones.BoneBake):
         outcome.bones, outcome.unit = started.reports, characters.length_unit(scene)
+
+
+def _use_method(meshes: list[bpy.types.Object], args: argparse.Namespace) -> list[SinewError | None]:
+    """Has the meshes deformed by the method chosen, or as they are. Returns an error for each that is not."""
+    from ..attach import properties
+    from ..deform import characters
+
+    if args.method is not None:
+        characters.set_parameters(args.set)
+        return characters.use_methods([(obj, args.method) for obj in meshes])
+    return [
+        None
+        if properties.has_sinew(obj) and properties.of(obj).enabled
+        else SinewError(f"{obj.name} is not deformed by Sinew; choose a method by --method")
+        for obj in meshes
+    ]
 
 
 @contextmanager

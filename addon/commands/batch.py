@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..blender_process import Limits
-from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
 from ..core.output import folder_to_write, writing
 from ..jobs.inputs import STANDARD_INPUT, Job, plan_jobs
@@ -100,11 +99,6 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     for job, wanted in zip(jobs, settings, strict=True):
         if action.methods and wanted.method is None:
             raise WrongUse(f"no method for {job.source}: give --method, or one in a job file")
-        try:
-            wanted.check_bakes()
-        except WrongUse as error:
-            raise WrongUse(f"{action.job}: {job.source}: {error}") from None
-    _check_bakes(jobs, settings)
     for rule in job_file.files:
         if not any(rule.matches(job.source) for job in jobs):
             console.note(f"{action.job}:{rule.line}: no file matches {', '.join(rule.match)}")
@@ -145,17 +139,6 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
         summary = _summary(action, rows, seconds)
         report = write_report(out, summary, rows)
     return _conclude(console, action, rows, summary, report)
-
-
-def _check_bakes(jobs: list[Job], settings: list[Settings]) -> None:
-    """Raises WrongUse where a bake would overwrite an input or another file's copy."""
-    taken = {path: job.source for job in jobs for path in (job.source, job.target)}
-    for job, wanted in zip(jobs, settings, strict=True):
-        for path in {bake_path(job.target, kind) for kind in wanted.kinds}:
-            if path in taken:
-                raise WrongUse(
-                    f"{path}: is for the bake of {job.source} and for {taken[path]}; rename one of them"
-                )
 
 
 class _Workers:
@@ -234,7 +217,6 @@ def _versions() -> dict[str, str]:
 
 
 def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings, journal: Journal) -> dict:
-    record = journal.latest.get(journal.name_of(job.target))
     name = hashlib.blake2b(os.fsencode(journal.name_of(job.target)), digest_size=8).hexdigest()
     return {
         "command": action.command,
@@ -244,7 +226,6 @@ def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings
         "frames": args.frames,
         "pictures": str(journal.out / PICTURES / name) if args.pictures else None,
         "overwrite": args.overwrite,
-        "ours": [str(path) for path in journal.baked(job.target, record)] if args.resume else [],
     }
 
 
@@ -262,8 +243,7 @@ def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> 
     same = ("command", "source", "settings")
     if record is None or not args.resume or not may_react or "error" in record:
         return None
-    is_current = journal.matches_with_bakes(job.target, record) and is_complete(record)
-    if is_current and all(record.get(k) == task[k] for k in same):
+    if is_complete(record) and all(record.get(k) == task[k] for k in same):
         return {"hash": record["hash"], "versions": record["versions"]}
     return None
 
@@ -275,10 +255,6 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
     if "unchanged" in outcome:
         return {**before, "unchanged": True}
     record = {key: task[key] for key in ("command", "source", "settings")} | outcome
-    record["beside"] = [
-        [journal.name_of(Path(unfinished)), journal.name_of(Path(path)), written]
-        for unfinished, path, written in outcome.get("beside", ())
-    ]
     if "error" in record:
         _record_failure(journal, target, record, before)
         return record
@@ -295,10 +271,9 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
 def _record_failure(journal: Journal, target: Path, record: dict, before: dict) -> None:
     record.pop("unfinished", None)
     # The older copy still exists, and belongs to this batch.
-    for key in ("written", "beside"):
-        record.pop(key, None)
-        if key in before:
-            record[key] = before[key]
+    record.pop("written", None)
+    if "written" in before:
+        record["written"] = before["written"]
     journal.record(target, record)
 
 
@@ -321,7 +296,7 @@ def _show_result(console: Console, progress: BatchProgress, task: dict, result: 
 def _row(job: Job, name: str, result: dict) -> dict:
     """Returns the entry of a file in the report."""
     status = "failed" if "error" in result else "unchanged" if "unchanged" in result else "written"
-    shown = ("error", "meshes", "left_out", "bakes", "notes", "versions", "seconds", "attempts", "pictures")
+    shown = ("error", "meshes", "left_out", "notes", "versions", "seconds", "attempts", "pictures")
     return {"source": str(job.source), "file": name, "status": status} | {
         key: result[key] for key in shown if key in result
     }

@@ -15,16 +15,8 @@ from .output import remove, writing
 
 # Bakes that a .blend plays, and bakes to files for other programs.
 BONES = "bones"
-IN_FILE = ("shape-keys", "mdd", "pc2", BONES)
-EXPORTS = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
-KINDS = (*IN_FILE, *EXPORTS)
-BAKED = ".baked.blend"
-
-
-def bake_path(copy: Path, kind: str) -> Path:
-    """Returns the file that a batch bakes beside a copy: "hero.usdc", or "hero.baked.blend" for bakes that a
-    .blend plays."""
-    return copy.with_suffix(EXPORTS.get(kind, BAKED))
+EXPORTS = {"alembic": ".abc", "usd": ".usdc"}
+KINDS = ("shape-keys", "mdd", "pc2", BONES, *EXPORTS)
 
 
 def mdd_header(frames: Sequence[float], vertices: int, rate: float) -> bytes:
@@ -99,13 +91,11 @@ def check_space(folder: Path, needed: int) -> None:
 
 
 def check_frames(kind: str, frames: Sequence[float]) -> None:
-    """Raises WrongUse where a bake of this kind is not possible for the frames, which are ascending."""
+    """Raises WrongUse where an export of this kind is not possible for the frames, which are ascending."""
     is_whole = all(float(frame).is_integer() for frame in frames)
-    if kind in ("alembic", "usd") and not (is_whole and is_even(frames, 1)):
+    if not (is_whole and is_even(frames, 1)):
         raise WrongUse(f"{kind}: Blender exports every frame of a range; give frames such as 1-48")
-    if kind in EXPORTS and not is_whole:
-        raise WrongUse(f"{kind}: Blender exports whole frames; give frames such as 1,12,40-48")
-    if kind in ("usd", "gltf") and frames[0] < 0:
+    if kind == "usd" and frames[0] < 0:
         raise WrongUse(f"{kind}: Blender exports no frames before 0; give others, or bake to alembic")
 
 

@@ -99,7 +99,7 @@ class Blend:
 class Solution:
     """The helper bones and all weights.
 
-    motions  float64 [frames, helpers, 3, 4]: rigid except for scale, the parent's or their own
+    motions  float64 [frames, helpers, 3, 4]: rigid except for the parent's scale
     parents  int [helpers], bones
     heads    float64 [helpers, 3]: the middle of the vertices that each moves
     bones    int [vertices, influences]: helpers are numbered after the rig's bones; -1 for none
@@ -122,8 +122,7 @@ class Solution:
     blends: tuple[Blend, ...] = ()
 
 
-KEYS, SCALED_KEYS, POSE = "keys", "scaled-keys", "pose"
-MOTIONS = (KEYS, SCALED_KEYS, POSE)
+KEYS, POSE = MOTIONS = ("keys", "pose")
 
 
 @dataclass(frozen=True)
@@ -280,7 +279,7 @@ class Helper:
     """One helper bone while it is solved.
 
     motion    float64 [frames, 3, 4]
-    scale     float64 [frames], of its parent; a bone that scales has its own
+    scale     float64 [frames], of its parent
     may_move  bool [vertices]
     blend     of the rig's bones that moves it; None for an independent motion
     """
@@ -374,7 +373,6 @@ class Solver:
     def _extrapolate(self, helper: Helper, old: Helper, further: float) -> None:
         """Moves a helper bone beyond its new motion, by `further` times its last change."""
         ahead = helper.motion + further * (helper.motion - old.motion)
-        helper.scale = np.maximum(helper.scale + further * (helper.scale - old.scale), _SMALLEST_SCALE)
         helper.motion = np.concatenate(
             [helper.scale[:, None, None] * _rotation_near(ahead[:, :, :3]), ahead[:, :, 3:]], axis=2
         )
@@ -447,7 +445,7 @@ class Solver:
         self, helper: Helper, vertices: np.ndarray, weights: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
         """float64 [frames, 3, 4]: the motion that, times `weights`, is nearest to `wanted` [vertices, frames
-        * 3]; Le and Deng's equation 9, with the scale of _scale_of()."""
+        * 3]; Le and Deng's equation 9, with the bone's scale."""
         rest = self.rest[vertices]
         frames = len(helper.scale)
         wanted = wanted.reshape(len(vertices), frames, 3)
@@ -465,19 +463,9 @@ class Solver:
         linear = helper.motion[:, :, :3] / helper.scale[:, None, None]
         cross += 1e-7 * np.square(from_middle).sum() * linear
         rotation = _rotation_near(cross)
-        helper.scale = self._scale_of(helper, rotation, cross, from_middle)
         linear = helper.scale[:, None, None] * rotation
         translation = middle - np.einsum("fik,fk->fi", linear, np.broadcast_to(rest_middle, (frames, 3)))
         return np.concatenate([linear, translation[:, :, None]], axis=2)
-
-    def _scale_of(
-        self, helper: Helper, rotation: np.ndarray, cross: np.ndarray, from_middle: np.ndarray
-    ) -> np.ndarray:
-        """float64 [frames]: the scale of a helper bone whose rotation was found.
-
-        rotation, cross, from_middle  as in _fitted()
-        """
-        return helper.scale
 
     def _moved(self, motion: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         """float64 [vertices, frames * 3]: moved by one bone's motion [frames, 3, 4]."""
@@ -605,31 +593,6 @@ class Solver:
             return blend.head
         vertices, slots = np.nonzero(self.bones == bone)
         return np.average(self.middle[vertices], axis=0, weights=self.weights[vertices, slots])
-
-
-@dataclass
-class ScalingSolver(Solver):
-    """A solver for helper bones that also scale from frame to frame. It continues from the rigid solution: if
-    they scale from the beginning, the error is up to twice as large.
-
-    scales  whether they scale yet
-    """
-
-    scales: bool = False
-
-    def refine(self) -> Generator[float, None, None]:
-        self.scales = True
-        return super().refine()
-
-    def _scale_of(
-        self, helper: Helper, rotation: np.ndarray, cross: np.ndarray, from_middle: np.ndarray
-    ) -> np.ndarray:
-        if not self.scales:
-            return helper.scale
-        # The extent that is wanted along the rotated vertices, divided by their own.
-        along = np.einsum("fik,fik->f", rotation, cross)
-        spread = np.square(from_middle).sum(axis=(0, 2))
-        return np.maximum(along / np.maximum(spread, 1e-30), _SMALLEST_SCALE)
 
 
 def _rotation_near(matrices: np.ndarray) -> np.ndarray:

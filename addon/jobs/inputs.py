@@ -9,9 +9,7 @@ from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
-from ..core.bake import BAKED
 from ..core.errors import WrongUse
-from .journal import NAME as JOURNAL
 from .journal import UNFINISHED
 
 STANDARD_INPUT = "-"
@@ -74,7 +72,6 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
         if p.is_file()
         and not (may_be_below and resolved in resolve(p).parents)
         and not p.name.endswith(UNFINISHED)
-        and not _is_bake(p)
     ]
     if not files:
         raise WrongUse(f"{given}: no {'.blend files in this folder' if path.is_dir() else 'file matches'}")
@@ -127,13 +124,6 @@ def _fixed_part(pattern: Path) -> Path:
             break
         fixed /= part
     return fixed
-
-
-def _is_bake(path: Path) -> bool:
-    """Whether the file is a batch's bake beside a copy; the batch's journal is then in a parent folder."""
-    start = path.name.removesuffix(BAKED)
-    beside_copy = start != path.name and path.with_name(f"{start}.blend").exists()
-    return beside_copy and any((folder / JOURNAL).exists() for folder in path.parents)
 
 
 def _check(jobs: list[Job]) -> None:

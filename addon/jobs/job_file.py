@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any, TypeAlias
 
-from ..core.bake import IN_FILE, KINDS, check_frames
 from ..core.errors import WrongUse
-from ..core.frames import parse_frames
 from ..core.parameters import parse
 from ..core.scale_rule import SCALE_RULES
 
@@ -33,12 +31,10 @@ class ObjectRule:
     method: str | None = None
     scale: str | None = None
     set: tuple[str, ...] | None = None
-    bake: tuple[str, ...] | None = None
 
     def as_task(self) -> dict:
-        bake = None if self.bake is None else list(self.bake)
         parameters = None if self.set is None else list(self.set)
-        given = {"method": self.method, "scale": self.scale, "set": parameters, "bake": bake}
+        given = {"method": self.method, "scale": self.scale, "set": parameters}
         return {"match": self.match} | {key: value for key, value in given.items() if value is not None}
 
 
@@ -49,8 +45,6 @@ class Settings:
     include, exclude  patterns of names of objects and of collections
     scale             name of a scale rule
     set               parameters as NAME=VALUE; later ones override earlier ones
-    bake              kinds of bakes, written beside the copy
-    bake_frames       as typed; None: those of the file's scene
     objects           later rules override earlier ones
     """
 
@@ -59,8 +53,6 @@ class Settings:
     exclude: tuple[str, ...] | None = None
     scale: str | None = None
     set: tuple[str, ...] = ()
-    bake: tuple[str, ...] | None = None
-    bake_frames: str | None = None
     objects: tuple[ObjectRule, ...] = ()
 
     def overridden_by(self, other: Settings) -> Settings:
@@ -70,22 +62,8 @@ class Settings:
             self.exclude if other.exclude is None else other.exclude,
             other.scale or self.scale,
             self.set + other.set,
-            self.bake if other.bake is None else other.bake,
-            other.bake_frames or self.bake_frames,
             self.objects + other.objects,
         )
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """All kinds of bakes of the file's objects, each once."""
-        every = [*(self.bake or ()), *(kind for rule in self.objects for kind in rule.bake or ())]
-        return tuple(dict.fromkeys(every))
-
-    def check_bakes(self) -> None:
-        """Raises WrongUse where a bake is not possible for the frames."""
-        if self.bake_frames is not None:
-            for kind in self.kinds:
-                check_frames(kind, sorted(set(parse_frames(self.bake_frames))))
 
     def as_task(self) -> dict:
         """Returns the settings as JSON, for tasks and for the journal."""
@@ -95,8 +73,6 @@ class Settings:
             "exclude": list(self.exclude or ()),
             "scale": self.scale,
             "set": list(self.set),
-            "bake": list(self.bake or ()),
-            "bake_frames": self.bake_frames,
             "objects": [rule.as_task() for rule in self.objects],
         }
 
@@ -185,30 +161,10 @@ def _one_of(names: Collection[str]) -> Callable[[object], str]:
     return read
 
 
-def _bakes(value: object) -> tuple[str, ...]:
-    found = _texts(value)
-    for kind in found:
-        if kind not in KINDS:
-            raise WrongUse(f"expected some of {', '.join(KINDS)}, got {kind!r}")
-    in_file = [kind for kind in found if kind in IN_FILE]
-    if len(in_file) > 1:
-        raise WrongUse(f"an object can have one of {', '.join(in_file)}")
-    return found
-
-
 def _parameters(value: object) -> tuple[str, ...]:
     texts = _texts(value)
     parse(texts)
     return texts
-
-
-def _frames(value: object) -> str:
-    text = _text(value)
-    try:
-        parse_frames(text)
-    except WrongUse as error:
-        raise WrongUse(str(error).removeprefix("frames: ")) from None
-    return text
 
 
 def _paths(value: object) -> tuple[str, ...]:
@@ -252,20 +208,6 @@ def keys(methods: Collection[str] = ()) -> tuple[Key, ...]:
             "only objects, or collections, of these names or patterns",
         ),
         Key("exclude", of_files, _texts, text_or_list, "objects, or collections, to leave out"),
-        Key(
-            "bake",
-            of_all,
-            _bakes,
-            f"some of {', '.join(KINDS)}",
-            "bakes to write beside the copies; [] for none",
-        ),
-        Key(
-            "bake_frames",
-            of_files,
-            _frames,
-            "frames such as 1,12,40-48",
-            "frames to bake; without it, those of the file's scene",
-        ),
         Key(OBJECTS, of_files, None, "tables", "settings of some objects; later ones win"),
         Key(FILES, (TOP,), None, "tables", "settings of some files; later ones win"),
         Key("match", (OBJECTS,), _text, "text; required", "name or pattern of objects"),
@@ -341,16 +283,8 @@ class _Reader:
         if "match" in known and "match" not in table:
             raise _NotAllowed(position, "match is missing")
         values = {key: self._value(known[key], value, (*position, key)) for key, value in table.items()}
-        if name == OBJECTS:
-            if len(values) == 1:
-                sentence = "these objects have no settings; expected method, scale, set or bake"
-                raise _NotAllowed(position, sentence)
-            return values
-        try:
-            bakes = {key: values[key] for key in ("bake", "bake_frames", OBJECTS) if key in values}
-            Settings(**bakes).check_bakes()
-        except WrongUse as error:
-            raise _NotAllowed((*position, "bake_frames"), str(error)) from None
+        if name == OBJECTS and len(values) == 1:
+            raise _NotAllowed(position, "these objects have no settings; expected method, scale or set")
         return values
 
     def _value(self, key: Key, value: Any, position: Position) -> Any:

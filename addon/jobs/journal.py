@@ -14,16 +14,13 @@ import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path, PurePath
-from typing import Any
 
 from ..core.errors import SinewError, WrongUse
 from ..core.lock import try_lock
 from ..core.output import writing
 
 NAME = "sinew-journal.jsonl"
-MARK = ".unfinished"
-UNFINISHED = f"{MARK}.blend"
-CACHES = ".baked_cache"
+UNFINISHED = ".unfinished.blend"
 
 
 class Journal:
@@ -79,54 +76,30 @@ class Journal:
         self.latest[record["file"]] = record
 
     def finish(self, target: Path, record: dict) -> None:
-        """Renames a copy and its bakes after their record was written. The copy is renamed last, so if it
-        exists, its bakes do, too. Files that have their final names already are not touched."""
-        for unfinished, path, written in self._files(target, record):
-            if _stamp(unfinished) == written:
-                os.replace(unfinished, path)
+        """Renames a copy after its record was written. A file that has its final name is not touched."""
+        unfinished = target.with_name(record.get("unfinished", target.name))
+        if _stamp(unfinished) == record.get("written"):
+            os.replace(unfinished, target)
 
     def matches(self, target: Path, record: dict | None) -> bool:
         """Whether `target` is still the file that its record describes."""
         return record is not None and record.get("written") == _stamp(target)
 
-    def matches_with_bakes(self, target: Path, record: dict) -> bool:
-        """Whether the target and its bakes are still the files that the record describes."""
-        files = self._files(target, record)
-        return all(_stamp(path) == written for _unfinished, path, written in files)
-
-    def baked(self, target: Path, record: dict | None) -> list[Path]:
-        """Returns the bakes of a record that are still the files that it describes."""
-        files = self._files(target, record)[:-1] if record is not None else []
-        return [path for _unfinished, path, written in files if _stamp(path) == written]
-
     def recover(self) -> None:
         """Renames the files that a killed run had recorded and not renamed yet."""
         for name, record in self.latest.items():
             if "unfinished" in record:
-                files = self._files(self.out / name, record)
-                if all(written in (_stamp(unfinished), _stamp(path)) for unfinished, path, written in files):
-                    self.finish(self.out / name, record)
-
-    def _files(self, target: Path, record: dict) -> list[tuple[Path, Path, list[int] | None]]:
-        """Returns, for each file of a record, its temporary path, its final path and its stamp. The copy is
-        the last."""
-        beside = [
-            (self.out / unfinished, self.out / path, written)
-            for unfinished, path, written in record.get("beside", ())
-        ]
-        unfinished = target.with_name(record.get("unfinished", target.name))
-        return [*beside, (unfinished, target, record.get("written"))]
+                self.finish(self.out / name, record)
 
     def remove_unfinished(self, targets: Iterable[Path]) -> None:
         """Removes unfinished copies of killed runs that no record describes."""
         for folder in {target.parent for target in targets}:
-            # Blender's own temporary files end with @; bakes have other extensions, and caches a folder.
-            for pattern in (f".*{MARK}*", f"*{CACHES}/.*{MARK}"):
-                for leftover in folder.glob(pattern):
-                    leftover.unlink(missing_ok=True)
+            # Blender's own temporary files end with @.
+            for leftover in folder.glob(f".*{UNFINISHED}*"):
+                leftover.unlink(missing_ok=True)
 
-    def _is_behind_link(self, path: Any) -> bool:
-        """Whether a folder on the way from `out` to a path of a record is a link, which can lead outside."""
+    def _is_behind_link(self, path: str) -> bool:
+        """Whether a folder on the way from `out` to a record's file is a link, which can lead outside."""
         folders = (self.out / folder for folder in PurePath(path).parents)
         return any(folder != self.out and folder.is_symlink() for folder in folders)
 
@@ -142,7 +115,7 @@ class Journal:
             # ignored, and its file is processed again.
             with suppress(ValueError):
                 record = json.loads(line)
-                if _is_sound(record) and not any(map(self._is_behind_link, _paths(record))):
+                if _is_sound(record) and not self._is_behind_link(record["file"]):
                     latest[record["file"]] = record
         return latest
 
@@ -152,25 +125,11 @@ def _is_sound(record: object) -> bool:
     only what a batch has written."""
     if not isinstance(record, dict):
         return False
-    beside, unfinished = record.get("beside", []), record.get("unfinished", f".{UNFINISHED}")
-    if not isinstance(beside, list) or not all(isinstance(one, list) and len(one) == 3 for one in beside):
-        return False
+    unfinished = record.get("unfinished", f".{UNFINISHED}")
     if not isinstance(unfinished, str) or PurePath(unfinished).name != unfinished:
         return False
-    if not all(map(_is_inside, _paths(record))):
-        return False
-    return all(_is_unfinished(name) for name in (unfinished, *(one[0] for one in beside)))
-
-
-def _paths(record: dict) -> list[Any]:
-    """Returns all paths of a record below the journal's folder."""
-    return [record.get("file"), *(path for one in record.get("beside", ()) for path in one[:2])]
-
-
-def _is_unfinished(path: str) -> bool:
-    """Whether the path is one under which a batch writes before it renames."""
-    name = PurePath(path).name
-    return name.startswith(".") and MARK in name
+    # The name under which a batch writes before it renames.
+    return _is_inside(record.get("file")) and unfinished.startswith(".") and UNFINISHED in unfinished
 
 
 def is_complete(record: dict) -> bool:

@@ -143,14 +143,7 @@ def _steps(
         break
     if "error" in outcome:
         return {**outcome, **facts}
-    beside = [[written, path, stamp(Path(written))] for written, path in outcome.pop("beside", ())]
-    return {
-        **outcome,
-        **facts,
-        "unfinished": unfinished.name,
-        "written": stamp(unfinished),
-        "beside": beside,
-    }
+    return {**outcome, **facts, "unfinished": unfinished.name, "written": stamp(unfinished)}
 
 
 def run_here(

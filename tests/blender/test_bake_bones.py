@@ -216,9 +216,7 @@ def skinned_by_gltf(glb, frames, rate):
     return points
 
 
-@pytest.mark.parametrize(
-    ("motion", "method"), [("keys", METHOD), ("scaled-keys", METHOD), ("pose", METHOD), ("pose", "cor")]
-)
+@pytest.mark.parametrize(("motion", "method"), [("keys", METHOD), ("pose", METHOD), ("pose", "cor")])
 def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     """The exporter converts constraints to keys."""
     obj, path = arm

@@ -30,7 +30,6 @@ from sinew_addon.attach import properties
 from sinew_addon.blender_process import BlenderProcess, Limits
 from sinew_addon.io import files
 from sinew_addon.jobs.job_file import Settings
-from test_bake import read_elsewhere
 
 # On Windows tools/platform_tests.py provides another.
 newest_only = pytest.mark.skipif(
@@ -174,102 +173,6 @@ def test_settings_for_files_and_objects(tmp_path):
     rows = report_of(tmp_path / "out")
     deviation = {mesh["object"]: mesh["deviation_part"] for mesh in rows["sub/hero.blend"]["meshes"]}
     assert deviation["Face"] <= scenes.TOLERANCE < 0.01 < deviation["Body"]
-
-
-BAKES = """
-inputs = ["in"]
-out = "out"
-method = "dq"
-scale = "none"
-bake = "usd"
-bake_frames = "1-11"
-
-[[files]]
-match = "hero.blend"
-
-[[files.objects]]
-match = "Body"
-bake = ["alembic", "mdd"]
-
-[[files.objects]]
-match = "Face"
-bake = "shape-keys"
-scale = "3.x"
-
-[[files]]
-match = "plain.blend"
-bake = []
-"""
-
-
-def make_heroes(folder: Path) -> None:
-    folder.mkdir()
-    for name in ("hero", "plain"):
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        for part in ("Body", "Face", "Hair"):
-            scenes.make_arm(name=part)
-        bpy.data.objects["Face"].hide_viewport = True
-        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
-
-
-@pytest.mark.slow
-def test_bakes_of_a_job_file(tmp_path):
-    """Bakes by file and object, next to the copies; in the journal and the report like those."""
-    make_heroes(tmp_path / "in")
-    (tmp_path / "job.toml").write_text(BAKES)
-    out = tmp_path / "out"
-    arguments = ("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
-    run_sinew(*arguments)
-    names = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
-    bakes = {"hero.usdc", "hero.abc", "hero.baked.blend", "hero.baked_cache/Body.mdd"}
-    assert names == {
-        "hero.blend", "plain.blend", "report.html", "report.json", "sinew-journal.jsonl", *bakes
-    }  # fmt: skip
-    rows = report_of(out)
-    assert {
-        bake["to"]: (bake["objects"], bake["frames"], bake["file"]) for bake in rows["hero.blend"]["bakes"]
-    } == {
-        "usd": (["Hair"], 11, "hero.usdc"),
-        "alembic": (["Body"], 11, "hero.abc"),
-        "mdd": (["Body"], 11, "hero.baked.blend"),
-        "shape-keys": (["Face"], 11, "hero.baked.blend"),
-    }
-    assert "bakes" not in rows["plain.blend"]
-    assert "hero.usdc: usd of Hair, 11 frames" in (out / "report.html").read_text(encoding="utf-8")
-
-    files.open_file(out / "hero.blend")
-    rules = {name: properties.of(bpy.data.objects[name]).scale_rule for name in ("Body", "Face", "Hair")}
-    assert rules == {"Body": "none", "Face": "3.x", "Hair": "none"}
-    bpy.data.objects["Face"].hide_viewport = False
-    frames = list(range(1, 12))
-    expected = {name: scenes.shapes(bpy.data.objects[name], frames) for name in rules}
-    baked = read_elsewhere(out / "hero.baked.blend", frames, tmp_path, ("Face",))
-    exported = read_elsewhere(out / "hero.usdc", frames, tmp_path)
-    for name, points in (("Body", baked), ("Face", baked), ("Hair", exported)):
-        assert scenes.worst(points[name], expected[name]) <= 1e-6 * scenes.diagonal(bpy.data.objects[name])
-    files.open_file(out / "hero.baked.blend")
-    assert bpy.data.objects["Face"].hide_viewport
-    assert [o.name for o in bpy.data.objects if properties.has_sinew(o)] == ["Hair"]
-    cache = bpy.data.objects["Body"].modifiers[0].filepath
-    # With the system's separators, as Blender writes paths.
-    assert cache.startswith("//")
-    assert Path(bpy.path.abspath(cache)) == out / "hero.baked_cache" / "Body.mdd"
-
-    before = contents(out)
-    run_sinew(*arguments, "--resume")
-    assert {row["status"] for row in report_of(out).values()} == {"unchanged"}
-    (out / "hero.usdc").unlink()
-    (out / "hero.baked_cache" / "Body.mdd").unlink()
-    run_sinew(*arguments, "--resume")
-    assert [row["status"] for row in report_of(out).values()] == ["written", "unchanged"]
-    assert set(contents(out)) == set(before)
-    (out / "hero.usdc").write_bytes(b"an artist's own")
-    result = run_sinew(*arguments, "--resume", status=1)
-    assert "hero.usdc: is there already" in result.stderr
-    assert (out / "hero.usdc").read_bytes() == b"an artist's own"
-    assert unfinished_in(out) == []
-    run_sinew(*arguments, "--overwrite")
-    assert (out / "hero.usdc").read_bytes() != b"an artist's own"
 
 
 @pytest.mark.slow

@@ -122,17 +122,6 @@ def test_linked_folders_and_their_circles(studio):
     assert set(planned(["chars"])) == {"chars/hero.blend", "chars/old/hero.blend", "chars/more/c.blend"}
 
 
-def test_bakes_beside_copies_are_not_inputs(studio):
-    for name in ("hero.baked.blend", "half.baked.blend"):
-        (studio / "chars" / name).touch()
-    found = {"chars/half.baked.blend", "chars/hero.blend", "chars/old/hero.blend"}
-    # A file of the user's: no batch has worked there.
-    assert set(planned(["chars"])) == {*found, "chars/hero.baked.blend"}
-    (studio / NAME).touch()
-    assert set(planned(["chars"])) == set(planned(["chars/**/*.blend"])) == found
-    assert set(planned(["chars/hero.baked.blend"])) == {"chars/hero.baked.blend"}
-
-
 def test_copies_of_an_earlier_run_are_not_inputs(studio):
     (studio / "chars" / "out").mkdir()
     (studio / "chars" / "out" / "hero.blend").touch()
@@ -195,7 +184,7 @@ def test_settings_of_files(tmp_path):
     assert job.inputs == (str(tmp_path / "chars"),)
     assert job.out == str(tmp_path / "done")
     plain = job.settings_of(Path("/x/a.blend"), Settings())
-    none = {"scale": None, "set": [], "bake": [], "bake_frames": None}
+    none = {"scale": None, "set": []}
     face = {"match": "Face", "method": "dq"}
     assert plain.as_task() == none | {
         "method": "lbs", "include": [], "exclude": ["Proxy*"], "objects": [face]
@@ -224,43 +213,32 @@ def test_a_byte_order_mark_is_no_key(tmp_path):
     assert read(tmp_path, "\ufeff" + JOB).settings.method == "lbs"
 
 
-BAKES = """\
+SCALES = """\
 scale = "3.x"
-bake = ["usd", "mdd"]
-bake_frames = "1-48"
 
 [[objects]]
 match = "Cape"
-bake = []
+scale = "none"
 
 [[files]]
 match = "hero.blend"
 scale = "none"
-bake_frames = "2-5"
 
 [[files.objects]]
 match = "Face"
-bake = "shape-keys"
 scale = "4.0"
 """
 
 
-def test_bakes_and_scale_of_files_and_objects(tmp_path):
-    job = read(tmp_path, BAKES)
-    plain = job.settings_of(Path("/x/a.blend"), Settings())
-    assert (plain.scale, plain.kinds, plain.bake_frames) == ("3.x", ("usd", "mdd"), "1-48")
+def test_scale_of_files_and_objects(tmp_path):
+    job = read(tmp_path, SCALES)
+    assert job.settings_of(Path("/x/a.blend"), Settings()).scale == "3.x"
     hero = job.settings_of(Path("/x/hero.blend"), Settings())
-    assert (hero.scale, hero.kinds, hero.bake_frames) == ("none", ("usd", "mdd", "shape-keys"), "2-5")
+    assert hero.scale == "none"
     assert hero.as_task()["objects"] == [
-        {"match": "Cape", "bake": []},
-        {"match": "Face", "scale": "4.0", "bake": ["shape-keys"]},
+        {"match": "Cape", "scale": "none"},
+        {"match": "Face", "scale": "4.0"},
     ]
-    # Any order is allowed, as they are sorted.
-    assert read(tmp_path, BAKES.replace('"1-48"', '"3,2,4,2"')).settings.bake_frames == "3,2,4,2"
-    # A rule's frames can contradict what the whole file bakes.
-    job = read(tmp_path, BAKES.replace('"2-5"', '"2,5"'))
-    with pytest.raises(WrongUse, match="usd: Blender exports every frame of a range"):
-        job.settings_of(Path("/x/hero.blend"), Settings()).check_bakes()
 
 
 @pytest.mark.parametrize(
@@ -288,15 +266,9 @@ def test_bakes_and_scale_of_files_and_objects(tmp_path):
             18,
             r"objects: expected entries that begin with \[\[files.objects",
         ),
-        (BAKES, '"3.x"', '"2.79"', 1, "scale: expected one of 4.0, 3.x, none, got '2.79'"),
-        (BAKES, '"usd", "mdd"', '"fbx"', 2, "bake: expected some of shape-keys, .*, got 'fbx'"),
-        (BAKES, '"usd", "mdd"', '"pc2", "mdd"', 2, "an object can have one of pc2, mdd"),
-        (BAKES, '"1-48"', '"1-"', 3, "bake_frames: expected frames such as"),
-        (BAKES, '"1-48"', '"1,5"', 3, "usd: Blender exports every frame"),
-        (BAKES, '"1-48"', '"-3-5"', 3, "usd: Blender exports no frames before 0"),
-        (BAKES, "bake = []\n", "", 5, "these objects have no settings"),
-        (BAKES, 'bake = "shape-keys"', "bake = 3", 16, "bake: expected a list"),
-        (BAKES, '"4.0"', "4.0", 17, "scale: expected text in quotes, got 4.0"),
+        (SCALES, '"3.x"', '"2.79"', 1, "scale: expected one of 4.0, 3.x, none, got '2.79'"),
+        (SCALES, 'scale = "none"\n\n[[files]]', "[[files]]", 3, "these objects have no settings"),
+        (SCALES, '"4.0"', "4.0", 13, "scale: expected text in quotes, got 4.0"),
     ],
 )
 def test_errors_have_a_line(tmp_path, job, old, new, line, sentence):
@@ -336,7 +308,7 @@ def test_the_keys_and_the_settings_are_the_same():
     """A key that is read and then ignored would be accepted without effect."""
     known = {key.name for key in keys()}
     assert known == {field.name for field in fields(Settings)} | {"inputs", "out", "files", "match"}
-    assert {field.name for field in fields(ObjectRule)} == {"match", "method", "scale", "set", "bake"}
+    assert {field.name for field in fields(ObjectRule)} == {"match", "method", "scale", "set"}
 
 
 def saved(folder, name="a.blend"):
@@ -366,16 +338,13 @@ def test_a_killed_run_is_finished_by_the_next(tmp_path):
     [
         {"file": "link/a.blend"},
         {"unfinished": "mine.blend"},
-        {"beside": [["mine.blend", "b.abc", None]]},
-        {"beside": [[".1.unfinished.abc", "link/b.abc", None]]},
-        {"beside": [["link/.1.unfinished.abc", "b.abc", None]]},
     ],
 )
 def test_a_journal_moves_only_unfinished_files_of_its_folder(tmp_path, harm):
     out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     for folder in (out, elsewhere):
         folder.mkdir()
-        for name in (".1.unfinished.blend", ".1.unfinished.abc", "mine.blend"):
+        for name in (".1.unfinished.blend", "mine.blend"):
             (folder / name).write_bytes(b"a copy")
     (out / "link").symlink_to(elsewhere, target_is_directory=True)
     before = sorted(tmp_path.rglob("*")) + sorted(elsewhere.iterdir())
@@ -383,7 +352,6 @@ def test_a_journal_moves_only_unfinished_files_of_its_folder(tmp_path, harm):
     # Each names what is there, so that its stamp is right.
     linked = out / record["file"]
     record["written"] = stamp(linked.with_name(record["unfinished"]))
-    record["beside"] = [[a, b, stamp(out / a)] for a, b, _none in record.get("beside", [])]
     (out / NAME).write_text(json.dumps(record) + "\n")
     with Journal(out) as journal:
         journal.recover()
@@ -438,10 +406,6 @@ def test_a_journal_that_can_not_be_written(tmp_path):
         {"file": "/tmp/out.blend"},
         {"file": "a.blend", "unfinished": "../../.1.unfinished.blend"},
         {"file": "a.blend", "unfinished": 7},
-        {"file": "a.blend", "beside": [["../x", "../y", [1, 2]]]},
-        {"file": "a.blend", "beside": [["x", "/etc/y", [1, 2]]]},
-        {"file": "a.blend", "beside": [["x"]]},
-        {"file": "a.blend", "beside": "x"},
         {"file": ["a.blend"]},
         ["a.blend"],
         "a.blend",
@@ -451,13 +415,10 @@ def test_a_journal_moves_no_file_outside_its_folder(tmp_path, line):
     """A folder may come from anyone, and contain a journal that moves files."""
     out = tmp_path / "deep" / "out"
     out.mkdir(parents=True)
-    for path in (out / ".1.unfinished.blend", tmp_path / "deep" / "x"):
-        path.write_bytes(b"a copy")
+    (out / ".1.unfinished.blend").write_bytes(b"a copy")
     if isinstance(line, dict):
         line = {"written": stamp(out / ".1.unfinished.blend"), **line}
         line["unfinished"] = line.get("unfinished", ".1.unfinished.blend")
-        for one in line["beside"] if isinstance(line.get("beside"), list) else ():
-            one[2:] = [stamp(tmp_path / "deep" / "x")] if len(one) > 1 else []
     (out / NAME).write_text(json.dumps(line) + "\n")
     before = sorted(path for path in tmp_path.rglob("*"))
     with Journal(out) as journal:

@@ -81,24 +81,6 @@ def test_two_helper_bones_a_joint_play_the_method(method):
     assert rms <= 0.16 * solution.before.rms
 
 
-@pytest.mark.parametrize("method", ["dq", "cor"])
-def test_helper_bones_that_scale_are_nearer(method):
-    """With two of them the error is at most .7 % of the limb's diameter, which rigid ones can not reach."""
-    motion = motion_by(method)
-    solution = solved(motion, Wanted(2), helper_bones.ScalingSolver)
-    rms, worst = errors_of(played(motion, solution), motion.targets)
-    assert np.allclose((solution.after.rms, solution.after.worst), (rms, worst), rtol=1e-3)
-    assert rms <= 0.007 * DIAMETER
-    assert rms <= 0.7 * solved(motion, Wanted(2)).after.rms
-    linear = solution.motions[..., :3]
-    squares = linear @ linear.swapaxes(-1, -2)
-    sizes = np.sqrt(squares[..., 0, 0])
-    # Scaled equally along all axes, which any engine supports.
-    assert np.allclose(squares, np.square(sizes)[..., None, None] * np.identity(3), atol=1e-9)
-    assert sizes.max() > 1.1
-    assert sizes.min() > 0.5
-
-
 def test_the_error_never_grows_with_more_helper_bones():
     motion = motion_by("dq")
     errors = [solved(motion, Wanted(count)) for count in range(5)]

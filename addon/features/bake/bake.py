@@ -192,10 +192,7 @@ def start(
         return BoneBake(meshes, frames, helpers)
     if kind in bake.EXPORTS:
         files.check_free(target, overwrite)
-    if kind in bake_export.SCENES:
-        return bake_export.SceneExport(meshes, kind, frames, target, overwrite)
-    if kind == bake_export.GLTF:
-        return bake_export.MorphExport(meshes, frames, target)
+        return bake_export.SceneExport(meshes, kind, frames, target)
     return Bake(meshes, kind, frames, target.with_name(f"{target.stem}_cache"), overwrite)
 
 

@@ -16,12 +16,10 @@ from ...blender_process import BlenderLost, BlenderProcess, Limits
 from ...core.errors import SinewError
 from ...core.output import remove, sentence
 from ...io import files
-from . import bake, bake_export
-
-Export = bake_export.SceneExport | bake_export.MorphExport
+from .bake_export import SceneExport
 
 
-def sample(started: Export) -> Generator[float, None, None]:
+def sample(started: SceneExport) -> Generator[float, None, None]:
     """Replaces started.sample(): yields the progress, 0 to 1, several times a second. If closed, or on an
     error, it ends the second Blender and removes its files."""
     images = [image for image in bpy.data.images if image.source != "VIEWER" and image.users]
@@ -52,14 +50,14 @@ def export(task: dict, report: Callable[..., None]) -> dict:
     window.scene = bpy.data.scenes[task["scene"]]
     window.view_layer = window.scene.view_layers[task["view_layer"]]
     meshes = [bpy.data.objects[name, None] for name in task["objects"]]
-    started = bake.start(meshes, task["kind"], task["frames"], Path(task["target"]), overwrite=True)
+    started = SceneExport(meshes, task["kind"], task["frames"], Path(task["target"]))
     started.report_progress = lambda share: report("exporting it", share=share)
     for share in started.sample():
         started.report_progress(share)
     return {}
 
 
-def _task(started: Export, copy: Path) -> dict:
+def _task(started: SceneExport, copy: Path) -> dict:
     return {
         "command": "export",
         "source": str(copy),
@@ -75,11 +73,10 @@ def _task(started: Export, copy: Path) -> dict:
 
 
 @contextmanager
-def _copy(started: Export) -> Iterator[Path]:
+def _copy(started: SceneExport) -> Iterator[Path]:
     """Context with a copy of the open file as it is now, saved beside the output."""
     copy = started.unfinished.with_suffix(".blend")
-    with started.whole_in_a_copy():
-        files.save_beside(None, started.path, copy)
+    files.save_beside(None, started.path, copy)
     link = copy.with_name(f"blendcache_{copy.stem}")
     try:
         _link_caches(link)

@@ -12,7 +12,7 @@ import numpy as np
 from ...attach import properties, stack, upstream_proxy
 from ...core import helper_bones, pose_helpers, pose_samples
 from ...core.errors import SinewError
-from ...core.helper_bones import POSE, SCALED_KEYS, HelperOptions, Motion, Report
+from ...core.helper_bones import POSE, HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
 from ...core.skin_stack import SkinStack, SkinStageFrame
 from ...core.spaces import transformed
@@ -137,8 +137,7 @@ class _Rig:
         diagonal = self._unit * at_frames.diagonal
         if options.motion != POSE:
             self._targets.clear()
-            solver = helper_bones.ScalingSolver if options.motion == SCALED_KEYS else helper_bones.Solver
-            self._solution = yield from helper_bones.solve(at_frames, options.of(at_frames), solver)
+            self._solution = yield from helper_bones.solve(at_frames, options.of(at_frames))
             self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal)
             return
         rest = self._bones.rest

@@ -10,7 +10,7 @@ from ...attach.feature import Feature
 from ...core.bake import BONES, EXPORTS
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
-from ...core.helper_bones import KEYS, POSE, SCALED_KEYS, HelperOptions
+from ...core.helper_bones import KEYS, POSE, HelperOptions
 from ...deform import characters
 from ...ui import stepped
 from ...ui.operators import OfSkinned, OnSinewObjects, sinew_targets
@@ -39,7 +39,6 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
             (BONES, "Bones", "Helper bones and weights, in this file: what engines play"),
             ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
             ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
-            ("gltf", "glTF", "The final meshes, the frames as morph targets; this file stays as it is"),
         ],
     )
     frames: bpy.props.StringProperty(
@@ -88,11 +87,6 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
         description="What moves helper bones",
         items=[
             (KEYS, "Keys", "Plain keys over these frames, of bones that do not change size: for any engine"),
-            (
-                SCALED_KEYS,
-                "Keys with Scale",
-                "Helper bones also grow and shrink, and come nearer: for engines that play scale",
-            ),
             (POSE, "Pose", "Constraints by which they follow the pose: other animation has them, too"),
         ],
     )

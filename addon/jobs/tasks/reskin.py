@@ -17,10 +17,8 @@ from ...core import parameters
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
 from ...core.names import fits
-from ...core.output import remove
 from ...core.views import seen_extent, whole_view
 from ...deform import characters, lifecycle, session
-from ...features.bake import bake_copy
 from ...features.compare import comparison
 from ...features.pages import render
 from ...io import files
@@ -72,22 +70,9 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         "notes": notes,
         "seconds": clock.seconds,
     }
-    names = {mesh["object"] for mesh in outcome["meshes"]}
     if task["frames"] != "none":
         _compare(task, skinned, outcome, clock)
-    if settings["bake"] or any(rule.get("bake") for rule in settings["objects"]):
-        with clock.doing("baking"):
-            outcome |= _bake(task, names)
     return outcome
-
-
-def _bake(task: dict, names: set[str]) -> dict:
-    unfinished = Path(task["unfinished"])
-    try:
-        return bake_copy.bake_copy(task, unfinished, names)
-    except SinewError:
-        remove(unfinished)
-        raise
 
 
 def restore(task: dict, report: Callable[[str], None]) -> dict:
