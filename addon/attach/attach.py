@@ -36,19 +36,22 @@ from .updates import updates_suspended
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """Returns the armature that deforms a mesh object: by Sinew, by its first Armature modifier or as its
-    parent."""
+    """Returns the armature that deforms a mesh object: by its first Armature modifier, whose armature Sinew
+    keeps, or as its parent. It is that of the stack as it is now, which Sinew itself follows later, and
+    while the mesh is hidden not at all."""
     if obj.type != "MESH":
         return None
     modifier = armature_modifier(obj)
-    if properties.has_sinew(obj) and properties.of(obj).armature is not None:
-        # While Sinew is off, the artist may have chosen another armature in the modifier.
-        is_chosen = modifier is not None and modifier.object is not None
-        if not (is_chosen and not properties.of(obj).replaces_modifiers):
-            return properties.of(obj).armature
-    if modifier is not None:
+    # An undo can have the object in its own modifier.
+    if modifier is not None and modifier.object not in (None, obj):
         return modifier.object
-    return obj.parent if stack.parent_deforms(obj) else None
+    if properties.has_sinew(obj):
+        kept = properties.of(obj).replaced_modifiers
+        same = (each for each in kept if modifier is not None and stack.modifier_of(obj, each) == modifier)
+        found = next(same, None) or next(iter(kept), None)
+        if found is not None and found.armature is not None:
+            return found.armature
+    return obj.parent if modifier is None and stack.parent_deforms(obj) else None
 
 
 def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -152,9 +152,13 @@ def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
 
 
 def is_current(obj: bpy.types.Object) -> bool:
-    """Whether the proxy's mesh, if it has one, is the object's."""
+    """Whether the proxy's mesh, if it has one, is the object's, and its vertex groups have the same names."""
     proxy = properties.of(obj).storage.upstream_proxy
-    return proxy is None or proxy.data == obj.data or mesh_compare.are_alike(obj.data, proxy.data)
+    if proxy is None or proxy.data == obj.data:
+        return True
+    # Blender renames groups along with bones only where an Armature modifier has these.
+    has_same_groups = proxy.vertex_groups.keys() == obj.vertex_groups.keys()
+    return has_same_groups and mesh_compare.are_alike(obj.data, proxy.data)
 
 
 def follow_points(obj: bpy.types.Object) -> None:

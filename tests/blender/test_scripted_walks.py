@@ -36,6 +36,9 @@ CASES = {
     "frame 6; leave_mode; frame 11",
     "a linked duplicate made single": "add Arm; duplicate Arm; frame 3; swap_mesh 'object 1'; frame 6; "
     "remove_all",
+    "hair of another beside a heat map": "add_shape_key Box; hair Box; add_modifier Box SOLIDIFY 0.9; "
+    "add Arm dq; heat Arm; save_and_load; view_layer; delete_modifier Box 'Solidify 3'; "
+    "shape_key_value Box 0.9 0.9",
     "a heat map of a shared mesh": "duplicate Arm; add Arm; frame 6; heat Arm; update; frame 7; "
     "heat Arm 0.9",
     "appended": "append; frame 2; frame 11",
@@ -145,6 +148,9 @@ CASES = {
     "chained ones swapped": "add_modifier Arm ARMATURE 'Other Rig' 0.9 0.1; add Arm; frame 6; "
     "move_modifier Arm Armature 'Armature 1'; frame 11; move_modifier Arm Armature 'Armature 1'; frame 6; "
     "remove Arm",
+    "chained ones swapped while it is hidden": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; "
+    "hide Arm viewport; move_modifier Arm 'Armature 1' Armature; character_method 'Other Rig' dq; "
+    "hide Arm viewport; frame 8",
     "something moved between": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add_modifier Arm SUBSURF 0.9; "
     "add Arm; frame 6; move_modifier Arm 'Subsurf 2' 'Armature 1'; frame 11; "
     "move_modifier Arm 'Subsurf 2' Armature; frame 6; remove Arm",
@@ -162,6 +168,8 @@ CASES = {
     "render 0.9",
     "weights that change": "add_modifier Arm VERTEX_WEIGHT_EDIT lower; add Arm; frame 6; weights Arm lower; "
     "frame 11",
+    "its vertex groups change": "add_modifier Arm SUBSURF; add Arm 0.9 log; frame 6; rename_bone Rig lower; "
+    "frame 8; groups Arm rename upper; frame 9; groups Arm bone 'group 3' upper; groups Arm move; frame 4",
     "nodes": "add_modifier Arm NODES; add Arm; frame 6; move_vertices Arm; frame 11; remove_all",
     "absolute shape keys": "add_shape_key Arm; absolute_shape_keys Arm; add Arm; frame 6; "
     "absolute_shape_keys Arm; frame 11",

@@ -214,8 +214,10 @@ class Child:
                 continue
             evaluated = obj.evaluated_get(depsgraph)
             found[obj.name_full] = (self.points_of(evaluated), self.np.array(evaluated.matrix_world))
-            # Without a window, hair alone has Blender make them.
-            if any(m.type == "PARTICLE_SYSTEM" and m.show_viewport for m in obj.modifiers):
+            # Hair has Blender make them, which modifiers behind it may drop. Views that draw colours of
+            # attributes, as for heat maps, keep them; the other side has no such views.
+            last = next((m for m in reversed(self.walker.modifiers(obj)) if m.show_viewport), None)
+            if last is not None and last.type == "PARTICLE_SYSTEM":
                 name = f"{obj.name_full} in the render, coordinates in the viewport"
                 self.walker.rendered[name] = self.points_of(evaluated, "undeformed_co")
             if self.side.is_sinew:
