@@ -74,11 +74,11 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
-def add_engine(parser: argparse.ArgumentParser) -> None:
+def add_engine(parser: argparse.ArgumentParser, default: str | None = "auto") -> None:
     parser.add_argument(
         "--engine",
         choices=("auto", "workbench", "cycles"),
-        default="auto",
+        default=default,
         help="of the pictures; auto, the default: Workbench, or Cycles where there is no OpenGL",
     )
 

@@ -217,12 +217,19 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["compare", path, "--frames", "1-10000000", "--out", tmp_path], "expected -1048574 to 1048574"),
         (["compare", path, "--frames", "", "--out", tmp_path], "expected frames"),
         (["compare", path, "--out", path], "is a file"),
+        (["render", path, *one, "--out", path / "golden"], "is a file"),
         (["compare", path, "--reference", "best", "--out", tmp_path], "expected one of"),
         (["compare", path, "--pictures", "-1", "--out", tmp_path], "expected 0 or more"),
         (["compare", path, "--influences", "-1", "--out", tmp_path], "expected 0 or more"),
         (["compare", path, "--size", "10", "--out", tmp_path], "expected 64 to 4096"),
         (["compare", path, tmp_path / path.name, "--out", tmp_path], "would both be written"),
         (["compare", tmp_path / "no.blend", "--out", tmp_path], "no such file"),
+        (["render", path, "--out", tmp_path], "are needed"),
+        (["render", path, "--tolerance", "-1", "--out", tmp_path], "a percentage"),
+        (["render", path, "--against", tmp_path / "none", "--out", tmp_path / "o"], "make golden pictures"),
+        (["render", path, "--against", tmp_path, "--out", tmp_path], "would replace the golden pictures"),
+        (["render", path, *one, "--own-look", "--out", tmp_path / "o"], "no camera"),
+        (["render", path, *one, "--size", "9", "--out", tmp_path / "o"], "64 to 4096"),
         (["info", tmp_path / "no.blend"], "no such file"),
     ]
     of_files = {
@@ -232,6 +239,8 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         "is a folder",
         "no mesh is deformed",
         "no mesh called 'Leg'",
+        "make golden pictures",
+        "no camera",
     }
     for arguments, sentence in cases:
         result = run_sinew(*arguments, status=1 if sentence in of_files else 2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare`: its numbers, findings and pictures, for files with known results."""
+"""`sinew compare` and `sinew render`: their numbers, findings and pictures, for files with known results."""
 
 from __future__ import annotations
 
@@ -162,3 +162,33 @@ def test_a_page_holds_its_pictures(tmp_path):
     colours = opaque_pixels(tmp_path / "wrist" / "pictures" / "dq-distance-24-close.png")
     yellow = (colours[:, 0] > 150) & (colours[:, 1] > 150) & (colours[:, 2] < 110)
     assert yellow.mean() > 0.02
+
+
+def test_golden_pictures(tmp_path):
+    _obj, armature = scenes.make_arm()
+    path = save(tmp_path / "arm.blend")
+    run_sinew(
+        "render", path, "--method", "dq", "--frames", "1,11", "--size", 128, "--out", tmp_path / "golden"
+    )
+    assert {p.name for p in (tmp_path / "golden").iterdir()} == {"0001.png", "0011.png", "render.json"}
+    # All methods keep the rest pose; frame 11 is bent.
+    result = run_sinew(
+        *("render", path, "--method", "lbs", "--against", tmp_path / "golden", "--out", tmp_path / "now"),
+        status=1,
+    )
+    assert "1 of 2 pictures within" in result.stdout
+    assert {p.name for p in (tmp_path / "now").glob("*.difference.png")} == {"0011.difference.png"}
+    assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
+    percent = float(re.search(r"\b11\b.*?(\d+\.\d+) %", result.stdout).group(1))
+    assert 0.5 < percent < 50.0
+    # The golden camera is used: larger motion at one frame does not change the framing of others.
+    for frame, scale in ((1, 1.0), (11, 3.0)):
+        armature.pose.bones[1].scale = (scale, scale, scale)
+        armature.pose.bones[1].keyframe_insert("scale", frame=frame)
+    save(path)
+    result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
+    assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
+    assert "1 of 2 pictures within" in result.stdout
+    (tmp_path / "golden" / "0011.png").write_bytes(b"no picture")
+    result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
+    assert "0011.png: can not be read as a picture" in result.stderr

@@ -111,6 +111,7 @@ def test_names_that_are_no_text(arm_file, tmp_path):
         ("check", file),
         ("points", file, "--method", "dq", "--frames", "1", "--out", tmp_path / "o.npz"),
         ("compare", file, "--frames", "1", "--pictures", "1", "--size", "64", "--out", tmp_path / "pages"),
+        ("render", file, "--method", "dq", "--frames", "1", "--size", "64", "--out", tmp_path / "render"),
         ("bake", file, "--method", "dq", "--to", "pc2", "--frames", "1-2", "--out", tmp_path / "bakes"),
         ("bake", file, "--method", "dq", "--to", "usd", "--frames", "1-2", "--out", tmp_path / "bakes"),
         ("inbetween", file, "--method", "dlb", "--out", tmp_path / "inbetween"),
@@ -124,6 +125,31 @@ def test_names_that_are_no_text(arm_file, tmp_path):
     process.communicate(os.fsencode(file) + b"\n", timeout=120)
     assert process.returncode == 0
     assert [os.fsencode(path.name) for path in (tmp_path / "out").glob("*.blend")] == [b"latin\xe9.blend"]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"frames": ["../../x"]},
+        {"frames": [1e300]},
+        {"frames": []},
+        {"frames": {"a": 1}},
+        {"size": "64"},
+        {"method": 3},
+        {"engine": None},
+        {"views": []},
+        {"own_look": "no"},
+    ],
+)
+def test_golden_settings_from_anybody(wrong, arm_file, tmp_path):
+    golden = tmp_path / "golden"
+    golden.mkdir()
+    view = {"direction": [0, 0, 1], "target": [0, 0, 0], "width": 1, "height": 1, "depth": 1}
+    right = {"file": "arm.blend", "method": "dq", "frames": [1], "engine": "workbench", "size": 64,
+             "own_look": False, "meshes": ["Arm"], "views": [view]}  # fmt: skip
+    (golden / "render.json").write_text(json.dumps(right | wrong))
+    refused = run_sinew("render", arm_file, "--against", golden, "--out", tmp_path / "out", status=1)
+    assert "is not what `sinew render` writes" in refused.stderr
 
 
 def test_a_journal_with_half_of_what_a_result_has(arm_file, tmp_path):

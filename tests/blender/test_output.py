@@ -48,6 +48,10 @@ WRITERS = {
         ("compare", "FILE", "--frames", "1,6", "--pictures", "1", "--size", "64", "--out", OUT),
         "out",
     ),
+    "render": (
+        ("render", "FILE", "--method", "dq", "--frames", "1,6", "--size", "64", "--out", OUT),
+        "out",
+    ),
 }
 
 
@@ -239,6 +243,7 @@ def test_standard_output_on_a_full_disk(arguments, inputs):
         ("reskin", "LONG", "--method", "dq", "--out", "OUT"),
         ("points", "FILE", "--method", "dq", "--frames", "1", "--out", "LONG.npz"),
         ("reskin", "FILE", "--method", "dq", "--out", "LONG"),
+        ("render", "FILE", "--against", "FILE/x", "--out", "OUT"),
         ("inbetween", "FILE/x", "--method", "dlb", "--out", "OUT"),
     ],
 )
@@ -332,10 +337,33 @@ def test_names_that_blender_would_fill_in(inputs, tmp_path):
     file = tmp_path / name
     file.write_bytes(inputs["FILE"].read_bytes())
     out = tmp_path / "o{scene_name}ut ##"
+    run_sinew("render", file, "--method", "dq", "--frames", "6", "--size", "64", "--out", out)
+    assert all_in(out) == ["0006.png", "render.json"]
     run_sinew("compare", file, "--frames", "1,6", "--size", "64", "--pictures", "1", "--out", out)
     assert (out / f"{file.stem}.html").exists()
     assert [path for path in (out / file.stem / "pictures").iterdir() if path.suffix == ".png"]
     assert all_in(tmp_path) == sorted([name, out.name, *(f"{out.name}/{path}" for path in all_in(out))])
+
+
+def test_no_two_frames_have_one_picture(inputs, tmp_path):
+    out = tmp_path / "out"
+    run_sinew(
+        *("render", inputs["FILE"], "--method", "dq", "--size", "64", "--out", out),
+        *("--frames", "6,6.5,6.501,6.999,-2.25"),
+    )
+    assert len(list(out.glob("*.png"))) == 5
+
+
+@pytest.mark.once
+def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
+    picture = tmp_path / "0006.png"
+    picture.write_bytes(b"rendered for days")
+    command = ("render", inputs["FILE"], "--method", "dq", "--frames", "6", "--size", "64", "--out", tmp_path)
+    assert "0006.png" in complaint(run_sinew(*command, status=1).stderr)
+    assert picture.read_bytes() == b"rendered for days"
+    picture.unlink()
+    run_sinew(*command)
+    run_sinew(*command)
 
 
 @pytest.mark.once

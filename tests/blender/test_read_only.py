@@ -110,6 +110,7 @@ def written(tmp_path_factory):
         ("info",),
         ("points", "--method", "dq", "--frames", "1,4,3"),
         ("compare", "--frames", "1,4", "--pictures", "1", "--size", "64"),
+        ("render", "--method", "dq", "--frames", "1,4", "--own-look"),
         ("reskin", "--method", "dq", "--frames", "1,4"),
         ("bake", "--method", "dq", "--to", "alembic", "--frames", "1-2"),
     ],

@@ -151,6 +151,8 @@ def test_it_runs_as_written(command, studio, tmp_path):
         run("sinew reskin characters/ --method dq --frames none --out reskinned/", folder)
     if "--resume" in command.words:
         run(command.line.replace(" --resume", ""), folder)
+    if "--against" in command.words:
+        run("sinew render human.blend --method dq --frames 1,16,32 --out golden/", folder)
     before = {path for path in folder.rglob("*") if path.is_file()}
     assert run(command.line, folder)
     written = {path for path in folder.rglob("*") if path.is_file()} - before

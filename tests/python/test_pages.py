@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects colours and plots."""
+"""Protects colours, plots and picture comparison."""
 
+import json
 import re
 import sys
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from sinew_addon.core import golden
 from sinew_addon.core.comparison import Comparison, RestFacts
+from sinew_addon.core.errors import SinewError
 from sinew_addon.core.heat import HeatScale, diverging, linear, viridis
 from sinew_addon.core.metrics import METRICS, Summary
 from sinew_addon.core.page import legend_texts, page
 from sinew_addon.core.plots import line_plot
+from sinew_addon.core.views import View
 
 
 def test_magnitudes_have_the_colours_of_matplotlib():
@@ -180,3 +184,57 @@ def test_without_matplotlib_the_page_says_so(monkeypatch):
     text = page(comparison, [])
     assert "Not drawn: plots need matplotlib" in text
     assert "All frames" in text
+
+
+def test_only_what_differs_visibly_counts():
+    picture = np.zeros((10, 20, 4))
+    picture[2:8, 5:15] = [0.5, 0.5, 0.5, 1.0]
+    other = picture.copy()
+    # The colour behind alpha 0 is invisible; a little alpha is along every edge.
+    other[0, 0] = [1.0, 1.0, 1.0, 0.0]
+    other[2, 5] = [0.6, 0.6, 0.6, 1.0]
+    assert golden.differing_share(golden.difference(picture, other)) == 0.0
+    other[7, 5:9] = 0.0
+    differences = golden.difference(picture, other)
+    assert golden.differing_share(differences) == pytest.approx(4 / 200)
+    shown = golden.difference_picture(differences, picture)
+    coloured = np.ptp(shown[:, :, :3], axis=2) > 0.1
+    assert coloured.sum() == 4
+    assert coloured[7, 5:9].all()
+
+
+def test_names_of_pictures_sort_by_frame():
+    frames = [-3, 1, 6.5, 6.25, 12, 1234]
+    assert [golden.picture_name(f) for f in frames[1:]] == [
+        "0001.png",
+        "0006.50.png",
+        "0006.25.png",
+        "0012.png",
+        "1234.png",
+    ]
+    assert len({golden.picture_name(f) for f in [*frames, -2.5, 6.75]}) == 8
+
+
+def test_a_folder_that_holds_no_golden_pictures_is_named(tmp_path):
+    with pytest.raises(SinewError, match="sinew render"):
+        golden.RenderSettings.read(tmp_path)
+    (tmp_path / golden.SETTINGS).write_text('{"frames": 3}')
+    with pytest.raises(SinewError, match="make the pictures again"):
+        golden.RenderSettings.read(tmp_path)
+
+
+def test_settings_of_golden_pictures_are_read_as_written(tmp_path):
+    view = View(np.array([0.0, -1.0, 0.0]), np.zeros(3), 1.0, 2.0, 3.0)
+    names = ("a.blend", "lbs", [1, 2.5], "cycles", 64, False, ["Body"], [view, view])
+    settings = golden.RenderSettings(*names, set=["mix.method=dq", "mix.group=Arms"])
+    path = tmp_path / golden.SETTINGS
+    path.write_text(settings.to_json())
+    assert golden.RenderSettings.read(tmp_path).to_json() == settings.to_json()
+    # Written by a version without parameters.
+    older = json.loads(settings.to_json())
+    del older["set"]
+    path.write_text(json.dumps(older))
+    assert golden.RenderSettings.read(tmp_path).set == []
+    path.write_text(json.dumps(older | {"set": [1]}))
+    with pytest.raises(SinewError, match="make the pictures again"):
+        golden.RenderSettings.read(tmp_path)

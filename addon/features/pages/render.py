@@ -146,6 +146,22 @@ class Studio:
             layer.material_override = material
 
 
+class OwnLook:
+    """Renders with the file's own camera and settings."""
+
+    def __init__(self, scene: bpy.types.Scene, path: Path) -> None:
+        if scene.camera is None:
+            raise SinewError(
+                f"{path}: has no camera to look through; leave --own-look away for clay pictures"
+            )
+        self._scene = scene
+        _prepare_png(scene)
+
+    def picture(self, path: Path) -> None:
+        """Renders to the PNG `path`."""
+        _render(self._scene, path)
+
+
 def _render(scene: bpy.types.Scene, path: Path) -> None:
     """Renders the current frame to the PNG `path`; raises SinewError where it cannot be written."""
     with scratch_folder() as folder:
@@ -184,14 +200,20 @@ def _prepare_output(scene: bpy.types.Scene) -> None:
     render.film_transparent = True
     render.use_border = render.use_compositing = render.use_sequencer = False
     render.use_freestyle = render.use_multiview = render.use_motion_blur = render.use_stamp = False
-    read_only.prepare_render()
-    settings = render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "IMAGE"
-    settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGBA", "8"
+    _prepare_png(scene)
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
+
+
+def _prepare_png(scene: bpy.types.Scene) -> None:
+    read_only.prepare_render()
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format = "PNG"
+    settings.color_mode = "RGBA"
+    settings.color_depth = "8"
 
 
 def _prepare_workbench(scene: bpy.types.Scene, halved: bool) -> None:

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads and writes PNG files with Blender itself, so that nothing has to be installed."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import SinewError
+from ...core.output import write_whole
+from ...io.files import telling_line
+
+
+def read_picture(path: Path) -> np.ndarray:
+    """float32 [height, width, 4] in 0..1, from the lowest row up, as stored. Raises SinewError."""
+    try:
+        image = bpy.data.images.load(str(path))
+    except RuntimeError:
+        raise SinewError(f"{path}: can not be read as a picture") from None
+    try:
+        width, height = image.size
+        if not width:
+            raise SinewError(f"{path}: can not be read as a picture")
+        pixels = np.empty(width * height * image.channels, dtype=np.float32)
+        # Reads the file: before, only the size is known.
+        image.pixels.foreach_get(pixels)
+    finally:
+        bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)
+
+
+def write_picture(path: Path, pixels: np.ndarray) -> None:
+    """Writes a PNG with 8 bits per channel."""
+    height, width, _channels = pixels.shape
+    image = bpy.data.images.new("Sinew Picture", width, height, alpha=True)
+    try:
+        image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
+        image.file_format = "PNG"
+
+        def write(unfinished: Path) -> None:
+            image.filepath_raw = str(unfinished)
+            try:
+                image.save()
+            except RuntimeError as error:
+                raise OSError(telling_line(error)) from None
+
+        write_whole(path, write)
+    finally:
+        bpy.data.images.remove(image)
