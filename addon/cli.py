@@ -75,8 +75,19 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
 
 
 def main(argv: list[str]) -> int:
-    """Runs one command. Returns the exit status: 0 all went well, 1 something did not, 2 wrong use."""
+    """Runs one command. Returns the exit status: 0 all went well, 1 something did not, 2 wrong use, 130
+    Ctrl-C."""
+    with interrupt.deferred():
+        try:
+            return _main(argv)
+        except KeyboardInterrupt:
+            print("sinew: stopped", file=sys.stderr)
+            return 130
+
+
+def _main(argv: list[str]) -> int:
     reason = native.load_error()
+    interrupt.check()
     if reason is not None:
         print(f"sinew: {reason}", file=sys.stderr)
         return 1
@@ -90,8 +101,7 @@ def main(argv: list[str]) -> int:
             output = console.take_over_output()
         if args.command not in WITHOUT_BLENDER:
             prepare_blender()
-        with interrupt.deferred():
-            return modules[args.command].run(args, output)
+        return modules[args.command].run(args, output)
     except SystemExit as stop:
         # Raised by the parser: within Blender, exiting would skip Blender's own cleanup.
         return stop.code if isinstance(stop.code, int) else 2

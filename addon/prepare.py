@@ -5,6 +5,7 @@ import os
 import shutil
 from typing import NoReturn
 
+from .core import interrupt
 from .core.errors import SinewError
 
 
@@ -27,6 +28,7 @@ def prepare_blender() -> None:
     normals.are_used = False
     if not hasattr(bpy.types.Object, "sinew"):
         registration.register()
+    interrupt.check()
 
 
 def leave_blender(status: int) -> NoReturn:

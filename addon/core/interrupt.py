@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C in a command. Blender ignores a KeyboardInterrupt raised within its handlers, so while code that
-uses bpy runs, Ctrl-C is only recorded, and the next check() raises it. Commands call check() for each frame
-and step of progress."""
+"""Ctrl-C in a command. Blender ignores a KeyboardInterrupt raised within its handlers or while it starts, and
+can crash then. So while code that uses bpy runs, Ctrl-C is only recorded, and the next check() raises it.
+Commands call check() for each frame and step of progress."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from types import FrameType
 
 _requested = False
 
-# The folders whose code Blender may have called.
+# The folders and modules whose code Blender may have called.
 _PACKAGE = __package__.rpartition(".")[0]
-_ON_BPY = tuple(f"{_PACKAGE}.{room}." for room in ("io", "attach", "deform", "ui", "features", "jobs.tasks"))
+_ROOMS = ("io", "attach", "deform", "ui", "features", "jobs.tasks", "prepare", "native")
+_ON_BPY = tuple(f"{_PACKAGE}.{room}." for room in _ROOMS)
 
 
 @contextmanager
@@ -55,7 +56,7 @@ def _on_interrupt(_signal: int, frame: FrameType | None) -> None:
 def _is_in_blender(frame: FrameType | None) -> bool:
     """Whether code that Blender may have called is running."""
     while frame is not None:
-        if frame.f_globals.get("__name__", "").startswith(_ON_BPY):
+        if f"{frame.f_globals.get('__name__')}.".startswith(_ON_BPY):
             return True
         frame = frame.f_back
     return False

@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 
 import bpy
 import numpy as np
+import program
 import pytest
 import scenes
 import sinew
@@ -45,6 +48,28 @@ def test_help_everywhere():
 def test_wrong_use_has_status_2():
     run_sinew(status=2)
     run_sinew("points", status=2)
+
+
+@pytest.mark.once
+@program.needs_interrupts
+@pytest.mark.parametrize("name", ["numpy", "sinew_addon.commands.render", "bpy_types", "sinew_addon.ui"])
+def test_ctrl_c_stops_a_command_that_starts(arm_file, name):
+    """Blender ignores what is raised while it starts, and lacks some of its modules then."""
+    code = f"""
+import os, signal, sys
+class Interrupts:
+    def find_spec(self, name, path=None, target=None):
+        if name.lstrip("_") == {name!r}:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupts())
+from sinew_addon.cli import run
+run()
+"""
+    command = [sys.executable, "-c", code, "info", arm_file[0]]
+    done = subprocess.run(command, env=program.ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "sinew: stopped\n")
+    assert not done.stdout
 
 
 @pytest.mark.once
