@@ -11,6 +11,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
+from ..core.influences import GroupWeights
 from ..io import mesh_compare
 from ..io.animation_paths import animated_paths
 from . import properties, references, stack
@@ -46,8 +47,12 @@ WEIGHT_CHANGERS = {
 _READERS = {"MULTIRES", "SKIN"}
 
 # The session_uid of meshes that are never copied: another add-on moves them with each frame, or they differ
-# from any copy, as where a weight is not a number.
+# from any copy.
 _shared: set[int] = set()
+
+# The session_uid of proxies that were made in the event that Sinew reacts to: their meshes are current until
+# Blender lists another change.
+_just_made: set[int] = set()
 
 # Marks a proxy's own copy of the mesh.
 _COPY = "sinew_copy"
@@ -109,13 +114,26 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     if proxy is None or proxy.get(_MADE_FROM) != wanted or shares_mesh(obj) != shares:
         # Never the old one with another mesh: see references.py.
         references.note(obj)
+        old_mesh = proxy.data.session_uid if proxy is not None else 0
         remove(obj)
-        storage.upstream_proxy = _make(obj, shares)
-        storage.upstream_proxy[_MADE_FROM] = wanted
-        if not shares and not mesh_compare.is_good_copy(obj.data, storage.upstream_proxy.data):
+        proxy = storage.upstream_proxy = _make(obj, shares)
+        proxy[_MADE_FROM] = wanted
+        if not shares and not mesh_compare.is_good_copy(obj.data, proxy.data, old_mesh):
             share_mesh(obj)
             return ensure(obj)
+        _just_made.add(proxy.session_uid)
     return storage.upstream_proxy
+
+
+def was_just_made(obj: bpy.types.Object) -> bool:
+    """Whether its proxy was made in the event that Sinew reacts to."""
+    proxy = properties.of(obj).storage.upstream_proxy
+    return proxy is not None and proxy.session_uid in _just_made
+
+
+def end_event() -> None:
+    """From here to the next event, others may change meshes."""
+    _just_made.clear()
 
 
 def set_outdated(obj: bpy.types.Object) -> None:
@@ -200,6 +218,14 @@ def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy
     if is_plain and not obj.visible_get(view_layer=depsgraph.view_layer):
         return None
     return evaluated.data
+
+
+def known_weights(obj: bpy.types.Object) -> GroupWeights | None:
+    """Returns the weights of the mesh that the Armature modifier gets, where they are those of a copy that
+    has been compared with the mesh; else None."""
+    if shares_mesh(obj) or any(m.type not in stack.ONLY_DEFORM for m in stack.upstream_changes(obj)):
+        return None
+    return mesh_compare.weights_of(properties.of(obj).storage.upstream_proxy.data)
 
 
 def changes_weights(obj: bpy.types.Object) -> bool:

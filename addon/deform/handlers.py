@@ -110,6 +110,7 @@ def _end_event(depsgraph: bpy.types.Depsgraph, waiting: Changes | None) -> None:
     if waiting is not None:
         _keep_evaluated_shapes(waiting)
         session.refresh_between_steps(bpy.context)
+    upstream_proxy.end_event()
     for _obj, state in current.pairs:
         state.evaluation.is_event_known = state.evaluation.was_tagged
     session.note_shown(depsgraph)

@@ -18,6 +18,7 @@ from ..attach import (
     point_store,
     properties,
     references,
+    upstream_proxy,
 )
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
@@ -206,6 +207,7 @@ def refresh(context: bpy.types.Context) -> None:
         with contextlib.nullcontext() if waiting() else updates_suspended():
             context.view_layer.update()
         note_shown(depsgraph)
+    upstream_proxy.end_event()
 
 
 def note_shown(depsgraph: bpy.types.Depsgraph) -> None:

@@ -11,7 +11,7 @@ from ..attach import attach, normals, point_store, properties, stack, upstream_p
 from ..attach.updates import may_change_file
 from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths
-from . import after_update, apply_plan, bound, precomputing, source
+from . import after_update, apply_plan, bound, events, precomputing, source
 from .bound import uid
 from .changes import Changes
 from .plan import Plan, State, plan
@@ -118,6 +118,15 @@ class _Event:
             upstream_proxy.share_mesh(obj)
         return self.is_copy_outdated
 
+    def _is_copy_known(self) -> bool:
+        """Whether the copy was compared or made in this event. The mesh is listed by what Sinew has evaluated
+        within it, as by what others' handlers change."""
+        is_listed = self.obj.data.session_uid in self.changes.meshes
+        is_new = upstream_proxy.was_just_made(self.obj)
+        return self.is_copy_outdated is not None or (
+            is_new and not (is_listed and events.others_are_subscribed())
+        )
+
     def _with_rest(self, facts: Facts) -> Facts:
         """Adds what decides what is read."""
         obj, skinned, depsgraph, changes = self.obj, self.skinned, self.depsgraph, self.changes
@@ -195,7 +204,7 @@ class _Event:
         if new.is_read:
             _check_modifiers(self.obj, self.changes)
             new = self._full_plan()
-        if not new.uses_builtin and self.is_copy_outdated is None:
+        if not (new.uses_builtin or self._is_copy_known()):
             self.is_copy_outdated = not upstream_proxy.is_current(self.obj)
         if self.is_copy_outdated:
             upstream_proxy.set_outdated(self.obj)

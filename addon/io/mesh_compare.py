@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -33,28 +34,48 @@ _VALUES = {
 def are_alike(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
     """Whether modifiers make the same of both: their points, faces, attributes, weights, materials and shape
     keys, but for the values of the keys. Neither is in edit mode."""
+    _newer_weights.clear()
     if not _are_alike_but_for_weights(mesh, copy):
         return False
-    if copy.session_uid not in _weights:
-        _note_weights(copy, mesh_io.read_group_weights(copy))
-    return mesh_io.read_group_weights(mesh).equals(_weights[copy.session_uid])
+    mine, its = mesh_io.read_group_weights(mesh), weights_of(copy)
+    # NaN equals nothing.
+    if replace(mine, weights=its.weights).equals(its) and np.array_equal(
+        mine.weights, its.weights, equal_nan=True
+    ):
+        return True
+    _newer_weights[copy.session_uid] = mine
+    return False
 
 
-def is_good_copy(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
-    """The same for a copy that was just made of the mesh: their weights are the same, if they are numbers."""
-    weights = mesh_io.read_group_weights(mesh)
-    _note_weights(copy, weights)
-    return not np.isnan(weights.weights).any() and _are_alike_but_for_weights(mesh, copy)
+def is_good_copy(mesh: bpy.types.Mesh, copy: bpy.types.Mesh, old_copy: int) -> bool:
+    """The same for a copy that was just made of the mesh. Only the first one of each mesh is compared.
+
+    old_copy  the session_uid of the one that it replaces; 0 for none
+    """
+    _weights.pop(old_copy, None)
+    if old_copy in _newer_weights:
+        _weights[copy.session_uid] = _newer_weights.pop(old_copy)
+    if mesh.session_uid not in _copied_well and _are_alike_but_for_weights(mesh, copy):
+        _copied_well.add(mesh.session_uid)
+    return mesh.session_uid in _copied_well
 
 
-# Those of copies, by session_uid. Nobody changes them, and reading them takes longer than all else.
+# The session_uid of meshes that equalled a copy.
+_copied_well: set[int] = set()
+# The weights of copies, by session_uid. Nobody changes them, and reading them takes longer than all else.
 _weights: dict[int, GroupWeights] = {}
+# Those of the mesh that was compared last, by the session_uid of its copy, if they are all that differs. The
+# next copy has them.
+_newer_weights: dict[int, GroupWeights] = {}
 
 
-def _note_weights(copy: bpy.types.Mesh, weights: GroupWeights) -> None:
-    if len(_weights) > 15:
-        _weights.clear()
-    _weights[copy.session_uid] = weights
+def weights_of(copy: bpy.types.Mesh) -> GroupWeights:
+    """Returns the weights of a copy, which are read once."""
+    if copy.session_uid not in _weights:
+        if len(_weights) > 15:
+            _weights.clear()
+        _weights[copy.session_uid] = mesh_io.read_group_weights(copy)
+    return _weights[copy.session_uid]
 
 
 def _are_alike_but_for_weights(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:

@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 from sinew_addon.attach import attach, properties, upstream_proxy
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import session
-from sinew_addon.io import mesh_io
+from sinew_addon.io import mesh_compare, mesh_io
 from test_against_armature_modifier import assert_equal_to_modifier
 
 FRAMES = [1, 4, 8, 11]
@@ -297,34 +297,76 @@ def test_a_mesh_that_another_addon_moves_with_each_frame(event, route):
     assert scenes.worst(shown, expected) <= 1e-5
 
 
-def test_an_edit_reads_weights_no_oftener_than_it_must(monkeypatch):
-    """Reading them takes longer than all else: to find the edit, for the new copy, after its evaluation, and
-    of what upstream made of them."""
+@pytest.mark.parametrize("kind", ["MIRROR", "SIMPLE_DEFORM"])
+def test_an_edit_is_compared_once(kind, monkeypatch, route):
+    """Weights take longest to read. What only moves points has those of the mesh."""
     obj, _armature = scenes.make_arm(bones=3)
-    scenes.put_in_front(obj, "MIRROR")
+    scenes.put_in_front(obj, kind)
     scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(8)
-    read, names = mesh_io.read_group_weights, []
-    monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: names.append(mesh.name) or read(mesh))
-    obj.vertex_groups["bone.1"].add(range(0, len(obj.data.vertices), 3), 0.7, "ADD")
-    bpy.context.view_layer.update()
-    assert len(names) <= 4, names
+    read, alike, meshes, compared = mesh_io.read_group_weights, mesh_compare.are_alike, [], []
+    monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: meshes.append(mesh.name) or read(mesh))
+    monkeypatch.setattr(mesh_compare, "are_alike", lambda *pair: compared.append(pair) or alike(*pair))
+
+    def edit_weights():
+        obj.vertex_groups["bone.1"].add(range(0, len(obj.data.vertices), 3), 0.1, "ADD")
+
+    def edit_points():
+        obj.data.vertices[0].co.y += 0.1
+        obj.data.update()
+
+    for edit, most in ((edit_weights, 3), (edit_weights, 2), (edit_points, 1), (edit_weights, 3)):
+        meshes.clear()
+        compared.clear()
+        edit()
+        bpy.context.view_layer.update()
+        assert len(meshes) <= (most if kind == "MIRROR" else 1), meshes
+        assert len(compared) == 1
     monkeypatch.undo()
     got = scenes.final_points(obj)
     attach.remove(obj)
     assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
 
 
-def test_a_mesh_that_does_not_equal_its_copy_is_shared():
-    """Weights that are no numbers equal nothing: Sinew would copy the mesh again and again."""
+@pytest.mark.parametrize("event", ["depsgraph_update_pre", "depsgraph_update_post"])
+def test_a_mesh_that_another_addon_edits_while_its_copy_is_made(event):
     obj, _armature = scenes.make_arm(bones=3)
-    obj.vertex_groups["bone.1"].add([3], float("nan"), "REPLACE")
-    scenes.put_in_front(obj, "MIRROR")
+    scenes.put_in_front(obj, "SIMPLE_DEFORM")
     scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(8)
-    proxy = properties.of(obj).storage.upstream_proxy
-    assert proxy is not None
-    assert proxy.data == obj.data or not np.isnan(mesh_io.read_group_weights(obj.data).weights).any()
+    before = properties.of(obj).storage.upstream_proxy
+    edits = []
+
+    @persistent
+    def edit(_scene, _depsgraph):
+        # The evaluation of the copy that was just made.
+        if not edits and properties.of(obj).storage.upstream_proxy != before:
+            edits.append(obj.vertex_groups["bone.1"].add(range(0, 60), 0.3, "ADD"))
+            obj.data.update_tag()
+
+    getattr(bpy.app.handlers, event).insert(0, edit)
+    obj.data.vertices[0].co.y += 0.1
+    obj.data.update()
+    bpy.context.view_layer.update()
+    getattr(bpy.app.handlers, event).remove(edit)
+    assert edits
+    bpy.context.view_layer.update()
+    got = scenes.final_points(obj)
+    attach.remove(obj)
+    assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
+
+
+def test_weights_that_are_no_numbers_equal_those_of_the_copy():
+    """Sinew would copy the mesh again and again."""
+    obj, _armature = scenes.make_arm(bones=3)
+    obj.vertex_groups["bone.1"].add([3], float("nan"), "REPLACE")
+    assert np.isnan(mesh_io.read_group_weights(obj.data).weights).any()
+    scenes.put_in_front(obj, "MIRROR")
+    scenes.add_sinew(obj, "lbs")
+    copy = properties.of(obj).storage.upstream_proxy
+    obj.data.update_tag()
+    bpy.context.view_layer.update()
+    assert properties.of(obj).storage.upstream_proxy == copy
 
 
 def test_weights_are_painted_on_the_shared_mesh():
