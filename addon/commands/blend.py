@@ -26,30 +26,20 @@ HELP = """\
 Blends two or more actions of an armature, bone by bone, into a new action of plain keys, and writes a copy of
 the file in which the armature plays it. FILE is never written to; the actions stay in the copy.
 
---clips adds the animations of BVH, glTF or FBX files whose bones have the same names and rest. Each action
-has a weight; with --weights-from they go from those in the first frame to --weights in the last. Aligned, the
-default, actions are brought to the same moment of their motion by the distance of their poses, and cycles to
-the weighted mean of their lengths. The root's steps over the ground are blended and added up."""
+Each action has a weight; with --weights-from they go from those in the first frame to --weights in the last.
+Aligned, the default, actions are brought to the same moment of their motion by the distance of their poses,
+and cycles to the weighted mean of their lengths. The root's steps on the ground are blended and added up."""
 
 # The names of core.motion.blend, as the options spell them.
 ROOT_MOTIONS = {"travel": "travel", "in-place": "in_place", "keyed": "keyed"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf, .fbx or .bvh")
+    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
     parser.add_argument("--armature", metavar="NAME", help="which, where the file has several that are moved")
-    parser.add_argument(
-        "--actions",
-        nargs="+",
-        default=[],
-        metavar="NAME",
-        help="of the file (default, with --clips: the one that the armature plays)",
-    )
-    parser.add_argument(
-        "--clips", nargs="+", default=[], type=Path, metavar="FILE", help="more, to be imported"
-    )
+    parser.add_argument("--actions", nargs="+", required=True, metavar="NAME", help="two or more of the file")
     for name, text in (
-        ("--weights", "one for each action, then for each clip (default: equal)"),
+        ("--weights", "one for each action (default: equal)"),
         ("--weights-from", "those of the first frame, if --weights are of the last"),
     ):
         parser.add_argument(name, nargs="+", type=float, metavar="W", help=text)
@@ -79,13 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     from ..features.blend import blend_actions
-    from ..io import clips, files
+    from ..io import files
 
     if args.out.resolve() == args.file.resolve():
         raise WrongUse(f"{args.out}: would replace the file itself; choose another name")
     if args.out.exists() and not args.overwrite:
         raise SinewError(f"{args.out}: is there already; use --overwrite to replace it")
-    console.note_on(args.file, files.open_file(args.file, importers=clips.IMPORTERS))
+    console.note_on(args.file, files.open_file(args.file))
     armature = _armature(args)
     made = _make(args, armature, _actions(args, armature), console)
     console.note_on(args.file, made.notes())
@@ -117,7 +107,7 @@ def _armature(args: argparse.Namespace) -> bpy.types.Object:
 def _actions(args: argparse.Namespace, armature: bpy.types.Object) -> list[bpy.types.Action]:
     import bpy
 
-    from ..io import actions, clips
+    from ..io import clips
 
     names = [a.name for a in bpy.data.actions if clips.keyed_properties(armature, a)]
     there = f"{armature.name} can play: {', '.join(names) or 'none'}"
@@ -125,13 +115,8 @@ def _actions(args: argparse.Namespace, armature: bpy.types.Object) -> list[bpy.t
     if missing:
         raise SinewError(f"{args.file}: has no action {missing[0]!r}; {there}")
     chosen = [bpy.data.actions[name] for name in args.actions]
-    played, _slot = actions.playing(armature)
-    if not chosen and args.clips and played is not None:
-        chosen.append(played)
-    for path in args.clips:
-        chosen += clips.import_actions(armature, path)
     if len(chosen) < 2:
-        raise WrongUse(f"sinew blend: expected two actions or more by --actions or --clips; {there}")
+        raise WrongUse(f"sinew blend: expected two actions or more; {there}")
     return chosen
 
 

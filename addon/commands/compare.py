@@ -27,7 +27,7 @@ SUMMARY = "show and measure methods beside each other"
 HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
     "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
-    "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and "
+    "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.json and "
     "the pictures."
 )
 
@@ -127,7 +127,6 @@ def _compare(
     subject = measure.gather(scene, meshes)
     comparison = _measure(path, subject, methods, frames, args, console)
     folder = args.out / as_file_name(path.stem)
-    write_text(folder / "metrics.csv", comparison.to_csv())
     write_text(folder / "metrics.json", comparison.to_json())
     sheets = []
     if engine is not None:

@@ -2,12 +2,10 @@
 """The results of a comparison of methods: measures of each frame, worst frames, diagnostics; as CSV and
 JSON."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Self
 
 from .diagnostics import Finding
@@ -131,19 +129,6 @@ class Comparison:
             if is_new and len(chosen) < count and self.shows(worst.measure, worst.value):
                 chosen.append(worst.frame)
         return sorted(chosen) or self.frames[:1]
-
-    def to_csv(self) -> str:
-        """Returns a row for each frame and method, with the entries of Summary and the times as columns."""
-        names = [field.name for field in fields(Summary)]
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["file", "method", "frame", *names, "milliseconds", "milliseconds_of_sinew"])
-        for method in self.methods:
-            rows = zip(self.frames, self.summaries[method], self.times[method], self.own[method], strict=True)
-            for frame, summary, taken, own in rows:
-                values = asdict(summary).values()
-                writer.writerow([self.file, method, frame, *values, f"{taken:.3f}", f"{own:.3f}"])
-        return text.getvalue()
 
     def to_json(self) -> str:
         """Returns everything, including the vertices of the findings."""

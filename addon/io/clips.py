@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads actions of an armature as clips, writes clips as actions, and imports actions from other formats."""
+"""Reads actions of an armature as clips, and writes clips as actions."""
 
-import re
 from collections.abc import Generator
-from pathlib import Path
-from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -13,21 +10,8 @@ from sinew import affine, quat_vec
 from ..core.errors import SinewError
 from ..core.inbetween import Poses
 from ..core.motion.clip import Clip, Rig
-from . import actions, files, pose_io
-from .animation_paths import players
+from . import actions, pose_io
 
-
-def _import_bvh(path: str) -> None:
-    bpy.ops.import_anim.bvh(filepath=path, use_fps_scale=True, rotate_mode="QUATERNION")
-
-
-Result = TypeVar("Result")
-
-# Imports that can contain an animated armature.
-IMPORTERS = {**files.IMPORTERS, ".bvh": _import_bvh}
-# How far the rest poses may differ for a clip of another file to fit this armature: radians, share of the
-# size.
-SAME_REST = (0.02, 0.01)
 # The columns of pose_io.read_channels() at rest, for quaternions.
 _REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 
@@ -136,42 +120,6 @@ def write(
     return action
 
 
-def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Action]:
-    """Imports the animations of a .bvh, .glb, .gltf or .fbx file as new actions of `armature`. What else
-    Blender's importer makes is removed.
-
-    Raises SinewError where the file has no animation, or its bones have another rest pose.
-    """
-    files.check_readable(path, tuple(IMPORTERS))
-    known = {block.session_uid for block in _blocks()}
-    window, scene = bpy.context.window, bpy.data.scenes.new(path.stem)
-    shown = window.scene, window.view_layer
-    scene.render.fps, scene.render.fps_base = window.scene.render.fps, window.scene.render.fps_base
-    try:
-        window.scene = scene
-        IMPORTERS[path.suffix.lower()](str(path))
-        armatures = [obj for obj in scene.objects if obj.type == "ARMATURE"]
-        sources = [(obj, action) for obj in armatures for action in _actions_of(obj)]
-        if not sources:
-            raise SinewError(f"{path}: has no animation of an armature")
-        rig, found = rig_of(armature), []
-        for source, action in sources:
-            # Without the number that Blender adds where an action of this name exists.
-            own = re.sub(r"\.\d{3}$", "", action.name)
-            name = path.stem if len(sources) == 1 else f"{path.stem} {own}"
-            keyed = {each for each in keyed_properties(source, action) if each[0] in rig.names}
-            found.append((_on_rig(finished(read(source, action)), rig, path), name, keyed))
-    except RuntimeError as error:
-        raise SinewError(f"{path}: Blender can not read it: {files.telling_line(error)}") from None
-    finally:
-        window.scene, window.view_layer = shown
-        bpy.data.batch_remove([block for block in _blocks() if block.session_uid not in known])
-    made = [finished(write(armature, clip, name, 1.0, keyed)) for clip, name, keyed in found]
-    for action in made:
-        action.use_fake_user = True
-    return made
-
-
 def _playing(armature: bpy.types.Object, action: bpy.types.Action) -> list[tuple[bpy.types.FCurve, str, int]]:
     """Returns the curves that move the armature's bones, each with the bone and the column of its channel."""
     rotations = pose_io.rotation_properties(armature.pose.bones)
@@ -217,47 +165,3 @@ def _kinds(mode: str) -> list[tuple[str, slice, np.ndarray]]:
     columns = {"location": slice(0, 3), "rotation": slice(3, 3 + width), "scale": slice(7, 10)}
     rest = _rest_channels(np.array([mode]))[0]
     return [(kind, where, rest[where]) for kind, where in columns.items()]
-
-
-def _on_rig(clip: Clip, rig: Rig, path: Path) -> Clip:
-    """Returns the clip of a similar armature for the bones of `rig`; bones that it lacks are at rest."""
-    rows = [(row, clip.rig.names.index(name)) for row, name in enumerate(rig.names) if name in clip.rig.names]
-    if not rows:
-        raise SinewError(f"{path}: has no bone of this armature's names: rename bones in one of them")
-    for row, source in rows:
-        apart = quat_vec.rigid_distance(rig.rest[row], clip.rig.rest[source])
-        if apart.angle > SAME_REST[0] or apart.translation > SAME_REST[1] * rig.size:
-            raise SinewError(
-                f"{path}: {rig.names[row]} rests otherwise than in this armature: retarget the clip first"
-            )
-    count = len(clip.poses.rigid)
-    rigid = np.tile(quat_vec.identity(), (count, len(rig.names), 1))
-    scale = np.ones((count, len(rig.names), 3))
-    for row, source in rows:
-        rigid[:, row], scale[:, row] = clip.poses.rigid[:, source], clip.poses.scale[:, source]
-    return Clip(clip.name, rig, Poses(rigid, scale), clip.length, clip.is_cyclic)
-
-
-def _actions_of(obj: bpy.types.Object) -> list[bpy.types.Action]:
-    """Returns the actions that an importer made for an armature object: the one that it plays and those in
-    its tracks."""
-    animation = obj.animation_data
-    if animation is None:
-        return []
-    found = [player.action for player in players(animation) if player.action is not None]
-    return [action for action in dict.fromkeys(found) if _playing(obj, action)]
-
-
-def finished(steps: Generator[float, None, Result]) -> Result:
-    """Runs a generator of this file to its end, and returns its result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
-
-
-def _blocks() -> list[bpy.types.ID]:
-    """All data-blocks of the open file."""
-    collections = [each.identifier for each in bpy.data.bl_rna.properties if each.type == "COLLECTION"]
-    return [block for name in collections for block in getattr(bpy.data, name)]

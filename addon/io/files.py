@@ -5,7 +5,7 @@ import errno
 import os
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import bpy
@@ -37,27 +37,21 @@ LAST_BLOCK = (24, 32)
 _ABOUT_ERROR = re.compile(r"^((Error|OSError): |\[Errno \d+\] )+")
 
 
-def open_file(
-    path: Path,
-    load_ui: bool = False,
-    scripts: bool = False,
-    importers: Mapping[str, Callable[[str], object]] = IMPORTERS,
-) -> list[str]:
+def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> list[str]:
     """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene, which gets the frame
     range of its animation. All objects leave the modes that they were saved in, but for Pose Mode, and
     evaluations write no files (read_only.py).
 
     Returns a sentence for each object that is not as in the file.
 
-    load_ui    also loads the file's windows and workspaces, for a copy that keeps them
-    scripts    whether scripts in the file run
-    importers  for files other than .blend, by their extensions
+    load_ui  also loads the file's windows and workspaces, for a copy that keeps them
+    scripts  whether scripts in the file run
 
     Raises SinewError where it cannot be read.
     """
-    check_readable(path, (".blend", *importers))
+    check_readable(path, (".blend", *IMPORTERS))
     try:
-        importer = importers.get(path.suffix.lower())
+        importer = IMPORTERS.get(path.suffix.lower())
         with read_only.opening() as sentences:
             if importer is None:
                 bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=scripts)

@@ -1,12 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Formats measured values for display, in the units that the preferences choose."""
+"""Formats measured values for display, in the units of the scene."""
 
 import bpy
 
-from . import addon_preferences
-
-# Choices for lengths.
-OF_SCENE, MILLIMETRES, NONE = "SCENE", "MILLIMETRES", "NONE"
 # Shorter lengths, as a share of a unit, are shown as 0.
 LEAST_LENGTH = 1e-6
 
@@ -34,8 +30,8 @@ _DIMENSIONS = {"area": 2, "volume": 3}
 
 
 def _power_of_length(settings: bpy.types.UnitSettings, unit: str, value: float, digits: int) -> str:
-    chosen, power = addon_preferences.value("units", default=OF_SCENE), _DIMENSIONS[unit]
-    if chosen == NONE or settings.system == "NONE":
+    power = _DIMENSIONS[unit]
+    if settings.system == "NONE":
         return f"{value:.{digits}g}"
     value *= settings.scale_length**power
     if settings.system == "METRIC":
@@ -45,12 +41,9 @@ def _power_of_length(settings: bpy.types.UnitSettings, unit: str, value: float, 
 
 
 def _length(settings: bpy.types.UnitSettings, value: float, digits: int) -> str:
-    chosen = addon_preferences.value("units", default=OF_SCENE)
-    if chosen == NONE or settings.system == "NONE":
+    if settings.system == "NONE":
         return f"{value:.{digits}g} units"
     value *= settings.scale_length
     if abs(value) < LEAST_LENGTH:
         value = 0.0
-    if chosen == MILLIMETRES:
-        return f"{1000.0 * value:.{digits}g} mm"
     return bpy.utils.units.to_string(settings.system, "LENGTH", value, precision=digits)

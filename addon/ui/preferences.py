@@ -9,7 +9,7 @@ import bpy
 
 from ..attach.subscribers import notify, subscribers
 from ..deform import precomputing, safe_mode, session
-from ..io import addon_preferences, units
+from ..io import addon_preferences
 from . import menus, operators
 from .sidebar import draw_text
 from .translations import tr
@@ -34,17 +34,6 @@ class SinewPreferences(bpy.types.AddonPreferences):
         default=operators.AS_BEFORE,
         options=set(),
     )
-    units: bpy.props.EnumProperty(
-        name="Lengths",
-        description="How measured lengths are shown in panels and heat maps",
-        items=[
-            (units.OF_SCENE, "As the Scene", "In the units of the scene"),
-            (units.MILLIMETRES, "Millimetres", "Always, where the scene has units"),
-            (units.NONE, "Plain Numbers", "As Blender stores them, whatever the scene's units"),
-        ],
-        default=units.OF_SCENE,
-        options=set(),
-    )
     cache_folder: bpy.props.StringProperty(
         name="Cache Folder",
         description="Where numbers of vertices are kept that methods take long to compute; empty: the "
@@ -65,7 +54,6 @@ class SinewPreferences(bpy.types.AddonPreferences):
         layout = self.layout.column()
         layout.use_property_split = True
         layout.prop(self, "first_method")
-        layout.prop(self, "units")
         layout.prop(self, "cache_folder")
         _draw_variable(layout, context, precomputing.VARIABLE)
         layout.prop(self, "safe_mode")

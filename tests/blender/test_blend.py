@@ -12,14 +12,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 from program import run_sinew
-from scipy.spatial.transform import Rotation
 from sinew import quat_vec
-from sinew_addon.core.errors import SinewError
 from sinew_addon.core.motion import blend as core
 from sinew_addon.core.motion.blend import Settings
 from sinew_addon.features.blend import blend_actions
 from sinew_addon.io import actions, clips, files
-from sinew_addon.io.clips import finished
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import walks
@@ -81,6 +78,15 @@ def make_walks(modes=("QUATERNION",), run_start=0.3):
     bpy.context.scene.frame_start = 1
     pair = walks.walk("WALK"), walks.walk("RUN", 30, 1.1, 0.2, start=run_start)
     return armature, [key_clip(armature, clip) for clip in pair], pair
+
+
+def finished(steps):
+    """Runs a generator to its end, and returns its result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
 
 
 def film(armature, frames):
@@ -227,93 +233,6 @@ def test_stopped_nothing_has_changed(steps):
 
 
 # Z up to Y up, as most BVH files have it: -Z is ahead.
-Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-
-
-def write_bvh(path, clip):
-    """A clip as a motion capture file, by the format's definition: bones rest unrotated, and each rotates
-    about its head relative to its parent, by angles about Z, X and Y."""
-    rig, posed = clip.rig, clip.rig.to_armature(clip.poses.rigid)
-    rest = rig.to_armature(np.tile(quat_vec.identity(), (len(rig.names), 1)))
-    turned = quat_vec.to_affine(quat_vec.compose(posed, quat_vec.inverse(rest)))[..., :3, :3]
-    turned = Y_UP @ turned @ Y_UP.T
-    heads, tails = np.moveaxis(rig.points(rest) @ Y_UP.T, 1, 0)
-    lines, order = ["HIERARCHY"], []
-
-    def joint(bone, depth):
-        parent = rig.parents[bone]
-        order.append(bone)
-        offset = heads[bone] - (heads[parent] if parent >= 0 else 0.0)
-        places = "Xposition Yposition Zposition " if parent < 0 else ""
-        lines.append(f"{'JOINT' if parent >= 0 else 'ROOT'} {rig.names[bone]}")
-        lines.append("{\nOFFSET " + " ".join(f"{x:.9f}" for x in offset))
-        lines.append(f"CHANNELS {6 if places else 3} {places}Zrotation Xrotation Yrotation")
-        below = np.flatnonzero(rig.parents == bone)
-        for child in below:
-            joint(child, depth + 1)
-        if not len(below):
-            end = " ".join(f"{x:.9f}" for x in tails[bone] - heads[bone])
-            lines.append("End Site\n{\nOFFSET " + end + "\n}")
-        lines.append("}")
-
-    joint(0, 0)
-    count = len(posed)
-    lines.append(f"MOTION\nFrames: {count}\nFrame Time: {1 / 24:.9f}")
-    for frame in range(count):
-        row = [*(Y_UP @ posed[frame, 0, 4:])]
-        for bone in order:
-            parent = rig.parents[bone]
-            own = turned[frame, bone]
-            own = own if parent < 0 else turned[frame, parent].T @ own
-            row += list(Rotation.from_matrix(own).as_euler("ZXY", degrees=True))
-        lines.append(" ".join(f"{x:.9f}" for x in row))
-    path.write_text("\n".join(lines) + "\n")
-
-
-def heads_of(clip):
-    return clip.rig.points(clip.rig.to_armature(clip.poses.rigid))[:, :, 0]
-
-
-def test_a_bvh_file_becomes_an_action(tmp_path):
-    pair = walks.walk("WALK"), walks.walk("RUN", 30, 1.1, 0.2, start=0.3)
-    for clip in pair:
-        write_bvh(tmp_path / f"{clip.name.lower()}.bvh", clip)
-    files.open_file(tmp_path / "walk.bvh", importers=clips.IMPORTERS)
-    legs = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
-    known = {block.session_uid for block in clips._blocks()}
-    (run,) = clips.import_actions(legs, tmp_path / "run.bvh")
-    assert {block.session_uid for block in clips._blocks()} - known == {run.session_uid}
-    assert run.name == "run"
-    assert run.use_fake_user
-    walk = legs.animation_data.action
-    for action, source in ((walk, pair[0]), (run, pair[1])):
-        shown = played(legs, action, range(1, 2 + round(source.length)))
-        order = [source.rig.names.index(name) for name in clips.rig_of(legs).names]
-        assert np.abs(shown[..., :3, 3] - heads_of(source)[:, order]).max() < 1e-4
-    made = finished(blend_actions.make(legs, [walk, run], (1, 1), Settings()))
-    assert made.blend.is_cyclic
-    assert made.frames == 26
-    wanted = core.blend(pair, (1, 1)).clip("blend")
-    order = [wanted.rig.names.index(name) for name in made.blend.rig.names]
-    # Bones have other rolls there, but the same motion.
-    assert np.abs(heads_of(made.blend.clip("blend")) - heads_of(wanted)[:, order]).max() < 1e-3
-
-
-def test_files_that_do_not_fit_are_refused(tmp_path):
-    armature, (walk, _run), _pair = make_walks()
-    actions.play(armature, walk, actions.slot_for(walk, armature))
-    bpy.ops.export_anim.bvh(filepath=str(tmp_path / "legs.bvh"), frame_start=1, frame_end=5)
-    known = {block.session_uid for block in clips._blocks()}
-    # The importer rolls bones in its own way, so they rest differently.
-    with pytest.raises(SinewError, match=r"legs\.bvh: \S+ rests otherwise"):
-        clips.import_actions(armature, tmp_path / "legs.bvh")
-    (tmp_path / "walk.txt").write_text("no motion")
-    (tmp_path / "bad.bvh").write_text("no motion")
-    for name, sentence in (("walk.txt", "expected a file ending"), ("none.bvh", "no such file"),
-                           ("bad.bvh", "bad.bvh: ")):  # fmt: skip
-        with pytest.raises(SinewError, match=sentence):
-            clips.import_actions(armature, tmp_path / name)
-    assert {block.session_uid for block in clips._blocks()} == known
 
 
 # --- The command
@@ -354,7 +273,6 @@ def test_the_command_says_what_is_wrong(walking, tmp_path):
         ([walking, "--actions", "WALK", "JUMP", *out], "no action 'JUMP'; Legs can play: RUN, WALK", 1),
         ([walking, "--actions", "WALK", *out], "expected two actions or more", 2),
         ([walking, *both, "--armature", "Arms", *out], "no armature 'Arms'; there are: Legs", 1),
-        ([walking, *both, "--clips", tmp_path / "none.bvh", *out], "none.bvh: no such file", 1),
         ([tmp_path / "none.blend", *both, *out], "no such file", 1),
     ]
     for arguments, sentence, status in cases:

@@ -72,7 +72,7 @@ def test_names_of_files_stay_in_the_folder(name, arm_file, tmp_path):
     run_sinew("compare", file, "--frames", "1", "--pictures", "0", "--out", out)
     run_sinew("bake", file, "--method", "dq", "--to", "mdd", "--frames", "1-2", "--out", out)
     assert [path.name for path in (tmp_path / "above").iterdir()] == ["out"]
-    assert len(list(out.glob("*/metrics.csv"))) == 1
+    assert len(list(out.glob("*/metrics.json"))) == 1
     assert len(list(out.glob("*/*.mdd"))) == 1
 
 

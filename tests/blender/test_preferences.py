@@ -38,20 +38,10 @@ def test_scripts_do_not_depend_on_it(preferences, selected):
     assert properties.of(selected).method == "lbs"
 
 
-@pytest.mark.parametrize(
-    ("chosen", "system", "text"),
-    [
-        ("SCENE", "METRIC", "2.5 cm"),
-        ("MILLIMETRES", "METRIC", "25 mm"),
-        ("MILLIMETRES", "NONE", "0.25 units"),
-        ("NONE", "METRIC", "0.25 units"),
-        ("NONE", "NONE", "0.25 units"),
-    ],
-)
-def test_lengths_are_in_the_chosen_units(preferences, chosen, system, text):
+@pytest.mark.parametrize(("system", "text"), [("METRIC", "2.5 cm"), ("NONE", "0.25 units")])
+def test_lengths_are_in_the_units_of_the_scene(system, text):
     scene = bpy.context.scene
     scene.unit_settings.system, scene.unit_settings.scale_length = system, 0.1
-    preferences.units = chosen
     assert units.text(scene, "length", 0.25) == text
 
 

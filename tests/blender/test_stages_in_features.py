@@ -5,7 +5,6 @@ test_delta_mush."""
 
 from __future__ import annotations
 
-import csv
 import json
 
 import bpy
@@ -100,17 +99,17 @@ def test_compare_measures_the_shapes_with_it(arm, stage, tmp_path):
         *("compare", path, "--methods", "blender,dq", "--frames", "11", "--pictures", 0),
         *(*options(stage), "--out", tmp_path / "page"),
     )
-    with open(tmp_path / "page" / "arm" / "metrics.csv", newline="", encoding="utf-8") as file:
-        rows = {row["method"]: row for row in csv.DictReader(file)}
+    found = json.loads((tmp_path / "page" / "arm" / "metrics.json").read_text(encoding="utf-8"))
+    rows = {method: row for method, (row,) in found["summaries"].items()}
     characters.use_method(obj, characters.BLENDER)
     # The Armature modifier has no stages.
     blender = scenes.shapes(obj, [11])[0]
     for method, shape in (("dq", shapes[-1]), (characters.BLENDER, blender)):
         mesh = trimesh.Trimesh(shape.astype(np.float64), scenes.triangles_of(obj), process=False)
-        assert float(rows[method]["volume"]) == pytest.approx(mesh.volume, rel=1e-4)
-        assert float(rows[method]["area"]) == pytest.approx(mesh.area, rel=1e-4)
+        assert rows[method]["volume"] == pytest.approx(mesh.volume, rel=1e-4)
+        assert rows[method]["area"] == pytest.approx(mesh.area, rel=1e-4)
     apart = np.linalg.norm(shapes[-1].astype(np.float64) - blender, axis=1)
-    assert float(rows["dq"]["distance_max"]) == pytest.approx(apart.max(), abs=2e-5)
+    assert rows["dq"]["distance_max"] == pytest.approx(apart.max(), abs=2e-5)
 
 
 @pytest.mark.parametrize("quantity", ["stretch", "bulge", "distance"])

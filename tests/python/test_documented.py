@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import shlex
@@ -86,6 +85,34 @@ def test_every_subcommand_is_documented():
 RUN_HERE = [command for command in WHOLE if not {"--scheduler", "--blender", "ik"} & set(command.words)]
 
 
+# An armature with two actions that swing one bone on another, which moves forwards.
+LEGS = """
+import math, sys
+import bpy
+bpy.ops.wm.read_homefile(use_empty=True)
+data = bpy.data.armatures.new("Legs")
+legs = bpy.data.objects.new("Legs", data)
+bpy.context.scene.collection.objects.link(legs)
+bpy.context.view_layer.objects.active = legs
+bpy.ops.object.mode_set(mode="EDIT")
+hips, leg = data.edit_bones.new("hips"), data.edit_bones.new("leg")
+hips.tail, leg.head, leg.tail, leg.parent = (0, 0, 1), (0, 0, 1), (0, 0, 2), hips
+bpy.ops.object.mode_set(mode="POSE")
+for name, count in (("walk", 5), ("run", 7)):
+    legs.animation_data_clear()
+    for frame in range(count):
+        legs.pose.bones["hips"].location.x = 0.1 * frame
+        legs.pose.bones["hips"].keyframe_insert("location", frame=frame + 1)
+        swing = math.radians(15) * math.sin(2 * math.pi * frame / (count - 1))
+        legs.pose.bones["leg"].rotation_quaternion = (math.cos(swing), math.sin(swing), 0, 0)
+        legs.pose.bones["leg"].keyframe_insert("rotation_quaternion", frame=frame + 1)
+    legs.animation_data.action.name = name
+    legs.animation_data.action.use_fake_user = True
+bpy.ops.object.mode_set(mode="OBJECT")
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+"""
+
+
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory):
     """A folder with the files that the documents mention."""
@@ -99,8 +126,7 @@ def studio(tmp_path_factory):
         (folder / name).write_text("0,0,0\n1,0,0\n0,2,0\n0,0,3\n", encoding="utf-8")
     for name in ("hand.csv", "camera.csv", "seen.csv"):
         (folder / name).write_text("1,0,0,0,1,2,3\n0.8,0.6,0,0,1,2,4\n0.8,0,0.6,0,2,2,3\n", encoding="utf-8")
-    for name, count in (("walk.bvh", 5), ("run.bvh", 7)):
-        (folder / name).write_text(swing(count), encoding="utf-8")
+    subprocess.run([sys.executable, "-c", LEGS, str(folder / "legs.blend")], check=True)
     batch = (ROOT / "docs" / "batch.md").read_text(encoding="utf-8")
     job = re.search(r"```toml\n(.*?)```", batch, re.DOTALL)[1]
     # The rig has one mesh, which the example's lists of names do not contain.
@@ -108,19 +134,6 @@ def studio(tmp_path_factory):
         re.sub(r"^include = .*\n", "", job, flags=re.MULTILINE), encoding="utf-8"
     )
     return folder
-
-
-def swing(count: int) -> str:
-    """A motion capture file with one bone on another that moves forwards; the first one swings once."""
-    site = "End Site { OFFSET 0 1 0 }"
-    leg = f"JOINT leg {{ OFFSET 0 1 0 CHANNELS 3 Zrotation Xrotation Yrotation {site} }}"
-    places = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
-    rows = [f"0 0 {0.1 * i} 0 0 0 0 {30 * math.sin(2 * math.pi * i / (count - 1))} 0" for i in range(count)]
-    text = f"HIERARCHY ROOT hips {{ OFFSET 0 0 0 {places} {leg} }}"
-    for word in ("CHANNELS", "JOINT", "End", "{", "}"):
-        text = text.replace(f" {word}", f"\n{word}")
-    text = text.replace("{ ", "{\n")
-    return "\n".join([text, "MOTION", f"Frames: {count}", "Frame Time: 0.0416667", *rows, ""])
 
 
 def run(line: str, folder: Path) -> str:
