@@ -265,7 +265,11 @@ def _copy_of_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
         copy.shape_keys.animation_data_clear()
         values = [key.path_from_id("value") for key in keys.key_blocks]
         for path in {*values, "eval_time", *animated_paths(keys)}:
-            driver = copy.shape_keys.driver_add(path).driver
+            try:
+                driver = copy.shape_keys.driver_add(path).driver
+            except TypeError:
+                # The curves of a deleted shape key stay.
+                continue
             driver.type = "SUM"
             target = driver.variables.new().targets[0]
             target.id_type, target.id, target.data_path = "KEY", keys, path
