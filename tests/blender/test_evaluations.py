@@ -182,7 +182,6 @@ def task(path: Path) -> dict:
         "unfinished": str(path.with_name("unfinished.blend")),
         "settings": Settings(method="dq").as_task(),
         "frames": "none",
-        "pictures": None,
     }
 
 

@@ -51,14 +51,11 @@ class Studio:
         meshes: list[bpy.types.Object],
         engine: str,
         size: int,
-        halved: bool = False,
     ) -> None:
         """Sets the scene up.
 
         engine  "workbench" or "cycles"
         size    pixels of a picture's longer side
-        halved  pictures are displayed at half their size, which smooths edges: so fewer samples per pixel are
-                enough
         """
         self.scene, self.engine, self._size = scene, engine, size
         for obj in scene.objects:
@@ -70,12 +67,9 @@ class Studio:
         scene.camera = bpy.data.objects.new("Sinew Camera", bpy.data.cameras.new("Sinew Camera"))
         scene.collection.objects.link(scene.camera)
         if engine == "workbench":
-            _prepare_workbench(scene, halved)
+            _prepare_workbench(scene)
         else:
-            self._clay, self._heat = _prepare_cycles(scene, halved)
-        if halved:
-            # Dither makes a file larger by half.
-            scene.render.dither_intensity = 0.0
+            self._clay, self._heat = _prepare_cycles(scene)
         self._show_clay()
 
     def painted(
@@ -216,24 +210,23 @@ def _prepare_png(scene: bpy.types.Scene) -> None:
     settings.color_depth = "8"
 
 
-def _prepare_workbench(scene: bpy.types.Scene, halved: bool) -> None:
+def _prepare_workbench(scene: bpy.types.Scene) -> None:
     scene.render.engine = "BLENDER_WORKBENCH"
-    scene.display.render_aa = "OFF" if halved else "8"
+    scene.display.render_aa = "8"
     shading = scene.display.shading
     shading.type = "SOLID"
     shading.light = "STUDIO"
     shading.single_color = CLAY
-    # World-space cavity is grainy with a single sample.
-    shading.cavity_type = "SCREEN" if halved else "BOTH"
+    shading.cavity_type = "BOTH"
     shading.show_shadows = shading.show_xray = shading.show_object_outline = False
     shading.show_backface_culling = False
 
 
-def _prepare_cycles(scene: bpy.types.Scene, halved: bool) -> tuple[bpy.types.Material, bpy.types.Material]:
+def _prepare_cycles(scene: bpy.types.Scene) -> tuple[bpy.types.Material, bpy.types.Material]:
     """Sets up lights and sampling; returns materials for clay and for heat."""
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
-    scene.cycles.samples = 4 if halved else 16
+    scene.cycles.samples = 16
     scene.cycles.use_denoising = False
     scene.world = bpy.data.worlds.new("Sinew World")
     scene.world.color = (0.25, 0.26, 0.28)
