@@ -56,7 +56,7 @@ class Case:
 
 SHADINGS = ("smooth", "sharp", "custom", "flat")
 # Who computes the normals, as in the panel.
-CHOICES = ("AS_BLENDER", "SKINNED", "LEAVE")
+CHOICES = ("BY_SINEW", "SKINNED", "LEAVE")
 
 
 def cases(million: bool) -> list[Case]:

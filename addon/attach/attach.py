@@ -17,7 +17,7 @@ from ..core import icons
 from ..core.errors import SinewError
 from ..core.icons import VIEWS, Deformer, Icons, Situation
 from ..core.phrases import phrase
-from ..io.animation_paths import animated_paths, is_animated, is_visibility_animated
+from ..io.actions import animated_paths, is_animated, is_visibility_animated
 from . import (
     baked,
     corrective_smooth,

@@ -9,7 +9,7 @@ import re
 import bpy
 
 from ..core.phrases import phrase
-from ..io.animation_paths import curves_of
+from ..io.actions import curves_of
 from . import properties
 
 # What sinew.bake calls its keys, and Blender a copy of one.

@@ -11,7 +11,7 @@ import bpy
 
 from ..core.errors import SinewError
 from ..core.phrases import Phrase, phrase
-from ..io.animation_paths import animated_paths
+from ..io.actions import animated_paths
 from . import properties, stack, stage_settings, upstream_proxy
 
 # The modifier's property for each parameter of the stage.

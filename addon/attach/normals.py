@@ -19,7 +19,7 @@ import bpy
 
 from ..core.phrases import phrase
 from ..io import mesh_io
-from ..io.animation_paths import is_animated, is_visibility_animated
+from ..io.actions import is_animated, is_visibility_animated
 from . import node_group, properties, stack, upstream_proxy
 
 # False: Sinew leaves normals of the setting By Sinew to Blender, which computes them when they are read.
@@ -58,7 +58,7 @@ class Kind(Enum):
 def are_given(settings: properties.SinewSettings) -> bool:
     """Whether the settings let Sinew give an object its normals."""
     return settings.normals == properties.SKINNED_NORMALS or (
-        are_used and settings.normals == properties.AS_BLENDER
+        are_used and settings.normals == properties.BY_SINEW
     )
 
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exporters and tools of others that do with Sinew what they do not do without it (docs/parity.md)."""
+"""What acts otherwise with Sinew than without (docs/parity.md): exporters, tools of others, and modifiers
+behind it, as behind Geometry Nodes (seen on 4.2 to 5.2)."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import bpy
 
@@ -32,3 +35,40 @@ def notes(obj: bpy.types.Object) -> list[str]:
     if obj.data.shape_keys is not None and not others:
         found.append(phrase("Switch Sinew off before an export to FBX, or the file has no shape keys"))
     return found
+
+
+def warnings(obj: bpy.types.Object) -> list[str]:
+    """Returns a sentence for each downstream modifier that acts otherwise with Sinew than without."""
+    return [phrase(text, name=modifier.name) for modifier in _changed(obj) if (text := _warning(modifier))]
+
+
+def _changed(obj: bpy.types.Object) -> Iterator[bpy.types.Modifier]:
+    """Yields the downstream modifiers in front of which Sinew's is the first that does more than deform."""
+    if any(
+        modifier.type not in stack.ONLY_DEFORM for modifier in stack.upstream(obj) if stack.is_on(modifier)
+    ):
+        return
+    for modifier in filter(stack.is_on, stack.downstream(obj)):
+        if modifier.type not in stack.ONLY_DEFORM:
+            return
+        yield modifier
+
+
+def _warning(modifier: bpy.types.Modifier) -> str:
+    # Blender uses the first vertices, as many as are in the list.
+    if modifier.type == "HOOK" and len(modifier.vertex_indices) and not modifier.vertex_group:
+        return (
+            "{name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this Hook; "
+            "give it a vertex group"
+        )
+    if modifier.type == "PARTICLE_SYSTEM" and modifier.particle_system.settings.emit_from != "VERT":
+        return (
+            "{name}: behind Sinew's modifier, Blender puts these particles and hairs elsewhere on the mesh; "
+            "emit them from vertices, from another mesh, or leave this mesh to its Armature modifier"
+        )
+    if modifier.type == "CLOTH" and modifier.settings.rest_shape_key is not None:
+        return (
+            "{name}: behind Sinew's modifier, Blender does not use the Rest Shape Key of this Cloth as it "
+            "should; leave this mesh to its Armature modifier"
+        )
+    return ""

@@ -13,8 +13,7 @@ from ..core.icons import Situation
 from ..core.scale_rule import SCALE_RULES
 from . import stage_settings
 from .feature import Feature
-from .method_items import method_items
-from .stage_settings import OFF
+from .stage_settings import OFF, OVERRIDABLE, method_items
 
 METHODS = {method.name: method for method in sinew.methods()}
 # A choice in addition to Sinew's methods: the Armature modifier as it is in the file.
@@ -91,7 +90,6 @@ def _requested(listener: str) -> Callable[[bpy.types.bpy_struct], float]:
 
 
 # On a library override, Blender saves only properties with this flag.
-OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 _INSERTABLE = {"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
 SAME_METHOD = "SAME"
 
@@ -102,7 +100,7 @@ def _hidden(kind: Callable, description: str = "", **settings: object) -> object
 
 
 # Who computes normals.
-AS_BLENDER, SKINNED_NORMALS, LEAVE_NORMALS = "AS_BLENDER", "SKINNED", "LEAVE"
+BY_SINEW, SKINNED_NORMALS, LEAVE_NORMALS = "BY_SINEW", "SKINNED", "LEAVE"
 
 
 def method_of_modifier(method: str, own: str, is_first: bool) -> str:
@@ -293,7 +291,7 @@ class SinewSettings(bpy.types.PropertyGroup):
         name="Normals",
         description="Who computes the normals that the mesh is drawn with (Blender 4.5 and later)",
         items=[
-            (AS_BLENDER, "By Sinew", "Computed with the points: Blender's own, in less time", 0),
+            (BY_SINEW, "By Sinew", "Computed with the points: Blender's own, in less time", 0),
             (
                 SKINNED_NORMALS,
                 "Skinned",
@@ -302,7 +300,7 @@ class SinewSettings(bpy.types.PropertyGroup):
             ),
             (LEAVE_NORMALS, "By Blender", "Computed whenever they are read", 1),
         ],
-        default=AS_BLENDER,
+        default=BY_SINEW,
         options=set(),
         update=_method_changed,
         override=OVERRIDABLE,
@@ -503,3 +501,23 @@ FEATURE = Feature(
         ),
     },
 )
+
+
+# Properties of SinewSettings; all stages and parameters of methods are shared, too.
+SHARED = ("method", "scale_rule", "normals", "leave_small")
+
+
+def share(source: bpy.types.Object, target: bpy.types.Object) -> None:
+    """Copies the shared settings of a mesh to another. The caller suspends updates meanwhile."""
+    own, other = of(target), of(source)
+    for name in SHARED:
+        assign(own, name, getattr(other, name))
+    for group, cls in SETTING_GROUPS.items():
+        for name in cls.__annotations__:
+            assign(getattr(own, group), name, getattr(getattr(other, group), name))
+
+
+def assign(group: bpy.types.PropertyGroup, name: str, value: object) -> None:
+    """Assigns only a different value: each assignment makes Blender evaluate the object."""
+    if getattr(group, name) != value:
+        setattr(group, name, value)

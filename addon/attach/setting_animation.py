@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..io import actions
-from ..io.animation_paths import players
+from ..io.actions import players
 from . import pose_driver, properties
 
 

@@ -7,7 +7,7 @@ import itertools
 
 import bpy
 
-from ..io.animation_paths import is_visibility_animated
+from ..io.actions import is_visibility_animated
 from . import node_group, properties
 
 # These change no positions, topology or weights, so they may be before the Armature modifier.

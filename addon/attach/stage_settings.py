@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from itertools import groupby
 from typing import Any
 
 import bpy
 import sinew
 
 from ..core import parameters
-from .method_items import method_items
 
 STAGES = {stage.name: stage for stage in sinew.stages()}
 # The parameter that switches each stage on: its first.
@@ -20,7 +20,7 @@ METHODS = {method.name: method for method in sinew.methods() if method.parameter
 # Choice of a parameter that names a method: the stage is off.
 OFF = "OFF"
 # On a library override, Blender saves only properties with this flag.
-_OVERRIDE = {"LIBRARY_OVERRIDABLE"}
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
 
 def groups(
@@ -88,7 +88,7 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
         "name": parameter.label,
         "description": parameter.description,
         "update": update,
-        "override": _OVERRIDE,
+        "override": OVERRIDABLE,
     }
     if parameter.kind == "method":
         choices = [(OFF, "Off", "Without this stage", 0), *method_items(1)]
@@ -113,3 +113,18 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
     if parameter.kind == "int":
         finite = {name: int(value) for name, value in finite.items()}
     return number(default=parameter.default, **finite, **facts)
+
+
+def method_items(first_number: int = 0) -> list[tuple[str, str, str, int]]:
+    """Returns the items. Blender shows an item without identifier as a heading. A property with these items
+    needs a default: otherwise it would be the first heading.
+
+    first_number  added to the numbers of methods, which start at 1
+    """
+    items = []
+    groups = groupby(sinew.methods(), lambda method: method.group)
+    for number, (group, methods) in enumerate(groups, start=1):
+        # Negative, so never the value of a property.
+        items.append(("", group, "", -number))
+        items += [(m.name, m.label, m.description, m.number + first_number) for m in methods]
+    return items

@@ -13,7 +13,7 @@ import bpy
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights
 from ..io import mesh_compare
-from ..io.animation_paths import animated_paths
+from ..io.actions import animated_paths
 from . import properties, references, stack
 
 # A Multi Modifier directly behind one of these mixes with what it got, not with what it made.

@@ -12,10 +12,9 @@ from ..core.comparison import USUAL_METHODS, Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
-from ..core.html import require_jinja
 from ..core.names import as_file_name
 from ..core.output import folder_to_write, write_text
-from ..core.page import page
+from ..core.page import page, require_jinja
 from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
 

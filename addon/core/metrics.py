@@ -20,9 +20,8 @@ import numpy as np
 
 from .influences import Influences
 from .rig import Bones
-from .rotations import rotated, rotations_of
 from .surface import Parts, Surface
-from .vectors import cross, dots
+from .vectors import cross, dots, rotated, rotations_of
 
 
 @dataclass(frozen=True)

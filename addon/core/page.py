@@ -14,7 +14,6 @@ from .comparison import Comparison
 from .diagnostics import Finding
 from .errors import SinewError
 from .heat import HeatScale
-from .html import render
 from .plots import colour_of, line_plot
 from .suggestion import MEASURED, Suggestion
 
@@ -188,3 +187,29 @@ def _frame_list(frames: Sequence[float]) -> str:
 
 def _data(path: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+def require_jinja() -> None:
+    """Raises SinewError where Jinja2 is missing, as in Blender's own Python."""
+    try:
+        import jinja2  # noqa: F401
+    except ImportError:
+        raise SinewError(
+            "pages need Jinja2, which this Python does not have; install sinew-blender in a Python of its "
+            "own and run `sinew` there"
+        ) from None
+
+
+def render(template: str, **values: object) -> str:
+    """Returns the page that a file of templates/ makes of the values. Text is escaped."""
+    require_jinja()
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    return environment.get_template(template).render(values)

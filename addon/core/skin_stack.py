@@ -15,10 +15,10 @@ from .arrays import are_equal
 from .parameters import Value
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
-from .spaces import is_same_space, transformed
 from .stage_mesh import StageMesh
 from .stages import StagesAfter, StageValues
 from .twist_spread import TwistInputs
+from .vectors import is_same_space, transformed
 from .vertex_data import METHODS, PROVIDERS, VertexData
 
 LINEAR = "lbs"

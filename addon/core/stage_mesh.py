@@ -10,7 +10,7 @@ import sinew
 
 from .arrays import OfArrays
 from .rig import Weighting
-from .spaces import transformed
+from .vectors import transformed
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arithmetic on arrays of vectors stored component by component, [k, n]."""
+"""Arithmetic on arrays of points, vectors and rotations, and their spaces. Vectors and rotations are stored
+component by component, [k, n]; rotations as quaternions (w, x, y, z), [4, n]."""
 
 import numpy as np
+import sinew
 
 
 def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -12,3 +14,41 @@ def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products of [3, n]: several times faster than numpy's own on rows."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def rotations_of(motions: np.ndarray) -> np.ndarray:
+    """Unit quaternions, float64 [4, n], of the rotations nearest to the linear parts `motions` [n, 3, 3]."""
+    affine = np.zeros((len(motions), 3, 4))
+    affine[:, :, :3] = motions
+    return np.ascontiguousarray(sinew.affine.to_dual_quat(sinew.affine.normalized(affine))[:, :4].T)
+
+
+def rotated(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Returns vectors [3, n] rotated by quaternions [4, n] of any length except 0; both have the same element
+    type."""
+    pairs = np.zeros((quaternions.shape[1], 7), quaternions.dtype)
+    pairs[:, :4] = quaternions.T
+    rows = sinew.quat_vec.transform_vector(sinew.quat_vec.normalized(pairs), np.ascontiguousarray(vectors.T))
+    return rows.T
+
+
+# The identity; is_same_space() recognises this object without comparing numbers.
+SAME_SPACE = np.identity(4)
+
+
+def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Returns `points` [n, 3] transformed by `matrix` [4, 4], affine; float64 [n, 3]."""
+    # Not with numpy's product: its BLAS uses threads even for so small a matrix, and these wait for each
+    # other, which takes up to a hundred times as long on a busy machine.
+    return sinew.affine.transform_point(matrix.astype(np.float64), points.astype(np.float64))
+
+
+def transformed_axes(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """The same as float64 [3, n], the layout of metrics.py."""
+    x, y, z = points.T.astype(np.float64)
+    columns = matrix[:3, :, np.newaxis]
+    return columns[:, 0] * x + columns[:, 1] * y + columns[:, 2] * z + columns[:, 3]
+
+
+def is_same_space(matrix: np.ndarray) -> bool:
+    return matrix is SAME_SPACE or np.array_equal(matrix, SAME_SPACE)

@@ -18,7 +18,7 @@ from .influences import Influences
 from .parameters import Value
 from .precompute import Start, precomputations
 from .rig import Weighting
-from .spaces import transformed
+from .vectors import transformed
 from .weld import Weld, weld
 
 METHODS = {method.name: method for method in sinew.methods()}

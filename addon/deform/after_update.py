@@ -13,7 +13,7 @@ import numpy as np
 
 from ..attach import point_store, properties
 from . import bound, pose, source
-from .changes import Changes
+from .events import Changes
 from .skinned_object import SkinnedObject
 
 

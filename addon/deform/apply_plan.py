@@ -9,17 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..attach import (
-    attach,
-    node_group,
-    normals,
-    point_store,
-    pose_driver,
-    properties,
-    shared_settings,
-    stack,
-    upstream_proxy,
-)
+from ..attach import attach, node_group, normals, point_store, pose_driver, properties, stack, upstream_proxy
 from ..core.errors import SinewError
 from ..core.icons import RENDER, VIEWPORT, VIEWS
 from ..io import armature_io
@@ -218,9 +208,9 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         log.error("%s", error)
         return True
     settings, others = properties.of(obj), properties.of(origin)
-    for name in shared_settings.SHARED:
-        shared_settings.assign(settings, name, getattr(others, name))
-    properties.copy_groups(others, settings, shared_settings.GROUPS)
+    for name in properties.SHARED:
+        properties.assign(settings, name, getattr(others, name))
+    properties.copy_groups(others, settings, properties.SETTING_GROUPS)
     properties.copy(others.before.smooth, settings.before.smooth)
     for name in VIEWS:
         properties.store(settings.stack, f"hidden_{name}", getattr(others.stack, f"hidden_{name}"))

@@ -21,8 +21,9 @@ from ..core.stage_mesh import StageMesh
 from ..core.stages import StagesAfter
 from ..core.vertex_data import VertexData
 from ..io import armature_io
-from . import method_needs, source, survey
-from .changes import Changes
+from ..io.actions import animated_paths
+from . import source, survey
+from .events import Changes
 from .plan import Normals
 from .source import Source
 
@@ -108,7 +109,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
 
     Requires source.is_ready().
     """
-    read_now = source.read(obj, depsgraph, method_needs.needs_surface(obj))
+    read_now = source.read(obj, depsgraph, needs_surface(obj))
     pairs = attach.replaced_modifiers(obj)
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     groups = stage_settings.vertex_groups(properties.of(obj))
@@ -168,7 +169,7 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
 
 def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
     """Whether a method that needs the mesh's triangles was chosen since."""
-    return bound.source.triangles is None and method_needs.needs_surface(obj)
+    return bound.source.triangles is None and needs_surface(obj)
 
 
 def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
@@ -240,3 +241,21 @@ def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgrap
     if armature is None or armature.data.is_editmode:
         return Bones.none()
     return armature_io.read_bones(armature.evaluated_get(depsgraph))
+
+
+def methods_of(obj: bpy.types.Object) -> list[str]:
+    """Returns the methods that its settings name now, each once."""
+    settings = properties.of(obj)
+    own = (replaced.method for replaced in list(settings.replaced_modifiers)[1:])
+    named = [settings.method, settings.mixed_method, *own]
+    return [name for name in dict.fromkeys(named) if name in METHODS]
+
+
+def is_method_animated(obj: bpy.types.Object) -> bool:
+    """Whether keys or drivers choose one of the methods."""
+    return any(path.startswith("sinew.") and path.endswith("method") for path in animated_paths(obj))
+
+
+def needs_surface(obj: bpy.types.Object) -> bool:
+    """Whether one of its methods needs the mesh's triangles. If methods are animated, any could be chosen."""
+    return any("topology" in METHODS[name].needs for name in methods_of(obj)) or is_method_animated(obj)

@@ -16,7 +16,7 @@ from ..attach.properties import BLENDER
 from ..core import interrupt, parameters
 from ..core.errors import SinewError, WrongUse
 from ..core.parameters import Value
-from ..core.spaces import transformed_axes
+from ..core.vectors import transformed_axes
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from ..io import mesh_io
 from . import lifecycle, session

@@ -19,7 +19,7 @@ from ..attach.updates import (
     updates_suspended,
 )
 from . import events, session
-from .changes import Changes, names_of_changed_meshes
+from .events import Changes, names_of_changed_meshes
 from .session import current
 
 # --- Evaluations and changes of frame

@@ -18,7 +18,7 @@ import sinew
 from ..attach import point_store, properties
 from ..core.icons import VIEWS
 from ..io import mesh_io
-from ..io.animation_paths import is_visibility_animated
+from ..io.actions import is_visibility_animated
 from . import pose, source
 from .plan import State
 from .skinned_object import Shown, SkinnedObject

@@ -18,9 +18,9 @@ from ..attach.feature import Feature
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, phase, updates_suspended
 from ..core.precompute import precomputations
-from ..io.animation_paths import animated_paths
+from ..io.actions import animated_paths
 from . import apply_plan, events, handlers, precompute_watch, precomputing, session
-from .changes import Changes
+from .events import Changes
 
 log = logging.getLogger("sinew")
 

@@ -15,9 +15,9 @@ from ..core.errors import SinewError
 from ..core.rig import Bones
 from ..core.scale_rule import BLENDER_4
 from ..core.skin_stack import NO_STAGES, SkinStageFrame
-from ..core.spaces import SAME_SPACE
 from ..core.stages import ORDER, StageValues
 from ..core.twist_spread import TwistInputs
+from ..core.vectors import SAME_SPACE
 from ..io import armature_io
 from .bound import Bound
 from .skinned_object import SkinnedObject

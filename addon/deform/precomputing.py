@@ -24,10 +24,10 @@ from ..core.errors import SinewError
 from ..core.file_cache import FileCache
 from ..core.phrases import phrase
 from ..core.precompute import precomputations
-from ..core.spaces import SAME_SPACE
+from ..core.vectors import SAME_SPACE
 from ..core.vertex_data import PROVIDERS, VertexData
 from ..io import addon_preferences, armature_io
-from .method_needs import is_method_animated, methods_of
+from .bound import is_method_animated, methods_of
 from .skinned_object import SkinnedObject
 
 VARIABLE = "SINEW_CACHE"

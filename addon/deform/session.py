@@ -26,7 +26,7 @@ from ..core.errors import SinewError
 from ..core.precompute import precomputations
 from . import after_update, apply_plan, events, undo
 from .bound import uid
-from .changes import GONE, Changes
+from .events import GONE, Changes
 from .in_depsgraph import DepsgraphRequests
 from .plan import UNSEEN, Plan, State
 from .skinned_object import SkinnedObject

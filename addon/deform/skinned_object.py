@@ -15,10 +15,10 @@ from ..core.errors import SinewError
 from ..core.skin_stack import NO_STAGES, SkinStageFrame
 from ..core.stages import StageValues
 from ..io import mesh_io
-from ..io.animation_paths import animated_paths, is_visibility_animated
+from ..io.actions import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
-from .changes import Changes
+from .events import Changes
 from .plan import Plan
 
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..attach import attach, behind_nodes, properties, stack, stage_settings
+from ..attach import attach, other_tools, properties, stack, stage_settings
 from ..attach.modifier_options import ModifierOptions, differences
 from ..core import sdef
 from ..core.errors import SinewError
 from ..core.phrases import phrase
 from ..core.rig import RigFacts, Weighting, describe_rig
-from ..core.spaces import transformed
+from ..core.vectors import transformed
 from ..io import armature_io, mesh_io
 from . import group_uses
 
@@ -37,7 +37,7 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    found = [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *behind_nodes.warnings(obj)]
+    found = [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *other_tools.warnings(obj)]
     return facts.with_warnings(found)
 
 

@@ -10,10 +10,10 @@ import bpy
 from ..attach import attach, normals, point_store, properties, stack, upstream_proxy
 from ..attach.updates import may_change_file
 from ..core.errors import SinewError
-from ..io.animation_paths import animated_paths
+from ..io.actions import animated_paths
 from . import after_update, apply_plan, bound, events, precomputing, source
 from .bound import uid
-from .changes import Changes
+from .events import Changes
 from .plan import Plan, State, plan
 from .react import Action, Facts, Known, is_at_end, react
 from .skinned_object import Noted, SkinnedObject

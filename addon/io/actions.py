@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The F-curves of an action that move bones: finding them, and reading their keys."""
+"""What plays an object's actions, and the F-curves of an action that move bones: finding them, and reading
+their keys."""
 
 import functools
 import re
@@ -252,3 +253,33 @@ def plays(channel: Channel, rotation: str | None) -> bool:
     """Whether the channel has an effect where `rotation` is its bone's rotation property: not a rotation of
     another mode, nor a channel of a missing bone."""
     return rotation is not None and channel.property in ("location", "scale", rotation)
+
+
+def animated_paths(obj: bpy.types.Object) -> set[str]:
+    """Returns the data paths that the object's actions and drivers set."""
+    return {curve.data_path for curve in curves_of(obj)}
+
+
+def curves_of(owner: bpy.types.Object | bpy.types.Mesh | bpy.types.Key) -> list[bpy.types.FCurve]:
+    """Returns the curves of its actions, also in strips, and of its drivers."""
+    animation = owner.animation_data
+    if animation is None:
+        return []
+    played = [all_curves(p.action, slot_of(p)) for p in players(animation)]
+    return [*animation.drivers, *(curve for each in played for curve in each)]
+
+
+def players(animation: bpy.types.AnimData) -> list[bpy.types.AnimData | bpy.types.NlaStrip]:
+    """Returns everything that plays an action, or could."""
+    return [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
+
+
+def is_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier, name: str) -> bool:
+    """Whether keys or drivers set a modifier's property."""
+    return f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].{name}' in animated_paths(obj)
+
+
+def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
+    """Whether keys or drivers switch a modifier on and off."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
+    return not animated_paths(obj).isdisjoint((f"{start}viewport", f"{start}render"))

@@ -9,8 +9,8 @@ from mathutils import Matrix, Quaternion, Vector
 
 from ..core.envelopes import Envelopes
 from ..core.rig import Bones
-from ..core.spaces import SAME_SPACE
 from ..core.twist_spread import NOT_TOLD, TwistInputs
+from ..core.vectors import SAME_SPACE
 
 # Before, a mesh object with a scale of 0 had no inverse, and Blender moved all its vertices to its origin.
 _MESH_HAS_INVERSE = bpy.app.version >= (5, 0)

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from .animation_paths import animated_paths
+from .actions import animated_paths
 
 # Blender reads caches that are marked as baked, and neither writes nor removes them: the session_uid of their
 # objects or scenes, each with a number among its caches.

@@ -13,7 +13,7 @@ import bpy
 
 from ..attach import properties
 from ..attach.feature import Feature
-from ..attach.shared_settings import GROUPS, SHARED, assign
+from ..attach.properties import SETTING_GROUPS, SHARED, assign
 from ..attach.subscribers import subscribers
 from ..deform import session
 from . import operators
@@ -115,7 +115,7 @@ def _computed(deferred: Any, group: str, name: str) -> object:
 
 
 # The classes of a mesh's settings by the name of the group; empty for the settings themselves.
-CLASSES_OF = {"": properties.SinewSettings, **GROUPS}
+CLASSES_OF = {"": properties.SinewSettings, **SETTING_GROUPS}
 
 
 def _class_of(group: str, names: tuple[str, ...]) -> type:
@@ -125,7 +125,7 @@ def _class_of(group: str, names: tuple[str, ...]) -> type:
     return type(f"SinewCharacter{title}", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
 
 
-_GROUP_CLASSES = {name: _class_of(name, tuple(cls.__annotations__)) for name, cls in GROUPS.items()}
+_GROUP_CLASSES = {name: _class_of(name, tuple(cls.__annotations__)) for name, cls in SETTING_GROUPS.items()}
 SinewCharacter = _class_of("", SHARED)
 
 
@@ -177,7 +177,7 @@ SinewCharacter.__annotations__.update(
         ),
         "chosen": bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}),
         **{
-            name: bpy.props.PointerProperty(type=cls, description=GROUPS[name].__doc__)
+            name: bpy.props.PointerProperty(type=cls, description=SETTING_GROUPS[name].__doc__)
             for name, cls in _GROUP_CLASSES.items()
         },
     }

@@ -5,7 +5,7 @@ import contextlib
 
 import bpy
 
-from ..attach import properties, shared_settings
+from ..attach import properties
 from ..core.errors import SinewError
 from ..deform import session
 from . import character
@@ -70,7 +70,7 @@ class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
         others = [other for other in character.followers(context) if other != obj]
         if not settings.is_own and others:
             with session.changing(context):
-                shared_settings.share(others[0], obj)
+                properties.share(others[0], obj)
         return {"FINISHED"}
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import bpy
 
-from ..attach import attach, behind_nodes, properties, stage_settings
+from ..attach import attach, other_tools, properties, stage_settings
 from ..deform import session
 from ..deform.plan import State
 from . import character, operators, precomputing, state_text, stepped
@@ -91,7 +91,7 @@ def _draw_add(layout: bpy.types.UILayout, context: bpy.types.Context, meshes: li
     row.operator("sinew.add", text=text, icon="MOD_ARMATURE")
     row.operator_menu_enum("sinew.add", "method", text="", icon="DOWNARROW_HLT")
     for obj in meshes:
-        for sentence in () if properties.has_sinew(obj) else behind_nodes.warnings(obj):
+        for sentence in () if properties.has_sinew(obj) else other_tools.warnings(obj):
             draw_text(layout, context, sentence, icon="ERROR")
 
 

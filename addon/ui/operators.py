@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import bpy
 
-from ..attach import attach, corrective_smooth, properties, shared_settings, stack, stage_settings
-from ..attach.method_items import method_items
+from ..attach import attach, corrective_smooth, properties, stack, stage_settings
+from ..attach.stage_settings import method_items
 from ..attach.updates import is_rendering_in_window, updates_suspended
 from ..core.errors import SinewError
 from ..deform import session
@@ -232,7 +232,7 @@ class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
             attach.add(obj, method)
             same = [o for o in followers if attach.armature_of(o) == attach.armature_of(obj)]
             if method is None and same:
-                shared_settings.share(same[0], obj)
+                properties.share(same[0], obj)
 
         with updates_suspended():
             result = _for_each(self, objects, add, "Sinew deforms")

@@ -6,7 +6,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
-from ..attach.shared_settings import GROUPS, SHARED
+from ..attach.properties import SETTING_GROUPS, SHARED
 from ..deform import session
 from .operators import OnSinewObjects
 
@@ -17,7 +17,7 @@ PATHS = (
     *(f"character.{name}" for name in SHARED),
     *(
         f"character.{group}.{name}"
-        for group, cls in GROUPS.items()
+        for group, cls in SETTING_GROUPS.items()
         for name in cls.__annotations__
         if name != "group"
     ),

@@ -5,7 +5,7 @@ import bpy
 import sinew
 
 from ..attach import corrective_smooth, normals, properties, stage_settings
-from ..deform import method_needs, session, small_meshes
+from ..deform import bound, session, small_meshes
 from . import operators
 from .sidebar import draw_text
 from .translations import tr
@@ -27,7 +27,7 @@ def draw_parameters(
 
     obj  whose settings these are; for a character, its lead
     """
-    for name in method_needs.methods_of(obj):
+    for name in bound.methods_of(obj):
         for parameter in properties.METHODS[name].parameters:
             layout.prop(getattr(settings, name), parameter.id)
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import bpy
 
-from ..attach import attach, behind_nodes, other_tools, properties
+from ..attach import attach, other_tools, properties
 from ..core.icons import Deformer
 from ..deform import lifecycle, session, small_meshes
 from ..deform.plan import ARMATURE_MODIFIER_MODES, State
@@ -95,7 +95,7 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
         )
     found += state.bound.facts.warnings
     # Such a modifier may have been added since.
-    return [*found, *(sentence for sentence in behind_nodes.warnings(obj) if sentence not in found)]
+    return [*found, *(sentence for sentence in other_tools.warnings(obj) if sentence not in found)]
 
 
 def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:

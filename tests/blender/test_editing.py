@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 import whole_file
-from sinew_addon.attach import attach, behind_nodes, point_store, properties, stack
+from sinew_addon.attach import attach, other_tools, point_store, properties, stack
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import safe_mode, session, survey
 from sinew_addon.deform.plan import State
@@ -226,8 +226,8 @@ def test_warnings_of_modifiers_that_act_differently_behind_sinew(kind, in_front)
         particles = obj.modifiers.new("Behind", "PARTICLE_SYSTEM").particle_system.settings
         particles.type, particles.emit_from = "HAIR", "FACE" if kind == "hair" else "VERT"
     is_warned = not in_front and kind in ("hair", "cloth with a rest shape")
-    before = behind_nodes.warnings(obj)
+    before = other_tools.warnings(obj)
     scenes.add_sinew(obj)
-    assert [bool(sentences) for sentences in (before, behind_nodes.warnings(obj))] == [is_warned, is_warned]
+    assert [bool(sentences) for sentences in (before, other_tools.warnings(obj))] == [is_warned, is_warned]
     assert (before == [s for s in state_text.problems_of(obj) if "behind Sinew's" in s]) or not is_warned
     assert is_warned == ("behind Sinew's" in " ".join(survey.describe_in_file(obj).warnings))

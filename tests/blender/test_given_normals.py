@@ -12,12 +12,12 @@ import pytest
 import routes
 import scenes
 from sinew_addon.attach import normals, properties, stack
-from sinew_addon.core import opengl
 from sinew_addon.core.shading import Shading, SurfaceNormals
 from sinew_addon.core.stage_mesh import Topology
 from sinew_addon.deform import session
+from sinew_addon.features.pages.render import has_opengl
 
-LEAVE, GIVE = properties.LEAVE_NORMALS, properties.AS_BLENDER
+LEAVE, GIVE = properties.LEAVE_NORMALS, properties.BY_SINEW
 NEAR = 1e-6
 COLLECTIONS = ("vertex_normals", "corner_normals")
 needs_support = pytest.mark.skipif(
@@ -520,7 +520,7 @@ def assert_same_pictures(obj, tmp_path, is_custom, step=0.0):
 @pytest.mark.parametrize("engine", ["CYCLES", "CYCLES blurred", "BLENDER_WORKBENCH"])
 @pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
 def test_pictures_are_the_same(shading, engine, tmp_path):
-    if engine == "BLENDER_WORKBENCH" and not opengl.has_opengl():
+    if engine == "BLENDER_WORKBENCH" and not has_opengl():
         pytest.skip("Workbench can not draw here")
     obj, _armature = make(shading)
     light_scene(obj)

@@ -10,7 +10,7 @@ import numpy as np
 import scenes
 import sinew
 from program import run_sinew
-from sinew_addon.attach import method_items, properties, stage_settings
+from sinew_addon.attach import properties, stage_settings
 from sinew_addon.core.parameters import parse
 from sinew_addon.deform import characters, session
 from test_sdef import make_model
@@ -52,7 +52,7 @@ def test_the_library_decides_what_there_is():
 
 
 def test_the_menu_has_the_groups_of_the_list():
-    items = method_items.method_items()
+    items = stage_settings.method_items()
     headings = [label for name, label, _text, _number in items if not name]
     assert headings == list(dict.fromkeys(m.group for m in sinew.methods()))
     shown = properties.SinewSettings.bl_rna.properties["method"].enum_items

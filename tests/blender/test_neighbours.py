@@ -16,7 +16,7 @@ from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.deform import in_depsgraph, safe_mode, session
 from sinew_addon.deform.plan import State
 from sinew_addon.features.compare import comparison
-from sinew_addon.io import animation_paths
+from sinew_addon.io import actions
 
 FRAMES = [1, 6, 11]
 
@@ -437,9 +437,9 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
     session.refresh(bpy.context)
     assert other.animation_data.action == obj.animation_data.action
     attach.remove(obj)
-    assert "sinew.method" in animation_paths.animated_paths(other)
+    assert "sinew.method" in actions.animated_paths(other)
     attach.remove(other)
     bpy.context.scene.frame_set(5)
     for each in (obj, other):
-        assert not animation_paths.animated_paths(each)
+        assert not actions.animated_paths(each)
         assert not each.is_property_set("sinew")

@@ -543,7 +543,7 @@ def leave_small(w: Walker, r: random.Random) -> None:
 
 @operation(1.5)
 def give_normals(w: Walker, r: random.Random) -> None:
-    obj, who = w.with_sinew(r), r.choice(("AS_BLENDER", "AS_BLENDER", "SKINNED", "LEAVE"))
+    obj, who = w.with_sinew(r), r.choice(("BY_SINEW", "BY_SINEW", "SKINNED", "LEAVE"))
     w.side.set_option(obj, "normals", who)
 
 

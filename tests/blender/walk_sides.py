@@ -337,7 +337,7 @@ class BlenderSide(Side):
         from sinew_addon.attach.modifier_options import ModifierOptions
         from sinew_addon.core.diagnostics import check_weights
         from sinew_addon.core.mend import WeightMender
-        from sinew_addon.core.spaces import transformed
+        from sinew_addon.core.vectors import transformed
         from sinew_addon.io import armature_io, mesh_io
 
         depsgraph = bpy.context.evaluated_depsgraph_get()

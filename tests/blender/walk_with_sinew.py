@@ -14,7 +14,7 @@ import numpy as np
 import routes
 import sinew
 import sinew_addon
-from sinew_addon.attach import attach, behind_nodes, properties, stack, stage_settings
+from sinew_addon.attach import attach, other_tools, properties, stack, stage_settings
 from sinew_addon.attach.subscribers import notify, subscribers
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
@@ -174,7 +174,7 @@ class SinewSide(Side):
         own = stack.own_modifiers(obj)
         others = {each.type for each in obj.modifiers if each != modifier and each not in own}
         if self.has_sinew(obj) and others == {"ARMATURE"}:
-            is_warned = any(text.startswith(f"{modifier.name}: ") for text in behind_nodes.warnings(obj))
+            is_warned = any(text.startswith(f"{modifier.name}: ") for text in other_tools.warnings(obj))
             if is_warned != (modifier.particle_system.settings.emit_from != "VERT"):
                 raise ValueError(f"{obj.name}: {'a' if is_warned else 'no'} warning about {modifier.name}")
 

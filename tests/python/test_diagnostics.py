@@ -12,7 +12,7 @@ from sinew_addon.core.diagnostics import PoseCheck, check_weights
 from sinew_addon.core.envelopes import Envelopes
 from sinew_addon.core.influences import GroupWeights, Influences, entries_of_bones
 from sinew_addon.core.rig import Bones, Weighting
-from sinew_addon.core.rotations import rotations_of
+from sinew_addon.core.vectors import rotations_of
 
 NAMES = ("root", "arm", "hand", "finger", "thumb", "tip")
 

@@ -14,7 +14,7 @@ from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...core.names import as_file_name
 from ...deform import characters
 from ...io import files
-from ...io.animation_paths import curves_of
+from ...io.actions import curves_of
 from . import bake_export, bake_state, shape_animation
 from .bake_bones import BoneBake
 from .bake_state import Started, take_off

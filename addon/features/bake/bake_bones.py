@@ -15,8 +15,8 @@ from ...core.errors import SinewError
 from ...core.helper_bones import POSE, HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
 from ...core.skin_stack import SkinStack, SkinStageFrame
-from ...core.spaces import transformed
 from ...core.stages import StageValues
+from ...core.vectors import transformed
 from ...deform import characters
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io, mesh_io

@@ -22,14 +22,16 @@ from ...attach import (
     upstream_proxy,
 )
 from ...attach.updates import updates_suspended
-from ...core import side_by_side
 from ...core.errors import SinewError
-from ...core.spaces import transformed
 from ...core.stages import ORDER
+from ...core.vectors import transformed
 from ...deform import characters, session
 from ...io import actions
-from ...io.animation_paths import players
+from ...io.actions import players
 from . import comparison_state, offset_nodes
+
+# The space between two characters, as a share of a character's width.
+GAP = 0.12
 
 # One for each method, in their order: a colour-blind-safe set (Okabe and Ito, 2008), and three that differ as
 # much from it and from the original's white.
@@ -67,7 +69,7 @@ def start(
     end(context)
     taken, problems = _comparable(meshes)
     # Before copies are made: the scene as it is now is already evaluated.
-    axis = side_by_side.row_axis(right)
+    axis = _row_axis(right)
     depsgraph = context.evaluated_depsgraph_get()
     points = np.concatenate([corners(obj.evaluated_get(depsgraph)) for obj in taken])
     collection = bpy.data.collections.new("Sinew Comparison")
@@ -81,7 +83,7 @@ def start(
                 for method in methods:
                     collection.objects.link(_copy(obj, method))
             state.axis = axis
-            state.spacing = side_by_side.spacing(points, axis)
+            state.spacing = _spacing(points, axis)
             state.first, state.second = methods[0], _other_than(methods[0], methods)
             state.arrangement = arrangement
     except BaseException:
@@ -245,3 +247,21 @@ def _use_own_actions(copy: bpy.types.Object) -> None:
             handle = actions.handle_of(actions.slot_of(player))
             actions.play_by_handle(player, player.action.copy(), handle)
             player.action[ACTION_MARK] = True
+
+
+def _row_axis(right: np.ndarray) -> np.ndarray:
+    """float64 [3]: the one of -X, +X, -Y and +Y that is nearest to `right` [3], which points to the right of
+    the screen; +X where that is vertical."""
+    axis = np.zeros(3)
+    nearest = int(np.abs(right[:2]).argmax())
+    axis[nearest] = -1.0 if right[nearest] < 0.0 else 1.0
+    return axis
+
+
+def _spacing(points: np.ndarray, axis: np.ndarray) -> float:
+    """The distance between neighbouring characters along `axis` [3]; 1 where they have no width along it.
+
+    points  [n, 3], n > 0, the character's, or the corners of its bounding box
+    """
+    width = float(np.ptp(points @ axis))
+    return (1.0 + GAP) * width if width > 0.0 else 1.0

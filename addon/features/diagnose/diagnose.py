@@ -15,7 +15,7 @@ from ...core.diagnostics import Finding, PoseCheck, check_weights
 from ...core.errors import SinewError
 from ...core.influences import GroupWeights
 from ...core.rig import Bones, Weighting
-from ...core.rotations import rotations_of
+from ...core.vectors import rotations_of
 from ...deform import characters, group_uses, session
 from ...io import armature_io, mesh_io
 from ...ui import stepped

@@ -20,7 +20,7 @@ import numpy as np
 from ...attach import properties, stage_settings
 from ...attach.updates import may_change_file
 from ...core.errors import SinewError
-from ...core.spaces import transformed
+from ...core.vectors import transformed
 from ...deform import session
 from ...io import armature_io, mesh_io
 

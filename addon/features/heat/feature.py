@@ -9,16 +9,7 @@ from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...deform import session
-from . import (
-    bake_error,
-    heat_legend,
-    heat_map,
-    heat_nodes,
-    heat_panel,
-    heat_view,
-    measures,
-    redraw,
-)
+from . import bake_error, heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measures
 
 
 def _begin() -> None:
@@ -77,7 +68,7 @@ FEATURE = Feature(
         (subscribers.after_removal, heat_view.tidy),
         (subscribers.objects_changed, _objects_changed),
         (subscribers.deformed, _colour),
-        (subscribers.frame_shown, redraw.request),
+        (subscribers.frame_shown, heat_panel.redraw),
         (measures.listeners, heat_view.sync_errors),
     ),
     overlays=(heat_legend.draw,),

@@ -6,15 +6,16 @@ from collections.abc import Iterator, Sequence
 import bpy
 
 from ...attach import properties
+from ...attach.updates import is_rendering_in_window
 from ...core.errors import SinewError
 from ...core.metrics import Measured
 from ...deform import characters, session
 from ...io import units
-from ...ui import operators, stepped
+from ...ui import operators, sidebar, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import joined, tr
-from . import bake_error, live, measures, redraw, worst_frames
+from . import bake_error, live, measures, worst_frames
 
 
 def meant(context: bpy.types.Context, quantity: str) -> list[bpy.types.Object]:
@@ -162,7 +163,8 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         # Blender draws only panels that are open and visible, so nothing is measured otherwise.
-        redraw.wanted = True
+        global is_redraw_wanted
+        is_redraw_wanted = True
         settings = measures.of(context.scene)
         # The last evaluation: nothing may be evaluated while drawing, as that can write.
         depsgraph = context.view_layer.depsgraph
@@ -261,3 +263,16 @@ CLASSES = (
     SINEW_PT_numbers,
     SINEW_PT_worst_frames,
 )
+
+
+# A panel with numbers was drawn since they last changed, so it is open.
+is_redraw_wanted = False
+
+
+def redraw() -> None:
+    """Keeps the numbers up to date where Blender would not redraw them, as in playback."""
+    global is_redraw_wanted
+    if not is_redraw_wanted or is_rendering_in_window():
+        return
+    is_redraw_wanted = False
+    sidebar.redraw()

@@ -16,9 +16,9 @@ from ...attach import attach, corrective_smooth, properties, stage_settings, ups
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured
 from ...core.skin_stack import SkinStack
-from ...core.spaces import is_same_space, transformed, transformed_axes
 from ...core.stages import StageValues
 from ...core.surface import Surface, joined
+from ...core.vectors import is_same_space, transformed, transformed_axes
 from ...deform import pose
 from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject

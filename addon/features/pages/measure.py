@@ -23,8 +23,8 @@ from ...core.influences import GroupWeights, Influences, entries_of_bones
 from ...core.influences import joined as influences_of_all
 from ...core.metrics import FrameOfRig, Gauge, Summary
 from ...core.rig import Bones, Weighting
-from ...core.spaces import transformed
 from ...core.surface import joined
+from ...core.vectors import transformed
 from ...deform import characters, group_uses, session
 from ...io import armature_io, mesh_io
 

@@ -7,6 +7,8 @@ afterwards.
 """
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -17,7 +19,6 @@ from mathutils import Matrix
 
 from ...core.errors import SinewError
 from ...core.heat import linear
-from ...core.opengl import default_engine
 from ...core.output import write_whole
 from ...core.scratch import scratch_folder
 from ...core.views import View, camera_axes
@@ -28,6 +29,12 @@ CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
 PNG_END = b"IEND\xaeB`\x82"
 
+# Whether Blender can draw here is tried in a new process, as it aborts without OpenGL.
+_PROBE = (
+    "import bpy; s = bpy.context.scene; s.render.engine = 'BLENDER_WORKBENCH'; "
+    "s.render.resolution_x = s.render.resolution_y = 8; bpy.ops.render.render()"
+)
+
 
 def chosen_engine(wanted: str) -> str:
     """Returns the engine, "workbench" or "cycles", for a name or "auto".
@@ -36,10 +43,25 @@ def chosen_engine(wanted: str) -> str:
     """
     if wanted == "cycles":
         return wanted
-    engine = default_engine(bpy.app.binary_path)
+    engine = "workbench" if has_opengl() else "cycles"
     if wanted not in ("auto", engine):
         raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
     return engine
+
+
+def has_opengl() -> bool:
+    """Whether Workbench can render here; takes as long as starting Blender."""
+    if bpy.app.binary_path:
+        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-expr", _PROBE]
+    else:
+        command = [sys.executable, "-c", _PROBE]
+    try:
+        probe = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return probe.returncode == 0
 
 
 class Studio:
