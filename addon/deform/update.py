@@ -356,7 +356,10 @@ def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
     Raises SinewError where those that Sinew works with are gone.
     """
     if stack.armature_modifier(obj) is None:
-        raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
+        raise SinewError(
+            f"{obj.name}: its Armature modifier was deleted or applied; add another and press Rebind, or "
+            "Remove"
+        )
     # The plan depends on settings such as Preserve Volume as the artist set them.
     attach.restore_volume(obj)
     attach.follow_stack(obj)

@@ -260,6 +260,28 @@ def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame, capfd):
     assert "nvalid driver" not in "".join(capfd.readouterr())
 
 
+@pytest.mark.parametrize("gone", ["applied", "deleted"])
+def test_another_armature_modifier_in_the_place_of_one_that_is_gone(arm, gone):
+    armature = arm.modifiers["Armature"].object
+    bpy.context.scene.frame_set(6)
+    bpy.context.view_layer.objects.active = arm
+    act = bpy.ops.object.modifier_apply if gone == "applied" else bpy.ops.object.modifier_remove
+    act(modifier="Armature")
+    bpy.context.view_layer.update()
+    assert "deleted or applied; add another and press Rebind, or Remove" in session.plan_of(arm).reason
+    assert not any(stack.is_on(modifier) for modifier in arm.modifiers)
+    another = arm.modifiers.new("Another", "ARMATURE")
+    another.object, another.use_deform_preserve_volume = armature, True
+    bpy.context.scene.frame_set(8)
+    expected = scenes.final_points(arm)
+    assert scenes.worst(expected, scenes.rest_points(arm)) > 0.05
+    bpy.ops.sinew.rebind()
+    assert session.plan_of(arm).state is not State.REFUSED
+    assert scenes.worst(scenes.final_points(arm), expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+    attach.remove(arm)
+    assert [modifier.name for modifier in arm.modifiers] == ["Another"]
+
+
 def test_a_node_group_removed_behind_sinews_handler(arm, neighbour):
     removed = []
 
