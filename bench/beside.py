@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures playback while a precomputation runs: python bench/beside.py [--name NAME]
 
-Frames of bench/frames.py at 24 and 60 a second, and as fast as they come: beside a computation for another
-mesh, and then as many alone, in one process.
+Frames of bench/frames.py at 24 and 60 a second, and as fast as they come: for some seconds alone, then beside
+a computation for another mesh, and so on, in one process.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import statistics
 import time
 from collections.abc import Callable, Iterator
 
@@ -19,7 +20,7 @@ import sinew
 
 CASES = (frames.Case(100_000, normals=True), frames.Case(characters=50, bones=50, normals=True))
 RATES = {"24/s": 1 / 24, "60/s": 1 / 60, "free": 0.0}
-MOST_SECONDS = 10.0
+SECONDS = 3.0
 
 
 def play(scene: frames.Scene, numbers: Iterator[int], period: float) -> list[float]:
@@ -31,20 +32,30 @@ def play(scene: frames.Scene, numbers: Iterator[int], period: float) -> list[flo
 
 
 def measure(scene: frames.Scene, start: Callable[[], sinew.Precomputation], runs: int, period: float) -> dict:
-    """Seconds from frame to frame beside it and alone, and the frame rate beside it over that alone."""
-    times: dict[str, list[float]] = {"beside": [], "alone": []}
+    """Seconds from frame to frame beside it and alone, and the frame rate beside it over that alone: of each
+    run the one beside it over that before and after, and of these the median."""
     numbers = itertools.cycle(range(1, frames.FRAMES + 1))
-    for _ in range(frames.BEFORE):
-        play(scene, numbers, period)
+
+    def block(run: sinew.Precomputation | None = None) -> list[float]:
+        times, end = [], time.perf_counter() + SECONDS
+        while time.perf_counter() < end and not (run is not None and run.has_ended):
+            times += play(scene, numbers, period)
+        return times
+
+    block()
+    alone, beside = [block()], []
     for _run in range(runs):
-        run, end = start(), time.perf_counter() + MOST_SECONDS
-        while not run.has_ended and time.perf_counter() < end:
-            times["beside"] += play(scene, numbers, period)
-        del run
-        while len(times["alone"]) < len(times["beside"]):
-            times["alone"] += play(scene, numbers, period)
-    rate = sum(times["alone"]) / sum(times["beside"])
-    return {name: common.spread(of) for name, of in times.items()} | {"rate": rate}
+        beside.append(block(start()))
+        alone.append(block())
+    rates = [
+        statistics.fmean(before + after) / statistics.fmean(between)
+        for before, between, after in zip(alone, beside, alone[1:], strict=False)
+    ]
+    times = {
+        name: common.spread([*itertools.chain(*blocks)])
+        for name, blocks in (("beside", beside), ("alone", alone))
+    }
+    return times | {"rate": statistics.median(rates)}
 
 
 def main() -> None:
