@@ -1895,6 +1895,9 @@ def undo(w: Walker, r: random.Random) -> None:
     w.push_undo()
     for _step in range(steps):
         bpy.ops.ed.undo()
+    for obj in filter(w.shares_action, w.objects()):
+        # Blender itself evaluates only one of the objects whose action has changed.
+        obj.update_tag(refresh={"OBJECT"})
     if r.random() < 0.3:
         if r.random() < 0.5:
             bpy.context.view_layer.update()
