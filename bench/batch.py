@@ -117,20 +117,25 @@ def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str,
     folder.mkdir()
     for index in range(files):
         shutil.copy(source, folder / f"{index:03d}.blend")
-    bare = ("--frames", "none")
+    bare = ("--frames", "none", "--no-pictures")
+    compared = ("--no-pictures",)
     runs: dict[str, list] = {
         "plain": [],
         "bare": [],
         "bare, 2 jobs": [],
         "compared": [],
         "compared, 2 jobs": [],
+        "drawn": [],
+        "drawn, 2 jobs": [],
     }
     for _ in range(repetitions):
         runs["plain"].append(plain(folder))
         runs["bare"].append(batch(folder, *bare, "--jobs", "1"))
         runs["bare, 2 jobs"].append(batch(folder, *bare, "--jobs", "2"))
-        runs["compared"].append(batch(folder, "--jobs", "1"))
-        runs["compared, 2 jobs"].append(batch(folder, "--jobs", "2"))
+        runs["compared"].append(batch(folder, *compared, "--jobs", "1"))
+        runs["compared, 2 jobs"].append(batch(folder, *compared, "--jobs", "2"))
+        runs["drawn"].append(batch(folder, "--jobs", "1"))
+        runs["drawn, 2 jobs"].append(batch(folder, "--jobs", "2"))
     shutil.rmtree(folder)
 
     def least(name: str, step: str) -> float:
@@ -151,8 +156,10 @@ def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str,
         "whole, 1 job, processor": 1000 * least("bare", "processor"),
         "whole, 2 jobs, processor": 1000 * least("bare, 2 jobs", "processor"),
         "comparing 9 frames": 1000 * least("compared", "comparing"),
+        "drawing 2 pictures": 1000 * least("drawn", "drawing"),
         "2 jobs, times as fast": least("bare", "file") / least("bare, 2 jobs", "file"),
         "2 jobs, compared, times as fast": least("compared", "file") / least("compared, 2 jobs", "file"),
+        "2 jobs, drawn, times as fast": least("drawn", "file") / least("drawn, 2 jobs", "file"),
     }
     return {name: round(value, 2) for name, value in result.items()}
 

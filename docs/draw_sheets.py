@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -98,6 +99,21 @@ def photograph(page: Path, target: Path, width: int, height: int) -> None:
         )
 
 
+def photograph_report(target: Path) -> None:
+    """Of a batch, in which one file is broken."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place, "characters")
+        shutil.copytree(BLEND_FILES, folder, ignore=shutil.ignore_patterns("report_*"))
+        (folder / "broken.blend").write_text("no file of Blender's\n")
+        words = [SINEW, "reskin", folder, "--method", "dq", "--out", Path(place, "out")]
+        # One file fails, so the batch does.
+        assert subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode == 1
+        page = Path(place, "out/report.html")
+        text = page.read_text(encoding="utf-8").replace(place, "/srv/film")
+        page.write_text(text, encoding="utf-8")
+        photograph(page, target, 1000, 780)
+
+
 def photograph_page(target: Path) -> None:
     with tempfile.TemporaryDirectory() as place:
         sinew("compare", find("human.blend"), "--methods", "lbs,cor,dq", "--pictures", "0", "--out", place)
@@ -122,6 +138,7 @@ def photograph_heat_map(target: Path) -> None:
 
 PICTURES: dict[str, Callable[[Path], None]] = {
     **dict.fromkeys(SHEETS, draw_sheet),
+    "batch-report.png": photograph_report,
     "page.png": photograph_page,
     "heat.png": photograph_heat_map,
 }

@@ -2,7 +2,7 @@
 """The common part of `sinew reskin` and `sinew restore`: inputs, workers, journal, progress, report."""
 
 import argparse
-import json
+import hashlib
 import os
 import re
 import sys
@@ -15,10 +15,11 @@ from pathlib import Path
 
 from ..blender_process import Limits
 from ..core.errors import SinewError, WrongUse
-from ..core.output import folder_to_write, write_text, writing
+from ..core.output import folder_to_write, writing
 from ..jobs.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..jobs.job_file import JobFile, Settings, read_job_file
 from ..jobs.journal import Journal, is_complete
+from ..jobs.report import PICTURES, write_report
 from ..jobs.workers import run_here, run_on_this_machine
 from .arguments import count, seconds
 from .console import BatchProgress, Console
@@ -109,7 +110,7 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
         journal.remove_unfinished(job.target for job in jobs)
         tasks, results = [], {}
         for job, wanted in zip(jobs, settings, strict=True):
-            task = _task(args, action, job, wanted)
+            task = _task(args, action, job, wanted, journal)
             try:
                 task["known"] = _known(args, task, job, journal)
                 tasks.append(task)
@@ -136,8 +137,7 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
         seconds = time.monotonic() - started
         rows = [_row(job, journal.name_of(job.target), results[job.target]) for job in jobs]
         summary = _summary(action, rows, seconds)
-        report = out / "report.json"
-        write_text(report, json.dumps({"summary": summary, "files": rows}, indent=1, ensure_ascii=False))
+        report = write_report(out, summary, rows)
     return _conclude(console, action, rows, summary, report)
 
 
@@ -216,13 +216,15 @@ def _versions() -> dict[str, str]:
     return {"sinew": sinew.__version__, "blender": bpy.app.version_string}
 
 
-def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings) -> dict:
+def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings, journal: Journal) -> dict:
+    name = hashlib.blake2b(os.fsencode(journal.name_of(job.target)), digest_size=8).hexdigest()
     return {
         "command": action.command,
         "source": str(job.source),
         "target": str(job.target),
         "settings": settings.as_task(),
         "frames": args.frames,
+        "pictures": str(journal.out / PICTURES / name) if args.pictures else None,
         "overwrite": args.overwrite,
     }
 
@@ -294,7 +296,7 @@ def _show_result(console: Console, progress: BatchProgress, task: dict, result: 
 def _row(job: Job, name: str, result: dict) -> dict:
     """Returns the entry of a file in the report."""
     status = "failed" if "error" in result else "unchanged" if "unchanged" in result else "written"
-    shown = ("error", "meshes", "left_out", "notes", "versions", "seconds", "attempts")
+    shown = ("error", "meshes", "left_out", "notes", "versions", "seconds", "attempts", "pictures")
     return {"source": str(job.source), "file": name, "status": status} | {
         key: result[key] for key in shown if key in result
     }

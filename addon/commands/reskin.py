@@ -32,6 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="frames at which copies are compared with the Armature modifier, such as 1,12,40-48; none; or "
         "auto, nine of the scene's (default)",
     )
+    parser.add_argument(
+        "--no-pictures", dest="pictures", action="store_false", help="a report without pictures, much faster"
+    )
     add_set(parser)
 
 

@@ -15,7 +15,7 @@ HELP = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     batch.add_arguments(parser)
-    parser.set_defaults(frames="none")
+    parser.set_defaults(frames="none", pictures=False)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

@@ -20,6 +20,7 @@ import sinew
 
 from ..blender_process import BlenderLost, BlenderProcess, Limits, wait_for_any
 from ..core.errors import SinewError
+from ..core.opengl import default_engine
 from .journal import UNFINISHED, content_hash, stamp
 
 ATTEMPTS = 2
@@ -37,6 +38,8 @@ def versions() -> dict[str, str]:
 Steps: TypeAlias = Generator[BlenderProcess, None, dict]
 """Yields the Blender that is at work, for the caller to wait for it, and returns the outcome."""
 
+_engine = cache(default_engine)
+
 
 class _Blenders:
     """The Blenders of this process, each reused for the next file. Threads of a cluster's worker share
@@ -49,6 +52,9 @@ class _Blenders:
     def run(self, task: dict, limits: Limits) -> Steps:
         blender = self._take(limits)
         try:
+            if task["pictures"] is not None:
+                # Found once for all of them, while the first one starts.
+                task = {**task, "engine": _engine()}
             blender.send(task, limits)
             while (outcome := blender.poll()) is None:
                 yield blender

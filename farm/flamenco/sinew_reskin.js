@@ -31,7 +31,7 @@ const JOB_TYPE = {
         { key: "chunk_size", label: "Files per Task", type: "int32", default: 4, propargs: { min: 1 },
           visible: "submission", description: "Number of files that one task does" },
         { key: "options", type: "string", default: "", visible: "submission",
-          description: "More options of sinew reskin, such as --set mix=dq --frames none" },
+          description: "More options of sinew reskin, such as --set mix=dq --no-pictures" },
         { key: "program", type: "string", choices: Object.keys(PROGRAMS), default: "extension",
           visible: "submission", description: "Where workers have Sinew: as the extension of their Blender, or as "
               + "the package sinew-blender, at the path of the variable sinew" },

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -13,7 +14,9 @@ import sys
 import time
 from collections import Counter
 from contextlib import ExitStack
+from html import unescape
 from pathlib import Path
+from urllib.parse import unquote
 
 import bpy
 import numpy as np
@@ -32,7 +35,7 @@ from sinew_addon.jobs.job_file import Settings
 newest_only = pytest.mark.skipif(
     bpy.app.version < (5, 2) and os.name != "nt", reason="long: runs with the newest Blender alone"
 )
-FAST = ("--frames", "none")
+FAST = ("--frames", "none", "--no-pictures")
 
 
 def make_rig(path: Path, degrees: float = 100.0) -> Path:
@@ -156,7 +159,7 @@ def test_settings_for_files_and_objects(tmp_path):
         method = "lbs"
         """
     )
-    result = run_sinew("reskin", "--job", tmp_path / "job.toml")
+    result = run_sinew("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
     assert "2 of 2 files re-skinned" in result.stdout
     methods = {}
     for name in ("hero", "extra"):
@@ -173,19 +176,36 @@ def test_settings_for_files_and_objects(tmp_path):
 
 
 @pytest.mark.slow
-def test_report_has_the_largest_deviation(tmp_path):
+def test_report_has_pictures_of_the_worst_frame(tmp_path):
+    from PIL import Image
+
     make_rig(tmp_path / "rig.blend")
     (tmp_path / "bad.blend").write_text("nothing")
     inputs, options = (tmp_path / "rig.blend", tmp_path / "bad.blend"), ("--method", "dq", "--frames", "1,11")
     run_sinew("reskin", *inputs, *options, "--out", tmp_path / "out", status=1)
-    rows = report_of(tmp_path / "out")
+    row = report_of(tmp_path / "out")["rig.blend"]
+    assert row["pictures"]["frame"] == row["meshes"][0]["frame"] == 11
     obj = bpy.data.objects["Arm"]
     linear, dual = (scenes.modifier_shapes(obj, [11], preserve_volume=keep)[0] for keep in (False, True))
     expected = np.linalg.norm(dual - linear, axis=1).max()
-    (mesh,) = rows["rig.blend"]["meshes"]
-    assert mesh["deviation"] == pytest.approx(expected, abs=1e-5)
-    assert (mesh["frame"], mesh["before"], mesh["method"]) == (11, "Armature, linear blend", "dq")
-    assert "is not a .blend file" in rows["bad.blend"]["error"]
+    assert row["meshes"][0]["deviation"] == pytest.approx(expected, abs=1e-5)
+    folder = tmp_path / "out" / "report-pictures"
+    before, after = (
+        np.asarray(Image.open(folder / row["pictures"][name]).convert("RGBA"), dtype=np.float64)
+        for name in ("before", "after")
+    )
+    assert before[..., 3].std() > 20, "an empty picture"
+    # Rendered at twice the size that the page shows, without smoothing.
+    assert max(before.shape[:2]) == 720
+    assert len(np.unique(before[..., 3])) <= 5
+    assert 0.5 < np.abs(before - after).mean() < 100
+
+    page = unescape((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    images = re.findall(r'<img[^>]* src="([^"]*)"', page)
+    assert [(tmp_path / "out" / unquote(image)).exists() for image in images] == [True, True]
+    assert "max-width: 360px; max-height: 360px" in page
+    assert "is not a .blend file" in page
+    assert "Armature, linear blend → dq" in page
 
 
 @pytest.mark.slow
@@ -194,7 +214,7 @@ def test_a_file_does_not_depend_on_those_before_it(tmp_path):
     folder = tmp_path / "in"
     shutil.copytree(Path(__file__).resolve().parents[2] / "blend_files", folder)
     make_rig(folder / "z.blend")
-    run_sinew("reskin", folder, "--method", "qv", "--out", tmp_path / "all", "--jobs", 1)
+    run_sinew("reskin", folder, "--method", "qv", "--out", tmp_path / "all", "--jobs", 1, "--no-pictures")
     run_sinew("reskin", folder / "z.blend", "--method", "qv", "--out", tmp_path / "alone", *FAST)
     both = []
     for path in (tmp_path / "all" / "z.blend", tmp_path / "alone" / "z.blend"):
@@ -280,7 +300,7 @@ def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
         "target": str(tmp_path / "out.blend"),
         "unfinished": str(tmp_path / "u.blend"),
     }
-    task = {"command": "reskin", "settings": settings, "frames": "auto", **paths}
+    task = {"command": "reskin", "settings": settings, "frames": "auto", "pictures": None, **paths}
     counts = []
     for threads in (0, 1):
         blender = BlenderProcess(Limits(threads=threads))
@@ -413,7 +433,7 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
     before = contents(folder)
     out = tmp_path / "local"
     lock_folder(out / "locked")
-    result = run_sinew("reskin", folder, "--method", "dq", "--out", out, status=1)
+    result = run_sinew("reskin", folder, "--method", "dq", "--out", out, "--no-pictures", status=1)
     assert contents(folder) == before
     rows = report_of(out)
     assert len(rows) == len(good) + len(broken) == 200

@@ -105,7 +105,7 @@ def rig(tmp_path):
 
 def arguments(rig: Path, out: Path, scheduler: str) -> tuple:
     return (
-        *("reskin", rig, "--method", "dq", "--frames", "none"),
+        *("reskin", rig, "--method", "dq", "--frames", "none", "--no-pictures"),
         *("--out", out, "--scheduler", scheduler),
     )
 

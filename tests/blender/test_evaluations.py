@@ -182,6 +182,7 @@ def task(path: Path) -> dict:
         "unfinished": str(path.with_name("unfinished.blend")),
         "settings": Settings(method="dq").as_task(),
         "frames": "none",
+        "pictures": None,
     }
 
 

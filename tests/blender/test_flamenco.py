@@ -166,7 +166,7 @@ def test_two_files_are_checked_and_reskinned(two_files, tmp_path):
     listed = files_of(job_type(), two_files)
     assert listed.splitlines() == ["hero [1].blend", "shots/hero [1].blend"]
     job = {"folder": str(two_files), "files": listed, "out": str(tmp_path / "copies"), "program": "package"}
-    tasks = compile_job(**job, method="qv", options="--frames none")["tasks"]
+    tasks = compile_job(**job, method="qv", options="--no-pictures --frames none")["tasks"]
     # A worker's Blender without the extension does not know its command.
     variables = {"{sinew}": COMMAND, "{blender}": ["false"]}
     before = {path: path.read_bytes() for path in two_files.rglob("*.blend")}

@@ -33,7 +33,7 @@ def test_names_are_no_html(tmp_path):
     file = tmp_path / "a'\"&<b>.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     run_sinew("compare", file, "--frames", "1,6", "--pictures", "0", "--out", tmp_path / "pages")
-    run_sinew("reskin", file, "--method", "dq", "--out", tmp_path / "out")
+    run_sinew("reskin", file, "--method", "dq", "--no-pictures", "--out", tmp_path / "out")
     for page in ((tmp_path / "pages").glob("*.html"), (tmp_path / "out").glob("*.html")):
         (text,) = [path.read_text(encoding="utf-8") for path in page]
         assert "script&gt;" in text
@@ -118,7 +118,7 @@ def test_names_that_are_no_text(arm_file, tmp_path):
     ):
         run_sinew(*command)
     process = start_sinew(
-        *("reskin", "-", "--method", "dq", "--out", tmp_path / "out"),
+        *("reskin", "-", "--method", "dq", "--no-pictures", "--out", tmp_path / "out"),
         stdin=subprocess.PIPE,
         env_more={"LC_ALL": "C.UTF-8", "PYTHONIOENCODING": "utf-8:strict"},
     )
@@ -155,7 +155,7 @@ def test_golden_settings_from_anybody(wrong, arm_file, tmp_path):
 def test_a_journal_with_half_of_what_a_result_has(arm_file, tmp_path):
     """Such a file is processed again."""
     out = tmp_path / "out"
-    command = ("reskin", arm_file, "--method", "dq", "--frames", "none", "--out", out)
+    command = ("reskin", arm_file, "--method", "dq", "--frames", "none", "--no-pictures", "--out", out)
     run_sinew(*command)
     journal = out / "sinew-journal.jsonl"
     for harm in ({"meshes": [{}]}, {"versions": {}}, {"left_out": "a"}):
@@ -172,7 +172,7 @@ def test_links_in_a_folder_from_elsewhere_are_not_followed(arm_file, tmp_path):
     before = precious.read_bytes()
     out.mkdir()
     (out / "sinew-journal.jsonl").symlink_to(precious)
-    reskin = ("reskin", arm_file, "--method", "dq", "--frames", "none", "--out", out)
+    reskin = ("reskin", arm_file, "--method", "dq", "--frames", "none", "--no-pictures", "--out", out)
     assert "is no journal but a link" in run_sinew(*reskin, status=1).stderr
     (out / "sinew-journal.jsonl").unlink()
     for name in (".report.unfinished.html", ".report.unfinished.json", ".points.unfinished.npz",

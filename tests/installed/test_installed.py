@@ -109,7 +109,7 @@ def test_reskin_by_this_machine():
 
 def test_reskin_by_a_dask_worker():
     with cluster() as address:
-        sinew("reskin", RIG, "--method", "dq", "--frames", "24", "--scheduler", address,
+        sinew("reskin", RIG, "--method", "dq", "--frames", "24", "--no-pictures", "--scheduler", address,
               "--out", HERE / "by-dask")  # fmt: skip
     assert (HERE / "by-dask" / "wrist.blend").exists()
 

@@ -28,5 +28,6 @@ def test_the_wheel_has_every_module(tmp_path):
         "manual.html",
         "translations/de.po",
         "core/templates/page.html",
+        "core/templates/report.html",
     }
     assert inside == {f"sinew_addon/{name}" for name in files}

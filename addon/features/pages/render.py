@@ -7,8 +7,6 @@ afterwards.
 """
 
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -19,6 +17,7 @@ from mathutils import Matrix
 
 from ...core.errors import SinewError
 from ...core.heat import linear
+from ...core.opengl import default_engine
 from ...core.output import write_whole
 from ...core.scratch import scratch_folder
 from ...core.views import View, camera_axes
@@ -29,12 +28,6 @@ CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
 PNG_END = b"IEND\xaeB`\x82"
 
-# Whether Blender can draw here is tried in a new process, as it aborts without OpenGL.
-_PROBE = (
-    "import bpy; s = bpy.context.scene; s.render.engine = 'BLENDER_WORKBENCH'; "
-    "s.render.resolution_x = s.render.resolution_y = 8; bpy.ops.render.render()"
-)
-
 
 def chosen_engine(wanted: str) -> str:
     """Returns the engine, "workbench" or "cycles", for a name or "auto".
@@ -43,25 +36,10 @@ def chosen_engine(wanted: str) -> str:
     """
     if wanted == "cycles":
         return wanted
-    engine = "workbench" if has_opengl() else "cycles"
+    engine = default_engine(bpy.app.binary_path)
     if wanted not in ("auto", engine):
         raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
     return engine
-
-
-def has_opengl() -> bool:
-    """Whether Workbench can render here; takes as long as starting Blender."""
-    if bpy.app.binary_path:
-        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-expr", _PROBE]
-    else:
-        command = [sys.executable, "-c", _PROBE]
-    try:
-        probe = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-    return probe.returncode == 0
 
 
 class Studio:
@@ -73,11 +51,14 @@ class Studio:
         meshes: list[bpy.types.Object],
         engine: str,
         size: int,
+        halved: bool = False,
     ) -> None:
         """Sets the scene up.
 
         engine  "workbench" or "cycles"
         size    pixels of a picture's longer side
+        halved  pictures are displayed at half their size, which smooths edges: so fewer samples per pixel are
+                enough
         """
         self.scene, self.engine, self._size = scene, engine, size
         for obj in scene.objects:
@@ -89,9 +70,12 @@ class Studio:
         scene.camera = bpy.data.objects.new("Sinew Camera", bpy.data.cameras.new("Sinew Camera"))
         scene.collection.objects.link(scene.camera)
         if engine == "workbench":
-            _prepare_workbench(scene)
+            _prepare_workbench(scene, halved)
         else:
-            self._clay, self._heat = _prepare_cycles(scene)
+            self._clay, self._heat = _prepare_cycles(scene, halved)
+        if halved:
+            # Dither makes a file larger by half.
+            scene.render.dither_intensity = 0.0
         self._show_clay()
 
     def painted(
@@ -232,23 +216,24 @@ def _prepare_png(scene: bpy.types.Scene) -> None:
     settings.color_depth = "8"
 
 
-def _prepare_workbench(scene: bpy.types.Scene) -> None:
+def _prepare_workbench(scene: bpy.types.Scene, halved: bool) -> None:
     scene.render.engine = "BLENDER_WORKBENCH"
-    scene.display.render_aa = "8"
+    scene.display.render_aa = "OFF" if halved else "8"
     shading = scene.display.shading
     shading.type = "SOLID"
     shading.light = "STUDIO"
     shading.single_color = CLAY
-    shading.cavity_type = "BOTH"
+    # World-space cavity is grainy with a single sample.
+    shading.cavity_type = "SCREEN" if halved else "BOTH"
     shading.show_shadows = shading.show_xray = shading.show_object_outline = False
     shading.show_backface_culling = False
 
 
-def _prepare_cycles(scene: bpy.types.Scene) -> tuple[bpy.types.Material, bpy.types.Material]:
+def _prepare_cycles(scene: bpy.types.Scene, halved: bool) -> tuple[bpy.types.Material, bpy.types.Material]:
     """Sets up lights and sampling; returns materials for clay and for heat."""
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
-    scene.cycles.samples = 16
+    scene.cycles.samples = 4 if halved else 16
     scene.cycles.use_denoising = False
     scene.world = bpy.data.worlds.new("Sinew World")
     scene.world.color = (0.25, 0.26, 0.28)

@@ -5,6 +5,7 @@ outcome."""
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import bpy
@@ -16,10 +17,14 @@ from ...core import parameters
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
 from ...core.names import fits
+from ...core.views import seen_extent, whole_view
 from ...deform import characters, lifecycle, session
 from ...features.compare import comparison
+from ...features.pages import render
 from ...io import files
 
+# Twice the size in the report.
+PICTURE_SIZE = 720
 # The number of frames that are compared if none are given.
 SAMPLES = 9
 
@@ -43,7 +48,8 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
     """Saves a copy in which Sinew deforms the meshes selected by the settings, then compares both files.
 
     task  "source", "target" and "unfinished" (where to save): paths; "settings" as from
-          jobs.job_file.Settings; "frames" to compare at ("auto", "none", or as typed)
+          jobs.job_file.Settings; "frames" to compare at ("auto", "none", or as typed); "pictures": the
+          beginning of two pictures' paths, or None; "engine" to draw them, found out where it is missing
 
     Raises SinewError, and saves nothing, where Sinew can deform no mesh.
     """
@@ -217,8 +223,8 @@ def _dotted(version: tuple[int, ...]) -> str:
 
 
 def _compare(task: dict, skinned: list[tuple[bpy.types.Object, dict]], outcome: dict, clock: _Clock) -> None:
-    """Adds to the outcome how far each mesh is from its Armature modifier's shape at most. The open file must
-    not be used afterwards: the copy is saved by now."""
+    """Adds to the outcome how far each mesh is from its Armature modifier's shape at most, and a picture of
+    both at the worst frame. The open file must not be used afterwards: the copy is saved by now."""
     scene = bpy.context.scene
     shown = [(obj, mesh) for obj, mesh in skinned if obj in scene.objects[:]]
     if not shown:
@@ -232,21 +238,31 @@ def _compare(task: dict, skinned: list[tuple[bpy.types.Object, dict]], outcome: 
         ours = [_points(scene, objects, frame) for frame in frames]
         characters.use_methods([(obj, characters.BLENDER) for obj in objects])
         theirs = [_points(scene, objects, frame) for frame in frames]
-        for i, (_obj, mesh) in enumerate(shown):
-            _add_deviation(mesh, frames, [p[i] for p in ours], [p[i] for p in theirs])
+        worst = max(
+            _deviation(mesh, frames, [p[i] for p in ours], [p[i] for p in theirs])
+            for i, (_obj, mesh) in enumerate(shown)
+        )[1]
+    if task["pictures"] is not None:
+        with clock.doing("drawing"):
+            engine = task.get("engine") or _engine()
+            outcome["pictures"] = _draw(scene, shown, worst, engine, Path(task["pictures"]))
 
 
-def _add_deviation(mesh: dict, frames: list[float], ours: list[np.ndarray], theirs: list[np.ndarray]) -> None:
-    """Adds to a mesh's facts how far `ours` is from `theirs` at most, given as points for each frame."""
+def _deviation(
+    mesh: dict, frames: list[float], ours: list[np.ndarray], theirs: list[np.ndarray]
+) -> tuple[float, float]:
+    """Adds to a mesh's facts how far `ours` is from `theirs` at most, given as points for each frame. Returns
+    that as a share of the mesh's diagonal, and the frame."""
     if any(a.shape != b.shape for a, b in zip(ours, theirs, strict=True)):
         mesh["warnings"].append("a modifier behind changes the number of vertices: not compared")
-        return
+        return 0.0, frames[0]
     between = [a - b for a, b in zip(ours, theirs, strict=True)]
     distances = [float(np.sqrt(np.einsum("ij,ij->i", d, d).max(initial=0.0))) for d in between]
     index = int(np.argmax(distances))
     diagonal = float(np.linalg.norm(np.ptp(theirs[index], axis=0))) if len(theirs[index]) else 0.0
     part = distances[index] / diagonal if diagonal else 0.0
     mesh.update(deviation=distances[index], deviation_part=part, frame=frames[index])
+    return part, frames[index]
 
 
 def _frames(wanted: str, scene: bpy.types.Scene) -> list[float]:
@@ -258,3 +274,30 @@ def _frames(wanted: str, scene: bpy.types.Scene) -> list[float]:
 def _points(scene: bpy.types.Scene, objects: list[bpy.types.Object], frame: float) -> list[np.ndarray]:
     characters.set_frame(scene, frame)
     return [characters.final_points(obj) for obj in objects]
+
+
+def _draw(
+    scene: bpy.types.Scene,
+    shown: list[tuple[bpy.types.Object, dict]],
+    frame: float,
+    engine: str,
+    stem: Path,
+) -> dict:
+    """Draws the meshes under their Armature modifiers, which deform now, and under Sinew."""
+    objects = [obj for obj, _mesh in shown]
+    characters.set_frame(scene, frame)
+    before = characters.world_points(objects)
+    characters.use_methods([(obj, mesh["method"]) for obj, mesh in shown])
+    view = whole_view([seen_extent(before), seen_extent(characters.world_points(objects))])
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    paths = {name: stem.with_name(f"{stem.name}-{name}.png") for name in ("after", "before")}
+    studio = render.Studio(scene, objects, engine, PICTURE_SIZE, halved=True)
+    studio.picture(view, paths["after"])
+    characters.use_methods([(obj, characters.BLENDER) for obj in objects])
+    studio.picture(view, paths["before"])
+    return {"frame": frame, **{name: path.name for name, path in paths.items()}}
+
+
+@cache
+def _engine() -> str:
+    return render.chosen_engine("auto")
