@@ -85,6 +85,22 @@ def draw_sheet(target: Path) -> None:
     sheet(*SHEETS[target.name]).save(target)
 
 
+def draw_elbows(_target: Path) -> None:
+    """One elbow under each method, for the list of methods."""
+    folder, methods = REPOSITORY / "addon/ui/pictures", [method.name for method in library.methods()]
+    with tempfile.TemporaryDirectory() as place:
+        sinew(
+            *("compare", find("elbow.blend"), "--methods", ",".join(methods), "--frames", "24"),
+            *("--size", "256", "--pictures", "1", "--out", place),
+        )
+        for method in methods:
+            picture = Image.open(Path(place, f"elbow/pictures/{method}-24.png")).convert("RGBA")
+            cut = picture.crop(
+                (picture.width - 140, picture.height - 130, picture.width - 10, picture.height)
+            )
+            cut.resize((96, 96), Image.Resampling.LANCZOS).save(folder / f"{method}.png", optimize=True)
+
+
 def photograph(page: Path, target: Path, width: int, height: int) -> None:
     """The top of a page, of so many pixels."""
     with tempfile.TemporaryDirectory() as profile:
@@ -141,6 +157,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "batch-report.png": photograph_report,
     "page.png": photograph_page,
     "heat.png": photograph_heat_map,
+    "elbows": draw_elbows,
 }
 
 

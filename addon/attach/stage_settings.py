@@ -17,6 +17,12 @@ STAGES = {stage.name: stage for stage in sinew.stages()}
 _SWITCHES = {stage.name: stage.parameters[0].id for stage in STAGES.values()}
 # Methods that have parameters.
 METHODS = {method.name: method for method in sinew.methods() if method.parameters}
+# What the library's list leaves open: of a choice, its label and its tooltip.
+_CHOICES = {
+    "0": ("Nearest Rotation", "Variant 0 of the paper: the rotation that fits the neighbourhood best"),
+    "2": ("Blended Quaternion", "Variant 2 of the paper: the blended quaternion, faster"),
+    "4": ("Smoothed Weights", "Variant 4 of the paper: the blended quaternion of smoothed weights, fastest"),
+}
 # Choice of a parameter that names a method: the stage is off.
 OFF = "OFF"
 # On a library override, Blender saves only properties with this flag.
@@ -95,7 +101,8 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
         return bpy.props.EnumProperty(items=choices, default=OFF, **facts)
     if parameter.kind == "enum":
         items = [
-            (choice, choice.replace("_", " ").title(), parameter.description) for choice in parameter.choices
+            (name, *_CHOICES.get(name, (name.replace("_", " ").title(), parameter.description)))
+            for name in parameter.choices
         ]
         return bpy.props.EnumProperty(items=items, default=parameter.default, **facts)
     if parameter.kind == "vertex_group":

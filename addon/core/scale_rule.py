@@ -21,14 +21,14 @@ class ScaleRule:
 BLENDER_4 = ScaleRule(
     1,
     "4.0",
-    "Bone by Bone (Blender 4 and 5)",
+    "Bone by Bone",
     "Each bone scales the vertex about itself before its motion is blended: Blender's rule since 4.0",
 )
 # The scales are blended as matrices; the vertex is scaled once, then moved by the blended motion.
 BLENDER_3 = ScaleRule(
     2,
     "3.x",
-    "Blended First (Blender 3)",
+    "Blended First",
     "The bones' scales are blended first, then their motions: Blender's rule up to 3.6",
 )
 IGNORED = ScaleRule(

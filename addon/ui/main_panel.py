@@ -9,6 +9,7 @@ from ..attach import attach, other_tools, properties, stage_settings
 from ..deform import session
 from ..deform.plan import State
 from . import character, operators, precomputing, state_text, stepped
+from .menus import SINEW_PT_methods
 from .presets import SINEW_PT_method_presets
 from .settings_layout import draw_method, draw_parameters, draw_stages
 from .sidebar import Sidebar, characters, draw_text, names_text, shortened
@@ -106,7 +107,7 @@ def _draw_character(
     settings = properties.of(lead) if len(meshes) == 1 else shared
     column = layout.column()
     column.active = shared.enabled
-    draw_method(column, settings)
+    draw_method(column, settings, SINEW_PT_methods.__name__)
     row = layout.row(align=True)
     row.prop(shared, "enabled", text=state_text.switch_text(meshes), toggle=True)
     row.operator("sinew.compare", text="Compare\u2026")

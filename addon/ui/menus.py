@@ -4,15 +4,22 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, groupby
+from pathlib import Path
 from typing import ClassVar
 
 import bpy
+import bpy.utils.previews
 import rna_keymap_ui
 
 from ..attach import properties
 from ..attach.feature import Feature
-from . import operators
+from . import character, operators
 from .stepped import OVER
+
+# One elbow under each method (docs/draw_sheets.py), and its height in lines of a menu.
+PICTURES, PICTURE_HEIGHT = Path(__file__).with_name("pictures"), 2.0
+# Holds what Blender loads of them; empty without a window.
+_pictures: list[bpy.utils.previews.ImagePreviewCollection] = []
 
 
 @dataclass(frozen=True)
@@ -41,13 +48,41 @@ class SINEW_MT_methods(bpy.types.Menu):
     bl_description = "How the bones' motions are blended, for all meshes of the character"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        has_sinew = operators.has_sinew_targets(context)
-        for group, methods in groupby(properties.METHODS.values(), lambda method: method.group):
-            layout.label(text=group)
-            for method in methods:
-                name = "sinew.use_method" if has_sinew else "sinew.add"
-                layout.operator(name, text=method.label).method = method.name
+        _draw_methods(context, self.layout)
+
+
+class SINEW_PT_methods(bpy.types.Panel):
+    """The same with pictures, which a menu would not put beside names."""
+
+    bl_label = "Method"
+    bl_description = SINEW_MT_methods.bl_description
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "WINDOW"
+    bl_options: ClassVar[set[str]] = {"INSTANCED"}
+    bl_ui_units_x = 11
+
+    def draw(self, context: bpy.types.Context) -> None:
+        row = self.layout.split(factor=0.2)
+        pictures = row.column()
+        _draw_methods(context, row.column(), pictures)
+
+
+def _draw_methods(
+    context: bpy.types.Context, names: bpy.types.UILayout, pictures: bpy.types.UILayout | None = None
+) -> None:
+    lead = character.lead(context)
+    operator = "sinew.add" if lead is None else "sinew.use_method"
+    for group, methods in groupby(properties.METHODS.values(), lambda method: method.group):
+        names.label(text=group)
+        if pictures is not None:
+            pictures.label()
+        for method in methods:
+            row = names.row()
+            if pictures is not None:
+                pictures.template_icon(_pictures[0][method.name].icon_id, scale=PICTURE_HEIGHT)
+                row.scale_y = PICTURE_HEIGHT
+            is_used = lead is not None and properties.of(lead).method == method.name
+            row.operator(operator, text=method.label, depress=is_used).method = method.name
 
 
 def _draw_entries(layout: bpy.types.UILayout, entries: Iterable[Entry]) -> None:
@@ -238,6 +273,10 @@ def draw_shortcuts(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
 
 
 def _begin() -> None:
+    if not bpy.app.background:
+        _pictures.append(bpy.utils.previews.new())
+        for picture in PICTURES.glob("*.png"):
+            _pictures[0].load(picture.stem, str(picture), "IMAGE")
     addons = bpy.context.window_manager.keyconfigs.addon
     if addons is None:
         # In background mode.
@@ -251,11 +290,16 @@ def _begin() -> None:
 
 
 def _end() -> None:
+    while _pictures:
+        bpy.utils.previews.remove(_pictures.pop())
     while _shortcuts:
         keymap, item = _shortcuts.pop()
         keymap.keymap_items.remove(item)
 
 
 FEATURE = Feature(
-    (SINEW_MT_methods, *SUBMENUS, SINEW_MT_menu, SINEW_MT_pie), menus=MENUS, begin=_begin, end=_end
+    (SINEW_MT_methods, SINEW_PT_methods, *SUBMENUS, SINEW_MT_menu, SINEW_MT_pie),
+    menus=MENUS,
+    begin=_begin,
+    end=_end,
 )

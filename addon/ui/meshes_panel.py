@@ -6,7 +6,7 @@ import bpy
 from ..attach import properties
 from ..deform import session
 from . import character, operators, state_text
-from .settings_layout import draw_method, draw_parameters, draw_stages
+from .settings_layout import draw_method, draw_parameters, draw_stages, named
 from .sidebar import Sidebar, characters, draw_text, shortened
 from .translations import tr
 
@@ -117,9 +117,7 @@ def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
             rows.append(("Last frame", f"{state.shown.milliseconds:.2f} ms"))
     column = layout.column(align=True)
     for name, value in rows:
-        split = column.split(factor=0.4)
-        split.label(text=name)
-        split.label(text=shortened(value), translate=False)
+        named(column, name).label(text=shortened(value), translate=False)
 
 
 CLASSES = (SINEW_UL_meshes, SINEW_PT_meshes)

@@ -14,10 +14,23 @@ from .translations import tr
 MOST_LEFT_OUT = 4
 
 
-def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    row = layout.split(factor=0.25)
-    row.label(text="Method")
-    row.prop(settings, "method", text="")
+def named(layout: bpy.types.UILayout, name: str, factor: float = 0.4) -> bpy.types.UILayout:
+    """Draws a name, and returns the rest of its row.
+
+    factor  the name's share of the width; Blender's own leaves less for it
+    """
+    row = layout.split(factor=factor)
+    row.label(text=name)
+    return row.row(align=True)
+
+
+def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, popover: str = "") -> None:
+    """Without a popover, which chooses for the character, this property's own list is shown."""
+    row = named(layout, "Method", factor=0.25)
+    if popover:
+        row.prop_with_popover(settings, "method", panel=popover, text="")
+    else:
+        row.prop(settings, "method", text="")
 
 
 def draw_parameters(
@@ -29,7 +42,7 @@ def draw_parameters(
     """
     for name in bound.methods_of(obj):
         for parameter in properties.METHODS[name].parameters:
-            layout.prop(getattr(settings, name), parameter.id)
+            _draw_parameter(layout, getattr(settings, name), parameter, obj)
 
 
 def draw_stages(
@@ -50,9 +63,9 @@ def draw_stages(
             if stage.name == "twist_spread" and settings.twist_spread.enabled:
                 _draw_twists(layout, context, obj)
     _draw_take_over(layout, context, obj, only)
-    layout.prop(settings, "scale_rule")
+    named(layout, "Scale").prop(settings, "scale_rule", text="")
     if normals.ARE_SUPPORTED:
-        layout.prop(settings, "normals")
+        named(layout, "Normals").prop(settings, "normals", text="")
     if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
         layout.prop(settings, "leave_small")
 
@@ -65,10 +78,10 @@ def _draw_mix(
     only: str,
 ) -> None:
     mix = settings.mix
-    layout.prop(mix, "method", text="Mix")
+    named(layout, "Mix").prop(mix, "method", text="")
     if mix.method == properties.OFF:
         return
-    layout.prop_search(mix, "group", obj, "vertex_groups", text="By")
+    named(layout, "By").prop_search(mix, "group", obj, "vertex_groups", text="")
     if not mix.group:
         draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
     _draw_make_group(layout, settings, obj, "mix", only)
@@ -105,11 +118,23 @@ def _draw_stage(
         return
     column = layout.column(align=True)
     for parameter in others:
+        _draw_parameter(column, group, parameter, obj)
         if parameter.kind == "vertex_group":
-            column.prop_search(group, parameter.id, obj, "vertex_groups")
             _draw_make_group(column, settings, obj, stage.name, only)
-        else:
-            column.prop(group, parameter.id)
+
+
+def _draw_parameter(
+    layout: bpy.types.UILayout,
+    group: bpy.types.PropertyGroup,
+    parameter: sinew.Parameter,
+    obj: bpy.types.Object,
+) -> None:
+    if parameter.kind == "vertex_group":
+        named(layout, parameter.label).prop_search(group, parameter.id, obj, "vertex_groups", text="")
+    elif parameter.kind == "enum":
+        named(layout, parameter.label).prop(group, parameter.id, text="")
+    else:
+        layout.prop(group, parameter.id)
 
 
 def _draw_twists(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
@@ -119,13 +144,18 @@ def _draw_twists(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bp
         return
     twists = state.bound.first_deformer.bones.twists
     column = layout.column(align=True)
+    if twists.bones:
+        row = column.split(factor=0.45, align=True)
+        for text in ("", "Amount", "Curve"):
+            row.label(text=text)
     for name, tip in zip(twists.bones, twists.tips, strict=True):
         bone = armature.pose.bones.get(name)
         if bone is None:
             continue
-        row = column.row(align=True)
+        row = column.split(factor=0.45, align=True)
         icon = "BACK" if name == tip else "FORWARD"
         row.label(text=name, icon=icon, translate=False)
+        row = row.row(align=True)
         row.prop(bone, "sinew_twist_amount", text="")
         row.prop(bone, "sinew_twist_curve", text="")
     if not twists.bones:

@@ -65,6 +65,9 @@ class SinewComparison(bpy.types.PropertyGroup):
         update=_changed,
     )
     shows_second: bpy.props.BoolProperty(options={"HIDDEN"}, update=_changed)
+    # Of the 3D view: its location and distance before it was moved to show all, and then.
+    view_before: bpy.props.FloatVectorProperty(size=4, options={"HIDDEN"})
+    view_moved: bpy.props.FloatVectorProperty(size=4, options={"HIDDEN"})
 
 
 CLASSES = (SinewComparison,)

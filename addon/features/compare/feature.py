@@ -45,6 +45,17 @@ def _compared(context: bpy.types.Context) -> list[bpy.types.Object]:
     return comparison.originals(state) if state is not None else []
 
 
+def _shown(meshes: list[bpy.types.Object]) -> set[str]:
+    """The method that all of them show, if it is one."""
+    methods = {
+        properties.of(obj).method
+        if properties.has_sinew(obj) and properties.of(obj).enabled
+        else characters.BLENDER
+        for obj in attach.deformed_meshes(meshes)
+    }
+    return methods if len(methods) == 1 else set()
+
+
 class SinewComparisonChoice(bpy.types.PropertyGroup):
     """A method in the dialog, called `name`."""
 
@@ -96,6 +107,9 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
         state = comparison_state.of_scene(context.scene)
         if state is not None and comparison_state.methods_of(state):
             self.methods = set(comparison_state.methods_of(state))
+        else:
+            # Its copy would be the original once more.
+            self.methods -= _shown(character(context))
         self.choices.clear()
         for name, _label, _description in METHOD_ITEMS:
             choice = self.choices.add()
@@ -117,6 +131,7 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
             raise SinewError("Choose at least one method to compare")
         if not meshes:
             raise SinewError("The armature deforms no mesh that is visible; show one first")
+        framing.give_back(context)
         problems = comparison.start(context, meshes, methods, _right_of_view(context))
         viewport = _viewport(context)
         if viewport is not None and viewport.local_view is not None:
@@ -173,6 +188,7 @@ class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
         return "" if comparison.is_on() else "There is no comparison"
 
     def run(self, context: bpy.types.Context) -> set[str]:
+        framing.give_back(context)
         comparison.end(context)
         return {"FINISHED"}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brings a character and its copies into a 3D view that does not show all of them."""
+"""Brings a character and its copies into a 3D view that does not show all, and gives the view back."""
 
 from collections.abc import Sequence
 
@@ -35,6 +35,31 @@ def show_all(
     region = next(region for region in area.regions if region.type == "WINDOW")
     if _are_visible(area, region, view, points):
         return
+    state.view_before = _place(view)
+    _fit(area, region, view, points)
+    state.view_moved = _place(view)
+
+
+def give_back(context: bpy.types.Context) -> None:
+    """Before a comparison ends: views that are still where show_all() moved one are where it was before."""
+    state = comparison_state.of_scene(context.scene)
+    moved = None if state is None else tuple(state.view_moved)
+    if not moved or not moved[3]:
+        return
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            view = area.spaces.active.region_3d if area.type == "VIEW_3D" else None
+            if view is not None and np.allclose(_place(view), moved, rtol=1e-5):
+                view.view_location, view.view_distance = state.view_before[:3], state.view_before[3]
+
+
+def _place(view: bpy.types.RegionView3D) -> tuple[float, ...]:
+    return (*view.view_location, view.view_distance)
+
+
+def _fit(
+    area: bpy.types.Area, region: bpy.types.Region, view: bpy.types.RegionView3D, points: np.ndarray
+) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     view.view_location = Vector(0.5 * (low + high))
     view.view_distance = max(0.5 * float(np.linalg.norm(high - low)), 1e-3)
