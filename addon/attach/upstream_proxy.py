@@ -170,13 +170,25 @@ def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
 
 
 def is_current(obj: bpy.types.Object) -> bool:
-    """Whether the proxy's mesh, if it has one, is the object's, and its vertex groups have the same names."""
+    """Whether the proxy's mesh, if it has one, is like the object's, has vertex groups of the same names, and
+    follows the same shape keys."""
     proxy = properties.of(obj).storage.upstream_proxy
     if proxy is None or proxy.data == obj.data:
         return True
     # Blender renames groups along with bones only where an Armature modifier has these.
     has_same_groups = proxy.vertex_groups.keys() == obj.vertex_groups.keys()
-    return has_same_groups and mesh_compare.are_alike(obj.data, proxy.data)
+    return has_same_groups and _follows_keys(obj, proxy) and mesh_compare.are_alike(obj.data, proxy.data)
+
+
+def _follows_keys(obj: bpy.types.Object, proxy: bpy.types.Object) -> bool:
+    """Whether the shape keys of the proxy's mesh, if it has any, follow those of the object's mesh, which may
+    be another one by now."""
+    keys = proxy.data.shape_keys
+    animation = None if keys is None else keys.animation_data
+    drivers = () if animation is None else animation.drivers
+    targets = (driven.driver.variables[0].targets[0].id for driven in drivers)
+    # All have the same target.
+    return next(targets, obj.data.shape_keys) == obj.data.shape_keys
 
 
 def follow_points(obj: bpy.types.Object) -> None:

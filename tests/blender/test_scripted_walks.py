@@ -178,6 +178,8 @@ CASES = {
     "its mesh changes": "add_shape_key Arm; key_shape_key Arm 1 11; add_modifier Arm SOLIDIFY; add Arm; "
     "frame 6; move_vertices Arm; shape_key_points Arm; weights Arm lower; shape_key_value Arm 0.7 0.9; "
     "shape_key_value Arm 0.7 0.1; edit_mesh Arm delete 0.3; frame 11",
+    "another mesh with shape keys": "add_shape_key Arm; add_modifier Arm SUBSURF; add Arm; frame 6; "
+    "replace_mesh Arm; shape_key_value Arm 0.9 0.9; swap_mesh Arm; shape_key_value Arm 0.9 0.9; frame 8",
     "a keyed shape key deleted": "add_shape_key Arm; key_shape_key Arm 1 11; add_shape_key Arm; "
     "add_modifier Arm SUBSURF; add Arm; frame 6; delete_shape_key Arm 0.9 'key 1'; frame 7",
     "its mesh without shape keys changes": "add_modifier Arm MASK lower; add Arm; frame 6; "
