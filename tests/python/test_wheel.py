@@ -8,6 +8,8 @@ import sys
 import zipfile
 from pathlib import Path
 
+import sinew
+
 ADDON = Path(__file__).resolve().parents[2] / "addon"
 
 
@@ -29,5 +31,6 @@ def test_the_wheel_has_every_module(tmp_path):
         "translations/de.po",
         "core/templates/page.html",
         "core/templates/report.html",
+        *(f"ui/pictures/{method.name}.png" for method in sinew.methods()),
     }
     assert inside == {f"sinew_addon/{name}" for name in files}
