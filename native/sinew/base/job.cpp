@@ -39,12 +39,18 @@ void give_way() noexcept {
 #endif
 }
 
-/// Sleeps for as long as a chunk took, where frames are deformed meanwhile: a thread of low priority still delays
-/// those that Blender wakes many times a frame, and takes their share of memory and caches.
-void make_room(std::chrono::steady_clock::duration taken) {
-    constexpr std::chrono::milliseconds kLongest{50};
+/// Since when this thread works without a rest.
+thread_local std::chrono::steady_clock::time_point works_since;
+
+/// Sleeps for as long as this thread has worked, where frames are deformed meanwhile: a thread of low priority still
+/// delays those that Blender wakes many times a frame, and takes their share of memory and caches.
+void make_room() {
+    constexpr std::chrono::milliseconds kShortest{1}, kLongest{50};
+    const auto worked = std::chrono::steady_clock::now() - works_since;
+    if (worked < kShortest) return;
     if (is_in_use())
-        std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(taken, kLongest));
+        std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(worked, kLongest));
+    works_since = std::chrono::steady_clock::now();
 }
 
 /// Starts a thread. Returns false if the system refuses.
@@ -53,6 +59,7 @@ bool start(std::thread& thread, bool gives_way, const Run& run) {
     try {
         thread = std::thread([gives_way, run] {
             if (gives_way) give_way();
+            works_since = std::chrono::steady_clock::now();
             run();
         });
     } catch (const std::system_error&) {
@@ -70,6 +77,7 @@ bool Job::go_on(double done) noexcept {
     double before = progress();
     while (before < done && !done_.compare_exchange_weak(before, done, std::memory_order_relaxed)) {
     }
+    if (gives_way_) make_room();
     return !is_cancelled_.load(std::memory_order_relaxed);
 }
 
@@ -83,9 +91,8 @@ void Job::for_each(std::size_t count, std::size_t chunk,
             while (!is_cancelled_.load(std::memory_order_relaxed)) {
                 const std::size_t begin = next.fetch_add(chunk, std::memory_order_relaxed);
                 if (begin >= count) return;
-                const auto began = std::chrono::steady_clock::now();
                 work(begin, std::min(begin + chunk, count));
-                if (gives_way_) make_room(std::chrono::steady_clock::now() - began);
+                if (gives_way_) make_room();
             }
         } catch (...) {
             next.store(count, std::memory_order_relaxed);

@@ -30,7 +30,7 @@ public:
 
     // For the work, on any of its threads.
 
-    /// Reports the completed share. Returns false once the job was cancelled.
+    /// Reports the completed share, and rests where the job gives way. Returns false once the job was cancelled.
     bool go_on(double done) noexcept;
     /// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), and returns when all are
     /// done, or when the job was cancelled. The first exception is rethrown; some chunks may then have been skipped.
