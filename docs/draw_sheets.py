@@ -86,7 +86,7 @@ def draw_sheet(target: Path) -> None:
 
 
 def draw_elbows(_target: Path) -> None:
-    """One elbow under each method, for the list of methods."""
+    """One elbow under each method, for the tab's list: always written to the extension."""
     folder, methods = REPOSITORY / "addon/ui/pictures", [method.name for method in library.methods()]
     with tempfile.TemporaryDirectory() as place:
         sinew(
@@ -168,7 +168,7 @@ def main() -> None:
     options = parser.parse_args()
     for name in options.only or PICTURES:
         PICTURES[name](options.out.resolve() / name)
-        print(options.out / name, flush=True)
+        print(name, flush=True)
 
 
 if __name__ == "__main__":

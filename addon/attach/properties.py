@@ -89,7 +89,7 @@ def _requested(listener: str) -> Callable[[bpy.types.bpy_struct], float]:
     return get
 
 
-# On a library override, Blender saves only properties with this flag.
+# A list of an override that gets items of its own.
 _INSERTABLE = {"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
 SAME_METHOD = "SAME"
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core import interrupt
 from ..core.bake import EXPORTS, KINDS
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
 from ..jobs.inputs import Job, plan_jobs
@@ -98,6 +98,8 @@ class Baked(Outcome):
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
+    if args.set and args.method is None:
+        raise WrongUse("--set goes with --method; without it meshes are baked as the file has them")
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
     suffix = EXPORTS.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]

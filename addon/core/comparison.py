@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The results of a comparison of methods: measures of each frame, worst frames, diagnostics; as CSV and
-JSON."""
+"""The results of a comparison of methods: measures of each frame, worst frames, diagnostics; as JSON."""
 
 import json
 import math

@@ -236,6 +236,7 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["points", path, "--method", "dq", "--frames", "9-3", "--out", out], "backwards"),
         (["points", path, "--method", "dq", "--frames", "one", "--out", out], "expected frames"),
         (["points", path, *one, "--object", "Leg", "--out", out], "no mesh called 'Leg'"),
+        (["bake", path, "--to", "mdd", "--set", "mix=dq", "--out", out], "--set goes with --method"),
         (["compare", path, "--methods", "lbs,x", "--out", tmp_path], "expected one of"),
         (["compare", path, "--frames", "9-3", "--out", tmp_path], "backwards"),
         (["compare", path, "--frames", "1,nan", "--out", tmp_path], "expected -1048574 to 1048574"),

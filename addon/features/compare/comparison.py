@@ -123,6 +123,11 @@ def is_on() -> bool:
     return any(comparison_state.of_scene(scene) is not None for scene in scenes)
 
 
+def method_shown(obj: bpy.types.Object) -> str:
+    """Returns that of the shape that an object shows, one of characters.method_names()."""
+    return properties.of(obj).method if session.plan_of(obj).is_read else characters.BLENDER
+
+
 def originals(state: comparison_state.SinewComparison) -> list[bpy.types.Object]:
     """Returns the compared objects, without those that the artist has deleted."""
     found = {properties.of(copy).identity.copied: None for copy in comparison_state.copies_of(state)}

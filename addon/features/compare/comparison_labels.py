@@ -13,7 +13,6 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...attach import properties
-from ...deform import characters, session
 from ...ui.translations import tr
 from . import comparison, comparison_state
 
@@ -37,8 +36,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
     found = []
     originals = comparison.originals(state)
     if originals:
-        by_sinew = session.plan_of(originals[0]).is_read
-        method = properties.of(originals[0]).method if by_sinew else characters.BLENDER
+        method = comparison.method_shown(originals[0])
         text = tr("Original: {method}", method=tr(properties.method_label(method)))
         found.append((text, (1.0, 1.0, 1.0), originals))
     for method in comparison_state.shown_methods(state):

@@ -45,17 +45,6 @@ def _compared(context: bpy.types.Context) -> list[bpy.types.Object]:
     return comparison.originals(state) if state is not None else []
 
 
-def _shown(meshes: list[bpy.types.Object]) -> set[str]:
-    """The method that all of them show, if it is one."""
-    methods = {
-        properties.of(obj).method
-        if properties.has_sinew(obj) and properties.of(obj).enabled
-        else characters.BLENDER
-        for obj in attach.deformed_meshes(meshes)
-    }
-    return methods if len(methods) == 1 else set()
-
-
 class SinewComparisonChoice(bpy.types.PropertyGroup):
     """A method in the dialog, called `name`."""
 
@@ -108,8 +97,10 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
         if state is not None and comparison_state.methods_of(state):
             self.methods = set(comparison_state.methods_of(state))
         else:
-            # Its copy would be the original once more.
-            self.methods -= _shown(character(context))
+            shown = {comparison.method_shown(obj) for obj in attach.deformed_meshes(character(context))}
+            if len(shown) == 1:
+                # Its copy would be the original once more.
+                self.methods -= shown
         self.choices.clear()
         for name, _label, _description in METHOD_ITEMS:
             choice = self.choices.add()
