@@ -13,7 +13,7 @@ import bpy
 class Subscribers:
     """Each list is called in the order of subscription.
 
-    evaluated                 Blender has evaluated a depsgraph, apart from changes of frame
+    evaluated                 Blender has evaluated a depsgraph where more changed than the frame or poses
     stepped                   an undo or redo step has ended
     loading                   another file is loaded
     loaded                    another file is there
@@ -51,5 +51,6 @@ subscribers = Subscribers()
 
 
 def notify(functions: list[Callable], *arguments: object) -> None:
-    for function in functions:
+    # A copy, as a function may remove itself.
+    for function in list(functions):
         function(*arguments)

@@ -52,7 +52,7 @@ _shared: set[int] = set()
 
 # The session_uid of proxies that were made in the event that Sinew reacts to: their meshes are current until
 # Blender lists another change.
-_just_made: set[int] = set()
+just_made: set[int] = set()
 
 # Marks a proxy's own copy of the mesh.
 _COPY = "sinew_copy"
@@ -121,19 +121,14 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
         if not shares and not mesh_compare.is_good_copy(obj.data, proxy.data, old_mesh):
             share_mesh(obj)
             return ensure(obj)
-        _just_made.add(proxy.session_uid)
+        just_made.add(proxy.session_uid)
     return storage.upstream_proxy
 
 
 def was_just_made(obj: bpy.types.Object) -> bool:
     """Whether its proxy was made in the event that Sinew reacts to."""
     proxy = properties.of(obj).storage.upstream_proxy
-    return proxy is not None and proxy.session_uid in _just_made
-
-
-def end_event() -> None:
-    """From here to the next event, others may change meshes."""
-    _just_made.clear()
+    return proxy is not None and proxy.session_uid in just_made
 
 
 def set_outdated(obj: bpy.types.Object) -> None:

@@ -23,7 +23,6 @@ from ..core.vertex_data import VertexData
 from ..io import armature_io
 from ..io.actions import animated_paths
 from . import source, survey
-from .events import Changes
 from .plan import Normals
 from .source import Source
 
@@ -180,30 +179,6 @@ def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
         or bound.options != [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
         or bound.groups != stage_settings.vertex_groups(properties.of(obj))
     )
-
-
-def have_bones_changed(
-    obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph, changes: Changes, are_unknown: bool
-) -> bool:
-    """Whether the bones of one of the armatures differ from those read. An armature in edit mode counts as
-    unchanged.
-
-    are_unknown  the changes do not say which armatures may have other bones
-    """
-    changed = False
-    for stage, replaced in zip(
-        bound.skin_stack.skin_stages, properties.of(obj).replaced_modifiers, strict=False
-    ):
-        armature, known = replaced.armature, stage.deformer.bones
-        if armature is None or armature.data.is_editmode:
-            continue
-        if are_unknown or armature.data.session_uid in changes.armatures or not known.complete:
-            # Clothes and hair have the armature of the body.
-            if armature.session_uid not in changes.bones:
-                bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-                changes.bones[armature.session_uid] = bones
-            changed |= not changes.bones[armature.session_uid].equals(known)
-    return changed
 
 
 def uid(data: bpy.types.ID | None) -> int:

@@ -170,6 +170,28 @@ class Changes:
         return _changed_meshes(depsgraph.updates, _uid_by(original))
 
     @classmethod
+    def of_poses(cls, depsgraph: bpy.types.Depsgraph, original: Find) -> Changes | None:
+        """Returns the changes where only poses changed, and perhaps bones at rest; None for any others.
+
+        For whatever else an artist changes about a mesh object, Blender also lists the mesh, the scene or an
+        action, or lists the object without a part that differs. It lists nothing more than for a pose where
+        the same update changes the object's name, or a switch of a modifier for renders (seen on 4.2, 4.5 and
+        5.2).
+        """
+        changes = cls(complete=True)
+        for update in depsgraph.updates:
+            is_object = isinstance(update.id, bpy.types.Object)
+            if not (is_object or isinstance(update.id, bpy.types.Armature)):
+                return None
+            if not (update.is_updated_geometry or update.is_updated_transform or update.is_updated_shading):
+                return None
+            found = original(update.id)
+            if found is None:
+                return None
+            (changes.touched if is_object else changes.armatures).add(found.session_uid)
+        return changes
+
+    @classmethod
     def read(
         cls,
         depsgraph: bpy.types.Depsgraph,

@@ -48,18 +48,22 @@ def _take_off_drivers_without_modifier() -> None:
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _react_to_update(depsgraph)
-    notify(subscribers.evaluated, depsgraph)
+    if not _was_only_posed(depsgraph):
+        notify(subscribers.evaluated, depsgraph)
 
 
-def _react_to_update(depsgraph: bpy.types.Depsgraph) -> None:
+def _was_only_posed(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Reacts to an update. Returns whether nothing had to be done, as it only posed what Sinew deforms."""
     with updates_suspended() as may_react:
         if current.is_idle:
-            return
-        original = events.finder("depsgraph_update_post", on_depsgraph_update)
-        waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
+            return False
+        original, waiting = events.finder("depsgraph_update_post", on_depsgraph_update), None
+        is_posed = may_react and may_change_file() and session.were_only_posed(depsgraph, original)
+        if not is_posed:
+            waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
     _end_event(depsgraph, waiting)
     _note_seen("depsgraph_update_post", depsgraph)
+    return is_posed
 
 
 @persistent
@@ -110,7 +114,7 @@ def _end_event(depsgraph: bpy.types.Depsgraph, waiting: Changes | None) -> None:
     if waiting is not None:
         _keep_evaluated_shapes(waiting)
         session.refresh_between_steps(bpy.context)
-    upstream_proxy.end_event()
+    upstream_proxy.just_made.clear()
     for _obj, state in current.pairs:
         state.evaluation.is_event_known = state.evaluation.was_tagged
     session.note_shown(depsgraph)

@@ -46,6 +46,7 @@ class Session:
     objects_seen      what _objects_now() was then
     skinned           what was read of those that are read, by session_uid
     pairs             these objects, each with what was read of it
+    armatures         the data of the armatures of those that are not switched off, by session_uid
     plans             the plans of the others, by session_uid
     told              the error that was reported last for an object, by its session_uid
     depsgraph         the address of the depsgraph last seen
@@ -63,6 +64,7 @@ class Session:
     objects_seen: tuple[int, int] = (0, 0)
     skinned: dict[int, SkinnedObject] = field(default_factory=dict)
     pairs: Pairs = field(default_factory=list)
+    armatures: set[int] = field(default_factory=set)
     plans: dict[int, Plan] = field(default_factory=dict)
     told: dict[int, str] = field(default_factory=dict)
     depsgraph: int = 0
@@ -127,6 +129,12 @@ def adopt_after_step() -> None:
 
 def _find_pairs(objects: list[bpy.types.Object]) -> None:
     current.pairs = [(obj, state) for obj in objects if (state := state_of(obj)) is not None]
+    current.armatures = {
+        armature.data.session_uid
+        for obj, state in current.pairs
+        if state.plan.is_read
+        for armature in properties.of(obj).armatures
+    }
     name_requests()
 
 
@@ -207,7 +215,7 @@ def refresh(context: bpy.types.Context) -> None:
         with contextlib.nullcontext() if waiting() else updates_suspended():
             context.view_layer.update()
         note_shown(depsgraph)
-    upstream_proxy.end_event()
+    upstream_proxy.just_made.clear()
 
 
 def note_shown(depsgraph: bpy.types.Depsgraph) -> None:
@@ -364,6 +372,32 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: events.Find) -> 
         return False
     notify(subscribers.frame_shown)
     return True
+
+
+def were_only_posed(depsgraph: bpy.types.Depsgraph, original: events.Find) -> bool:
+    """Whether nothing but poses changed since the last evaluation, and this one gave all skinned objects
+    their points: there is nothing else to be checked."""
+    is_known = current.objects is not None and current.depsgraph == depsgraph.as_pointer()
+    if not is_known or current.is_after_step or current.missed is not None or current.expected:
+        return False
+    changes = Changes.of_poses(depsgraph, original)
+    if changes is None or not changes.armatures <= current.armatures:
+        return False
+    try:
+        if not all(_was_only_posed(obj, depsgraph, changes) for obj in current.objects or ()):
+            return False
+    except ReferenceError:
+        # The object was deleted since the list was made.
+        return False
+    notify(subscribers.frame_shown)
+    return True
+
+
+def _was_only_posed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> bool:
+    state = state_of(obj)
+    if not plan_of(obj).is_read:
+        return True
+    return state is not None and state.was_only_posed(obj, depsgraph, changes)
 
 
 def _was_deformed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, meshes: set[int] | None) -> bool:

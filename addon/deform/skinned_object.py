@@ -14,7 +14,7 @@ from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
 from ..core.skin_stack import NO_STAGES, SkinStageFrame
 from ..core.stages import StageValues
-from ..io import mesh_io
+from ..io import armature_io, mesh_io
 from ..io.actions import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
@@ -91,6 +91,7 @@ class Noted:
     mesh_users           the number of users of the mesh; with several, another could read while Sinew writes
     visibility_keyed     for each Armature modifier, whether an animation switches it on and off
     state                what the artist can change about the object itself, from state_of()
+    switches             a part of the state, from switches_of()
     groups               the names of its vertex groups
     loses_marks          as from undeformed.loses_marks()
     dependencies         the session_uid of everything that the shape depends on
@@ -106,6 +107,7 @@ class Noted:
     mesh_users: int
     visibility_keyed: list[bool]
     state: list
+    switches: list
     groups: list[str]
     loses_marks: bool
     dependencies: set[int]
@@ -125,6 +127,7 @@ class Noted:
             mesh_users=mesh.users,
             visibility_keyed=[is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)],
             state=state_of(obj),
+            switches=switches_of(obj),
             groups=obj.vertex_groups.keys(),
             loses_marks=undeformed.loses_marks(obj),
             dependencies=own | set(bound.armatures),
@@ -216,6 +219,50 @@ class SkinnedObject:
         # Where vertex groups are added, removed or renamed, Blender lists the scene as changed, too.
         return self.noted.mode == obj.mode and self.noted.state == state_of(obj)
 
+    def was_only_posed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> bool:
+        """Whether the last evaluation gave the object its shape, and nothing else has to be checked.
+
+        changes  as from Changes.of_poses()
+        """
+        if self.needs_apply or self.needs_recheck or not self.is_attached(obj):
+            return False
+        if self.noted.dependencies.isdisjoint(changes.touched):
+            return self.plan.is_in_depsgraph
+        return (
+            self.was_deformed(obj, depsgraph)
+            and self.noted.name == obj.name
+            and self.noted.switches == switches_of(obj)
+            and not self.have_bones_changed(obj, depsgraph, changes)
+        )
+
+    def have_bones_changed(
+        self,
+        obj: bpy.types.Object,
+        depsgraph: bpy.types.Depsgraph,
+        changes: Changes,
+        are_unknown: bool = False,
+    ) -> bool:
+        """Whether the bones of one of the armatures differ from those read. An armature in edit mode counts
+        as unchanged.
+
+        are_unknown  the changes do not say which armatures may have other bones
+        """
+        settings: properties.SinewSettings = obj.sinew
+        changed = False
+        for stage, replaced in zip(
+            self.bound.skin_stack.skin_stages, settings.replaced_modifiers, strict=False
+        ):
+            armature, known = replaced.armature, stage.deformer.bones
+            if armature is None or armature.data.is_editmode:
+                continue
+            if are_unknown or armature.data.session_uid in changes.armatures or not known.complete:
+                # Clothes and hair have the armature of the body.
+                if armature.session_uid not in changes.bones:
+                    bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+                    changes.bones[armature.session_uid] = bones
+                changed |= not changes.bones[armature.session_uid].equals(known)
+        return changed
+
     def is_as_noted(self, obj: bpy.types.Object) -> bool:
         """Whether the object itself is as it was when the plan was applied."""
         if self.noted.state != state_of(obj) or self.noted.groups != obj.vertex_groups.keys():
@@ -268,10 +315,17 @@ def state_of(obj: bpy.types.Object) -> list:
     # Adding an animation has no event of its own.
     state += sorted(path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers")))
     for modifier in obj.modifiers:
-        state += (modifier.name, modifier.show_viewport, modifier.show_render)
-        if modifier.type == "SUBSURF":
-            # With 0 levels a Subdivision modifier is off.
-            state += (modifier.levels, modifier.render_levels)
         if modifier.type == "ARMATURE":
             state += (uid(modifier.object), attach.method_of(modifier), *ModifierOptions.values(modifier))
-    return state
+    return state + switches_of(obj)
+
+
+def switches_of(obj: bpy.types.Object) -> list:
+    """The names of the object's modifiers, and what switches them on and off."""
+    switches = []
+    for modifier in obj.modifiers:
+        switches += (modifier.name, modifier.show_viewport, modifier.show_render)
+        if modifier.type == "SUBSURF":
+            # With 0 levels a Subdivision modifier is off.
+            switches += (modifier.levels, modifier.render_levels)
+    return switches

@@ -179,8 +179,7 @@ class _Event:
     def _have_bones_changed(self) -> bool:
         # While it was off, changes were not recorded.
         are_unknown = self.old.state is State.OFF or self.changes.after_step
-        read, changes = self.skinned.bound, self.changes
-        return bound.have_bones_changed(self.obj, read, self.depsgraph, changes, are_unknown)
+        return self.skinned.have_bones_changed(self.obj, self.depsgraph, self.changes, are_unknown)
 
     # --- Performing
 

@@ -15,6 +15,8 @@ from ..core.vectors import SAME_SPACE
 # Before, a mesh object with a scale of 0 had no inverse, and Blender moved all its vertices to its origin.
 _MESH_HAS_INVERSE = bpy.app.version >= (5, 0)
 
+_CURVED = bpy.types.Bone.bl_rna.properties["bbone_mapping_mode"].enum_items["CURVED"].value
+
 
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     """Returns the rest bones of an evaluated armature object, in the order of its pose, and the joints of
@@ -23,9 +25,11 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     deform = np.empty(len(bones), dtype=bool)
     lengths = np.empty(len(bones), dtype=np.float32)
     segments = np.empty(len(bones), dtype=np.int32)
+    mappings = np.empty(len(bones), dtype=np.int32)
     bones.foreach_get("use_deform", deform)
     bones.foreach_get("length", lengths)
     bones.foreach_get("bbone_segments", segments)
+    bones.foreach_get("bbone_mapping_mode", mappings)
     rest = _read_matrices(bones, "matrix_local")
     first_joints = np.full(len(bones), -1, dtype=np.int32)
     parts, count, complete = [rest], len(bones), True
@@ -40,12 +44,12 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
         parts.append(joints)
         count += segments[bone] + 1
     return Bones(
-        tuple(bone.name for bone in bones),
+        tuple(bones.keys()),
         deform,
         np.concatenate(parts),
         lengths,
         segments,
-        np.array([bone.bbone_mapping_mode == "CURVED" for bone in bones], dtype=bool),
+        mappings == _CURVED,
         first_joints,
         _read_envelopes(bones),
         _read_parents(bones),
@@ -116,9 +120,8 @@ def _read_envelopes(bones: bpy.types.bpy_prop_collection) -> Envelopes:
 
 
 def _read_parents(bones: bpy.types.bpy_prop_collection) -> np.ndarray:
-    numbers = {bone.name: number for number, bone in enumerate(bones)}
-    parents = [-1 if bone.parent is None else numbers[bone.parent.name] for bone in bones]
-    return np.array(parents, dtype=np.int32).reshape(-1)
+    numbers = {bone: number for number, bone in enumerate(bones)} | {None: -1}
+    return np.array([numbers[bone.parent] for bone in bones], dtype=np.int32).reshape(-1)
 
 
 def read_twists(evaluated_armature: bpy.types.Object, bones: Bones) -> TwistInputs:

@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 
 import bpy
 import numpy as np
@@ -119,6 +120,90 @@ def test_posing_evaluates_the_mesh_once(set_up: Setup):
         bpy.context.view_layer.update()
 
     assert [evaluations_in(pose, obj.name) for _ in range(3)] == [1, 1, 1]
+
+
+def modules_passed(action: Callable[[], object]) -> dict[str, set[str]]:
+    """The extension's modules whose functions run during the action on this thread, by the function that
+    Blender called."""
+    root = str(Path(session.__file__).resolve().parents[1]) + os.sep
+    passed: dict[str, set[str]] = {}
+
+    def note(frame: FrameType | None, event: str, _argument: object) -> None:
+        own = []
+        while frame is not None and event == "call":
+            own += [frame.f_code] if frame.f_code.co_filename.startswith(root) else []
+            frame = frame.f_back
+        if own:
+            passed.setdefault(own[-1].co_name, set()).add(own[0].co_filename.removeprefix(root))
+
+    sys.setprofile(note)
+    try:
+        action()
+    finally:
+        sys.setprofile(None)
+    return passed
+
+
+@pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
+def test_a_frame_passes_few_modules_after_the_evaluation(set_up: Setup):
+    obj, armature = scenes.make_arm()
+    set_up(obj, armature)
+    scenes.add_sinew(obj)
+    for frame in (1, 2, 3):
+        bpy.context.scene.frame_set(frame)
+
+    def pose() -> None:
+        armature.pose.bones[1].rotation_quaternion[1] += 0.25
+        bpy.context.view_layer.update()
+
+    pose()
+    shown = session.state_of(obj).shown.number
+    passed = modules_passed(pose) | modules_passed(lambda: bpy.context.scene.frame_set(4))
+    assert session.state_of(obj).shown.number == shown + 2
+    for function, modules in passed.items():
+        print(function, len(modules), *sorted(modules))
+    assert len(passed["on_frame_change"]) <= 7
+    assert len(passed["on_depsgraph_update"]) <= 10
+
+
+def rename(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.name = "Another"
+
+
+def hide_in_renders(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.modifiers["Sinew"].show_render = False
+
+
+def edit_bone(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    armature.data.bones[1].use_deform = False
+
+
+def mute_driver(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.animation_data.drivers[0].mute = True
+
+
+def swap_armature(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    other = armature.copy()
+    bpy.context.collection.objects.link(other)
+    obj.modifiers["Armature"].object = other
+
+
+@pytest.mark.parametrize("change", [rename, hide_in_renders, edit_bone, mute_driver, swap_armature])
+def test_what_changes_along_with_a_pose_is_noticed(change: Setup):
+    """As by a script: Blender lists both at once."""
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(2)
+    armature.pose.bones[1].rotation_quaternion[1] += 0.25
+    bpy.context.view_layer.update()
+    change(obj, armature)
+    armature.pose.bones[1].rotation_quaternion[1] += 0.25
+    bpy.context.view_layer.update()
+    state, points = session.state_of(obj), scenes.final_points(obj)
+    assert state.is_as_noted(obj)
+    assert state.noted.name == obj.name
+    properties.of(obj).enabled = False
+    assert scenes.worst(points, scenes.final_points(obj)) < 1e-5
 
 
 @pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])

@@ -17,6 +17,7 @@ def _begin() -> None:
 
 
 def _end() -> None:
+    heat_panel.end()
     heat_view.activate(())
     for obj in filter(bake_error.is_on, bpy.data.objects):
         if obj.type == "MESH":
@@ -68,7 +69,6 @@ FEATURE = Feature(
         (subscribers.after_removal, heat_view.tidy),
         (subscribers.objects_changed, _objects_changed),
         (subscribers.deformed, _colour),
-        (subscribers.frame_shown, heat_panel.redraw),
         (measures.listeners, heat_view.sync_errors),
     ),
     overlays=(heat_legend.draw,),

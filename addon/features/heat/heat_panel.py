@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 import bpy
 
 from ...attach import properties
+from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...core.errors import SinewError
 from ...core.metrics import Measured
@@ -163,8 +164,8 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         # Blender draws only panels that are open and visible, so nothing is measured otherwise.
-        global is_redraw_wanted
-        is_redraw_wanted = True
+        if redraw not in subscribers.frame_shown:
+            subscribers.frame_shown.append(redraw)
         settings = measures.of(context.scene)
         # The last evaluation: nothing may be evaluated while drawing, as that can write.
         depsgraph = context.view_layer.depsgraph
@@ -265,14 +266,15 @@ CLASSES = (
 )
 
 
-# A panel with numbers was drawn since they last changed, so it is open.
-is_redraw_wanted = False
-
-
 def redraw() -> None:
-    """Keeps the numbers up to date where Blender would not redraw them, as in playback."""
-    global is_redraw_wanted
-    if not is_redraw_wanted or is_rendering_in_window():
-        return
-    is_redraw_wanted = False
-    sidebar.redraw()
+    """Keeps the numbers up to date where Blender would not redraw them, as in playback. Called once for each
+    time that they are drawn."""
+    if not is_rendering_in_window():
+        end()
+        sidebar.redraw()
+
+
+def end() -> None:
+    """Has redraw() not be called again."""
+    if redraw in subscribers.frame_shown:
+        subscribers.frame_shown.remove(redraw)
