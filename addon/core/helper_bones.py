@@ -471,7 +471,7 @@ class Solver:
         """float64 [vertices, frames * 3]: moved by one bone's motion [frames, 3, 4]."""
         rest = self.rest[vertices]
         if rest.shape[1] == 1:
-            # Not with numpy's product: see spaces.transformed().
+            # Not with numpy's product: see vectors.transformed().
             x, y, z = motion[:, :, :3].reshape(-1, 3).T
             moved = rest[:, 0, :1] * x
             moved += rest[:, 0, 1:2] * y

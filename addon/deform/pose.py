@@ -18,7 +18,7 @@ from ..core.skin_stack import NO_STAGES, SkinStageFrame
 from ..core.stages import ORDER, StageValues
 from ..core.twist_spread import TwistInputs
 from ..core.vectors import SAME_SPACE
-from ..io import armature_io
+from ..io import armature_io, spaces
 from .bound import Bound
 from .skinned_object import SkinnedObject
 
@@ -60,10 +60,10 @@ def read(
         if armature is None or armature.data.is_editmode or not takes_part:
             frames.append(None)
             continue
-        space, back = armature_io.bones_from_model(evaluated, armature), None
+        space, back = spaces.bones_from_model(evaluated, armature), None
         if space is None:
-            space, back = SAME_SPACE, armature_io.model_from_bones(evaluated, armature)
-            if not armature_io.is_usable(back):
+            space, back = SAME_SPACE, spaces.model_from_bones(evaluated, armature)
+            if not spaces.is_usable(back):
                 frames.append(None)
                 continue
         pose = _finite(armature_io.read_pose(armature, stage.deformer.bones), stage.deformer.bones)

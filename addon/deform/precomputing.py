@@ -26,7 +26,7 @@ from ..core.phrases import phrase
 from ..core.precompute import precomputations
 from ..core.vectors import SAME_SPACE
 from ..core.vertex_data import PROVIDERS, VertexData
-from ..io import addon_preferences, armature_io
+from ..io import addon_preferences, spaces
 from .bound import is_method_animated, methods_of
 from .skinned_object import SkinnedObject
 
@@ -186,7 +186,7 @@ def _request(
 ) -> None:
     space = SAME_SPACE
     if data.weighting.depends_on_points:
-        found = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+        found = spaces.bones_from_model_in(depsgraph, obj, armature)
         if found is None:
             # An armature can be scaled to zero for a moment.
             return

@@ -13,7 +13,7 @@ from ..core.errors import SinewError
 from ..core.phrases import phrase
 from ..core.rig import RigFacts, Weighting, describe_rig
 from ..core.vectors import transformed
-from ..io import armature_io, mesh_io
+from ..io import armature_io, mesh_io, spaces
 from . import group_uses
 
 
@@ -31,7 +31,7 @@ def describe(
     """
     space = None
     if armature is not None:
-        space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+        space = spaces.bones_from_model_in(depsgraph, obj, armature)
     if space is not None and weighting.depends_on_points:
         points = transformed(points, space)
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])

@@ -5,15 +5,11 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Quaternion, Vector
+from mathutils import Quaternion, Vector
 
 from ..core.envelopes import Envelopes
 from ..core.rig import Bones
 from ..core.twist_spread import NOT_TOLD, TwistInputs
-from ..core.vectors import SAME_SPACE
-
-# Before, a mesh object with a scale of 0 had no inverse, and Blender moved all its vertices to its origin.
-_MESH_HAS_INVERSE = bpy.app.version >= (5, 0)
 
 _CURVED = bpy.types.Bone.bl_rna.properties["bbone_mapping_mode"].enum_items["CURVED"].value
 
@@ -174,44 +170,3 @@ def _read_joints(
         owners += [bone] * (segments + 1)
     joints = np.array(flat, dtype=np.float64).reshape(-1, 4, 4)
     return (matrices[owners].astype(np.float64) @ joints).astype(np.float32)
-
-
-def bones_from_model(
-    evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object
-) -> np.ndarray | None:
-    """Returns float64 [4, 4], from the mesh object's space to armature space; None where there is none, as a
-    scale is 0, not finite or too large."""
-    mesh_world, armature_world = evaluated_mesh.matrix_world, evaluated_armature.matrix_world
-    if not armature_world.determinant():
-        return None
-    if mesh_world == armature_world:
-        return SAME_SPACE
-    mesh, armature = _read(mesh_world), _read(armature_world)
-    if not (is_usable(mesh) and is_usable(armature)):
-        return None
-    if mesh_world.determinant():
-        space = np.linalg.inv(armature) @ mesh
-    elif _MESH_HAS_INVERSE:
-        space = np.linalg.inv(model_from_bones(evaluated_mesh, evaluated_armature))
-    else:
-        return None
-    return space if is_usable(space) else None
-
-
-def is_usable(matrix: np.ndarray) -> bool:
-    """Whether products with other matrices are finite in float32. Blender stores infinity as the largest
-    number."""
-    return bool((np.abs(matrix) < 1e38).all())
-
-
-def model_from_bones(evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object) -> np.ndarray:
-    """Returns float64 [4, 4], from armature space to the mesh object's, as Blender has it where a scale is
-    0."""
-    mesh_world, armature_world = evaluated_mesh.matrix_world, _read(evaluated_armature.matrix_world)
-    if not (mesh_world.determinant() or _MESH_HAS_INVERSE):
-        return np.zeros((4, 4))
-    return _read(mesh_world.inverted_safe()) @ armature_world
-
-
-def _read(matrix: Matrix) -> np.ndarray:
-    return np.array(matrix, dtype=np.float64)

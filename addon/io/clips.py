@@ -39,13 +39,6 @@ def rig_of(armature: bpy.types.Object) -> Rig:
     )
 
 
-def up_of(armature: bpy.types.Object) -> np.ndarray:
-    """Returns [3]: the world's Z in armature space, of length 1."""
-    up = np.array(armature.matrix_world.to_3x3().normalized().inverted_safe(), dtype=np.float64)[:, 2]
-    length = float(np.linalg.norm(up))
-    return up / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-
-
 def read(
     armature: bpy.types.Object, action: bpy.types.Action, rig: Rig | None = None
 ) -> Generator[float, None, Clip]:

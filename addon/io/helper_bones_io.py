@@ -6,12 +6,11 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ..core.helper_bones import Blend
 from ..core.pose_samples import Joints
 from ..core.rig import Bones
-from . import actions, mesh_io
+from . import actions, mesh_io, spaces
 
 COLLECTION = "Sinew helpers"
 # Attributes of a baked mesh: each vertex's rms error, after the bake and before it.
@@ -155,16 +154,9 @@ def _use_copy_of_action(rig: bpy.types.Object) -> None:
 
 def _channels(bone: bpy.types.Bone, motions: np.ndarray, parent_poses: np.ndarray) -> np.ndarray:
     """Returns float64 [times, 10]: location, quaternion and scale, as in pose_io.read_channels()."""
-    rest = np.array(bone.matrix_local, dtype=np.float64)
+    poses = motions @ np.array(bone.matrix_local, dtype=np.float64)
     channels = np.empty((len(motions), 10))
-    for number, (motion, parent) in enumerate(zip(motions, parent_poses, strict=True)):
-        basis = bone.convert_local_to_pose(
-            Matrix(motion @ rest),
-            bone.matrix_local,
-            parent_matrix=Matrix(parent),
-            parent_matrix_local=bone.parent.matrix_local,
-            invert=True,
-        )
+    for number, basis in enumerate(spaces.channels_from_poses(bone, poses, parent_poses)):
         location, rotation, scale = basis.decompose()
         channels[number] = (*location, *rotation, *scale)
         # Takes the shorter way from key to key.

@@ -10,6 +10,7 @@ from sinew.ik import Effector
 
 from ..core.errors import SinewError
 from ..core.ik import Posed, Tree
+from . import spaces
 
 
 def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) -> list[Tree]:
@@ -53,16 +54,15 @@ def read_posed(armature: bpy.types.Object, tree: Tree) -> Posed:
     cannot be read."""
     graph = bpy.context.evaluated_depsgraph_get()
     evaluated = armature.evaluated_get(graph)
-    from_world = evaluated.matrix_world.inverted_safe()
     goals, poles, influences = [], [], []
     for bone, name in tree.constraints:
         constraint = evaluated.pose.bones[bone].constraints[name]
         target = constraint.target.evaluated_get(graph)
-        goals.append(_target(evaluated, from_world, target, constraint.subtarget))
+        goals.append(_target(evaluated, target, constraint.subtarget))
         pole = Vector((0.0, 0.0, 0.0))
         if constraint.pole_target is not None:
             target = constraint.pole_target.evaluated_get(graph)
-            pole = _target(evaluated, from_world, target, constraint.pole_subtarget).translation
+            pole = _target(evaluated, target, constraint.pole_subtarget).translation
         poles.append(pole)
         influences.append(constraint.influence)
     parent = evaluated.pose.bones[tree.bones[0]].parent
@@ -73,20 +73,6 @@ def read_posed(armature: bpy.types.Object, tree: Tree) -> Posed:
         np.array(poles),
         np.array(influences),
     )
-
-
-def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """Returns float64 [frames, 4]: the local quaternion for each armature-space matrix, whatever the bone
-    inherits."""
-    rest = bone.bone
-    result = np.empty((len(matrices), 4))
-    for number, (matrix, parent) in enumerate(zip(matrices, parents, strict=True)):
-        above = {}
-        if bone.parent is not None:
-            above = {"parent_matrix": Matrix(parent), "parent_matrix_local": bone.parent.bone.matrix_local}
-        basis = rest.convert_local_to_pose(Matrix(matrix), rest.matrix_local, invert=True, **above)
-        result[number] = basis.to_quaternion()
-    return result
 
 
 def _active(bone: bpy.types.PoseBone) -> bpy.types.Constraint | None:
@@ -180,13 +166,15 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
                 )
 
 
-def _target(armature: bpy.types.Object, from_world: Matrix, target: bpy.types.Object, part: str) -> Matrix:
+def _target(armature: bpy.types.Object, target: bpy.types.Object, part: str) -> Matrix:
     """Returns the target in armature space; all arguments are evaluated."""
     if target.type != "ARMATURE" or not part:
-        return from_world @ target.matrix_world
+        return spaces.bones_from_object(armature, target)
     bone = target.pose.bones.get(part)
     if bone is None:
         raise SinewError(
             f"{armature.name}: {target.name} has no bone {part!r}, an IK target; choose another one"
         )
-    return bone.matrix.copy() if target == armature else from_world @ target.matrix_world @ bone.matrix
+    if target == armature:
+        return bone.matrix.copy()
+    return spaces.bones_from_object(armature, target) @ bone.matrix

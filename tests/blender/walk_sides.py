@@ -338,14 +338,14 @@ class BlenderSide(Side):
         from sinew_addon.core.diagnostics import check_weights
         from sinew_addon.core.mend import WeightMender
         from sinew_addon.core.vectors import transformed
-        from sinew_addon.io import armature_io, mesh_io
+        from sinew_addon.io import armature_io, mesh_io, spaces
 
         depsgraph = bpy.context.evaluated_depsgraph_get()
         (modifier,) = armature_modifiers(obj)
         evaluated = modifier.object.evaluated_get(depsgraph)
         bones, weights = armature_io.read_bones(evaluated), mesh_io.read_group_weights(obj.data)
         weighting = ModifierOptions.read(modifier).weighting(obj.vertex_groups.keys(), weights, bones)
-        space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), evaluated)
+        space = spaces.bones_from_model(obj.evaluated_get(depsgraph), evaluated)
         points = mesh_io.read_points(obj.data)
         points = points if space is None else transformed(points, space)
         names = [group.name for group in obj.vertex_groups]

@@ -9,7 +9,7 @@ import bpy
 
 from ...core.errors import SinewError
 from ...core.motion import blend as core
-from ...io import actions, clips
+from ...io import actions, clips, spaces
 
 Result = TypeVar("Result")
 
@@ -67,7 +67,7 @@ def make(
         steps = clips.read(armature, action, rig)
         clip = yield from _part(steps, READING * number / len(chosen), READING / len(chosen))
         sources.append(clip)
-    blend = core.blend(sources, weights, settings, clips.up_of(armature))
+    blend = core.blend(sources, weights, settings, spaces.up_of(armature))
     keyed = set().union(*(clips.keyed_properties(armature, action) for action in chosen))
     name = name or f"Blend {' '.join(action.name for action in chosen)}"
     first = float(bpy.context.scene.frame_start)

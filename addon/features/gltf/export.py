@@ -22,7 +22,7 @@ from ...attach.updates import may_change_file
 from ...core.errors import SinewError
 from ...core.vectors import transformed
 from ...deform import session
-from ...io import armature_io, mesh_io
+from ...io import mesh_io, spaces
 
 # Raised when readers of earlier files could not read new ones correctly.
 VERSION = 1
@@ -111,7 +111,7 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
         armature = settings.armature
         assert armature is not None
         assert deformer.vertex_data is not None
-        space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+        space = spaces.bones_from_model_in(depsgraph, obj, armature)
         skinning.centres = deformer.vertex_data.of("cor", space)
     return skinning
 

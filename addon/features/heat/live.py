@@ -22,7 +22,7 @@ from ...core.vectors import is_same_space, transformed, transformed_axes
 from ...deform import pose
 from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
-from ...io import armature_io, mesh_io
+from ...io import mesh_io, spaces
 
 # Sets of objects that are kept prepared: those of the heat map and those of the panel.
 MOST_SUBJECTS = 2
@@ -185,7 +185,7 @@ def _space(part: Part, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     if armature is None:
         # It was deleted, and other armatures deform the mesh.
         return np.identity(4)
-    space = armature_io.bones_from_model(part.obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+    space = spaces.bones_from_model_in(depsgraph, part.obj, armature)
     return np.identity(4) if space is None else space
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...core import ik as core
 from ...core.errors import SinewError
 from ...deform import characters
-from ...io import actions, ik_io, pose_io
+from ...io import actions, ik_io, pose_io, spaces
 from ..action_copy import action_copy
 
 
@@ -90,7 +90,8 @@ def _bake(
         bone = armature.pose.bones[name]
         parent = tree.parents[number]
         before = posed.parent if parent < 0 else matrices[:, parent]
-        _write_keys(armature, name, ik_io.local_rotations(bone, matrices[:, number], before), frames)
+        channels = spaces.channels_from_poses(bone.bone, matrices[:, number], before)
+        _write_keys(armature, name, np.array([each.to_quaternion() for each in channels]), frames)
     return Baked(tree, solution, core.tip_errors(tree, problem, matrices))
 
 

@@ -26,7 +26,7 @@ from ...core.rig import Bones, Weighting
 from ...core.surface import joined
 from ...core.vectors import transformed
 from ...deform import characters, group_uses, session
-from ...io import armature_io, mesh_io
+from ...io import armature_io, mesh_io, spaces
 
 # Shapes are kept for as many frames as fit into this, as each method plays all of them.
 MOST_BYTES = 256_000_000
@@ -317,5 +317,5 @@ def _in_armature_space(
     obj: bpy.types.Object, armature: bpy.types.Object, mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph
 ) -> np.ndarray:
     points = mesh_io.read_points(mesh)
-    space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+    space = spaces.bones_from_model_in(depsgraph, obj, armature)
     return points if space is None else transformed(points, space)
