@@ -24,6 +24,7 @@ from . import (
     point_store,
     pose_driver,
     properties,
+    property_groups,
     setting_animation,
     stack,
     stored_vertex_data,
@@ -306,7 +307,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
         is_left = situation is Situation.BUILT_IN and view.deformer is Deformer.SINEW
         if is_left and now.sinew and obj.mode not in ("EDIT", "SCULPT"):
             # The artist wants Sinew to deform it, though it is small.
-            properties.store(settings, "leave_small", False)
+            property_groups.store(settings, "leave_small", False)
         _store(obj, name, icons.follow(view, situation, now))
     # So that what was taken over is not taken for another click.
     _set_icons(obj, situation)
@@ -322,11 +323,11 @@ def _follow_ended_keys(obj: bpy.types.Object) -> None:
     if not ended:
         return
     for modifier, replaced in ended:
-        properties.store(replaced, "visibility_is_keyed", False)
+        property_groups.store(replaced, "visibility_is_keyed", False)
         for name in VIEWS:
-            properties.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
+            property_groups.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
         for name in VIEWS:
-            properties.store(replaced, f"was_off_{name}", False)
+            property_groups.store(replaced, f"was_off_{name}", False)
     _set_icons(obj, Situation(properties.of(obj).stack.situation))
 
 
@@ -366,7 +367,7 @@ def _view(obj: bpy.types.Object, name: str) -> icons.View:
 
 
 def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
-    properties.store(properties.of(obj).stack, f"hidden_{name}", view.hidden)
+    property_groups.store(properties.of(obj).stack, f"hidden_{name}", view.hidden)
     pairs = replaced_modifiers(obj)
     none = (False,) * len(pairs)
     for pair, shown, forced, switched in zip(
@@ -374,9 +375,9 @@ def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
     ):
         _modifier, replaced = pair
         if not _is_keyed(obj, *pair):
-            properties.store(replaced, f"show_{name}", shown)
-        properties.store(replaced, f"was_off_{name}", forced)
-        properties.store(replaced, f"switched_{name}", switched)
+            property_groups.store(replaced, f"show_{name}", shown)
+        property_groups.store(replaced, f"was_off_{name}", forced)
+        property_groups.store(replaced, f"switched_{name}", switched)
 
 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
@@ -397,7 +398,7 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
         smooth[name] = not situation.is_by_sinew or view.deformer is Deformer.ARMATURE
     undeformed.mark(obj, situation.is_by_sinew)
     corrective_smooth.switch(obj, **smooth)
-    properties.store(settings.stack, "situation", situation.value)
+    property_groups.store(settings.stack, "situation", situation.value)
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:
@@ -418,10 +419,10 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
         restore_volume(obj)
     for (modifier, replaced), wanted in zip(pairs, nearest, strict=True):
         own = modifier.use_deform_preserve_volume
-        properties.store(replaced, "preserve_volume", own)
-        properties.store(replaced, "was_nearest", own == wanted)
+        property_groups.store(replaced, "preserve_volume", own)
+        property_groups.store(replaced, "was_nearest", own == wanted)
         _preserve_volume(modifier, wanted)
-    properties.store(settings.before, "has_nearest_volume", True)
+    property_groups.store(settings.before, "has_nearest_volume", True)
 
 
 def restore_volume(obj: bpy.types.Object) -> None:
@@ -434,7 +435,7 @@ def restore_volume(obj: bpy.types.Object) -> None:
         # What the artist has switched since stays, too.
         if modifier is not None and not replaced.was_nearest:
             _preserve_volume(modifier, replaced.preserve_volume)
-    properties.store(settings.before, "has_nearest_volume", False)
+    property_groups.store(settings.before, "has_nearest_volume", False)
 
 
 def has_switched_volume(obj: bpy.types.Object) -> bool:
@@ -457,7 +458,7 @@ def _note_keyed_visibility(obj: bpy.types.Object) -> None:
             continue
         if is_first or replaced.visibility_is_keyed:
             for name in VIEWS:
-                properties.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
+                property_groups.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
         # While the object is hidden, no animation sets icons that Sinew has switched off.
         elif obj.visible_get():
             # Where one sets only the other icon, this one is restored.
@@ -465,7 +466,7 @@ def _note_keyed_visibility(obj: bpy.types.Object) -> None:
                 if not is_animated(obj, modifier, f"show_{name}"):
                     _show_in(modifier, name, getattr(replaced, f"show_{name}"))
         if obj.visible_get():
-            properties.store(replaced, "visibility_is_keyed", True)
+            property_groups.store(replaced, "visibility_is_keyed", True)
 
 
 def _is_keyed(
@@ -519,8 +520,8 @@ def _replaced_modifier(
             elif is_alone and nodes is not None and getattr(nodes, f"show_{name}"):
                 _show_in(modifier, name, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
-    properties.store(found, "name", modifier.name)
-    properties.store(found, "uid", modifier.persistent_uid)
+    property_groups.store(found, "name", modifier.name)
+    property_groups.store(found, "uid", modifier.persistent_uid)
     return found
 
 

@@ -12,7 +12,7 @@ import bpy
 from ..core.errors import SinewError
 from ..core.phrases import Phrase, phrase
 from ..io.actions import animated_paths
-from . import properties, stack, stage_settings, upstream_proxy
+from . import properties, property_groups, stack, stage_settings, upstream_proxy
 
 # The modifier's property for each parameter of the stage.
 NAMES = {
@@ -97,7 +97,7 @@ def take_over(obj: bpy.types.Object) -> None:
         ("show_viewport", modifier.show_viewport),
         ("show_render", modifier.show_render),
     ):
-        properties.store(replaced, name, value)
+        property_groups.store(replaced, name, value)
     for name, value in _values(modifier).items():
         setattr(settings.delta_mush, name, value)
     settings.delta_mush.enabled = True

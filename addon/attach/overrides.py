@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import node_group, properties, stack
+from . import node_group, properties, property_groups, stack
 
 
 def store(obj: bpy.types.Object) -> None:
@@ -17,7 +17,7 @@ def store(obj: bpy.types.Object) -> None:
     settings = properties.of(obj)
     point_buffer = settings.storage.point_buffer
     if obj.override_library is not None and point_buffer is not None:
-        properties.copy(settings, properties.of(point_buffer))
+        property_groups.copy(settings, properties.of(point_buffer))
         properties.of(point_buffer).identity.is_helper = True
 
 
@@ -29,5 +29,5 @@ def restore() -> None:
         nodes = stack.sinew_modifier(obj)
         point_buffer = node_group.get_input(nodes, "Points") if nodes is not None else None
         if isinstance(point_buffer, bpy.types.Object) and len(properties.of(point_buffer).replaced_modifiers):
-            properties.copy(properties.of(point_buffer), properties.of(obj))
+            property_groups.copy(properties.of(point_buffer), properties.of(obj))
             properties.of(obj).identity.is_helper = False

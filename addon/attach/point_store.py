@@ -17,6 +17,7 @@ from . import (
     point_buffer,
     pose_driver,
     properties,
+    property_groups,
     references,
     stack,
     undeformed,
@@ -195,7 +196,7 @@ def clear_references_to_itself(obj: bpy.types.Object) -> None:
     was in that memory when the step was made, Blender (4.2 to 5.2) has pointers to it point to the object
     itself: it remaps these before it links the others, in its function
     read_libblock_undo_restore_at_old_address(). Sinew would write its points into the artist's mesh."""
-    if properties.clear_pointers(properties.of(obj), obj):
+    if property_groups.clear_pointers(properties.of(obj), obj):
         clear_references(obj)
 
 

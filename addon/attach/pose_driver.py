@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import node_group, properties, references, stack
+from . import node_group, properties, property_groups, references, stack
 
 PATH = "sinew.driver.pose"
 # The properties that the last two variables read.
@@ -83,7 +83,7 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
             return
         _take_off(obj, curve)
     references.note(obj)
-    properties.store(identity, "token", obj.session_uid)
+    property_groups.store(identity, "token", obj.session_uid)
     curve = obj.driver_add(path)
     # The modifier maps any value of the variables to 0, so no frame changes the input. Assigning the
     # coefficients would make Blender also evaluate the object's keys, and revert what was moved without a

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
@@ -11,7 +11,7 @@ import sinew
 
 from ..core.icons import Situation
 from ..core.scale_rule import SCALE_RULES
-from . import stage_settings
+from . import property_groups, stage_settings
 from .feature import Feature
 from .stage_settings import OFF, OVERRIDABLE, method_items
 
@@ -398,64 +398,11 @@ def is_copy(obj: bpy.types.Object) -> bool:
     return obj.is_property_set("sinew") and bool(obj.sinew.identity.method)
 
 
-def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
-    """Copies all values of a group of settings to another, without calling the listeners."""
-    for name, prop in source.bl_rna.properties.items():
-        if name == "rna_type":
-            continue
-        if prop.type == "COLLECTION":
-            getattr(target, name).clear()
-            for item in getattr(source, name):
-                copy(item, getattr(target, name).add())
-        elif prop.type == "POINTER" and isinstance(getattr(source, name), bpy.types.PropertyGroup):
-            if source.is_property_set(name):
-                copy(getattr(source, name), getattr(target, name))
-        elif not prop.is_readonly and source.is_property_set(name):
-            value = getattr(source, name)
-            # By key: assigning to the property itself calls the listeners.
-            if prop.type == "ENUM":
-                target[name] = next(i.value for i in prop.enum_items if i.identifier == value)
-            elif prop.type == "BOOLEAN":
-                target[name] = value
-            else:
-                setattr(target, name, value)
-
-
-def copy_groups(source: SinewSettings, target: SinewSettings, names: Iterable[str]) -> None:
-    """Copies some groups of the settings. Groups that do not exist are not read, as that would make them."""
-    for name in names:
-        if source.is_property_set(name):
-            copy(getattr(source, name), getattr(target, name))
-
-
 def make_groups(settings: SinewSettings) -> None:
     """Makes all groups of settings of the object, by reading them: Blender 5.2 cannot give a library override
     a group that its library lacks."""
     for name in (*SETTING_GROUPS, *_HIDDEN_GROUPS):
         getattr(settings, name)
-
-
-def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) -> None:
-    """Sets a value that only Sinew uses, without Blender's update: that would touch the object's mesh, as a
-    change of weights does."""
-    if getattr(group, name) != value:
-        group[name] = value
-
-
-def clear_pointers(group: bpy.types.PropertyGroup, target: bpy.types.ID) -> bool:
-    """Clears the pointers to the target, also of groups within the group. Returns whether there were any."""
-    found = False
-    for name, prop in group.bl_rna.properties.items():
-        if prop.type not in ("POINTER", "COLLECTION") or name == "rna_type":
-            continue
-        value = getattr(group, name)
-        if value == target:
-            setattr(group, name, None)
-            found = True
-        for each in value if prop.type == "COLLECTION" else (value,):
-            if isinstance(each, bpy.types.PropertyGroup):
-                found |= clear_pointers(each, target)
-    return found
 
 
 def clear(obj: bpy.types.Object) -> None:
@@ -511,13 +458,7 @@ def share(source: bpy.types.Object, target: bpy.types.Object) -> None:
     """Copies the shared settings of a mesh to another. The caller suspends updates meanwhile."""
     own, other = of(target), of(source)
     for name in SHARED:
-        assign(own, name, getattr(other, name))
+        property_groups.assign(own, name, getattr(other, name))
     for group, cls in SETTING_GROUPS.items():
         for name in cls.__annotations__:
-            assign(getattr(own, group), name, getattr(getattr(other, group), name))
-
-
-def assign(group: bpy.types.PropertyGroup, name: str, value: object) -> None:
-    """Assigns only a different value: each assignment makes Blender evaluate the object."""
-    if getattr(group, name) != value:
-        setattr(group, name, value)
+            property_groups.assign(getattr(own, group), name, getattr(getattr(other, group), name))

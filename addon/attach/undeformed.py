@@ -20,7 +20,7 @@ from collections.abc import Iterator
 import bpy
 
 from ..io import mesh_io
-from . import node_group, properties, references, stack
+from . import node_group, properties, property_groups, references, stack
 
 # These make a mesh that has none of the attributes of what they get.
 _MAKE_A_MESH = {
@@ -100,7 +100,7 @@ def _make_neutral(obj: bpy.types.Object) -> None:
 
 def _ensure_mark(obj: bpy.types.Object) -> None:
     mark = stack.mark_modifier(obj) or _new(obj, stack.MARK_NAME, "NODES")
-    properties.store(properties.of(obj).stack, "mark_uid", mark.persistent_uid)
+    property_groups.store(properties.of(obj).stack, "mark_uid", mark.persistent_uid)
     group = node_group.get_or_make_stack_mark()
     if mark.node_group != group:
         references.note(obj)
@@ -126,8 +126,8 @@ def mark(obj: bpy.types.Object, is_marked: bool) -> None:
     if not before.marks_rest and not is_marked:
         return
     own = is_on and (before.adds_rest_position or not before.marks_rest)
-    properties.store(before, "adds_rest_position", own)
-    properties.store(before, "marks_rest", is_marked)
+    property_groups.store(before, "adds_rest_position", own)
+    property_groups.store(before, "marks_rest", is_marked)
     if is_on != (is_marked or own):
         obj.add_rest_position_attribute = is_marked or own
 

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .arrays import OfArrays
 from .bendy import spread_over_joints
 from .envelopes import Envelopes, fill_from_envelopes, multiply_by_envelopes
 from .influences import Entries, Influences
@@ -19,7 +20,7 @@ NAMES_SHOWN = 5
 
 
 @dataclass(frozen=True)
-class Bones:
+class Bones(OfArrays):
     """The bones of an armature at rest, followed by the joints of bendy bones (see bendy.py).
 
     names         all bones, in Blender's order
@@ -79,17 +80,6 @@ class Bones:
         """The bones that share the twist of another."""
         finder = TwistFinder(self.names, self.deform, self.parents, self.rest, self.lengths, self.segments)
         return finder.find(self.first_joints, len(self.rest) - len(self.names))
-
-    def equals(self, other: Bones) -> bool:
-        return (
-            self.names == other.names
-            and np.array_equal(self.deform, other.deform)
-            and np.array_equal(self.rest, other.rest)
-            and np.array_equal(self.segments, other.segments)
-            and np.array_equal(self.parents, other.parents)
-            and np.array_equal(self.curved, other.curved)
-            and self.envelopes.equals(other.envelopes)
-        )
 
     def groups_without_bone(self, group_names: Sequence[str]) -> list[str]:
         """Returns the groups without a bone of the same name."""

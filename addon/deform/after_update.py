@@ -13,7 +13,7 @@ import numpy as np
 
 from ..attach import point_store, properties
 from . import bound, pose, source
-from .events import Changes
+from .changes import Changes
 from .skinned_object import SkinnedObject
 
 

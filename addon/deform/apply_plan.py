@@ -9,7 +9,17 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..attach import attach, node_group, normals, point_store, pose_driver, properties, stack, upstream_proxy
+from ..attach import (
+    attach,
+    node_group,
+    normals,
+    point_store,
+    pose_driver,
+    properties,
+    property_groups,
+    stack,
+    upstream_proxy,
+)
 from ..core.errors import SinewError
 from ..core.icons import RENDER, VIEWPORT, VIEWS
 from ..io import armature_io
@@ -208,12 +218,10 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         log.error("%s", error)
         return True
     settings, others = properties.of(obj), properties.of(origin)
-    for name in properties.SHARED:
-        properties.assign(settings, name, getattr(others, name))
-    properties.copy_groups(others, settings, properties.SETTING_GROUPS)
-    properties.copy(others.before.smooth, settings.before.smooth)
+    properties.share(origin, obj)
+    property_groups.copy(others.before.smooth, settings.before.smooth)
     for name in VIEWS:
-        properties.store(settings.stack, f"hidden_{name}", getattr(others.stack, f"hidden_{name}"))
+        property_groups.store(settings.stack, f"hidden_{name}", getattr(others.stack, f"hidden_{name}"))
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
     return True

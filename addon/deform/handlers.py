@@ -19,7 +19,7 @@ from ..attach.updates import (
     updates_suspended,
 )
 from . import events, session
-from .events import Changes, names_of_changed_meshes
+from .changes import Changes, Find, finder, names_of_changed_meshes
 from .session import current
 
 # --- Evaluations and changes of frame
@@ -57,7 +57,7 @@ def _was_only_posed(depsgraph: bpy.types.Depsgraph) -> bool:
     with updates_suspended() as may_react:
         if current.is_idle:
             return False
-        original, waiting = events.finder("depsgraph_update_post", on_depsgraph_update), None
+        original, waiting = finder("depsgraph_update_post", on_depsgraph_update), None
         is_posed = may_react and may_change_file() and session.were_only_posed(depsgraph, original)
         if not is_posed:
             waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
@@ -84,7 +84,7 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
     waiting = None
     with updates_suspended() as may_react:
         if not current.is_idle:
-            original = events.finder("frame_change_post", on_frame_change)
+            original = finder("frame_change_post", on_frame_change)
             if not session.were_all_deformed(depsgraph, original):
                 waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
     _end_event(depsgraph, waiting)
@@ -120,7 +120,7 @@ def _end_event(depsgraph: bpy.types.Depsgraph, waiting: Changes | None) -> None:
     session.note_shown(depsgraph)
 
 
-def _read_changes(depsgraph: bpy.types.Depsgraph, original: events.Find, frame: bool) -> Changes:
+def _read_changes(depsgraph: bpy.types.Depsgraph, original: Find, frame: bool) -> Changes:
     """An evaluation's list of updates is complete only where the one before was seen, too: a render has a
     depsgraph of its own."""
     same = current.depsgraph == depsgraph.as_pointer()

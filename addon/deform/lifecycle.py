@@ -20,7 +20,7 @@ from ..attach.updates import is_rendering_in_window, phase, updates_suspended
 from ..core.precompute import precomputations
 from ..io.actions import animated_paths
 from . import apply_plan, events, handlers, precompute_watch, precomputing, session
-from .events import Changes
+from .changes import Changes
 
 log = logging.getLogger("sinew")
 

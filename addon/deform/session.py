@@ -26,7 +26,7 @@ from ..core.errors import SinewError
 from ..core.precompute import precomputations
 from . import after_update, apply_plan, events, undo
 from .bound import uid
-from .events import GONE, Changes
+from .changes import GONE, Changes, Find
 from .in_depsgraph import DepsgraphRequests
 from .plan import UNSEEN, Plan, State
 from .skinned_object import SkinnedObject
@@ -350,7 +350,7 @@ def waiting() -> set[tuple[int, int]]:
     }
 
 
-def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: events.Find) -> bool:
+def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     """Whether the evaluation gave all skinned objects their points, and nothing else has to be checked."""
     if (
         current.objects is None
@@ -374,7 +374,7 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: events.Find) -> 
     return True
 
 
-def were_only_posed(depsgraph: bpy.types.Depsgraph, original: events.Find) -> bool:
+def were_only_posed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     """Whether nothing but poses changed since the last evaluation, and this one gave all skinned objects
     their points: there is nothing else to be checked."""
     is_known = current.objects is not None and current.depsgraph == depsgraph.as_pointer()

@@ -18,7 +18,7 @@ from ..io import armature_io, mesh_io
 from ..io.actions import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
-from .events import Changes
+from .changes import Changes
 from .plan import Plan
 
 

@@ -17,7 +17,7 @@ from ..core.shading import Shading, SurfaceNormals
 from ..core.shape_keys import ShapeKeys
 from ..core.stage_mesh import Topology
 from ..io import mesh_io
-from .events import Changes
+from .changes import Changes
 
 
 @dataclass

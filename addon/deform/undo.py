@@ -13,7 +13,7 @@ import contextlib
 
 import bpy
 
-from .events import Changes
+from .changes import Changes
 from .plan import State
 from .skinned_object import SkinnedObject
 

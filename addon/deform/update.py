@@ -13,7 +13,7 @@ from ..core.errors import SinewError
 from ..io.actions import animated_paths
 from . import after_update, apply_plan, bound, events, precomputing, source
 from .bound import uid
-from .events import Changes
+from .changes import Changes
 from .plan import Plan, State, plan
 from .react import Action, Facts, Known, is_at_end, react
 from .skinned_object import Noted, SkinnedObject

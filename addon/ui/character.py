@@ -11,9 +11,9 @@ from typing import Any
 
 import bpy
 
-from ..attach import properties
+from ..attach import properties, property_groups
 from ..attach.feature import Feature
-from ..attach.properties import SETTING_GROUPS, SHARED, assign
+from ..attach.properties import SETTING_GROUPS, SHARED
 from ..attach.subscribers import subscribers
 from ..deform import session
 from . import operators
@@ -108,7 +108,7 @@ def _computed(deferred: Any, group: str, name: str) -> object:
         if any(getattr(settings, name) != value for settings in each):
             with session.changing(bpy.context):
                 for settings in each:
-                    assign(settings, name, value)
+                    property_groups.assign(settings, name, value)
 
     facts = {key: value for key, value in deferred.keywords.items() if key not in _NOT_COMPUTED}
     return deferred.function(get=get, set=set_all, options=set(), **facts)

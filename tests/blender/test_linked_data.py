@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.attach import attach, properties, stack
+from sinew_addon.attach import attach, properties, property_groups, stack
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.scale_rule import BLENDER_3
 from sinew_addon.deform import session
@@ -126,7 +126,7 @@ def test_settings_are_copied_whole():
     settings = properties.of(obj)
     settings.leave_small = False
     settings.scale_rule = BLENDER_3.name
-    properties.copy(settings, properties.of(other))
+    property_groups.copy(settings, properties.of(other))
     copied = properties.of(other)
     assert [s.name for s in copied.replaced_modifiers] == [s.name for s in settings.replaced_modifiers]
     for name in ("method", "leave_small", "scale_rule", "enabled"):

@@ -18,6 +18,7 @@ from ...attach import (
     orphans,
     point_buffer,
     properties,
+    property_groups,
     stack,
     upstream_proxy,
 )
@@ -216,7 +217,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
         if original is not None:
             settings.scale_rule = original.scale_rule
             # A copy shows one method, without another mixed in.
-            properties.copy_groups(original, settings, (*properties.METHOD_GROUPS, *ORDER))
+            property_groups.copy_groups(original, settings, (*properties.METHOD_GROUPS, *ORDER))
             if smooth is not None:
                 # The stage replaces it.
                 copy.modifiers.remove(copy.modifiers[smooth])
