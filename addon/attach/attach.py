@@ -7,8 +7,6 @@ a Blender without Sinew can play it. What the artist or a tool does to the modif
 that core/icons.py gives it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import bpy

@@ -2,8 +2,6 @@
 """Shapes that an object has from a bake, while its Armature modifier is off: shape keys, or a cache that a
 modifier plays. Sinew would deform them once more, so Add switches them off, and Remove on again."""
 
-from __future__ import annotations
-
 import re
 
 import bpy

@@ -2,8 +2,6 @@
 """A Corrective Smooth directly behind the Armature modifiers can be replaced by the stage delta_mush: it then
 stays in the stack, switched off while Sinew deforms."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ There are separate groups with and without normals: without, a mesh whose normal
 nodes for them.
 """
 
-from __future__ import annotations
-
 import zlib
 
 import bpy

@@ -11,8 +11,6 @@ same, or are read again along with the weights. Weighted Normal and Normal Edit 
 proxy, so Sinew does not know their result.
 """
 
-from __future__ import annotations
-
 from enum import Enum
 
 import bpy

@@ -2,8 +2,6 @@
 """What tells people without Sinew what is missing from a saved file: a text block, and warnings at the
 modifiers."""
 
-from __future__ import annotations
-
 import bpy
 
 from . import node_group, properties

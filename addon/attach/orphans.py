@@ -2,8 +2,6 @@
 """Removes what Sinew made for objects that were deleted since: point buffers, upstream proxies, node
 groups."""
 
-from __future__ import annotations
-
 import bpy
 
 from . import node_group, properties, upstream_proxy

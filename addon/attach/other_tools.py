@@ -2,8 +2,6 @@
 """What acts otherwise with Sinew than without (docs/parity.md): exporters, tools of others, and modifiers
 behind it, as behind Geometry Nodes (seen on 4.2 to 5.2)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

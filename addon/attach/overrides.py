@@ -5,8 +5,6 @@ Blender saves the modifier that Sinew adds, and the point buffer that it names i
 stores a copy of the settings.
 """
 
-from __future__ import annotations
-
 import bpy
 
 from . import node_group, properties, property_groups, stack

@@ -7,8 +7,6 @@ has other vertices than what is deformed, or the points are written after the up
 evaluation Sinew writes to its evaluated copy, and the original keeps the rest points.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

@@ -6,8 +6,6 @@ not what is deformed. Within Blender's evaluation they are written to the evalua
 that a frame changes no mesh of the file.
 """
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

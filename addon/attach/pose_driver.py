@@ -12,8 +12,6 @@ If it is on a property of the object, it makes nothing dirty and only keeps the 
 that are written after the update. Its value is always 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ last step (a helper, a node group) is in neither step and gone afterwards: Blend
 (seen on 4.2 to 5.2). So point_store.clear_references() clears these references before undo.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

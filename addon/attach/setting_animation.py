@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keys and drivers of Sinew's own settings."""
 
-from __future__ import annotations
-
 import bpy
 
 from ..io import actions

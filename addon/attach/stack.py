@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds Sinew's modifier, the Armature modifiers, and those before and behind them in an object's stack."""
 
-from __future__ import annotations
-
 import itertools
 
 import bpy

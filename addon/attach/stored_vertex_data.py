@@ -5,8 +5,6 @@ saved file is opened. The key is a hash of what the data was made from: a change
 It is a property of the mesh, not an attribute: downstream modifiers would interpolate that in every frame.
 """
 
-from __future__ import annotations
-
 import hashlib
 import logging
 from collections.abc import Mapping

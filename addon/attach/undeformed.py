@@ -12,8 +12,6 @@ Applying Sinew's modifier evaluates it alone, on a mesh without that attribute, 
 modifier stands one that marks each mesh that goes through the whole stack: one without this mark is deformed.
 """
 
-from __future__ import annotations
-
 import fnmatch
 from collections.abc import Iterator
 

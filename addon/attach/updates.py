@@ -2,8 +2,6 @@
 """Makes handlers of Blender's events run on one thread at a time, and ignore events that Sinew itself causes.
 A window that renders calls handlers from the render's thread, too."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import bpy

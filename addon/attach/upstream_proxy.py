@@ -6,8 +6,6 @@ evaluates it along with the object, and Sinew deforms its evaluated mesh. It has
 Blender applies no modifier to a mesh with a second user, and other people's tools do not expect one.
 """
 
-from __future__ import annotations
-
 import bpy
 
 from ..core.errors import SinewError

@@ -3,8 +3,6 @@
 can crash then. So while code that uses bpy runs, Ctrl-C is only recorded, and the next check() raises it.
 Commands call check() for each frame and step of progress."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager

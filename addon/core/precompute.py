@@ -2,8 +2,6 @@
 """Precomputations: run once for each hash of their inputs, by threads of the native library. Whoever asks for
 one of them has the results of all that have ended taken."""
 
-from __future__ import annotations
-
 import time
 from collections import OrderedDict
 from collections.abc import Callable

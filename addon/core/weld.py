@@ -2,8 +2,6 @@
 """Vertices at one place that the same bones move alike count as one: a mesh that an exporter split at its
 seams is smoothed like a whole one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -2,8 +2,6 @@
 """Sinew after Blender's evaluation: the points go into an object of the file, and Blender evaluates once
 more."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from dataclasses import replace

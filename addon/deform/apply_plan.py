@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Applies a plan to an object: its modifiers, their armature pointers, and the storage of its points."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sinew's functions in the lists of those that Blender calls at events, bpy.app.handlers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import bpy

@@ -2,8 +2,6 @@
 """Finds vertex groups with another use than the weights of a bone: a group without a bone is no fault if it
 is a mask."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sinew's handlers of evaluations and changes of frame."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable
 

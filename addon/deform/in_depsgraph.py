@@ -7,8 +7,6 @@ original may go at any moment. Anything unusual, such as changed weights, is lef
 afterwards and may change the file.
 """
 
-from __future__ import annotations
-
 import time
 
 import bpy

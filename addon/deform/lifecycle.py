@@ -2,8 +2,6 @@
 """What happens to the open file as a whole: undo, redo, loading, saving, rendering, and the end of Sinew.
 Each of Blender's events has one handler, which calls the subscribers in order."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import logging

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A timer of the window that watches precomputations while one runs, and gives objects their results."""
 
-from __future__ import annotations
-
 import time
 
 import bpy

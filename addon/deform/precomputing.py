@@ -5,8 +5,6 @@ In a window it is computed while the artist works; meanwhile the object has its 
 the shape from the data of the mesh before it changed. Scripts, commands and renders wait for it instead.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Decides what an event means for an object: one pure function of plain facts, without Blender."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Safe mode: nothing of Sinew runs within Blender's evaluation, on Blender's threads."""
 
-from __future__ import annotations
-
 import os
 
 from ..io import addon_preferences

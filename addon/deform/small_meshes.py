@@ -5,8 +5,6 @@ they take less time than the request for points alone.
 Sinew stays on and can measure, bake and compare as usual; only who deforms each frame differs.
 """
 
-from __future__ import annotations
-
 import bpy
 
 from ..attach import attach, pose_driver, properties, stage_settings, upstream_proxy

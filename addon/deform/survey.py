@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Facts and warnings about a mesh that an armature deforms, for the artist."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

@@ -7,8 +7,6 @@ before the step and after it. Listed data is read again; bones, and what the art
 object itself, are always compared.
 """
 
-from __future__ import annotations
-
 import contextlib
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Observes what an event shows of an object, and performs what react.py decides."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import bpy

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares a mesh with its copy, and keeps the copy's points as those of the mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

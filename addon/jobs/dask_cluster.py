@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The workers of a batch: Blenders of a dask cluster. The Python package has this, the extension does not."""
 
-from __future__ import annotations
-
 import ipaddress
 import logging
 from collections.abc import Callable, Generator, Sequence

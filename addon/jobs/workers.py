@@ -5,8 +5,6 @@ This process distributes the tasks: the Blenders are separate processes already,
 time for a small file as Blender takes to save it (bench/README.md).
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib.metadata
 import uuid
