@@ -99,6 +99,11 @@ def _hidden(kind: Callable, description: str = "", **settings: object) -> object
     return kind(description=description, options={"HIDDEN"}, override=OVERRIDABLE, **settings)
 
 
+def _setting(kind: Callable, update: Callable = _method_changed, **settings: object) -> object:
+    """Returns a property that the artist sets, which keys and drivers can not."""
+    return kind(options=set(), update=update, override=OVERRIDABLE, **settings)
+
+
 # Who computes normals.
 BY_SINEW, SKINNED_NORMALS, LEAVE_NORMALS = "BY_SINEW", "SKINNED", "LEAVE"
 
@@ -271,15 +276,13 @@ class SinewSettings(bpy.types.PropertyGroup):
         update=_method_changed,
         override=OVERRIDABLE,
     )
-    enabled: bpy.props.BoolProperty(
+    enabled: _setting(
+        bpy.props.BoolProperty,
         name="On",
         description="Deform with Sinew where the icon of its modifier is on. Where that of an Armature "
         "modifier is switched on, that deforms instead; where Sinew's is switched off, nothing does. Off: "
         "Blender's Armature modifier deforms, to compare the two",
         default=True,
-        options=set(),
-        update=_method_changed,
-        override=OVERRIDABLE,
     )
     is_own: bpy.props.BoolProperty(
         name="Own Settings",
@@ -287,7 +290,8 @@ class SinewSettings(bpy.types.PropertyGroup):
         options=set(),
         override=OVERRIDABLE,
     )
-    normals: bpy.props.EnumProperty(
+    normals: _setting(
+        bpy.props.EnumProperty,
         name="Normals",
         description="Who computes the normals that the mesh is drawn with (Blender 4.5 and later)",
         items=[
@@ -301,25 +305,19 @@ class SinewSettings(bpy.types.PropertyGroup):
             (LEAVE_NORMALS, "By Blender", "Computed whenever they are read", 1),
         ],
         default=BY_SINEW,
-        options=set(),
-        update=_method_changed,
-        override=OVERRIDABLE,
     )
-    heat: bpy.props.BoolProperty(
+    heat: _setting(
+        bpy.props.BoolProperty,
         name="Heat Map",
         description="Show a measure of the deformation as colours of the mesh",
-        options=set(),
         update=_heat_changed,
-        override=OVERRIDABLE,
     )
-    leave_small: bpy.props.BoolProperty(
+    leave_small: _setting(
+        bpy.props.BoolProperty,
         name="Leave to Blender Where Faster",
         description="Have the Armature modifier deform this mesh where it gives the same shape and, as the "
         "mesh is small, takes less time",
         default=True,
-        options=set(),
-        update=_method_changed,
-        override=OVERRIDABLE,
     )
     replaced_modifiers: bpy.props.CollectionProperty(
         type=SinewReplacedModifier, options={"HIDDEN"}, override=_INSERTABLE

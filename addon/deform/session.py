@@ -3,7 +3,7 @@
 
 import contextlib
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import bpy
@@ -362,11 +362,14 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     meshes = set() if current.all_use_builtin else Changes.meshes_in(depsgraph, original)
     if meshes and GONE in meshes:
         return False
-    try:
-        if not all(_was_deformed(obj, depsgraph, meshes) for obj in current.objects):
-            return False
-    except ReferenceError:
-        # The object was deleted since the list was made.
+    if not _is_each(
+        lambda obj, state: (
+            state.was_deformed(obj, depsgraph)
+            and state.is_untouched_by_frame(obj, meshes)
+            # Up to Blender 5.1 the points are requested also for a modifier without its node group.
+            and state.is_attached(obj)
+        )
+    ):
         return False
     notify(subscribers.frame_shown)
     return True
@@ -381,34 +384,22 @@ def were_only_posed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     changes = Changes.of_poses(depsgraph, original)
     if changes is None or not changes.armatures <= current.armatures:
         return False
-    try:
-        if not all(_was_only_posed(obj, depsgraph, changes) for obj in current.objects or ()):
-            return False
-    except ReferenceError:
-        # The object was deleted since the list was made.
+    if not _is_each(lambda obj, state: state.was_only_posed(obj, depsgraph, changes)):
         return False
     notify(subscribers.frame_shown)
     return True
 
 
-def _was_only_posed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> bool:
-    state = state_of(obj)
-    if not plan_of(obj).is_read:
-        return True
-    return state is not None and state.was_only_posed(obj, depsgraph, changes)
-
-
-def _was_deformed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, meshes: set[int] | None) -> bool:
-    state = state_of(obj)
-    if not plan_of(obj).is_read:
-        return True
-    return (
-        state is not None
-        and state.was_deformed(obj, depsgraph)
-        and state.is_untouched_by_frame(obj, meshes)
-        # Up to Blender 5.1 the points are requested also for a modifier without its node group.
-        and state.is_attached(obj)
-    )
+def _is_each(holds: Callable[[bpy.types.Object, SkinnedObject], bool]) -> bool:
+    """Whether something holds for each object that Sinew reads, and each was read."""
+    try:
+        return all(
+            not plan_of(obj).is_read or ((state := state_of(obj)) is not None and holds(obj, state))
+            for obj in current.objects or ()
+        )
+    except ReferenceError:
+        # The object was deleted since the list was made.
+        return False
 
 
 def _do_all_use_builtin() -> bool:

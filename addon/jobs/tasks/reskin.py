@@ -53,11 +53,8 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
 
     Raises SinewError, and saves nothing, where Sinew can deform no mesh.
     """
-    source, settings = Path(task["source"]), task["settings"]
-    clock = _Clock(report)
-    with clock.doing("opening"):
-        notes = files.open_file(source, load_ui=True)
-    notes += _notes_on_file()
+    source, settings, clock = Path(task["source"]), task["settings"], _Clock(report)
+    notes = _open(source, clock)
     with clock.doing("deforming"):
         skinned, left_out = _use_sinew(_meant(settings, source), settings)
     if not skinned:
@@ -80,11 +77,8 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
 
     Raises SinewError, and saves nothing, where no mesh has Sinew.
     """
-    source, settings = Path(task["source"]), task["settings"]
-    clock = _Clock(report)
-    with clock.doing("opening"):
-        notes = files.open_file(source, load_ui=True)
-    notes += _notes_on_file()
+    source, settings, clock = Path(task["source"]), task["settings"], _Clock(report)
+    notes = _open(source, clock)
     with clock.doing("restoring"):
         comparison.end(bpy.context)
         skinned = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and _is_meant(obj, settings)]
@@ -132,15 +126,14 @@ def _use_sinew(
             "before": way,
             "method": method,
             "scale": properties.of(obj).scale_rule,
-            "warnings": [*(state.bound.facts.warnings if state is not None else ()), *_told(obj)],
+            "warnings": [
+                *(state.bound.facts.warnings if state is not None else ()),
+                # What else deforms the mesh than Sinew, and what was found switched off.
+                *(*session.plan_of(obj).view_reasons, *attach.notes(obj)),
+            ],
         }
         skinned.append((obj, mesh))
     return skinned, left_out
-
-
-def _told(obj: bpy.types.Object) -> list[str]:
-    """Returns what else deforms the mesh than Sinew, and what was found switched off."""
-    return [*session.plan_of(obj).view_reasons, *attach.notes(obj)]
 
 
 def _meant(settings: dict, source: Path) -> list[bpy.types.Object]:
@@ -198,9 +191,10 @@ def _described(obj: bpy.types.Object) -> str:
     return "; ".join(f"{m.name}, {ways[m.use_deform_preserve_volume]}" for m in modifiers)
 
 
-def _notes_on_file() -> list[str]:
-    """Returns notes about the file itself for the user of the copy."""
-    notes = []
+def _open(source: Path, clock: _Clock) -> list[str]:
+    """Opens the file. Returns notes about it for the user of the copy."""
+    with clock.doing("opening"):
+        notes = files.open_file(source, load_ui=True)
     # The third number of a file's version is that of its format, not of a release.
     written, running = tuple(bpy.data.version)[:2], bpy.app.version[:2]
     if written != running:
