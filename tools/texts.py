@@ -13,7 +13,7 @@ import sinew
 import sinew_addon
 from bl_ui.utils import PresetPanel
 from sinew_addon import registration
-from sinew_addon.core import metrics, suggestion
+from sinew_addon.core import battery, metrics, recommendation, suggestion
 from sinew_addon.core.vertex_data import PROVIDERS
 from sinew_addon.features.diagnose import mending
 from sinew_addon.features.heat import heat_panel
@@ -105,6 +105,10 @@ def _of_lists() -> Iterator[tuple[str, str]]:
         yield criterion.label, "CRITERIA"
         yield criterion.text, "CRITERIA"
         yield criterion.praise, "CRITERIA"
+    for candidate in (*recommendation.METHODS, *recommendation.STAGES):
+        yield candidate.why, "recommendation"
+    for pose in battery.FIGURE:
+        yield pose, "battery"
     for mend in mending.ALL.values():
         yield mend.label, "mending"
         yield mend.description, "mending"

@@ -47,6 +47,26 @@ def method(text: str) -> str:
     return one_of([method.name for method in sinew.methods()])(text)
 
 
+def add_method(
+    parser: argparse.ArgumentParser,
+    text: str,
+    required: bool = False,
+    read: Callable[[str], str] = method,
+) -> None:
+    """Adds --method, and --preset in its place.
+
+    text  the help of --method
+    """
+    group = parser.add_mutually_exclusive_group(required=required)
+    group.add_argument("--method", type=read, help=text)
+    group.add_argument(
+        "--preset",
+        dest="method",
+        choices=tuple(parameters.PRESETS),
+        help="what Sinew chooses by measuring, instead of a method; --set overrides it",
+    )
+
+
 def one_of(names: Collection[str]) -> Callable[[str], str]:
     """The type of an argument of many choices, which `choices` would repeat in each line of help."""
 

@@ -17,7 +17,7 @@ from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
 from ..jobs.inputs import Job, plan_jobs
-from .arguments import add_copies, add_set, count, method, percent
+from .arguments import add_copies, add_method, add_set, count, percent
 from .console import Console
 from .outcome import Outcome, conclude, of_each
 
@@ -45,11 +45,7 @@ shapes move in straight lines."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_copies(parser)
-    parser.add_argument(
-        "--method",
-        type=method,
-        help="a method of `sinew methods`, for all meshes (default: each as the file has it)",
-    )
+    add_method(parser, "a method of `sinew methods`, for all meshes (default: each as the file has it)")
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
     parser.add_argument("--step", type=count, default=1, metavar="N", help="every Nth of the frames")
@@ -99,7 +95,9 @@ class Baked(Outcome):
 
 def run(args: argparse.Namespace, console: Console) -> int:
     if args.set and args.method is None:
-        raise WrongUse("--set goes with --method; without it meshes are baked as the file has them")
+        raise WrongUse(
+            "--set goes with --method or --preset; without it meshes are baked as the file has them"
+        )
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
     suffix = EXPORTS.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
@@ -143,6 +141,8 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
                 taken.append(obj)
             else:
                 outcome.left_out.append(str(error))
+        for sentence in characters.sentences():
+            console.note(f"{source}: {sentence}")
         if not taken:
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
         try:

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..core.bake import is_whole
 from ..core.errors import SinewError
 from ..core.output import file_to_write, write_whole
-from .arguments import add_file, add_set, count, method
+from .arguments import add_file, add_method, add_set, count
 from .console import Console
 
 SUMMARY = "write a .glb whose skins have Sinew's method and centres of rotation"
@@ -28,11 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", required=True, type=partial(file_to_write, endings=(".glb",)), metavar="OUT.glb"
     )
-    parser.add_argument(
-        "--method",
-        type=method,
-        help="a method of `sinew methods`, for all meshes (default: each as the file has it)",
-    )
+    add_method(parser, "a method of `sinew methods`, for all meshes (default: each as the file has it)")
     parser.add_argument(
         "--influences", type=count, default=4, metavar="N", help="of a vertex, at most (default: 4)"
     )
@@ -57,6 +53,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
             characters.set_parameters(args.set)
             errors = characters.use_methods([(obj, args.method) for obj in meshes])
             left_out += [str(error) for error in errors if error is not None]
+            for sentence in characters.sentences():
+                console.note(f"{args.file}: {sentence}")
         if not any(properties.has_sinew(obj) and properties.of(obj).enabled for obj in meshes):
             reason = left_out[0] if left_out else "no mesh has Sinew; choose a method by --method"
             raise SinewError(f"{args.file}: {reason}")

@@ -7,6 +7,7 @@ import math
 
 import sinew
 
+from ..core.parameters import PRESETS
 from .arguments import add_json
 from .console import Console
 
@@ -26,6 +27,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
                 _facts(method) | {"group": method.group, "needs": list(method.needs)} for method in methods
             ],
             "stages": [_facts(stage) for stage in stages],
+            "presets": [{"name": name, "description": text} for name, text in PRESETS.items()],
         }
         console.say(json.dumps(rows, indent=2))
     else:
@@ -40,6 +42,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             ("stage", "parameters", "what it does"),
             [(s.name, ", ".join(_parameters(s)), s.description) for s in stages],
         )
+        console.table(("preset", "what it chooses"), list(PRESETS.items()))
     return 0
 
 

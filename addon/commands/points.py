@@ -13,7 +13,8 @@ from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import file_to_write, write_whole
-from .arguments import add_file, add_object, add_set
+from ..core.parameters import PRESETS
+from .arguments import add_file, add_method, add_object, add_set
 from .console import Console
 
 SUMMARY = "write the deformed vertices of chosen frames"
@@ -26,9 +27,8 @@ HELP = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
-    parser.add_argument(
-        "--method", required=True, help="a method of `sinew methods`, or blender for the Armature modifier"
-    )
+    text = "a method of `sinew methods`, or blender for the Armature modifier"
+    add_method(parser, text, required=True, read=str)
     parser.add_argument("--frames", required=True, help="such as 1,12,40-48")
     add_object(parser)
     parser.add_argument(
@@ -45,7 +45,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..io import files
 
     frames = parse_frames(args.frames)
-    characters.check_methods([args.method])
+    if args.method not in PRESETS:
+        characters.check_methods([args.method])
     characters.set_parameters(args.set)
     console.note_on(args.file, files.open_file(args.file))
     try:
@@ -55,13 +56,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     failed = False
     taken = []
-    for obj in meshes:
-        try:
-            characters.use_method(obj, args.method)
+    errors = characters.use_methods([(obj, args.method) for obj in meshes])
+    for obj, reason in zip(meshes, errors, strict=True):
+        if reason is None:
             taken.append(obj)
-        except SinewError as error:
+        else:
             failed = True
-            console.complain(f"{args.file}: left out: {error}")
+            console.complain(f"{args.file}: left out: {reason}")
+    for sentence in characters.sentences():
+        console.note(f"{args.file}: {sentence}")
     if not taken:
         raise SinewError(f"{args.file}: no mesh that Sinew can deform")
 

@@ -16,8 +16,8 @@ from ..core.golden import (
     picture_name,
 )
 from ..core.output import folder_to_write, remove, write_text
-from ..core.parameters import Value, as_texts, parse
-from .arguments import add_engine, add_file, add_object, add_set, pixels
+from ..core.parameters import PRESETS, Value, as_texts, parse
+from .arguments import add_engine, add_file, add_method, add_object, add_set, pixels
 from .console import Console
 
 # In percent of the pixels; between Blender 4.2 and 5.2 on one machine, no pixel differs.
@@ -35,7 +35,8 @@ HELP = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
-    parser.add_argument("--method", help="a method of `sinew methods`, or blender for the Armature modifier")
+    text = "a method of `sinew methods`, or blender for the Armature modifier"
+    add_method(parser, text, read=str)
     parser.add_argument("--frames", help="such as 1,12,40-48")
     add_object(parser)
     parser.add_argument("--size", type=pixels, help="pixels of a picture's longer side (default: 640)")
@@ -74,8 +75,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if args.frames is not None:
         frames = parse_frames(args.frames)
     if method is None or frames is None:
-        raise WrongUse("render: --method and --frames are needed where there is no --against")
-    characters.check_methods([method])
+        raise WrongUse("render: --method or --preset, and --frames, are needed where there is no --against")
+    if method not in PRESETS:
+        characters.check_methods([method])
     parameters = {**parse(golden.set), **args.set} if golden is not None else args.set
     characters.set_parameters(parameters)
     if golden is not None:
@@ -143,6 +145,8 @@ def _draw(
         else:
             views = characters.whole_views(meshes, [method], frames)
         studio = render.Studio(scene, meshes, engine, size)
+    for sentence in characters.sentences():
+        console.note(f"{args.file}: {sentence}")
     names = [obj.name for obj in meshes]
     settings = RenderSettings(
         args.file.name, method, frames, engine, size, args.own_look, names, views, as_texts(parameters)

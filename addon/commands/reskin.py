@@ -6,10 +6,10 @@ import argparse
 import sinew
 
 from ..core.frames import parse_frames
-from ..core.parameters import as_texts
+from ..core.parameters import PRESETS, as_texts
 from ..jobs.job_file import Settings, keys
 from . import batch
-from .arguments import add_set, method
+from .arguments import add_method, add_set
 from .console import Console
 
 SUMMARY = "write copies of files whose meshes are deformed by Sinew"
@@ -21,9 +21,7 @@ HELP = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     batch.add_arguments(parser)
-    parser.add_argument(
-        "--method", type=method, help="a method of `sinew methods`; needed unless the job file has one"
-    )
+    add_method(parser, "a method of `sinew methods`; this or --preset unless the job file has one")
     parser.add_argument("--job", metavar="FILE.toml", help="settings for files and objects (docs/batch.md)")
     parser.add_argument("--job-help", action=_JobHelp, nargs=0, help="show the keys of a job file and exit")
     parser.add_argument(
@@ -48,7 +46,7 @@ class _JobHelp(argparse.Action):
 
 
 def _methods() -> list[str]:
-    return [method.name for method in sinew.methods()]
+    return [*(method.name for method in sinew.methods()), *PRESETS]
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

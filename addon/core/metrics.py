@@ -92,6 +92,11 @@ METRICS = {
 }
 
 
+# The squared length of a blend of rotations, below which its vertex is bent: halves of two that are 13
+# degrees apart, or a tenth of one that is 22 degrees from the rest.
+BENT = 0.9968
+
+
 @dataclass(frozen=True)
 class FrameOfRig:
     """The rest shape and the bones of one frame, all in one space, in whose unit lengths are measured.
@@ -185,18 +190,23 @@ class Gauge:
 
     def set_frame(self, frame: FrameOfRig) -> None:
         """Sets the frame of the shapes to be measured next."""
+        self._pose = self.pose_of(frame)
+
+    def pose_of(self, frame: FrameOfRig) -> Pose:
+        """Returns what measures of a frame share, for Measured; the frame that is set stays."""
         # The rest shape changes only with shape keys or the object's transform.
         same = self._pose is not None and frame.rest is self._pose.frame.rest
         rest = self._rest
         if rest is None or not (same or np.array_equal(frame.rest.T, rest.points)):
             rest = Shape(self.surface, frame.rest)
-        self._rest, self._pose = rest, Pose(self._skin, rest, frame)
+        self._rest = rest
+        return Pose(self._skin, rest, frame)
 
     @property
     def rest(self) -> Shape:
         """The rest shape of the frame set last."""
-        assert self._rest is not None, "set_frame() comes first"
-        return self._rest
+        assert self._pose is not None, "set_frame() comes first"
+        return self._pose.rest
 
     def measure(
         self, points: np.ndarray, other: np.ndarray | Callable[[], np.ndarray] | None = None
@@ -219,7 +229,7 @@ class Skin:
     """
 
     def __init__(self, surface: Surface, influences: Influences) -> None:
-        self.surface, self._influences = surface, influences
+        self.surface, self.influences = surface, influences
         self.weighted = np.flatnonzero(influences.counts)
         self.starts = influences.offsets[self.weighted].astype(np.int64)
         self.heaviest = _heaviest_bones(influences, self.weighted, self.starts)
@@ -238,30 +248,46 @@ class Skin:
 
     @cached_property
     def limbs(self) -> Parts:
-        """The triangles that follow each bone: that of two of their corners, or of one where all differ."""
+        """The triangles that follow each bone."""
+        return Parts.of(self.surface, self.limb_of_triangles)
+
+    @cached_property
+    def limb_of_vertices(self) -> np.ndarray:
+        """int64 [vertices]: the heaviest bone of each; -1 for none."""
         of_vertices = np.full(self.surface.vertex_count, -1)
         of_vertices[self.weighted] = self.heaviest
-        return Parts.of(self.surface, np.sort(of_vertices[self.surface.triangles], axis=1)[:, 1])
+        return of_vertices
+
+    @cached_property
+    def limb_of_triangles(self) -> np.ndarray:
+        """int64 [triangles]: that of two of their corners, or of one where all differ."""
+        return np.sort(self.limb_of_vertices[self.surface.triangles], axis=1)[:, 1]
+
+    def blended(self, rotations: np.ndarray) -> np.ndarray:
+        """float32 [4, vertices]: the weighted sums of the bones' rotations, shorter where these differ.
+
+        rotations  unit quaternions [4, bones]
+        """
+        # Only the sign of a dot product is needed: single precision is enough.
+        rotations = rotations.astype(np.float32)
+        blended = np.zeros((4, self.surface.vertex_count), dtype=np.float32)
+        blended[0] = 1.0
+        if len(self.weighted):
+            bones, weights = self.influences.bones, self.influences.weights
+            heaviest = np.repeat(self.heaviest, self.influences.counts[self.weighted])
+            terms = rotations.take(bones, axis=1)
+            # All are brought into the hemisphere of the heaviest: a sum of two then never cancels.
+            terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
+            blended[:, self.weighted] = np.add.reduceat(terms, self.starts, axis=1)
+        return blended
 
     def rotated_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """float32 [3, triangles]: normals, of any length, rotated by the bones of their corners.
 
         rotations  unit quaternions [4, bones]
         """
-        # Only the sign of a dot product is needed: single precision is enough.
-        rotations = rotations.astype(np.float32)
-        vertex_rotations = np.zeros((4, self.surface.vertex_count), dtype=np.float32)
-        vertex_rotations[0] = 1.0
-        if len(self.weighted):
-            bones, weights = self._influences.bones, self._influences.weights
-            heaviest = np.repeat(self.heaviest, self._influences.counts[self.weighted])
-            terms = rotations.take(bones, axis=1)
-            # All are brought into the hemisphere of the heaviest: a sum of two then never cancels.
-            terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
-            sums = np.add.reduceat(terms, self.starts, axis=1)
-            vertex_rotations[:, self.weighted] = sums / np.maximum(
-                np.sqrt(dots(sums, sums)), np.float32(1e-12)
-            )
+        vertex_rotations = self.blended(rotations)
+        vertex_rotations /= np.maximum(np.sqrt(dots(vertex_rotations, vertex_rotations)), np.float32(1e-12))
         first, second, third = (vertex_rotations.take(corner, axis=1) for corner in self.surface.corners)
         one = np.float32(1.0)
         total = first + np.where(dots(first, second) < 0.0, -one, one) * second
@@ -294,6 +320,39 @@ class Pose:
         """float64 [limbs]: their volumes at rest."""
         return self.skin.limbs.volumes(self.rest.points)
 
+    @cached_property
+    def is_bent(self) -> np.ndarray:
+        """bool [vertices]: those that bones move which rotate apart, and those whose neighbours other bones
+        rotate otherwise."""
+        blended = self.skin.blended(self.frame.rotations)
+        squares, (first, second) = dots(blended, blended), self.skin.surface.ends
+        cosines = dots(blended.take(first, axis=1), blended.take(second, axis=1))
+        apart = cosines * cosines < BENT * squares[first] * squares[second]
+        is_bent = squares < BENT
+        is_bent[first[apart]] = is_bent[second[apart]] = True
+        return is_bent
+
+    @property
+    def bone_count(self) -> int:
+        return len(self.frame.motions)
+
+    @cached_property
+    def bent_areas(self) -> np.ndarray:
+        """float64 [bones]: how much of the surface that follows each bone most is bent."""
+        limbs = self.skin.limb_of_triangles
+        taken = self.bent_triangles & (limbs >= 0)
+        return np.bincount(limbs[taken], self.rest.areas[taken], self.bone_count)
+
+    @cached_property
+    def bent_edges(self) -> np.ndarray:
+        """bool [edges]"""
+        return self.is_bent[self.skin.surface.edges].any(axis=1)
+
+    @cached_property
+    def bent_triangles(self) -> np.ndarray:
+        """bool [triangles]"""
+        return self.is_bent[self.skin.surface.triangles].any(axis=1)
+
 
 class Shape:
     """A surface at given points; each property is computed once, when it is first read.
@@ -323,6 +382,16 @@ class Shape:
         first, second = (self.points.take(end, axis=1) for end in self.surface.ends)
         along = second - first
         return np.sqrt(dots(along, along))
+
+    @cached_property
+    def folded(self) -> np.ndarray:
+        """bool [triangles]: those more than 120 degrees from a neighbour."""
+        first, second = self.surface.neighbours
+        normals = self.normals / np.maximum(2.0 * self.areas, 1e-30)
+        sharp = dots(normals.take(first, axis=1), normals.take(second, axis=1)) < -0.5
+        found = np.zeros(len(self.surface.triangles), dtype=bool)
+        found[first[sharp]] = found[second[sharp]] = True
+        return found
 
     @cached_property
     def volume(self) -> float:
@@ -395,6 +464,47 @@ class Measured:
     def entry(self, name: str) -> float:
         """Returns one entry of the summary, or `bulge_worst`, without computing the others."""
         return self._ENTRIES[name](self)
+
+    @property
+    def pose(self) -> Pose:
+        return self._pose
+
+    def by_limb(self) -> dict[str, np.ndarray]:
+        """Returns measures of what is bent, float64 [bones], each of the part of the mesh that follows a bone
+        most; NaN for a bone that has nothing bent:
+
+        stretch  of edges, RMS
+        volume   that the limb gains or loses, as a part of its own
+        folded   the share of area that is folded against a neighbour, and is not at rest
+        bulge    above zero, RMS
+        """
+        pose, rest, surface = self._pose, self.rest, self.shape.surface
+        count, bones = pose.bone_count, pose.skin.limb_of_vertices
+        bent = np.flatnonzero(pose.is_bent & (bones >= 0))
+        ends = surface.ends[:, pose.bent_edges]
+        of_edges = bones[ends].ravel()
+        taken, lengths = of_edges >= 0, np.tile(rest.lengths[pose.bent_edges], 2)
+        squares = lengths * np.tile((self.stretch - 1.0)[pose.bent_edges] ** 2, 2)
+        sums, wholes = (np.bincount(of_edges[taken], each[taken], count) for each in (squares, lengths))
+        of_triangles, areas = pose.skin.limb_of_triangles, rest.areas
+        taken = pose.bent_triangles & (of_triangles >= 0)
+        folded = areas * (self.shape.folded & ~rest.folded)
+        folds, of_all = (np.bincount(of_triangles[taken], each[taken], count) for each in (folded, areas))
+        squares = np.bincount(bones[bent], self.bulge[bent].clip(min=0.0) ** 2, count)
+        swollen = squares / np.maximum(np.bincount(bones[bent], minlength=count), 1)
+        volume, limbs = np.zeros(count), pose.skin.limbs
+        numbers = np.unique(of_triangles[of_triangles >= 0])
+        changes = np.abs(limbs.volumes(self.shape.points) - pose.rest_limbs)
+        volume[numbers] = np.divide(
+            changes, np.abs(pose.rest_limbs), out=np.zeros_like(changes), where=pose.rest_limbs != 0.0
+        )
+        found = {
+            "stretch": np.sqrt(np.divide(sums, wholes, out=np.zeros(count), where=wholes > 0.0)),
+            "volume": volume,
+            "folded": np.divide(folds, of_all, out=np.zeros(count), where=of_all > 0.0),
+            "bulge": np.sqrt(swollen),
+        }
+        return {name: np.where(pose.bent_areas > 0.0, values, np.nan) for name, values in found.items()}
 
     def summary(self) -> Summary:
         entries: dict[str, Any] = {field.name: self.entry(field.name) for field in fields(Summary)}

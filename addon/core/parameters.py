@@ -14,6 +14,12 @@ Value: TypeAlias = float | int | bool | str
 OFF = "off"
 """The value "none" of a parameter that names a method."""
 
+PRESETS = {
+    "recommended": "Method, Twist Spread, Limit Bulge and, where weights are crude, Delta Mush: measured on "
+    "the character, in the frames in which its joints bend most, or without an action in a battery of poses"
+}
+"""What chooses a method and stages, by its name."""
+
 SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
 

@@ -76,10 +76,48 @@ class Bones(OfArrays):
         return axes
 
     @cached_property
+    def _finder(self) -> TwistFinder:
+        return TwistFinder(self.names, self.deform, self.parents, self.rest, self.lengths, self.segments)
+
+    @cached_property
     def twists(self) -> Twists:
         """The bones that share the twist of another."""
-        finder = TwistFinder(self.names, self.deform, self.parents, self.rest, self.lengths, self.segments)
-        return finder.find(self.first_joints, len(self.rest) - len(self.names))
+        return self._finder.find(self.first_joints, len(self.rest) - len(self.names))
+
+    @cached_property
+    def carriers(self) -> np.ndarray:
+        """int32 [bones]: the deforming bone that carries each deforming one, and the parent of each other; -1
+        for none."""
+        found = [
+            self._carrier(bone) if deforms else int(self.parents[bone])
+            for bone, deforms in enumerate(self.deform)
+        ]
+        return np.array(found, dtype=np.int32).reshape(-1)
+
+    def _carrier(self, bone: int) -> int:
+        """In rigs whose deforming bones hang on others of the same places, the one at the place of a bone
+        above."""
+        carrier, above = self._finder.carrier(bone), int(self.parents[bone])
+        places = self.rest[: len(self.names), :3, 1:4]
+        while carrier < 0 and above >= 0:
+            apart = np.abs(places - places[above]).max(axis=(1, 2))
+            alike = np.flatnonzero(self.deform & (apart <= 1e-3 * self.lengths))
+            alike = alike[alike != bone]
+            carrier, above = int(alike[0]) if len(alike) else -1, int(self.parents[above])
+        return carrier
+
+    @cached_property
+    def from_the_root(self) -> list[int]:
+        """The bones, each after the one that carries it."""
+        order: dict[int, None] = {}
+        for bone in range(len(self.names)):
+            chain: list[int] = []
+            # Rigs whose bones hang on others may carry each other in a circle.
+            while bone >= 0 and bone not in order and bone not in chain:
+                chain.append(bone)
+                bone = int(self.carriers[bone])
+            order.update(dict.fromkeys(reversed(chain)))
+        return list(order)
 
     def groups_without_bone(self, group_names: Sequence[str]) -> list[str]:
         """Returns the groups without a bone of the same name."""

@@ -60,6 +60,15 @@ class Surface:
         missing[keys == opposite] = 0
         return np.repeat(keys, missing.clip(min=0)), keys[counts > 1]
 
+    @cached_property
+    def neighbours(self) -> np.ndarray:
+        """int64 [2, n]: pairs of triangles with a common edge."""
+        keys = np.sort(np.stack([self.corners, np.roll(self.corners, -1, axis=0)]), axis=0)
+        flat = (keys[0] * self.vertex_count + keys[1]).ravel()
+        order = np.argsort(flat, kind="stable")
+        same = np.flatnonzero(flat[order[1:]] == flat[order[:-1]])
+        return np.stack([order[same], order[same + 1]]) % max(len(self.triangles), 1)
+
     @property
     def clash_count(self) -> int:
         """The number of directed edges that two triangles share: their normals disagree, or the edge has more

@@ -88,12 +88,12 @@ class TwistFinder:
         """The deforming bones that each bone carries next, by its chain."""
         children: list[list[int]] = [[] for _name in self._names]
         for bone in np.flatnonzero(self._deform):
-            parent = self._carrier(int(bone))
+            parent = self.carrier(int(bone))
             if parent >= 0:
                 children[parent].append(int(bone))
         return children
 
-    def _carrier(self, bone: int) -> int:
+    def carrier(self, bone: int) -> int:
         """The nearest deforming bone above. In rigs whose deforming bones hang on others, the one at whose
         tail the bone starts. -1 for none."""
         above = int(self._parents[bone])
@@ -121,7 +121,7 @@ class TwistFinder:
         if role == NEITHER or not self._lengths[bone] > 0.0:
             return None
         if role == UPPER:
-            base = self._carrier(bone)
+            base = self.carrier(bone)
             base = int(self._parents[bone]) if base < 0 else base
             if base < 0:
                 self._leave_out(bone, "{bone} has no parent to be twisted against")

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeAlias
 
 import bpy
 import numpy as np
@@ -121,6 +122,63 @@ def set_parameters(values: Mapping[str, Value]) -> None:
 _values_of_all: dict[str, Value] = {}
 
 
+Chosen: TypeAlias = tuple[str, Mapping[str, Value], str]
+"""A method, values of parameters by their full names, and a sentence that says why."""
+
+choosers: dict[str, Callable[[Sequence[bpy.types.Object]], Chosen]] = {}
+"""For each of parameters.PRESETS, which may stand in the place of a method: chooses for the meshes of a
+character, which are deformed by Sinew already."""
+
+# The method of meshes while a preset is being chosen.
+_FIRST = "dq"
+_sentences: list[str] = []
+
+
+def sentences() -> list[str]:
+    """Returns what presets chose since the last call, and why."""
+    found = list(dict.fromkeys(_sentences))
+    _sentences.clear()
+    return found
+
+
+def _with_presets(
+    wanted: Sequence[tuple[bpy.types.Object, str]], values: Mapping[bpy.types.Object, Mapping[str, Value]]
+) -> tuple[
+    Sequence[tuple[bpy.types.Object, str]],
+    Mapping[bpy.types.Object, Mapping[str, Value]],
+    dict[bpy.types.Object, SinewError],
+]:
+    """Returns the same with methods and values in the place of presets, and the errors of meshes that none
+    can be chosen for."""
+    named = {obj: method for obj, method in wanted if method in choosers}
+    if not named:
+        return wanted, values, {}
+    nothing: dict[bpy.types.Object, dict[str, Value]] = {obj: {} for obj in named}
+    errors = _use_methods([(obj, _FIRST) for obj in named], session.changing, values=nothing)
+    failed = {obj: error for obj, error in zip(named, errors, strict=True) if error is not None}
+    characters: dict[tuple[str, bpy.types.Object | None], list[bpy.types.Object]] = {}
+    for obj, preset in named.items():
+        if obj not in failed:
+            characters.setdefault((preset, attach.armature_of(obj)), []).append(obj)
+    chosen: dict[bpy.types.Object, Chosen] = {}
+    for (preset, _armature), meshes in characters.items():
+        try:
+            with shown([obj for obj in meshes if obj.name in bpy.context.scene.objects]):
+                choice = choosers[preset](meshes)
+        except SinewError as error:
+            failed |= dict.fromkeys(meshes, error)
+            continue
+        chosen |= dict.fromkeys(meshes, choice)
+        _sentences.append(f"{', '.join(obj.name for obj in meshes)}: {choice[2]}")
+    given = {obj: values.get(obj, _values_of_all) for obj, _method in wanted}
+    found = [(obj, chosen[obj][0] if obj in chosen else method) for obj, method in wanted]
+    return (
+        found,
+        {obj: {**chosen[obj][1], **own} if obj in chosen else own for obj, own in given.items()},
+        failed,
+    )
+
+
 def _use_methods(
     wanted: Sequence[tuple[bpy.types.Object, str]],
     changing: Callable[[bpy.types.Context], AbstractContextManager[None]],
@@ -128,9 +186,12 @@ def _use_methods(
     values: Mapping[bpy.types.Object, Mapping[str, Value]] = MappingProxyType({}),
 ) -> list[SinewError | None]:
     errors: list[SinewError | None] = []
+    wanted, values, failed = _with_presets(wanted, values)
     with changing(bpy.context):
         for obj, method in wanted:
             try:
+                if obj in failed:
+                    raise failed[obj]
                 _choose(obj, method, values.get(obj, _values_of_all))
                 if scales.get(obj) is not None:
                     # As for the method: what the caller asks for overrides keys in the file.
@@ -194,6 +255,7 @@ def deformable_meshes(
         meshes = deformed_meshes(scene, name)
     except SinewError as error:
         raise SinewError(f"{path}: {error}") from None
+    methods = [_FIRST if method in choosers else method for method in methods]
     taken, reasons = [], []
     for obj in meshes:
         try:

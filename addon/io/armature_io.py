@@ -129,6 +129,26 @@ def read_twists(evaluated_armature: bpy.types.Object, bones: Bones) -> TwistInpu
     return tuple(inputs)
 
 
+def read_limits(armature: bpy.types.Object) -> dict[str, np.ndarray]:
+    """Returns the limits of rotation of each bone that has some, as battery.Limits: those of inverse
+    kinematics, or of a Limit Rotation in its own space."""
+    limits = {}
+    for bone in armature.pose.bones:
+        found = np.full((3, 2), np.nan)
+        constraints = [each for each in bone.constraints if each.type == "LIMIT_ROTATION" and not each.mute]
+        for axis, letter in enumerate("xyz"):
+            if getattr(bone, f"lock_ik_{letter}"):
+                found[axis] = 0.0
+            elif getattr(bone, f"use_ik_limit_{letter}"):
+                found[axis] = getattr(bone, f"ik_min_{letter}"), getattr(bone, f"ik_max_{letter}")
+            for each in constraints:
+                if each.owner_space == "LOCAL" and getattr(each, f"use_limit_{letter}"):
+                    found[axis] = getattr(each, f"min_{letter}"), getattr(each, f"max_{letter}")
+        if not np.isnan(found).all():
+            limits[bone.name] = found
+    return limits
+
+
 def _turns_told(bone: bpy.types.PoseBone) -> tuple[float, ...]:
     """Returns the rotation of a bone's channels, and the angles that they give beyond half a turn."""
     mode = bone.rotation_mode

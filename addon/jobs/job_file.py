@@ -185,7 +185,13 @@ def keys(methods: Collection[str] = ()) -> tuple[Key, ...]:
     return (
         Key("inputs", (TOP,), _texts, text_or_list, f"files, folders and patterns, {below}"),
         Key("out", (TOP,), _text, "text", f"folder of the copies, {below}"),
-        Key("method", of_all, _one_of(methods), "a method of `sinew methods`", "how the meshes are deformed"),
+        Key(
+            "method",
+            of_all,
+            _one_of(methods),
+            "a method or preset of `sinew methods`",
+            "how the meshes are deformed",
+        ),
         Key(
             "scale",
             of_all,

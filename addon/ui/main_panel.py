@@ -108,6 +108,7 @@ def _draw_character(
     column = layout.column()
     column.active = shared.enabled
     draw_method(column, settings, SINEW_PT_methods.__name__)
+    stepped.draw_progress(layout, "sinew.recommend")
     row = layout.row(align=True)
     row.prop(shared, "enabled", text=state_text.switch_text(meshes), toggle=True)
     row.operator("sinew.compare", text="Compare\u2026")

@@ -72,6 +72,15 @@ def _draw_methods(
 ) -> None:
     lead = character.lead(context)
     operator = "sinew.add" if lead is None else "sinew.use_method"
+    if pictures is not None:
+        pictures.label()
+    if lead is None:
+        names.operator("sinew.add", text="Recommended", icon="SOLO_ON").method = operators.RECOMMENDED
+    else:
+        # From a menu, too, in steps.
+        row = names.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator("sinew.recommend", icon="SOLO_ON")
     for group, methods in groupby(properties.METHODS.values(), lambda method: method.group):
         names.label(text=group)
         if pictures is not None:
@@ -124,6 +133,7 @@ class SINEW_MT_compare(_Submenu, bpy.types.Menu):
         Entry("sinew.compare", "Compare Methods\u2026", icon="MOD_ARRAY"),
         Entry("sinew.flip_comparison"),
         Entry("sinew.end_comparison"),
+        Entry("sinew.recommend", icon="SOLO_ON"),
         *_over("sinew.suggest", "Suggest a Method"),
     )
 

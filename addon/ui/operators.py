@@ -176,7 +176,7 @@ class _OfOneMesh:
         return [obj for obj in objects if self.name in ("", obj.name)]
 
 
-AS_BEFORE = "AS_BEFORE"
+AS_BEFORE, RECOMMENDED = "AS_BEFORE", "RECOMMENDED"
 # The choices of Add Sinew's first method.
 FIRST_METHODS = [
     (
@@ -185,6 +185,7 @@ FIRST_METHODS = [
         "Each mesh keeps its shape; one that joins others has their settings",
         0,
     ),
+    (RECOMMENDED, "Recommended", "Method and stages are measured and set for the character", 1000),
     *method_items(1),
 ]
 
@@ -224,7 +225,7 @@ class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
         return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        method = None if self.method == AS_BEFORE else self.method
+        method = None if self.method in (AS_BEFORE, RECOMMENDED) else self.method
         objects = self.meant([obj for obj in targets(context) if not properties.has_sinew(obj)])
         followers = [obj for obj in sinew_targets(context) if not properties.of(obj).is_own]
 
@@ -240,6 +241,8 @@ class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
             for sentence in attach.notes(obj):
                 self.report({"WARNING"}, f"{obj.name}: {tr(sentence)}")
         session.refresh(context)
+        if self.method == RECOMMENDED and result == {"FINISHED"}:
+            bpy.ops.sinew.recommend("INVOKE_DEFAULT")
         return result
 
 

@@ -39,7 +39,7 @@ LONG_TERM = {
     *("test_diagnostics_panel", "test_found_where_looked_for", "test_golden", "test_heat_map", "test_ik"),
     *("test_inbetween", "test_lesson", "test_mask_groups", "test_mending", "test_method_parameters"),
     *("test_methods_against_reference", "test_mix", "test_precomputation"),
-    *("test_preferences", "test_scale_rule", "test_sdef", "test_small_meshes"),
+    *("test_preferences", "test_recommended", "test_scale_rule", "test_sdef", "test_small_meshes"),
     *("test_suggest", "test_translations", "test_twist_spread", "test_worst_frames"),
 }
 # Run a second time with Sinew's default for small meshes, except for tests marked by_sinew.

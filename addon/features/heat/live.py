@@ -5,8 +5,9 @@ by Blender.
 Shapes are the results of skinning alone, in world space; several objects are measured as one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import bpy
@@ -14,15 +15,17 @@ import numpy as np
 
 from ...attach import attach, corrective_smooth, properties, stage_settings, upstream_proxy
 from ...core import influences
-from ...core.metrics import FrameOfRig, Gauge, Measured
+from ...core.metrics import FrameOfRig, Gauge, Measured, Pose, Shape
+from ...core.rig import Bones
 from ...core.skin_stack import SkinStack
 from ...core.stages import StageValues
 from ...core.surface import Surface, joined
+from ...core.twist_spread import NOT_TOLD, TwistInputs
 from ...core.vectors import is_same_space, transformed, transformed_axes
 from ...deform import pose
 from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
-from ...io import mesh_io, spaces
+from ...io import armature_io, mesh_io, spaces
 
 # Sets of objects that are kept prepared: those of the heat map and those of the panel.
 MOST_SUBJECTS = 2
@@ -96,7 +99,8 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
     )
     if stamp != subject.stamp:
         _bring_rest(subject, worlds)
-        subject.gauge.set_frame(_frame_of_rig(subject, armatures))
+        frames = [skinned.shown.frames for _obj, skinned in pairs]
+        subject.gauge.set_frame(_frame_of_rig(subject, armatures, subject.rest, frames))
         shape = _in_world([skinned.points for _obj, skinned in pairs], worlds)
         others = [_Other.of(part, other) for part in subject.parts]
 
@@ -106,6 +110,77 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
         subject.measured, subject.stamp = subject.gauge.measure(shape, reference), stamp
         subject.under_other = None
     return subject
+
+
+@dataclass(frozen=True)
+class Moment:
+    """All that the shapes of one frame depend on but method and stages; or the same in a pose that no frame
+    has. Measuring it changes nothing, and does not depend on the scene's frame.
+
+    rest_points, frames  of each part
+    armatures            world matrices of the first armature of each part
+    """
+
+    subject: Subject
+    rest_points: list[np.ndarray]
+    frames: list[pose.Frames]
+    worlds: list[np.ndarray]
+    armatures: list[np.ndarray]
+
+    @classmethod
+    def of(cls, subject: Subject, depsgraph: bpy.types.Depsgraph) -> Self:
+        """That of the last call of measure()."""
+        frames = []
+        for part in subject.parts:
+            inputs = _twists(part, depsgraph)
+            own = part.skinned.shown.frames
+            frames.append([frame and replace(frame, twists=inputs) for frame in own])
+        return cls(
+            subject,
+            [part.skinned.shown.rest_points for part in subject.parts],
+            frames,
+            [_world(part.obj, depsgraph) for part in subject.parts],
+            [_world(properties.of(part.obj).armature, depsgraph) for part in subject.parts],
+        )
+
+    def posed(self, poses: Callable[[Bones], np.ndarray]) -> Self:
+        """Returns the same in other poses, which tell no turns.
+
+        poses  returns float32 [bones + joints, 4, 4], armature space
+        """
+        frames = [
+            [
+                frame
+                and replace(
+                    frame,
+                    pose=poses(stage.deformer.bones),
+                    twists=tuple((*of_bone[:2], *NOT_TOLD) for of_bone in frame.twists),
+                )
+                for stage, frame in zip(part.skin_stack.skin_stages, own, strict=False)
+            ]
+            for part, own in zip(self.subject.parts, self.frames, strict=True)
+        ]
+        return replace(self, frames=frames)
+
+    @cached_property
+    def pose(self) -> Pose:
+        rest = _in_world(self.rest_points, self.worlds)
+        return self.subject.gauge.pose_of(_frame_of_rig(self.subject, self.armatures, rest, self.frames))
+
+    def measured(self, method: str, stages: StageValues) -> Measured:
+        """Measures the shape under a method and stages; without a mix."""
+        shapes = []
+        for part, rest_points, own in zip(self.subject.parts, self.rest_points, self.frames, strict=True):
+            frames = _under(part, own, method)
+            shapes.append(_Other(part.skin_stack, rest_points, frames, stages).points().copy())
+        return Measured(self.pose, Shape(self.subject.gauge.surface, _in_world(shapes, self.worlds)), None)
+
+
+def _twists(part: Part, depsgraph: bpy.types.Depsgraph) -> TwistInputs:
+    armature = properties.of(part.obj).armature
+    if armature is None:
+        return ()
+    return armature_io.read_twists(armature.evaluated_get(depsgraph), part.bound.first_deformer.bones)
 
 
 def measured_under(subject: Subject, method: str, depsgraph: bpy.types.Depsgraph) -> Measured:
@@ -212,10 +287,7 @@ class _Other:
             frames = pose.of_modifiers(part.obj, shown.frames)
             stage_values = corrective_smooth.stage_values(part.obj)
         else:
-            own = stage_settings.method_values(properties.of(part.obj), (other,))
-            frames = [
-                frame and replace(frame, method=other, mix="", parameters=own) for frame in shown.frames
-            ]
+            frames = _under(part, shown.frames, other)
             stage_values = shown.stage_values
         return cls(part.skin_stack, shown.rest_points, frames, stage_values)
 
@@ -223,6 +295,12 @@ class _Other:
         """float32 [vertices, 3], object space."""
         self.skin_stack.deform(self.rest_points, self.frames, values=self.stage_values)
         return self.skin_stack.points
+
+
+def _under(part: Part, frames: pose.Frames, method: str) -> pose.Frames:
+    """Returns the same poses under another method, without a mix."""
+    own = stage_settings.method_values(properties.of(part.obj), (method,))
+    return [frame and replace(frame, method=method, mix="", parameters=own) for frame in frames]
 
 
 def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
@@ -236,13 +314,15 @@ def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
     subject.rest, subject.rest_made_from = _in_world(shapes, worlds), (shapes, worlds)
 
 
-def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
+def _frame_of_rig(
+    subject: Subject, armatures: list[np.ndarray], rest: np.ndarray, frames: Sequence[pose.Frames]
+) -> FrameOfRig:
     rigs = []
-    for part, armature in zip(subject.parts, armatures, strict=True):
-        bones, frame = part.bound.first_deformer.bones, part.skinned.shown.frames[0]
+    for part, armature, (frame, *_others) in zip(subject.parts, armatures, frames, strict=True):
+        bones = part.bound.first_deformer.bones
         at_rest = armature @ bones.rest
         rigs.append((bones, at_rest, at_rest if frame is None else armature @ frame.pose))
-    return FrameOfRig.of(subject.rest, rigs)
+    return FrameOfRig.of(rest, rigs)
 
 
 def _world(obj: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> np.ndarray:

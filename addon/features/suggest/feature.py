@@ -1,20 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Suggestions: a panel with the best methods at each measure, or all in order, and a click to use one.
-Nothing is stored in files."""
+Nothing is stored in files.
+
+Beside them the preset Recommended, which measures and sets."""
 
 from collections.abc import Iterator
+from typing import ClassVar
 
 import bpy
 
 from ...attach import properties
 from ...attach.feature import Feature
+from ...core import parameters
+from ...core.errors import SinewError
+from ...core.recommendation import Choice
 from ...core.suggestion import CRITERIA, Criterion, Suggestion, Worst
+from ...deform import characters, session
 from ...io import units
-from ...ui import operators, stepped
+from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
-from . import suggest
+from . import recommend, suggest
 
 BEST = "best"
 # Several methods can be equally good.
@@ -39,6 +46,28 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SINEW_OT_recommend(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
+    bl_label = "Recommended"
+    bl_description = (
+        "Measure the character in the frames in which its joints bend most, or without an action in a "
+        "battery of poses, and set method and stages"
+    )
+    saying = "Sinew measures methods and stages"
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        objects = character.followers(context)
+        if not objects:
+            raise SinewError("All meshes have settings of their own")
+        self.choice = yield from recommend.search(context.scene, objects)
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        with session.changing(context):
+            recommend.use(character.followers(context), self.choice)
+        _View.choices[context.scene.session_uid] = self.choice
+        self.report({"INFO"}, self.choice.text)
+        return {"FINISHED"}
+
+
 class SINEW_OT_suggestions_by(bpy.types.Operator):
     bl_idname = "sinew.suggestions_by"
     bl_label = "Suggestions by Measure"
@@ -60,9 +89,11 @@ class SINEW_OT_suggestions_by(bpy.types.Operator):
 
 
 class _View:
-    """What the panel shows: BEST, or a criterion's name."""
+    """What the panel shows: BEST, or a criterion's name; and what was recommended last, by the session_uid of
+    the scene."""
 
     measure = BEST
+    choices: ClassVar[dict[int, Choice]] = {}
 
 
 class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
@@ -70,12 +101,19 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.scene.session_uid in suggest.suggestions and operators.has_sinew_targets(context)
+        uid = context.scene.session_uid
+        is_any = uid in suggest.suggestions or uid in _View.choices
+        return is_any and operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.active = operators.are_any_on(context)
-        suggestion = suggest.suggestions[context.scene.session_uid]
+        uid = context.scene.session_uid
+        if uid in _View.choices:
+            draw_text(layout, context, tr(_View.choices[uid].text), icon="SOLO_ON")
+        suggestion = suggest.suggestions.get(uid)
+        if suggestion is None:
+            return
         used = {properties.of(obj).method for obj in sinew_targets(context)}
         if suggestion.recommended:
             _draw_method(layout, suggestion, suggestion.recommended, used)
@@ -152,6 +190,18 @@ def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None
     return units.text(scene, criterion.unit, worst.value)
 
 
+def _begin() -> None:
+    characters.choosers[RECOMMENDED] = recommend.choose
+
+
+def _end() -> None:
+    del characters.choosers[RECOMMENDED]
+    suggest.suggestions.clear()
+    _View.choices.clear()
+
+
+(RECOMMENDED,) = parameters.PRESETS
+
 FEATURE = Feature(
-    (SINEW_OT_suggest, SINEW_OT_suggestions_by, SINEW_PT_suggest), end=suggest.suggestions.clear
+    (SINEW_OT_suggest, SINEW_OT_recommend, SINEW_OT_suggestions_by, SINEW_PT_suggest), begin=_begin, end=_end
 )

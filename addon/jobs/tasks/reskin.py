@@ -57,6 +57,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
     notes = _open(source, clock)
     with clock.doing("deforming"):
         skinned, left_out = _use_sinew(_meant(settings, source), settings)
+    notes += characters.sentences()
     if not skinned:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
     with clock.doing("saving"), updates_suspended():
@@ -111,7 +112,7 @@ def _use_sinew(
     scales = {obj: _setting_of(obj, settings, "scale") for obj in objects}
     values = {obj: _parameters_of(obj, settings) for obj in objects}
     skinned, left_out = [], []
-    for (obj, method), (way, had_sinew), error in zip(
+    for (obj, _method), (way, had_sinew), error in zip(
         wanted, before, characters.use_methods_for_file(wanted, scales, values), strict=True
     ):
         if error is not None:
@@ -124,7 +125,7 @@ def _use_sinew(
             "object": obj.name,
             "vertices": len(obj.data.vertices),
             "before": way,
-            "method": method,
+            "method": properties.of(obj).method,
             "scale": properties.of(obj).scale_rule,
             "warnings": [
                 *(state.bound.facts.warnings if state is not None else ()),

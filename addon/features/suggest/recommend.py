@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measures a character in the frames in which its joints bend most, or in a battery of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+from ...attach import attach, properties, stage_settings
+from ...core import battery, interrupt, recommendation
+from ...core.errors import SinewError
+from ...core.parameters import OFF, Value
+from ...core.phrases import phrase
+from ...core.recommendation import Choice
+from ...core.rig import Bones
+from ...deform import characters, session
+from ...io import armature_io
+from ...ui import stepped
+from ..heat import live
+from ..heat.worst_frames import armatures_of, check_measurable, measure_at
+from .suggest import crossing_triangles
+
+# Frames of an action that are looked at, and most of them that are measured.
+LOOKED_AT, MEASURED = 100, 12
+# A joint that bends less says nothing.
+BENDS = np.radians(30.0)
+# Crossings take longest, and only strong bends have some.
+MOST_CROSSINGS = 6
+
+
+class Moment(NamedTuple):
+    """A frame or a pose, with its crossings at rest; None where they are not counted."""
+
+    name: str
+    moment: live.Moment
+    at_rest: set[tuple[int, int]] | None
+
+
+def search(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> Generator[float, None, Choice]:
+    """Yields the progress; returns the choice. Objects, actions and the scene's frame are as before.
+
+    Raises SinewError where an object cannot be measured.
+    """
+    check_measurable(objects)
+    named = yield from _in_frames(scene, objects)
+    if not named:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        subject = live.measure(session.states_of(objects, depsgraph), properties.BLENDER, depsgraph)
+        if subject is None:
+            raise SinewError("Nothing to measure: Sinew deforms none of the chosen meshes")
+        named = _in_battery(live.Moment.of(subject, depsgraph))
+    moments = [_with_crossings(name, moment, k, len(named)) for k, (name, moment) in enumerate(named)]
+    if not moments:
+        return Choice("lbs")
+    subject = moments[0].moment.subject
+    skin = moments[0].moment.pose.skin
+    crude = recommendation.is_crude(skin.influences, subject.gauge.surface.edges)
+
+    def measure(choice: Choice, number: int) -> recommendation.Values:
+        _name, moment, at_rest = moments[number]
+        measured = moment.measured(choice.method, choice.stage_values)
+        crossing = None
+        if at_rest is not None and np.isfinite(measured.shape.points).all():
+            crossing = _new_crossings(moment, measured.shape.points.T, at_rest)
+        return recommendation.values_of(measured, crossing)
+
+    names = [(each.name, np.sqrt(each.moment.pose.bent_areas)) for each in moments]
+    diagonal = moments[0].moment.pose.rest.diagonal
+    return (yield from recommendation.search(measure, names, diagonal, crude))
+
+
+def _new_crossings(moment: live.Moment, points: np.ndarray, at_rest: set[tuple[int, int]]) -> np.ndarray:
+    """Returns the triangles that cross others, each as often as it does."""
+    pairs = np.array(list(_crossings(moment, points) - at_rest), np.int64).reshape(-1, 2)
+    return np.flatnonzero(moment.pose.bent_triangles)[pairs].ravel()
+
+
+def _with_crossings(name: str, moment: live.Moment, number: int, count: int) -> Moment:
+    step = max(1, -(-count // MOST_CROSSINGS))
+    at_rest = _crossings(moment, moment.pose.rest.points.T) if number % step == 0 else None
+    return Moment(name, moment, at_rest)
+
+
+def _crossings(moment: live.Moment, points: np.ndarray) -> set[tuple[int, int]]:
+    """Those of triangles that are bent, by their numbers among these."""
+    return crossing_triangles(points, moment.subject.gauge.surface.triangles[moment.pose.bent_triangles])
+
+
+def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
+    """Returns the poses of the battery, by their names. Several armatures are posed at the same time."""
+    rigs: dict[int, tuple[Bones, set[str], dict[str, np.ndarray]]] = {}
+    for part in now.subject.parts:
+        pairs = attach.replaced_modifiers(part.obj)
+        for stage, (_modifier, replaced) in zip(part.skin_stack.skin_stages, pairs, strict=False):
+            if replaced.armature is not None:
+                limits = armature_io.read_limits(replaced.armature)
+                known = rigs.setdefault(replaced.armature.session_uid, (stage.deformer.bones, set(), limits))
+                known[1].update(stage.deformer.moving_bones)
+    found: dict[tuple[str, ...], list[battery.Pose]] = {}
+    for bones, names, limits in rigs.values():
+        moving = np.array([name in names for name in bones.names], bool)
+        found[bones.names] = battery.poses(bones, limits, moving)
+    longest = max(found.values(), key=len, default=[])
+    moments = []
+    for number, (name, _rotations) in enumerate(longest):
+
+        def pose(bones: Bones, number: int = number) -> np.ndarray:
+            own = found.get(bones.names, [])
+            return battery.posed(bones, own[number]) if number < len(own) else bones.rest
+
+        moments.append((name, now.posed(pose)))
+    return moments
+
+
+def _in_frames(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]
+) -> Generator[float, None, list[tuple[str, live.Moment]]]:
+    """Returns the frames of the action in which joints bend most; none without an action, or where none bends
+    by much."""
+    armatures = armatures_of(objects)
+    try:
+        frames = stepped.frames_over(scene, armatures, "ACTION")
+    except SinewError:
+        return []
+    places = np.linspace(0, len(frames) - 1, min(len(frames), LOOKED_AT)).round().astype(int)
+    moments, angles = [], []
+    with stepped.kept_frame(scene, armatures):
+        for place in places:
+            subject, depsgraph = measure_at(scene, objects, properties.BLENDER, frames[place])
+            moment = live.Moment.of(subject, depsgraph)
+            moments.append((phrase("frame {frame}", frame=frames[place]), moment))
+            angles.append(_angles(moment))
+            yield 0.0
+    of_bones = np.array(angles)
+    chosen: list[int] = []
+    for bone in np.argsort(-of_bones.max(axis=0)):
+        frame = int(of_bones[:, bone].argmax())
+        if of_bones[frame, bone] >= BENDS and frame not in chosen and len(chosen) < MEASURED:
+            chosen.append(frame)
+    return [moments[frame] for frame in sorted(chosen)]
+
+
+def _angles(moment: live.Moment) -> np.ndarray:
+    """float64: by how much bones that move vertices are bent, in all parts."""
+    found = []
+    for part, (frame, *_others) in zip(moment.subject.parts, moment.frames, strict=True):
+        deformer = part.bound.first_deformer
+        moving = np.isin(deformer.bones.names, deformer.moving_bones)
+        angles = np.zeros(len(moving)) if frame is None else battery.bend_angles(deformer.bones, frame.pose)
+        found.append(np.where(moving, angles, 0.0))
+    return np.concatenate(found)
+
+
+def choose(objects: Sequence[bpy.types.Object]) -> characters.Chosen:
+    """See characters.choosers."""
+    steps = search(bpy.context.scene, objects)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            choice: Choice = end.value
+            return choice.method, choice.values, choice.text
+        interrupt.check()
+
+
+def use(objects: Sequence[bpy.types.Object], choice: Choice) -> None:
+    """Sets it on objects that have Sinew. The caller has them deformed."""
+    for obj in objects:
+        settings = properties.of(obj)
+        properties.assign(settings, "method", choice.method)
+        for name, value in choice.values.items():
+            group, _dot, own = name.partition(".")
+            stored: Value = stage_settings.OFF if value == OFF else value
+            properties.assign(getattr(settings, group), own, stored)
