@@ -9,7 +9,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, stage_settings
+from ...attach import attach, properties, property_groups, stage_settings
 from ...core import battery, interrupt, recommendation
 from ...core.errors import SinewError
 from ...core.parameters import OFF, Value
@@ -170,8 +170,8 @@ def use(objects: Sequence[bpy.types.Object], choice: Choice) -> None:
     """Sets it on objects that have Sinew. The caller has them deformed."""
     for obj in objects:
         settings = properties.of(obj)
-        properties.assign(settings, "method", choice.method)
+        property_groups.assign(settings, "method", choice.method)
         for name, value in choice.values.items():
             group, _dot, own = name.partition(".")
             stored: Value = stage_settings.OFF if value == OFF else value
-            properties.assign(getattr(settings, group), own, stored)
+            property_groups.assign(getattr(settings, group), own, stored)
