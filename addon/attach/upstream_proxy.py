@@ -238,12 +238,21 @@ def changes_weights(obj: bpy.types.Object) -> bool:
     return any(m.type in WEIGHT_CHANGERS for m in stack.upstream_changes(obj))
 
 
-def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
-    """shares: it has no copy of the mesh, but the mesh."""
+def copy_that_follows(obj: bpy.types.Object, name: str) -> bpy.types.Object:
+    """Returns a copy, in no collection, that follows the object, whatever moves that."""
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
-    copy.name = f"{obj.name} Sinew upstream"
+    copy.name = name
+    for constraint in list(copy.constraints):
+        copy.constraints.remove(constraint)
+    copy.constraints.new("COPY_TRANSFORMS").target = obj
+    return copy
+
+
+def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
+    """shares: it has no copy of the mesh, but the mesh."""
+    copy = copy_that_follows(obj, f"{obj.name} Sinew upstream")
     if not shares:
         copy.data = _copy_of_mesh(obj)
     properties.clear(copy)
@@ -253,10 +262,6 @@ def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)
-    # So that it follows the object, whatever moves that.
-    for constraint in list(copy.constraints):
-        copy.constraints.remove(constraint)
-    copy.constraints.new("COPY_TRANSFORMS").target = obj
     _keep_animation_of_modifiers(copy)
     _clear_parent(copy)
     return copy

@@ -165,17 +165,12 @@ class Changes:
 
     def add(self, other: Changes) -> None:
         """Adds the changes of another evaluation to these."""
-        self.touched |= other.touched
-        self.objects |= other.objects
-        self.moved |= other.moved
-        self.meshes |= other.meshes
-        self.armatures |= other.armatures
+        for name in ("touched", "objects", "moved", "meshes", "armatures"):
+            getattr(self, name).update(getattr(other, name))
+        for name in ("node_groups", "structure", "lost", "after_step"):
+            setattr(self, name, getattr(self, name) or getattr(other, name))
         self.edited += other.edited
-        self.node_groups |= other.node_groups
-        self.structure |= other.structure
         self.complete &= other.complete
-        self.lost |= other.lost
-        self.after_step |= other.after_step
 
 
 def names_of_changed_meshes(depsgraph: bpy.types.Depsgraph) -> set[str]:

@@ -14,15 +14,9 @@ def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
     modifier's mask), a shape key, one of Sinew's stages, a constraint, or a bone of another of the object's
     armatures."""
     unused = set(names)
-    found: set[str] = set()
-    all_uses = (_in_modifiers, _in_shape_keys, _in_stages, _bones_of_all_armatures, _in_constraints)
-    for uses in all_uses:
-        if not unused:
-            break
-        now = unused.intersection(uses(obj))
-        found |= now
-        unused -= now
-    return found
+    for uses in (_in_modifiers, _in_shape_keys, _in_stages, _bones_of_all_armatures, _in_constraints):
+        unused -= set(uses(obj)) if unused else set()
+    return set(names) - unused
 
 
 def _in_modifiers(obj: bpy.types.Object) -> Iterator[str]:

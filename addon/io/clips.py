@@ -73,7 +73,8 @@ def read(
 
 def keyed_properties(armature: bpy.types.Object, action: bpy.types.Action) -> set[tuple[str, str]]:
     """Returns what an action keys: bones with "location", "rotation" or "scale"."""
-    return {(bone, _property_of(column)) for _curve, bone, column in _playing(armature, action)}
+    names = ("location",) * 3 + ("rotation",) * 4 + ("scale",) * 3
+    return {(bone, names[column]) for _curve, bone, column in _playing(armature, action)}
 
 
 def write(
@@ -146,10 +147,6 @@ def _rest_channels(modes: np.ndarray) -> np.ndarray:
     channels[modes == "AXIS_ANGLE", 3:7] = (0.0, 0.0, 1.0, 0.0)
     channels[~np.isin(modes, list(pose_io.ROTATION_PROPERTIES)), 3:7] = 0.0
     return channels
-
-
-def _property_of(column: int) -> str:
-    return "location" if column < 3 else "rotation" if column < 7 else "scale"
 
 
 def _kinds(mode: str) -> list[tuple[str, slice, np.ndarray]]:

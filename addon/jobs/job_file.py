@@ -88,11 +88,8 @@ class FileRule:
 
     def matches(self, path: PurePath) -> bool:
         """Whether a pattern matches, or equals the end of the path, as a path can contain brackets."""
-        return any(path.match(pattern) or _ends_with(path, PurePath(pattern)) for pattern in self.match)
-
-
-def _ends_with(path: PurePath, end: PurePath) -> bool:
-    return path.parts[-len(end.parts) :] == end.parts
+        ends = (PurePath(pattern).parts for pattern in self.match)
+        return any(map(path.match, self.match)) or any(path.parts[-len(end) :] == end for end in ends)
 
 
 @dataclass(frozen=True)

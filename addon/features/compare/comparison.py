@@ -192,20 +192,13 @@ def corners(evaluated: bpy.types.Object) -> np.ndarray:
 
 def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     """Returns a copy, deformed by `method` if an armature deforms it, in no collection yet."""
-    copy = obj.copy()
-    if copy.override_library is not None:
-        copy.make_local(clear_liboverride=True)
-    copy.name = f"{obj.name} {properties.method_label(method)}"
+    copy = upstream_proxy.copy_that_follows(obj, f"{obj.name} {properties.method_label(method)}")
     original = properties.of(obj) if properties.has_sinew(obj) else None
     replaced = corrective_smooth.replaced_modifier(obj) if original is not None else None
     smooth = replaced.name if replaced is not None else None
     _take_sinew_off(copy)
     for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:
         copy.modifiers.remove(modifier)
-    # It follows the original, whatever moves that.
-    for constraint in list(copy.constraints):
-        copy.constraints.remove(constraint)
-    copy.constraints.new("COPY_TRANSFORMS").target = obj
     if copy.field is not None:
         copy.field.type = "NONE"
     copy.hide_select = True
