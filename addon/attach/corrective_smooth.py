@@ -119,13 +119,9 @@ def stage_values(obj: bpy.types.Object) -> Mapping[str, Mapping[str, Any]]:
 
 
 def replaced_modifier(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
-    """Returns the modifier that was taken over, even if it was moved and renamed; else one of its name."""
+    """Returns the modifier that was taken over; None for none."""
     replaced = properties.of(obj).before.smooth
-    smooths = [modifier for modifier in obj.modifiers if modifier.type == "CORRECTIVE_SMOOTH"]
-    if not replaced.name:
-        return None
-    same = (m for m in smooths if m.persistent_uid == replaced.uid)
-    return next(same, None) or next((m for m in smooths if m.name == replaced.name), None)
+    return stack.modifier_of(obj, replaced, "CORRECTIVE_SMOOTH") if replaced.name else None
 
 
 def switch(obj: bpy.types.Object, viewport: bool, render: bool) -> None:

@@ -24,8 +24,7 @@ from . import (
 from .subscribers import subscribers
 
 ATTRIBUTE, NORMALS_ATTRIBUTE = ".sinew_points", ".sinew_normals"
-# Earlier versions also stored colours in the mesh.
-_OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, node_group.IN_STACK, "sinew_colours")
+_OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, node_group.IN_STACK)
 
 
 def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders: bool = True) -> None:
@@ -224,8 +223,7 @@ def _free_attribute_name(mesh: bpy.types.Mesh) -> str:
 
 
 def remove_attributes(obj: bpy.types.Object) -> None:
-    """Removes all of Sinew's attributes from the mesh: a mesh that was copied, or saved by an earlier Sinew,
-    can have several."""
+    """Removes all of Sinew's attributes from the mesh: one that was copied can have several."""
     mesh, storage = obj.data, properties.of(obj).storage
     for name in [each.name for each in mesh.attributes] if mesh.is_editable else ():
         if name.startswith(_OWN_ATTRIBUTES):

@@ -153,13 +153,15 @@ def _start(obj: bpy.types.Object) -> int:
 
 
 def modifier_of(
-    obj: bpy.types.Object, replaced: properties.SinewReplacedModifier
-) -> bpy.types.ArmatureModifier | None:
-    """Returns the Armature modifier that was replaced, even if it was moved and renamed; else one of its
+    obj: bpy.types.Object,
+    replaced: properties.SinewReplacedModifier | properties.SinewSwitchedOff,
+    kind: str = "ARMATURE",
+) -> bpy.types.Modifier | None:
+    """Returns the modifier of this type that was replaced, even if it was moved and renamed; else one of its
     name."""
-    armatures = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
-    same = (m for m in armatures if m.persistent_uid == replaced.uid)
-    return next(same, None) or next((m for m in armatures if m.name == replaced.name), None)
+    found = [modifier for modifier in obj.modifiers if modifier.type == kind]
+    same = (m for m in found if m.persistent_uid == replaced.uid)
+    return next(same, None) or next((m for m in found if m.name == replaced.name), None)
 
 
 def _deforms(modifier: bpy.types.Modifier) -> bool:

@@ -67,7 +67,6 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _is_dead(folder: Path) -> bool:
-    """Whether no process has its lock. Raises OSError without a lock file, which older versions did not
-    make."""
+    """Whether no process has its lock. Raises OSError for a folder of others, without a lock file."""
     with (folder / LOCK).open("r+b") as lock:
         return try_lock(lock.fileno())

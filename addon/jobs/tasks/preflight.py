@@ -111,7 +111,7 @@ def _obstacle(obj: bpy.types.Object) -> str | None:
 
 
 def _remains(obj: bpy.types.Object) -> Iterator[str]:
-    """Yields remains of Sinew on an object without its settings, as older versions left them."""
+    """Yields remains of Sinew on an object without its settings."""
     if obj.type != "MESH" or properties.is_helper(obj):
         return
     if stack.sinew_modifier(obj) is not None:
