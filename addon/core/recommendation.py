@@ -56,6 +56,7 @@ STAGES = (
     Candidate("bulge_limit", 0.1, "bent joints bulge less"),
     Candidate("delta_mush", 0.2, "crude weights are smoothed", crude=True, often=0.25),
 )
+STAGE_NAMES = tuple(each.name for each in STAGES)
 # The weights of a vertex differ from those of its neighbour by so much, in the mean over where they differ:
 # joints have no more than two edges to bend in.
 CRUDE = 0.45
@@ -174,7 +175,7 @@ def search(
         ]
         if not known:
             known = values
-        elif _is_kept(candidate, gains):
+        elif is_kept(candidate, gains):
             best, known = tried, values
             place = phrase(moments[gains.index(max(gains))][0])
             why = phrase("{why} (most: {place})", why=phrase(candidate.why), place=place)
@@ -182,7 +183,8 @@ def search(
     return replace(best, why=tuple(whys.values()) if moments else ())
 
 
-def _is_kept(candidate: Candidate, gains: Sequence[float]) -> bool:
+def is_kept(candidate: Candidate, gains: Sequence[float]) -> bool:
+    """Whether the candidate is better, by its gains in all moments."""
     changed = [each for each in gains if abs(each) > SAME]
     better = sum(each > SAME for each in gains)
     return (

@@ -123,23 +123,30 @@ class Worst:
 class Suggestion:
     """The worst values of each method, and what follows from them, once all are added.
 
-    methods   name -> label, in order
+    methods   name -> label, in order; stages among them stand for the recommended method with the stage
     frames    that were measured
     diagonal  of the rest shape: lengths are judged relative to it
     worst     by method and criterion: the largest magnitude over the frames, and its frame; missing for a
               criterion that could not be measured
+    helping   the stages that make the recommended method better, each with what it does
     """
 
-    methods: Mapping[str, str]
+    methods: dict[str, str]
     frames: Sequence[float]
     diagonal: float
     worst: dict[tuple[str, str], Worst] = field(default_factory=dict)
+    helping: dict[str, Phrase] = field(default_factory=dict)
 
     def add(self, method: str, criterion: str, value: float, frame: float) -> None:
         """Adds a value. NaN, as the volume of a flat mesh, does not count."""
         known = self.worst.get((method, criterion))
         if value == value and (known is None or abs(value) > abs(known.value)):
             self.worst[method, criterion] = Worst(value, frame)
+
+    def add_stages(self, labels: Mapping[str, str]) -> None:
+        """Adds stages. What is recommended, and why, is said of methods alone."""
+        self.methods |= labels if self.recommended and self.reason else {}
+        vars(self).pop("torn", None)
 
     @cached_property
     def torn(self) -> dict[str, Phrase]:
@@ -184,7 +191,7 @@ class Suggestion:
         best = {method for criterion in CRITERIA for method in self.best(criterion)}
         return next((method for method in as_good if method in best), as_good[0])
 
-    @property
+    @cached_property
     def reason(self) -> Phrase:
         """Why the recommended method is, in its two strongest points."""
         best_at = [criterion for criterion in CRITERIA if self.recommended in self.best(criterion)]
@@ -204,7 +211,11 @@ class Suggestion:
         """One sentence: the recommended method and why."""
         if not self.recommended:
             return phrase("All methods are equally good here")
-        return phrase("{method}: {why}", method=phrase(self.methods[self.recommended]), why=self.reason)
+        text = phrase("{method}: {why}", method=phrase(self.methods[self.recommended]), why=self.reason)
+        for stage, why in self.helping.items():
+            helps = phrase("with {stage} {why}", stage=phrase(self.methods[stage]), why=why)
+            text = phrase("{first}; {second}", first=text, second=helps)
+        return text
 
     def _magnitudes(self, name: str) -> dict[str, float]:
         """The worst values by method, without their signs."""

@@ -17,7 +17,7 @@ from ...attach import attach, corrective_smooth, properties, stage_settings, ups
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, Pose, Shape
 from ...core.rig import Bones
-from ...core.skin_stack import SkinStack
+from ...core.skin_stack import NO_STAGES, SkinStack
 from ...core.stages import StageValues
 from ...core.surface import Surface, joined
 from ...core.twist_spread import NOT_TOLD, TwistInputs
@@ -117,13 +117,14 @@ class Moment:
     """All that the shapes of one frame depend on but method and stages; or the same in a pose that no frame
     has. Measuring it changes nothing, and does not depend on the scene's frame.
 
-    rest_points, frames  of each part
-    armatures            world matrices of the first armature of each part
+    rest_points, frames, stages  of each part
+    armatures                    world matrices of the first armature of each part
     """
 
     subject: Subject
     rest_points: list[np.ndarray]
     frames: list[pose.Frames]
+    stages: list[StageValues]
     worlds: list[np.ndarray]
     armatures: list[np.ndarray]
 
@@ -139,6 +140,7 @@ class Moment:
             subject,
             [part.skinned.shown.rest_points for part in subject.parts],
             frames,
+            [part.skinned.shown.stage_values for part in subject.parts],
             [_world(part.obj, depsgraph) for part in subject.parts],
             [_world(properties.of(part.obj).armature, depsgraph) for part in subject.parts],
         )
@@ -167,12 +169,20 @@ class Moment:
         rest = _in_world(self.rest_points, self.worlds)
         return self.subject.gauge.pose_of(_frame_of_rig(self.subject, self.armatures, rest, self.frames))
 
-    def measured(self, method: str, stages: StageValues) -> Measured:
-        """Measures the shape under a method and stages; without a mix."""
+    def measured(
+        self, method: str, stages: StageValues | None = None, more: StageValues = NO_STAGES
+    ) -> Measured:
+        """Measures the shape under a method and stages; without a mix.
+
+        stages  None: those that are shown
+        more    beside these
+        """
         shapes = []
-        for part, rest_points, own in zip(self.subject.parts, self.rest_points, self.frames, strict=True):
-            frames = _under(part, own, method)
-            shapes.append(_Other(part.skin_stack, rest_points, frames, stages).points().copy())
+        for part, rest_points, own, shown in zip(
+            self.subject.parts, self.rest_points, self.frames, self.stages, strict=True
+        ):
+            frames, values = _under(part, own, method), {**(shown if stages is None else stages), **more}
+            shapes.append(_Other(part.skin_stack, rest_points, frames, values).points().copy())
         return Measured(self.pose, Shape(self.subject.gauge.surface, _in_world(shapes, self.worlds)), None)
 
 

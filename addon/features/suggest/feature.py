@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import bpy
 
-from ...attach import properties
+from ...attach import properties, stage_settings
 from ...attach.feature import Feature
 from ...core import parameters
 from ...core.errors import SinewError
@@ -114,10 +114,15 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         suggestion = suggest.suggestions.get(uid)
         if suggestion is None:
             return
-        used = {properties.of(obj).method for obj in sinew_targets(context)}
+        shown = [properties.of(obj) for obj in sinew_targets(context)]
+        used = {settings.method for settings in shown}
+        used |= {name for settings in shown for name in stage_settings.names_on(settings)}
         if suggestion.recommended:
             _draw_method(layout, suggestion, suggestion.recommended, used)
             draw_text(layout, context, tr("It {why}", why=tr(suggestion.reason)), icon="SOLO_ON")
+            for stage, why in suggestion.helping.items():
+                _draw_method(layout, suggestion, stage, used)
+                draw_text(layout, context, tr("Then {why}", why=tr(why)), icon="SOLO_ON")
         else:
             draw_text(layout, context, tr(suggestion.text), icon="INFO")
         for method, why in suggestion.torn.items():
@@ -141,7 +146,7 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
 def _draw_best(
     layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, used: set[str]
 ) -> None:
-    """used: the methods of the objects that the panel is about"""
+    """used: the methods and stages of the objects that the panel is about"""
     for criterion in CRITERIA:
         best = suggestion.best(criterion)
         row = layout.split(factor=0.45)
@@ -174,8 +179,12 @@ def _draw_order(
 
 
 def _draw_method(layout: bpy.types.UILayout, suggestion: Suggestion, method: str, used: set[str]) -> None:
-    text = suggestion.methods[method]
-    layout.operator("sinew.use_method", text=text, depress=method in used).method = method
+    """method: or a stage, with the recommended method"""
+    text, own = suggestion.methods[method], method
+    if method not in properties.METHODS:
+        text, own = tr("with {stage}", stage=tr(text)), suggestion.recommended
+    button = layout.operator("sinew.use_method", text=text, depress={method, own} <= used)
+    button.method, button.stage = own, "" if own == method else method
 
 
 def _value(context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion, method: str) -> str:

@@ -2,13 +2,16 @@
 """Goes through frames, and measures the shapes that each method would give."""
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from ...attach import properties
+from ...attach import properties, stage_settings
+from ...core import recommendation
 from ...core.metrics import Measured, Shape
+from ...core.phrases import phrase
 from ...core.suggestion import LONGEST, MEASURED, Suggestion
 from ...ui import stepped
 from ..heat import live
@@ -49,13 +52,17 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     places = np.linspace(0, len(frames) - 1, min(len(frames), CROSSING_FRAMES)).round().astype(int)
     counted = {frames[place] for place in places}
     labels = {name: method.label for name, method in properties.METHODS.items()}
-    suggestion = Suggestion(labels, frames, 0.0)
-    done, of_all = 0, len(frames) * len(labels)
+    suggestion = Suggestion(labels.copy(), frames, 0.0)
+    off = [each for each in recommendation.STAGES if not any(_is_on(obj, each.name) for obj in objects)]
+    moments: list[Moment] = []
+    # The recommended method is measured once more, where stages start from.
+    done, of_all = 0, len(frames) * (len(labels) + 1 + len(off))
     with stepped.kept_frame(scene, armatures):
         for frame in frames:
             subject, depsgraph = measure_at(scene, objects, properties.BLENDER, frame)
             at_rest = _crossings(subject.gauge.rest) if frame in counted else None
             suggestion.diagonal = subject.measured.rest.diagonal
+            moments.append(Moment(frame, live.Moment.of(subject, depsgraph), at_rest))
             for method in labels:
                 measured = live.measured_under(subject, method, depsgraph)
                 _add(suggestion, method, frame, measured)
@@ -64,12 +71,57 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
                     suggestion.add(method, "crossings", new, frame)
                 done += 1
                 yield done / of_all
+    for _step in _add_stages(suggestion, off, moments):
+        done += 1
+        yield done / of_all
     suggestions[scene.session_uid] = suggestion
+
+
+class Moment(NamedTuple):
+    """A frame, with its crossings at rest; None where they are not counted."""
+
+    frame: float
+    moment: live.Moment
+    at_rest: set[tuple[int, int]] | None
+
+
+def _is_on(obj: bpy.types.Object, stage: str) -> bool:
+    return stage_settings.is_on(properties.of(obj), stage)
+
+
+def _add_stages(
+    suggestion: Suggestion, stages: Sequence[recommendation.Candidate], moments: Sequence[Moment]
+) -> Iterator[None]:
+    """Adds the recommended method with each of the stages, and which of them help."""
+    method = suggestion.recommended
+    if not method:
+        return
+    suggestion.add_stages({each.name: stage_settings.STAGES[each.name].label for each in stages})
+    weights = [np.sqrt(each.moment.pose.bent_areas) for each in moments]
+    before = []
+    for each in moments:
+        before.append(recommendation.values_of(each.moment.measured(method), None))
+        yield
+    for stage in stages:
+        more, gains = {stage.name: recommendation.values_on(stage.name)}, []
+        for (frame, moment, at_rest), known, own in zip(moments, before, weights, strict=True):
+            measured = moment.measured(method, more=more)
+            _add(suggestion, stage.name, frame, measured)
+            if at_rest is not None:
+                new = len(_crossings(measured.shape) - at_rest)
+                suggestion.add(stage.name, "crossings", new, frame)
+            values = recommendation.values_of(measured, None)
+            gains.append(recommendation.gain(known, values, suggestion.diagonal, own))
+            yield
+        if recommendation.is_kept(stage, gains):
+            suggestion.helping[stage.name] = phrase(stage.why)
 
 
 def _add(suggestion: Suggestion, method: str, frame: float, measured: Measured) -> None:
     for name, entry in MEASURED.items():
-        suggestion.add(method, name, measured.entry(entry), frame)
+        # A spread twist is not where the bones are that flips are measured against.
+        if (method, name) != ("twist_spread", "flips"):
+            suggestion.add(method, name, measured.entry(entry), frame)
     if not np.isfinite(measured.shape.points).all():
         suggestion.add(method, LONGEST, np.inf, frame)
 
