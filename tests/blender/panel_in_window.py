@@ -38,7 +38,7 @@ SUGGEST, BEST = (850, 125), (880, 156)
 # The height of the status bar in pixels.
 STATUS_BAR = 24
 # Positions in the list of methods.
-DUAL_QUATERNION = (955, 244)
+DUAL_QUATERNION = (955, 265)
 # Positions in the dialog of a comparison, which opens here.
 DIALOG, CENTRES_OF_ROTATION, LOG_MATRIX = (400, 400), (171, 470), (171, 577)
 faults: list[str] = []

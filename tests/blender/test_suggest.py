@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
+from sinew_addon.core import thumbnail
 from sinew_addon.core.suggestion import CRITERIA, MEASURED, Suggestion
 from sinew_addon.features.heat import live
-from sinew_addon.features.suggest import suggest
+from sinew_addon.features.suggest import suggest, worst_pictures
 from sinew_addon.features.suggest.suggest import crossing_triangles
 
 
@@ -112,3 +113,27 @@ def test_crossings_are_pairs_without_a_common_vertex():
     # Adjacent faces share vertices.
     assert crossing_triangles(points, triangles[[0, 2]]) == set()
     assert crossing_triangles(points, triangles[[0, 3]]) == set()
+
+
+def test_pictures_are_drawn_where_each_is_worst(monkeypatch):
+    """As in a window: without one there are none."""
+    obj, _armature = scenes.skinned_arm("lbs", sides=16, rings=41)
+    bpy.ops.sinew.suggest()
+    scene = bpy.context.scene
+    assert not worst_pictures.icon(scene, "lbs")
+    monkeypatch.setattr(worst_pictures, "are_drawn", lambda: True)
+    seen = []
+    monkeypatch.setattr(
+        worst_pictures.thumbnail,
+        "draw",
+        lambda *args, own=thumbnail.draw: seen.append(own(*args)) or seen[-1],
+    )
+    for _share in suggest.scan(scene, [obj], "SCENE"):
+        pass
+    assert len(seen) == len(found().methods)
+    middles = [picture[picture.shape[0] // 2, picture.shape[1] // 2, 3] for picture in seen]
+    # The place is in the middle of its picture.
+    assert np.mean(middles) > 0.9
+    assert set(worst_pictures._pictures[scene.session_uid]) == set(found().methods)
+    worst_pictures.clear()
+    assert not worst_pictures.icon(scene, "lbs")

@@ -21,9 +21,12 @@ from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
-from . import recommend, suggest
+from . import recommend, suggest, worst_pictures
 
 BEST = "best"
+PICTURES_IN_A_ROW = 2
+# In lines of the panel.
+PICTURE_HEIGHT = 5.0
 # Several methods can be equally good.
 MOST_BEST = 3
 
@@ -114,9 +117,7 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         suggestion = suggest.suggestions.get(uid)
         if suggestion is None:
             return
-        shown = [properties.of(obj) for obj in sinew_targets(context)]
-        used = {settings.method for settings in shown}
-        used |= {name for settings in shown for name in stage_settings.names_on(settings)}
+        used = _used(context)
         if suggestion.recommended:
             _draw_method(layout, suggestion, suggestion.recommended, used)
             draw_text(layout, context, tr("It {why}", why=tr(suggestion.reason)), icon="SOLO_ON")
@@ -143,10 +144,38 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
 
 
+class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
+    bl_label = "At Their Worst"
+    bl_parent_id = "SINEW_PT_suggest"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        suggestion = suggest.suggestions.get(context.scene.session_uid)
+        return suggestion is not None and worst_pictures.are_drawn()
+
+    def draw(self, context: bpy.types.Context) -> None:
+        suggestion, used = suggest.suggestions[context.scene.session_uid], _used(context)
+        draw_text(self.layout, context, "Each where it stretches most, in its worst frame")
+        grid = self.layout.grid_flow(row_major=True, columns=PICTURES_IN_A_ROW, even_columns=True)
+        for method in suggestion.methods:
+            number = worst_pictures.icon(context.scene, method)
+            if number:
+                cell = grid.column(align=True)
+                cell.template_icon(number, scale=PICTURE_HEIGHT)
+                _draw_method(cell, suggestion, method, used)
+
+
+def _used(context: bpy.types.Context) -> set[str]:
+    """The methods and stages of the objects that the panel is about."""
+    shown = [properties.of(obj) for obj in sinew_targets(context)]
+    stages = {name for settings in shown for name in stage_settings.names_on(settings)}
+    return {settings.method for settings in shown} | stages
+
+
 def _draw_best(
     layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, used: set[str]
 ) -> None:
-    """used: the methods and stages of the objects that the panel is about"""
+    """used: as from _used()"""
     for criterion in CRITERIA:
         best = suggestion.best(criterion)
         row = layout.split(factor=0.45)
@@ -206,11 +235,20 @@ def _begin() -> None:
 def _end() -> None:
     del characters.choosers[RECOMMENDED]
     suggest.suggestions.clear()
+    worst_pictures.clear()
     _View.choices.clear()
 
 
 (RECOMMENDED,) = parameters.PRESETS
 
 FEATURE = Feature(
-    (SINEW_OT_suggest, SINEW_OT_recommend, SINEW_OT_suggestions_by, SINEW_PT_suggest), begin=_begin, end=_end
+    (
+        SINEW_OT_suggest,
+        SINEW_OT_recommend,
+        SINEW_OT_suggestions_by,
+        SINEW_PT_suggest,
+        SINEW_PT_suggest_pictures,
+    ),
+    begin=_begin,
+    end=_end,
 )

@@ -16,6 +16,7 @@ from ...core.suggestion import LONGEST, MEASURED, Suggestion
 from ...ui import stepped
 from ..heat import live
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
+from . import worst_pictures
 
 
 def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> set[tuple[int, int]]:
@@ -74,6 +75,10 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     for _step in _add_stages(suggestion, off, moments):
         done += 1
         yield done / of_all
+    worst_pictures.begin(scene)
+    for name in suggestion.methods if worst_pictures.are_drawn() else ():
+        worst_pictures.add(scene, name, _at_worst(suggestion, name, moments))
+        yield 1.0
     suggestions[scene.session_uid] = suggestion
 
 
@@ -83,6 +88,15 @@ class Moment(NamedTuple):
     frame: float
     moment: live.Moment
     at_rest: set[tuple[int, int]] | None
+
+
+def _at_worst(suggestion: Suggestion, name: str, moments: Sequence[Moment]) -> Measured:
+    """Measures a method, or the recommended one with a stage, in the frame of its longest edge."""
+    frame = suggestion.worst[name, LONGEST].frame
+    moment = next(each.moment for each in moments if each.frame == frame)
+    if name in properties.METHODS:
+        return moment.measured(name)
+    return moment.measured(suggestion.recommended, more={name: recommendation.values_on(name)})
 
 
 def _is_on(obj: bpy.types.Object, stage: str) -> bool:
