@@ -291,6 +291,8 @@ def follow_icons(obj: bpy.types.Object) -> None:
     _follow_ended_keys(obj)
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
     situation = Situation(settings.stack.situation)
+    # With a modifier that is gone, Sinew's icon was another.
+    is_any_gone = len(settings.replaced_modifiers) > len(pairs)
     for name in VIEWS:
         view = _view(obj, name)
         before = icons.icons(view, situation)
@@ -298,7 +300,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
             was_on if _is_keyed(obj, modifier, replaced) else getattr(modifier, f"show_{name}")
             for (modifier, replaced), was_on in zip(pairs, before.modifiers, strict=True)
         )
-        is_unknown = nodes is None or is_animated(obj, nodes, f"show_{name}")
+        is_unknown = is_any_gone or nodes is None or is_animated(obj, nodes, f"show_{name}")
         now = Icons(before.sinew if is_unknown else getattr(nodes, f"show_{name}"), modifiers)
         if now == before:
             continue

@@ -136,6 +136,8 @@ CASES = {
     "a render of a hidden mesh": "add Arm dq; key_method Arm 5 11 dq; hide Arm viewport; weights Arm lower; "
     "frame 9; render 0.9",
     # Modifiers
+    "the modifier that is on deleted": "add_modifier Arm ARMATURE Rig 0.9; toggle_modifier Arm 'Armature 1'; "
+    "add Arm dq; delete_modifier Arm Armature 0.1 0.1; frame 6; frame 11",
     "a deleted Armature modifier": "add Arm 0.3 0.3; frame 6; delete_modifier Arm 0.1; "
     "says Arm 'Armature modifier was deleted'; frame 3; touch Arm; frame 4; "
     "says Arm 'Armature modifier was deleted'; remove_all",
