@@ -157,7 +157,9 @@ class _Battery:
         if self._directions is not None:
             for name, moves in FIGURE.items():
                 found.append(Pose(name, dict(self._moved(moves, free))))
-            free = [bone for bone in free if not self._roles[bone]]
+            # Faces and hair keep still.
+            face = {bone for bone in free if any(self._roles[above] == "neck" for above in self._above(bone))}
+            free = [bone for bone in free if not self._roles[bone] and bone not in face]
         found += self._general(free)
         return [pose for pose in found if pose.rotations]
 
@@ -190,6 +192,12 @@ class _Battery:
         for bone in self._bones.from_the_root:
             above = int(self._bones.carriers[bone])
             roles[bone] = self._role(self._words[bone], roles[above] if above >= 0 else "")
+        arms = [bone for bone, role in enumerate(roles) if role in ("shoulder", "upper_arm")]
+        trunk = {above for arm in arms for above in self._above(arm)}
+        for bone, role in enumerate(roles):
+            # Rigify's neck and head are bones of the spine.
+            if role == "spine" and bone not in trunk and trunk & set(self._above(bone)):
+                roles[bone] = "neck"
         return roles
 
     @staticmethod

@@ -38,7 +38,7 @@ SUGGEST, BEST = (850, 125), (880, 156)
 # The height of the status bar in pixels.
 STATUS_BAR = 24
 # Positions in the list of methods.
-DUAL_QUATERNION = (955, 265)
+RECOMMENDED, DUAL_QUATERNION = (955, 168), (955, 265)
 # Positions in the dialog of a comparison, which opens here.
 DIALOG, CENTRES_OF_ROTATION, LOG_MATRIX = (400, 400), (171, 470), (171, 577)
 faults: list[str] = []
@@ -97,6 +97,31 @@ def start() -> Iterator[None]:
     window.choose_tab()
     bpy.ops.ed.undo_push(message="made")
     yield from window.wait()
+
+
+def recommended_by_click() -> Iterator[None]:
+    """Method and stages of all, in one undo step."""
+    from bl_ext.user_default.sinew.features.suggest.feature import _View
+
+    names = ("twist_spread", "bulge_limit", "delta_mush")
+
+    def settings() -> list[tuple[str, list[bool]]]:
+        return [(obj.sinew.method, [getattr(obj.sinew, name).enabled for name in names]) for obj in meshes()]
+
+    choose("lbs")
+    before = settings()
+    yield from window.click(METHOD)
+    yield from window.click(RECOMMENDED)
+    yield from window.until(lambda: scene().session_uid in _View.choices, "a recommendation")
+    window.press("ESC", RECOMMENDED)
+    yield from window.wait()
+    choice = _View.choices[scene().session_uid]
+    wanted = [choice.values[f"{name}.enabled"] for name in names]
+    check("recommended", settings(), [(choice.method, wanted)] * 5)
+    check("another than before", settings() != before)
+    yield from undo()
+    check("recommended, undone", settings(), before)
+    choose("dq")
 
 
 def one_click_for_a_method() -> Iterator[None]:
@@ -453,6 +478,7 @@ def steps() -> Iterator[None]:
     yield from off_greys()
     yield from progress_in_the_status_bar()
     yield from suggested_by_click()
+    yield from recommended_by_click()
     yield from mends_by_clicks()
     yield from corrective_keys()
     yield from modifiers()

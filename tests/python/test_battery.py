@@ -27,26 +27,56 @@ LIMBS = {
     "foot": ("shin", (0.1, 0, 0.1), (0.1, -0.15, 0.0)),
 }
 NAMES = {
-    "rigify": lambda name, side: f"DEF-{name}.{side}" if side else f"DEF-{name}",
-    "unreal": lambda name, side: (
-        {"upper_arm": "upperarm", "forearm": "lowerarm", "shin": "calf", "index": "index_01"}.get(name, name)
-        + (f"_{side.lower()}" if side else "")
-    ),
-    "mixamo": lambda name, side: (
-        "mixamorig:"
-        + {"L": "Left", "R": "Right", "": ""}[side]
-        + {
-            **{
-                "upper_arm": "Arm",
-                "forearm": "ForeArm",
-                "thigh": "UpLeg",
-                "shin": "Leg",
-                "index": "HandIndex1",
-            },
-            **{"chest": "Spine1"},
-        }.get(name, name.title())
-    ),
+    "rigify": "DEF-{name}{.S}",
+    "unreal": "{name}{_s}",
+    "mixamo": "mixamorig:{Side}{Name}",
+    "vrm": "J_Bip_{X}_{Name}",
+    "makehuman": "{name}{.S}",
+    "auto_rig": "{name}{.x}",
 }
+# What rigs call the bones; others have their plain names.
+OTHERS = {
+    "rigify": {
+        **{"hips": "spine", "spine": "spine.001", "chest": "spine.003", "neck": "spine.004"},
+        **{"head": "spine.006", "index": "f_index.01"},
+    },
+    "unreal": {
+        **{"hips": "pelvis", "spine": "spine_01", "chest": "spine_02", "upper_arm": "upperarm"},
+        **{"forearm": "lowerarm", "shin": "calf", "index": "index_01"},
+    },
+    "mixamo": {
+        **{"chest": "spine1", "upper_arm": "arm", "forearm": "ForeArm", "thigh": "UpLeg"},
+        **{"shin": "leg", "index": "HandIndex1"},
+    },
+    "vrm": {
+        **{"upper_arm": "UpperArm", "forearm": "LowerArm", "thigh": "UpperLeg", "shin": "LowerLeg"},
+        **{"index": "Index1"},
+    },
+    "makehuman": {
+        **{"hips": "root", "spine": "spine05", "chest": "spine01", "neck": "neck01"},
+        **{"upper_arm": "upperarm01", "forearm": "lowerarm01", "hand": "wrist", "thigh": "upperleg01"},
+        **{"shin": "lowerleg01", "index": "finger2-1"},
+    },
+    "auto_rig": {
+        **{"hips": "root", "spine": "spine_01", "chest": "spine_02", "upper_arm": "arm_stretch"},
+        **{"forearm": "forearm_stretch", "thigh": "thigh_stretch", "shin": "leg_stretch", "index": "index1"},
+    },
+}
+
+
+def named(naming, name, side):
+    """side: L, R or empty"""
+    name = OTHERS[naming].get(name, name)
+    words = {"L": "Left", "R": "Right", "": ""}
+    values = {
+        **{"{name}": name, "{Name}": name[0].upper() + name[1:], "{Side}": words[side], "{X}": side or "C"},
+        **{"{.S}": f".{side}" if side else "", "{_s}": f"_{side.lower()}" if side else ""},
+        "{.x}": f".{side.lower() or 'x'}",
+    }
+    made = NAMES[naming]
+    for place, value in values.items():
+        made = made.replace(place, value)
+    return made
 
 
 def rig(bones):
@@ -73,12 +103,11 @@ def rig(bones):
 def figure(naming="rigify"):
     """Returns the bones, and the number of each by its plain name and side."""
     made, plain = {}, {}
-    name_of = NAMES[naming]
     for side, sign in (("", 1), ("L", 1), ("R", -1)):
         for name, (parent, head, tail) in (LIMBS if side else TRUNK).items():
-            own = name_of(name, side)
+            own = named(naming, name, side)
             mirrored = [tuple(np.multiply(point, (sign, 1, 1))) for point in (head, tail)]
-            above = name_of(parent, side if parent in LIMBS else "") if parent else ""
+            above = named(naming, parent, side if parent in LIMBS else "") if parent else ""
             plain[name, side] = len(made)
             made[own] = (above, *mirrored)
     return rig(made), plain

@@ -104,17 +104,15 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        uid = context.scene.session_uid
-        is_any = uid in suggest.suggestions or uid in _View.choices
+        is_any = context.scene.session_uid in suggest.suggestions or _choice(context) is not None
         return is_any and operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.active = operators.are_any_on(context)
-        uid = context.scene.session_uid
-        if uid in _View.choices:
-            draw_text(layout, context, tr(_View.choices[uid].text), icon="SOLO_ON")
-        suggestion = suggest.suggestions.get(uid)
+        choice, suggestion = _choice(context), suggest.suggestions.get(context.scene.session_uid)
+        if choice is not None:
+            draw_text(layout, context, tr(choice.text), icon="SOLO_ON")
         if suggestion is None:
             return
         used = _used(context)
@@ -165,9 +163,16 @@ class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
                 _draw_method(cell, suggestion, method, used)
 
 
+def _choice(context: bpy.types.Context) -> Choice | None:
+    """What was recommended last, as long as it is what the character has."""
+    choice = _View.choices.get(context.scene.session_uid)
+    is_there = choice is not None and {choice.method, *choice.stages} <= _used(context)
+    return choice if is_there else None
+
+
 def _used(context: bpy.types.Context) -> set[str]:
     """The methods and stages of the objects that the panel is about."""
-    shown = [properties.of(obj) for obj in sinew_targets(context)]
+    shown = [properties.of(obj) for obj in character.known_meshes(context)]
     stages = {name for settings in shown for name in stage_settings.names_on(settings)}
     return {settings.method for settings in shown} | stages
 

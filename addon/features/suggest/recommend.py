@@ -25,6 +25,8 @@ from .suggest import crossing_triangles
 
 # Frames of an action that are looked at, and most of them that are measured.
 LOOKED_AT, MEASURED = 100, 12
+# The share of the time that this takes.
+LOOKING = 0.3
 # A joint that bends less says nothing.
 BENDS = np.radians(30.0)
 # Crossings take longest, and only strong bends have some.
@@ -69,7 +71,12 @@ def search(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> Gener
 
     names = [(each.name, np.sqrt(each.moment.pose.bent_areas)) for each in moments]
     diagonal = moments[0].moment.pose.rest.diagonal
-    return (yield from recommendation.search(measure, names, diagonal, crude))
+    shares = recommendation.search(measure, names, diagonal, crude)
+    while True:
+        try:
+            yield LOOKING + (1.0 - LOOKING) * next(shares)
+        except StopIteration as end:
+            return end.value
 
 
 def _new_crossings(moment: live.Moment, points: np.ndarray, at_rest: set[tuple[int, int]]) -> np.ndarray:
@@ -133,7 +140,7 @@ def _in_frames(
             moment = live.Moment.of(subject, depsgraph)
             moments.append((phrase("frame {frame}", frame=frames[place]), moment))
             angles.append(_angles(moment))
-            yield 0.0
+            yield LOOKING * len(moments) / len(places)
     of_bones = np.array(angles)
     chosen: list[int] = []
     for bone in np.argsort(-of_bones.max(axis=0)):
