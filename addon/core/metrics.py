@@ -95,6 +95,8 @@ METRICS = {
 # The squared length of a blend of rotations, below which its vertex is bent: halves of two that are 13
 # degrees apart, or a tenth of one that is 22 degrees from the rest.
 BENT = 0.9968
+# Limbs of less volume count as having this share of all.
+LEAST_LIMB = 1e-3
 
 
 @dataclass(frozen=True)
@@ -281,6 +283,16 @@ class Skin:
             blended[:, self.weighted] = np.add.reduceat(terms, self.starts, axis=1)
         return blended
 
+    def by_weights(self, of_limbs: np.ndarray) -> np.ndarray:
+        """float64 [vertices]: values of limbs, blended by each vertex's weights of their bones."""
+        bones = np.unique(self.limb_of_triangles)
+        bones, influences = bones[bones >= 0], self.influences
+        of_bones = np.zeros(max(influences.bones.max(initial=-1), bones.max(initial=-1)) + 1)
+        of_bones[bones] = of_limbs
+        owners = np.repeat(np.arange(self.surface.vertex_count), influences.counts)
+        terms = influences.weights * of_bones[influences.bones]
+        return np.bincount(owners, terms, self.surface.vertex_count)
+
     def rotated_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """float32 [3, triangles]: normals, of any length, rotated by the bones of their corners.
 
@@ -450,6 +462,23 @@ class Measured:
         change = float(np.abs(self._pose.skin.limbs.volumes(self.shape.points) - at_rest).sum())
         whole = float(np.abs(at_rest).sum())
         return change / whole if whole > 0.0 else float("nan")
+
+    @cached_property
+    def limb_losses(self) -> np.ndarray:
+        """float64 [vertices]: the volume that the limbs around each lose or gain, as a part of their own, at
+        most 1."""
+        skin, at_rest = self._pose.skin, self._pose.rest_limbs
+        change = np.abs(skin.limbs.volumes(self.shape.points) - at_rest)
+        # Flat parts have hardly any.
+        own = np.maximum(np.abs(at_rest), LEAST_LIMB * np.abs(at_rest).sum())
+        return skin.by_weights(np.divide(change, own, out=np.zeros_like(own), where=own > 0.0).clip(max=1.0))
+
+    @property
+    def rest_distances(self) -> np.ndarray:
+        """float64 [vertices]: how far each is from the axis of its heaviest bone at rest; 0 without one."""
+        distances = np.zeros(self.shape.surface.vertex_count)
+        distances[self._pose.skin.weighted] = self._pose.rest_distances
+        return distances
 
     @cached_property
     def stretch(self) -> np.ndarray:

@@ -3,18 +3,23 @@
 is a mask."""
 
 from collections.abc import Collection, Iterator
+from functools import partial
 
 import bpy
 
 from ..attach import properties, stack, stage_settings
 
 
-def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
+def used(obj: bpy.types.Object, names: Collection[str], but: str = "") -> set[str]:
     """Returns those of the object's groups `names` that something uses: a modifier (also as the Armature
     modifier's mask), a shape key, one of Sinew's stages, a constraint, or a bone of another of the object's
-    armatures."""
+    armatures.
+
+    but  the name of a stage that does not count
+    """
     unused = set(names)
-    for uses in (_in_modifiers, _in_shape_keys, _in_stages, _bones_of_all_armatures, _in_constraints):
+    in_stages = partial(_in_stages, but=but)
+    for uses in (_in_modifiers, _in_shape_keys, in_stages, _bones_of_all_armatures, _in_constraints):
         unused -= set(uses(obj)) if unused else set()
     return set(names) - unused
 
@@ -53,9 +58,10 @@ def _in_shape_keys(obj: bpy.types.Object) -> Iterator[str]:
     yield from (key.vertex_group for key in keys.key_blocks) if keys is not None else ()
 
 
-def _in_stages(obj: bpy.types.Object) -> Iterator[str]:
+def _in_stages(obj: bpy.types.Object, but: str) -> Iterator[str]:
     if properties.has_sinew(obj):
-        yield from stage_settings.vertex_groups(properties.of(obj)).values()
+        groups = stage_settings.vertex_groups(properties.of(obj))
+        yield from (group for stage, group in groups.items() if stage != but)
 
 
 def _bones_of_all_armatures(obj: bpy.types.Object) -> Iterator[str]:

@@ -15,6 +15,7 @@ _SECTIONS = {
     "bpy.ops.sinew.use_method*": "method",
     "bpy.ops.sinew.own_settings*": "meshes",
     "bpy.ops.sinew.make_group*": "stages",
+    "bpy.ops.sinew.auto_mix*": "stages",
     "bpy.ops.sinew.take_over_smooth*": "stages",
     "bpy.ops.sinew.suggest*": "suggest",
     "bpy.ops.sinew.bake_inbetweens*": "in-betweens",

@@ -119,6 +119,7 @@ class SINEW_MT_stages(_Submenu, bpy.types.Menu):
     entries = (
         Entry("sinew.own_settings", "Own Settings of This Mesh"),
         Entry("sinew.take_over_smooth", icon="MOD_SMOOTH"),
+        *_over("sinew.auto_mix", "Auto-Mix"),
         Entry("sinew.make_group", "Make Vertex Group of the Mix", values={"stage": "mix"}),
         Entry("sinew.make_group", "Make Vertex Group of Limit Bulge", values={"stage": "bulge_limit"}),
         Entry("sinew.make_group", "Make Vertex Group of Delta Mush", values={"stage": "delta_mush"}),

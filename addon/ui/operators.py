@@ -163,7 +163,7 @@ def _for_each(
     return {"FINISHED"}
 
 
-class _OfOneMesh:
+class OfOneMesh:
     """An operator on all meshes of a character, or on one by name."""
 
     name: bpy.props.StringProperty(
@@ -190,7 +190,7 @@ FIRST_METHODS = [
 ]
 
 
-class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
+class SINEW_OT_add(Acting, OfOneMesh, bpy.types.Operator):
     bl_label = "Add Sinew"
     bl_description = (
         "Deform all meshes of the armature with Sinew, in the place of their Armature modifiers. Those stay "
@@ -246,7 +246,7 @@ class SINEW_OT_add(Acting, _OfOneMesh, bpy.types.Operator):
         return result
 
 
-class SINEW_OT_rebind(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
+class SINEW_OT_rebind(OnSinewObjects, OfOneMesh, bpy.types.Operator):
     bl_label = "Rebind"
     bl_description = "Read meshes, weights and bones anew, and switch on again after an error"
 
@@ -260,7 +260,7 @@ class SINEW_OT_rebind(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
         return result
 
 
-class SINEW_OT_remove(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
+class SINEW_OT_remove(OnSinewObjects, OfOneMesh, bpy.types.Operator):
     bl_label = "Remove"
     bl_description = (
         "Take Sinew off all meshes of the character and give their Armature modifiers back as they were"
@@ -271,7 +271,7 @@ class SINEW_OT_remove(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
         return _for_each(self, objects, attach.remove, "Removed Sinew from")
 
 
-class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
+class SINEW_OT_take_over_smooth(OnSinewObjects, OfOneMesh, bpy.types.Operator):
     bl_label = "Take Over Corrective Smooth"
     bl_description = (
         "Have Delta Mush smooth in the place of the Corrective Smooth modifier, by its settings. It stays in "
@@ -296,7 +296,7 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
             return _for_each(self, objects, corrective_smooth.take_over, "Took over Corrective Smooth of")
 
 
-class SINEW_OT_make_group(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
+class SINEW_OT_make_group(OnSinewObjects, OfOneMesh, bpy.types.Operator):
     bl_label = "Make Vertex Group"
     bl_description = (
         "Make the vertex group that says where the stage acts, and choose it. The shape stays as it is until "

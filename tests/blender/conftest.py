@@ -35,6 +35,7 @@ OLDEST_AND_NEWEST = {
 # Tests of what Sinew computes from a character, and of its panels: they only run in long-term releases. The
 # others run how Blender evaluates, stores, edits and renders.
 LONG_TERM = {
+    "test_auto_mix",
     *("test_bulge_limit", "test_character", "test_corrective_key", "test_ddm", "test_delta_mush"),
     *("test_diagnostics_panel", "test_found_where_looked_for", "test_golden", "test_heat_map", "test_ik"),
     *("test_inbetween", "test_lesson", "test_mask_groups", "test_mending", "test_method_parameters"),

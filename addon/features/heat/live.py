@@ -201,6 +201,24 @@ def measured_under(subject: Subject, method: str, depsgraph: bpy.types.Depsgraph
     return subject.gauge.measure(shape, subject.measured.shape.points.T)
 
 
+def measured_of_mix(
+    subject: Subject, second_of: Callable[[bpy.types.Object], str], depsgraph: bpy.types.Depsgraph
+) -> tuple[Measured, Measured]:
+    """Measures the frame of the last call of measure() under each of the two methods of a mix alone.
+
+    second_of  of an object: its second method
+    """
+    worlds = [_world(part.obj, depsgraph) for part in subject.parts]
+    first, second = (
+        subject.gauge.measure(_in_world([_Other.of_mix(*each).points() for each in chosen], worlds))
+        for chosen in (
+            [(part, "") for part in subject.parts],
+            [(part, second_of(part.obj)) for part in subject.parts],
+        )
+    )
+    return first, second
+
+
 def measured_under_other(subject: Subject, other: str, depsgraph: bpy.types.Depsgraph) -> Measured | None:
     """Like measured_under(), computed once per frame; None where everything is shown under this method.
 
@@ -300,6 +318,22 @@ class _Other:
             frames = _under(part, shown.frames, other)
             stage_values = shown.stage_values
         return cls(part.skin_stack, shown.rest_points, frames, stage_values)
+
+    @classmethod
+    def of_mix(cls, part: Part, second: str) -> Self:
+        """Under the first method of a mix or, where one is given, under the second. Armature modifiers with a
+        method of their own are not mixed."""
+        shown, settings = part.skinned.shown, properties.of(part.obj)
+        frames = [frame and replace(frame, mix="") for frame in shown.frames]
+        if second:
+            own = stage_settings.method_values(settings, (second,))
+            frames = [
+                replace(frame, method=second, parameters=own)
+                if frame is not None and frame.method == settings.method
+                else frame
+                for frame in frames
+            ]
+        return cls(part.skin_stack, shown.rest_points, frames, shown.stage_values)
 
     def points(self) -> np.ndarray:
         """float32 [vertices, 3], object space."""
