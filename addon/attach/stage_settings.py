@@ -22,6 +22,8 @@ _CHOICES = {
     "0": ("Nearest Rotation", "Variant 0 of the paper: the rotation that fits the neighbourhood best"),
     "2": ("Blended Quaternion", "Variant 2 of the paper: the blended quaternion, faster"),
     "4": ("Smoothed Weights", "Variant 4 of the paper: the blended quaternion of smoothed weights, fastest"),
+    "blender": ("Shorter Way", "As Blender: a vertex turns the shorter way between its bones"),
+    "hierarchy": ("Along the Chain", "Turns add up from bone to bone, beyond half a turn"),
 }
 # Choice of a parameter that names a method: the stage is off.
 OFF = "OFF"
@@ -60,6 +62,16 @@ def method_values(settings: bpy.types.PropertyGroup, methods: Iterable[str]) -> 
         if name in METHODS
         for each in METHODS[name].parameters
     }
+
+
+def has_defaults(settings: bpy.types.PropertyGroup, methods: Iterable[str]) -> bool:
+    """Whether all parameters of these methods have their defaults."""
+    return all(
+        getattr(getattr(settings, name), each.id) == each.default
+        for name in methods
+        if name in METHODS
+        for each in METHODS[name].parameters
+    )
 
 
 def is_on(settings: bpy.types.PropertyGroup, name: str) -> bool:

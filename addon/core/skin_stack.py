@@ -165,6 +165,7 @@ class SkinDeformer:
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=self._rest_from_armature,
             parameters=frame.parameters or None,
+            parents=self._parents_of(frame),
         )
         return True
 
@@ -232,7 +233,13 @@ class SkinDeformer:
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=rest_inverses,
             parameters=frame.parameters or None,
+            parents=self._parents_of(frame),
         )
+
+    def _parents_of(self, frame: Frame) -> np.ndarray | None:
+        """Returns each bone's parent where signs come from the hierarchy."""
+        signs = (frame.parameters.get(f"{name}.signs") for name in (frame.method, frame.mix))
+        return self.bones.twists.parents if "hierarchy" in signs else None
 
     def _take_new_data(self, frame: Frame) -> bool:
         """Whether the methods' vertex data has changed; meshes are then packed again."""

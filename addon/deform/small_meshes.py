@@ -51,6 +51,7 @@ def has_builtin_shape(obj: bpy.types.Object) -> bool:
     return (
         methods - {properties.SAME_METHOD} <= set(VERTICES)
         and settings.scale_rule == BLENDER_4.name
+        and stage_settings.has_defaults(settings, VERTICES)
         and not stage_settings.names_on(settings)
     )
 
@@ -72,4 +73,5 @@ def fingerprint(obj: bpy.types.Object) -> list[str]:
     settings = properties.of(obj)
     modifiers = [obj.modifiers.get(replaced.name) for replaced in settings.replaced_modifiers]
     methods = [attach.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
-    return [settings.method, settings.scale_rule, *stage_settings.names_on(settings), *methods]
+    own = [settings.method, settings.scale_rule, settings.dq.signs]
+    return [*own, *stage_settings.names_on(settings), *methods]

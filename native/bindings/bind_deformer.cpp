@@ -13,6 +13,7 @@
 #include "parameters.h"
 #include "sinew/deformer.h"
 #include "sinew/methods/methods.h"
+#include "sinew/skeleton/continued_rotations.h"
 
 namespace sinew::bindings {
 MeshArguments::MeshArguments(const py::object& rest_points, const py::object& influence_offsets,
@@ -286,7 +287,8 @@ void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_
 
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
                                const py::object& threads, const py::object& bones_from_model,
-                               const py::object& rest_inverses, const py::object& parameters) {
+                               const py::object& rest_inverses, const py::object& parameters,
+                               const py::object& parents) {
     DeformArguments arguments;
     arguments.bones = rest_inverses.is_none() ? checked_affines(bone_transforms, "bone_transforms")
                                               : posed_from_rest(bone_transforms, rest_inverses);
@@ -296,6 +298,11 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
     arguments.values = checked_parameters(deformer, parameters);
     options.parameters = arguments.values.of_method;
     options.mix_parameters = arguments.values.of_mix;
+    if (!parents.is_none()) {
+        const auto of_bones = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
+        arguments.rotations = continued_rotations(Skeleton(as_span(of_bones)), arguments.bones);
+        options.rotations = arguments.rotations;
+    }
     options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
     if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
         fail("bones_from_model", "an invertible transform", "one of determinant 0");
@@ -307,9 +314,10 @@ namespace {
 
 py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone_transforms, const Out& out,
                           const Threads& threads, const OptionalArrayLike& bones_from_model,
-                          const OptionalArrayLike& rest_inverses, const ParameterValues& parameters) {
-    const DeformArguments arguments =
-        checked_deform(deformer, bone_transforms, threads, bones_from_model, rest_inverses, parameters);
+                          const OptionalArrayLike& rest_inverses, const ParameterValues& parameters,
+                          const OptionalArrayLike& parents) {
+    const DeformArguments arguments = checked_deform(deformer, bone_transforms, threads, bones_from_model,
+                                                     rest_inverses, parameters, parents);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const auto to = as_points_to_write(points);
     deformer.call([&] { static_cast<void>(deformer.deform(arguments.bones, arguments.options, to)); });
@@ -384,6 +392,7 @@ mix: None, or (name of another method, weights): weights float32 [vertices] are 
 Other threads may deform meanwhile: each of their results has either the old points or the new ones.)")
         .def("deform", &deform, "bone_transforms"_a, "out"_a = py::none(), "threads"_a = py::none(),
              "bones_from_model"_a = py::none(), "rest_inverses"_a = py::none(), "parameters"_a = py::none(),
+             "parents"_a = py::none(),
              R"(The deformed points, float32 [vertices, 3], model space.
 
 bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
@@ -394,6 +403,8 @@ rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. If given, bone_transforms
 parameters: a dict of values of methods' parameters by their full names, METHOD.PARAMETER, as described by
     Parameter; missing ones have their defaults. Parameters of methods that the deformer does not use have no
     effect.
+parents: int32 [bones], the parent of each bone, which precedes it, -1 for none: where the parameter `signs` is
+    "hierarchy", rotations add up along chains, beyond half a turn. None: each bone turns the shorter way.
 
 A vertex without influences is not moved.)");
 }

@@ -55,6 +55,7 @@ struct Parameters {
 struct DeformArguments {
     std::vector<Affine<float>> bones;  // posed_from_rest
     Parameters values;
+    std::vector<Quat<float>> rotations;  // empty without parents
     DeformOptions options;
 
     DeformArguments() = default;
@@ -68,6 +69,7 @@ void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_
 /// The arguments of Deformer.deform, except for `out`.
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
                                const py::object& threads, const py::object& bones_from_model,
-                               const py::object& rest_inverses, const py::object& parameters);
+                               const py::object& rest_inverses, const py::object& parameters,
+                               const py::object& parents);
 
 }  // namespace sinew::bindings

@@ -9,6 +9,7 @@
 #include "sinew/mesh/bone_sets.h"
 #include "sinew/methods/check_bind_data.h"
 #include "sinew/methods/packed_binding.h"
+#include "sinew/methods/signs.h"
 #include "sinew/stages/mix/mix_blocks.h"
 
 namespace sinew {
@@ -118,8 +119,8 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     const PackedBinding& packed = *state_->packed;
     if (points.size() != packed.vertex_count) return false;
     const PaletteStore::Reading reading(state_->palettes);
-    const Bones bones{packed.mesh.used_bones, packed.stretched_bones,   posed_from_rest,
-                      packed.rest_bones,      options.bones_from_model, &state_->sets};
+    const Bones bones{packed.mesh.used_bones,   packed.stretched_bones, posed_from_rest,  packed.rest_bones,
+                      options.bones_from_model, &state_->sets,          options.rotations};
     const SpaceRows rows(options.bones_from_model);
     const std::array<ParameterValues, 2> parameters{
         valid_values(kMethods[state_->methods[0]], options.parameters),
@@ -128,7 +129,8 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     for (std::size_t k = 0; k < state_->kernels_in_use().size(); ++k) {
         const Kernel& kernel = *state_->kernels[k];
         Palette& palette = reading.palette(k);
-        fill_palette(kernel, packed.mesh.pairs, bones, palette);
+        // Methods whose kernel can keep signs have that parameter first.
+        fill_palette(kernel, packed.mesh.pairs, bones, Signs::are_kept(parameters[k]), palette);
         frames[k] = {&packed.mesh,
                      state_->rest_points().data(),
                      packed.vertex_data[state_->methods[k]].get(),

@@ -22,6 +22,9 @@ struct DeformOptions {
     std::span<const double> parameters{};
     /// The same for the method that the stage `mix` adds.
     std::span<const double> mix_parameters{};
+    /// [bones] the quaternion of each bone whose sign is taken where `signs` is "hierarchy"; unit length. Empty, and
+    /// for missing bones: the one nearer to the identity. See continued_rotations().
+    std::span<const Quat<float>> rotations{};
 };
 
 /// The stage `mix`: a second method, and its share at each vertex. See stages/mix/mix.h.

@@ -24,6 +24,7 @@
 #include "sinew/methods/cor/centres_of_rotation.h"
 #include "sinew/methods/methods.h"
 #include "sinew/normals.h"
+#include "sinew/skeleton/continued_rotations.h"
 #include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/skeleton/keyframes.h"
 #include "sinew/skinned_normals.h"

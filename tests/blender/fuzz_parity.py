@@ -629,7 +629,9 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
         check_coordinates(obj, expected, outcome, route)
-        properties.of(obj).sdef.interpolation = str(numbers(seed, "sdef").choice(["nlerp", "slerp"]))
+        settings = properties.of(obj)
+        settings.sdef.interpolation = str(numbers(seed, "sdef").choice(["nlerp", "slerp"]))
+        settings.cor.signs = settings.sbs.signs = str(numbers(seed, "signs").choice(["blender", "hierarchy"]))
         for method in OTHERS:
             try:
                 error = error_to_reference(obj, armature, method, seed, outcome, route)

@@ -221,7 +221,7 @@ def _by_one_method(
             frame.pose.astype(np.float64) @ np.linalg.inv(deformer.bones.rest.astype(np.float64)),
             deformer.bones.rest_axes.astype(np.float64),
             data,
-            frame.parameters,
+            frame.parameters | {f"{method}.parents": deformer.bones.twists.parents},
         )
 
     deformed, margins = by(data)

@@ -150,8 +150,8 @@ def results() -> list[Result]:
         *(
             Result(array, "Sinew", method.name, METHOD_VALUES.get(method.name, {}) | chosen)
             for method in METHODS.values()
-            if method.name not in BLENDERS
             for array, chosen in choices(method)
+            if array not in BLENDERS
         ),
         *(
             Result(f"{array}_after_{first}", "Sinew", first, {}, {stage.name: values | chosen})
@@ -163,10 +163,11 @@ def results() -> list[Result]:
 
 
 def choices(owner: sinew.Method | sinew.Stage) -> Iterator[tuple[str, dict[str, Value]]]:
-    """Each result with the name of its array."""
+    """Each result with the name of its array, in which Blender's way is not named."""
     kinds = [parameter for parameter in owner.parameters if parameter.kind == "enum"]
     for chosen in itertools.product(*(kind.choices for kind in kinds)):
-        yield "_".join([owner.name, *chosen]), {k.id: c for k, c in zip(kinds, chosen, strict=True)}
+        name = "_".join([owner.name, *(choice for choice in chosen if choice != "blender")])
+        yield name, {k.id: c for k, c in zip(kinds, chosen, strict=True)}
 
 
 SetUp = Callable[[bpy.types.Object, bpy.types.Object], None]
@@ -282,6 +283,8 @@ def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
     posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
     rest_matrices = [np.array(bone.matrix_local) for bone in armature.data.bones]
     pose_matrices = [np.array(bone.matrix) for bone in posed]
+    number = {bone.name: index for index, bone in enumerate(armature.data.bones)}
+    parents = [number[bone.parent.name] if bone.parent else -1 for bone in armature.data.bones]
     first = []
     for index, bone in enumerate(armature.data.bones):
         first.append(len(rest_matrices))
@@ -289,12 +292,14 @@ def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
             joint = posed[index].bbone_segment_matrix
             rest_matrices.append(rest_matrices[index] @ np.array(joint(k, rest=True)))
             pose_matrices.append(pose_matrices[index] @ np.array(joint(k, rest=False)))
+            parents.append(index)
     return {
         "rest": np.array(rest_matrices, dtype=np.float32),
         "posed": np.array(pose_matrices, dtype=np.float32),
         "lengths": np.array([bone.length for bone in armature.data.bones], dtype=np.float32),
         "segments": np.array([bone.bbone_segments for bone in armature.data.bones], dtype=np.int32),
         "first_joint": np.array(first, dtype=np.int32),
+        "parents": np.array(parents, dtype=np.int32),
     }
 
 

@@ -111,7 +111,13 @@ def test_it_plays_elsewhere_as_here(tmp_path, method, mixed):
     use(obj, method, mixed)
     file = write(tmp_path / "a.glb")
     (mesh,) = file.header["meshes"]
-    assert mesh["extras"]["sinew"] == {"version": 1, "method": method, **({"mix": mixed} if mixed else {})}
+    signs = {f"{name}.signs": "blender" for name in (method, mixed) if name in ("dq", "cor")}
+    assert mesh["extras"]["sinew"] == {
+        "version": 1,
+        "method": method,
+        **({"mix": mixed} if mixed else {}),
+        **({"parameters": signs} if signs else {}),
+    }
     (primitive,) = mesh["primitives"]
     assert ("_SINEW_CENTRE" in primitive["attributes"]) == ("cor" in (method, mixed))
     assert ("_SINEW_MIX" in primitive["attributes"]) == bool(mixed)
@@ -216,7 +222,7 @@ def test_custom_properties_stay(tmp_path):
     # Saved files store centres in the mesh.
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     extras = write(tmp_path / "a.glb", export_extras=True).header["meshes"][0]["extras"]
-    assert extras.pop("sinew") == {"version": 1, "method": "cor"}
+    assert extras.pop("sinew") == {"version": 1, "method": "cor", "parameters": {"cor.signs": "blender"}}
     assert extras["tailor"] == "Ann"
 
 

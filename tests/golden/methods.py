@@ -40,6 +40,12 @@ def blended(quaternions, w):
     return (signs(quaternions, w) * w) @ quaternions
 
 
+def signed(of, w, pose, by):  # the quaternions of bones, with signs by a rule
+    if by == "hierarchy":
+        return pose.along_chain[of]
+    return signs(pose.quaternion[of], w)[:, None] * pose.quaternion[of]
+
+
 def by_whole_bones(x, of, pose):  # [n, 3]: where each bone puts x, scale included
     return np.array([moved_by(pose.motion[b], x) for b in of])
 
@@ -52,8 +58,8 @@ def scaled(x, of, w, pose):  # what the scale of bones adds, for methods that bl
     return w @ (by_whole_bones(x, of, pose) - by_rigid_bones(x, of, pose))
 
 
-def about(centre, x, of, w, pose):  # rotated about a centre, which linear blending moves
-    rotation = rotation_of(blended(pose.quaternion[of], w))
+def about(centre, x, of, w, pose, signs):  # rotated about a centre, which linear blending moves
+    rotation = rotation_of(w @ signed(of, w, pose, signs))
     return rotation @ (x - centre) + w @ by_rigid_bones(centre, of, pose) + scaled(x, of, w, pose)
 
 
@@ -67,28 +73,27 @@ def translations(
     return by_whole_bones(x, of, pose) - np.array([pose.rotation[b] @ x for b in of])
 
 
-def dq(x, of, w, pose, kept):
-    real, dual = dual_blend(x, of, w, pose)
+def dq(x, of, w, pose, kept, signs="blender"):
+    real, dual = dual_blend(x, of, w, pose, signs)
     conjugate = real * [1, -1, -1, -1]
     return multiply(multiply(real, [0.0, *x]) + 2 * dual, conjugate)[1:] / (real @ real)
 
 
-def dual_blend(x, of, w, pose):
-    q, t = pose.quaternion[of], translations(x, of, pose)
+def dual_blend(x, of, w, pose, signs="blender"):
+    q, t = signed(of, w, pose, signs), translations(x, of, pose)
     duals = np.array([multiply([0.0, *b], a) / 2 for a, b in zip(q, t, strict=True)])
-    s = signs(q, w) * w
-    return s @ q, s @ duals
+    return w @ q, w @ duals
 
 
 def qv(x, of, w, pose, kept):
     return rotation_of(blended(pose.quaternion[of], w)) @ x + w @ translations(x, of, pose)
 
 
-def cor(x, of, w, pose, kept):
-    return about(kept, x, of, w, pose)
+def cor(x, of, w, pose, kept, signs="blender"):
+    return about(kept, x, of, w, pose, signs)
 
 
-def sbs(x, of, w, pose, kept):
+def sbs(x, of, w, pose, kept, signs="blender"):
     """The centre is the point that the bones move most alike; of several the nearest to their heads' mean."""
     centre, count = pose.head[of].mean(axis=0), len(of)
     first, second = np.triu_indices(count, 1)
@@ -100,7 +105,7 @@ def sbs(x, of, w, pose, kept):
     for left, size, right in zip(u.T, sizes, vt, strict=True):
         if size > 1e-3 * count:
             centre = centre + (left @ wanted) / size * right
-    return about(centre, x, of, w, pose)
+    return about(centre, x, of, w, pose, signs)
 
 
 def sdef(x, of, w, pose, kept, interpolation):

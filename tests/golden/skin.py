@@ -47,13 +47,24 @@ def bones(case):
     rotation = np.array([axes(p) @ axes(r).T for p, r in zip(posed, rest, strict=True)])
     head = rest[:, :3, 3]
     translation = posed[:, :3, 3] - np.einsum("bij,bj->bi", rotation, head)
+    quaternions = np.array([quaternion(r) for r in rotation])
     return SimpleNamespace(
         motion=motion,
         rotation=rotation,
-        quaternion=np.array([quaternion(r) for r in rotation]),
+        quaternion=quaternions,
+        along_chain=along_chain(quaternions, case["parents"], np.linalg.det(motion[:, :3, :3]) < 0),
         translation=translation,
         head=head,
     )
+
+
+def along_chain(quaternions, parents, mirrors):  # with the signs that continue the parents'
+    result, nearby = [], []
+    for q, parent, is_mirrored in zip(quaternions, parents, mirrors, strict=True):
+        before = np.array([1.0, 0, 0, 0]) if parent < 0 else nearby[parent]
+        result.append(-q if q @ before < 0 else q)
+        nearby.append(before if is_mirrored else result[-1])
+    return np.array(result)
 
 
 def joints(case, bone, point):  # of a bendy bone: the two next to the point, with their shares

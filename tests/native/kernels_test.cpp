@@ -12,6 +12,7 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 #include "sinew/base/x86_support.h"
+#include "sinew/skeleton/continued_rotations.h"
 
 namespace sinew {
 namespace {
@@ -163,6 +164,78 @@ TEST_P(Kernels, agree_for_bones_turned_far) {
         }
     }
     EXPECT_LT(errors(method(), scene).back(), 2 * kTolerance);
+}
+
+/// A chain of 12 bones that twist and coil by `degrees` each about axes that change, every third one scaled if
+/// `scaled`. Vertices have up to four of them that are neighbours, in shared sets and in own ones.
+Scene scene_of_chain(double degrees, bool scaled) {
+    Random random(7);
+    Scene scene;
+    QuatVec<double> bone{Quat<double>(1, 0, 0, 0), Vec3<double>(0.0)};
+    for (int i = 0; i < 12; ++i) {
+        const Vec3<double> axis(0.2 * random.uniform(-1.0, 1.0), 1.0, 0.2 * random.uniform(-1.0, 1.0));
+        bone = bone * QuatVec<double>{about(axis, degrees), 0.1 * random.vector(1.0)};
+        const double stretch = scaled && i % 3 == 2 ? 1.5 : 1.0;
+        scene.posed_from_rest.push_back(cast<float>(to_affine(bone) * scaling<double>({1.0, stretch, 1.0})));
+        scene.rest_bones.emplace_back();
+    }
+    for (int i = 0; i < 1000; ++i) {
+        const auto count = static_cast<std::size_t>(1 + i % 4);
+        auto influences = random.influences<float>(count, 12);
+        const std::int32_t first = i < 600 ? i % 8 : random.index(9);
+        for (std::size_t k = 0; k < count; ++k) {
+            influences[k].bone = first + static_cast<std::int32_t>(k);
+        }
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
+    }
+    return scene;
+}
+
+TEST_P(Kernels, keep_the_signs_of_a_chain) {
+    const bool has_signs = !method().parameters.empty() && method().parameters[0].id == "signs";
+    if (!has_signs) GTEST_SKIP();
+    std::vector<std::int32_t> parents(12);
+    std::iota(parents.begin(), parents.end(), -1);
+    const std::vector<double> blender{0.0}, kept{1.0};
+    for (const double degrees : {20.0, 70.0, 110.0, 170.0}) {
+        for (const bool scaled : {false, true}) {
+            Scene scene = scene_of_chain(degrees, scaled);
+            const Deformer deformer(scene.data(), method());
+            const auto shorter = deformed(deformer, scene);
+            scene.rotations = continued_rotations(Skeleton(parents), scene.posed_from_rest);
+            const auto expected = in_double(method(), scene, kept);
+            const auto points = deformed(deformer, scene, {.parameters = kept, .rotations = scene.rotations});
+            double error = 0.0, difference = 0.0;
+            for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+                error = std::max(error, distance(Vec3<double>(points[vertex]), expected[vertex]));
+                difference = std::max(difference,
+                                      distance(Vec3<double>(points[vertex]), Vec3<double>(shorter[vertex])));
+            }
+            EXPECT_LT(error, 10 * kTolerance) << degrees << scaled;
+            // Up to 60 degrees a bone, no two of four are more than half a turn apart.
+            EXPECT_EQ(difference > 0.1, degrees > 60.0) << degrees << scaled;
+            if (degrees < 60.0) EXPECT_EQ(difference, 0.0);
+            const auto asked =
+                deformed(deformer, scene, {.parameters = blender, .rotations = scene.rotations});
+            EXPECT_TRUE(same_bits(asked, shorter));
+        }
+    }
+}
+
+// Two bones a whole turn apart, where signs are kept.
+TEST_P(Kernels, a_sum_that_cancels_gives_numbers) {
+    Scene scene;
+    for (int i = 0; i < 2; ++i) {
+        scene.posed_from_rest.push_back(
+            cast<float>(to_affine(QuatVec<double>{about({0, 1, 0}, 0.0), {1, 2, 3}})));
+        scene.rest_bones.emplace_back();
+    }
+    scene.add_vertex({1, 2, 3}, {{0, 0.5f}, {1, 0.5f}});
+    const std::vector<Quat<float>> rotations{{1, 0, 0, 0}, {-1, 0, 0, 0}};
+    const std::vector<double> kept{1.0};
+    const auto points =
+        deformed(Deformer(scene.data(), method()), scene, {.parameters = kept, .rotations = rotations});
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(std::isfinite(points[0][i]));
 }
 
 TEST_P(Kernels, agree_for_many_influences) {

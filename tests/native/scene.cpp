@@ -51,25 +51,42 @@ std::vector<T> numbers_of(const Scene& scene, std::size_t vertex, const MethodIn
     return {first, first + static_cast<std::ptrdiff_t>(method.vertex_floats)};
 }
 
+/// Gives a bone the sign of the scene's rotations.
+template <class Bone>
+void take_sign(Bone& bone, const Quat<float>& rotation) {
+    if constexpr (requires { bone.rigid.real; }) {
+        if (glm::dot(bone.rigid.real, Quat<double>(rotation)) < 0.0) {
+            bone.rigid = {-bone.rigid.real, -bone.rigid.dual};
+        }
+    } else if constexpr (requires { bone.rigid.rotation; }) {
+        if (glm::dot(bone.rigid.rotation, Quat<double>(rotation)) < 0.0) {
+            bone.rigid.rotation = -bone.rigid.rotation;
+        }
+    }
+}
+
 template <class T, class Method>
 std::vector<Vec3<T>> by_method(const Scene& scene, std::span<const double> parameters) {
     std::vector<typename Method::template Bone<T>> palette;
     for (std::size_t bone = 0; bone < scene.posed_from_rest.size(); ++bone) {
-        palette.push_back(cast<T>(Method::prepare(cast<double>(scene.posed_from_rest[bone]),
-                                                  cast<double>(scene.rest_bones[bone]))));
+        auto prepared =
+            Method::prepare(cast<double>(scene.posed_from_rest[bone]), cast<double>(scene.rest_bones[bone]));
+        if (!scene.rotations.empty()) take_sign(prepared, scene.rotations[bone]);
+        palette.push_back(cast<T>(prepared));
     }
     std::vector<Vec3<T>> points;
     for (std::size_t vertex = 0; vertex < scene.rest_points.size(); ++vertex) {
         const auto influences = normalised_influences_of<T>(scene, vertex);
         const Vec3<T> rest(scene.rest_points[vertex]);
-        if constexpr (!Method::info.parameters.empty()) {
-            static_assert(Method::info.vertex_floats > 0);
+        if constexpr (Method::info.vertex_floats > 0 && !Method::info.parameters.empty()) {
             const std::vector<T> numbers = numbers_of<T>(scene, vertex, Method::info);
             points.push_back(
                 Method::template deform_vertex<T>(palette, influences, rest, numbers, parameters));
         } else if constexpr (Method::info.vertex_floats > 0) {
             const std::vector<T> numbers = numbers_of<T>(scene, vertex, Method::info);
             points.push_back(Method::template deform_vertex<T>(palette, influences, rest, numbers));
+        } else if constexpr (!Method::info.parameters.empty()) {
+            points.push_back(Method::template deform_vertex<T>(palette, influences, rest, parameters));
         } else {
             points.push_back(Method::template deform_vertex<T>(palette, influences, rest));
         }

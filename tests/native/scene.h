@@ -40,6 +40,8 @@ struct Scene {
     std::vector<float> weights;
     std::vector<Affine<float>> rest_bones;
     std::vector<Affine<float>> posed_from_rest;
+    // DeformOptions::rotations, whose signs definitions take; empty: theirs are free
+    std::vector<Quat<float>> rotations;
 
     // [vertices][kVertexNumbers] three points, then 1, or 0 for some vertices. A method uses the first of these
     // numbers.

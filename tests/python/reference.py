@@ -144,6 +144,32 @@ def in_one_hemisphere(quaternions, weights):
     return np.array(signs), margin
 
 
+def along_chain(transforms, parents):
+    """Quaternions [bones, 4] with the signs that continue the parents', and how far each, and those before
+    it, are from a tie. A bone that mirrors has its parent's."""
+    quaternions, margins = [], []
+    for matrix, parent in zip(transforms[:, :3, :3], parents, strict=True):
+        at_root = np.array([1.0, 0, 0, 0]), 1.0
+        before, margin = at_root if parent < 0 else (quaternions[parent], margins[parent])
+        q = before
+        if np.linalg.det(matrix) >= 0.0:
+            lengths = np.linalg.norm(matrix, axis=0)
+            q = quaternion_by_blender(matrix / np.where(lengths > 0.0, lengths, 1.0))
+        quaternions.append(-q if q @ before < 0.0 else q)
+        margins.append(min(margin, abs(q @ before)))
+    return np.array(quaternions), np.array(margins)
+
+
+def signs_of(quaternions, weights, kept):
+    """As in_one_hemisphere(); `kept`: quaternions whose signs are taken instead, and the margin is also
+    the length of the sum."""
+    if kept is None:
+        return in_one_hemisphere(quaternions, weights)
+    along = (quaternions * kept).sum(axis=1)
+    signs = np.where(along < 0.0, -1.0, 1.0)
+    return signs, min(np.abs(along).min(), np.linalg.norm((signs * weights) @ quaternions))
+
+
 def lbs(point, motions, rotations, weights):
     blended = np.tensordot(weights, motions, axes=1)
     return (blended @ np.append(point, 1.0))[:3], 1.0
@@ -162,18 +188,18 @@ def qv(point, motions, rotations, weights):
     return rotation(blended / np.linalg.norm(blended)) @ point + weights @ translations, margin
 
 
-def dq(point, motions, rotations, weights):
+def dq(point, motions, rotations, weights, kept=None):
     quaternions, translations = rigid_terms(point, motions, rotations)
-    rotated, translated, margin = blended_motion(quaternions, translations, weights)
+    rotated, translated, margin = blended_motion(quaternions, translations, weights, kept)
     return rotated @ point + translated, margin
 
 
-def blended_motion(quaternions, translations, weights):
+def blended_motion(quaternions, translations, weights, kept=None):
     """Rotation and translation of the sum of unit dual quaternions, and the margin."""
     duals = np.array(
         [0.5 * left_multiplication([0.0, *t]) @ q for q, t in zip(quaternions, translations, strict=True)]
     )
-    signs, margin = in_one_hemisphere(quaternions, weights)
+    signs, margin = signs_of(quaternions, weights, kept)
     real, dual = (signs * weights) @ quaternions, (signs * weights) @ duals
     length = np.linalg.norm(real)
     return rotation(real / length), translation(real / length, dual / length), margin
@@ -209,24 +235,24 @@ def rigid_parts(motions, rotations, heads):
     )
 
 
-def blended_rotation(rotations, weights):
+def blended_rotation(rotations, weights, kept=None):
     """The 3x3 rotation of the sum of quaternions, and the margin."""
     quaternions = np.array([quaternion(r) for r in rotations])
-    signs, margin = in_one_hemisphere(quaternions, weights)
+    signs, margin = signs_of(quaternions, weights, kept)
     blended = (signs * weights) @ quaternions
     return rotation(blended / np.linalg.norm(blended)), margin
 
 
-def about(centre, point, motions, rotations, weights, heads):
+def about(centre, point, motions, rotations, weights, heads, kept):
     """Rotated by the blend about `centre`, which the rigid motions' mean moves; then what bones scale."""
     translations = rigid_parts(motions, rotations, heads)
-    rotated, margin = blended_rotation(rotations, weights)
+    rotated, margin = blended_rotation(rotations, weights, kept)
     scaled = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point - translations
     return rotated @ (point - centre) + weights @ (rotations @ centre + translations + scaled), margin
 
 
-def cor(point, motions, rotations, weights, heads, centre=None):
-    return about(point if centre is None else centre, point, motions, rotations, weights, heads)
+def cor(point, motions, rotations, weights, heads, centre=None, kept=None):
+    return about(point if centre is None else centre, point, motions, rotations, weights, heads, kept)
 
 
 def sdef(point, motions, rotations, weights, heads, spheres=None, interpolation="nlerp"):
@@ -253,7 +279,7 @@ def sdef(point, motions, rotations, weights, heads, spheres=None, interpolation=
 SAME_ROTATION = 1e-3
 
 
-def sbs(point, motions, rotations, weights, heads):
+def sbs(point, motions, rotations, weights, heads, kept=None):
     """The centre by the singular values of all pairs' equations; the tie is also where one is left out."""
     translations = rigid_parts(motions, rotations, heads)
     start, count, margin = heads.mean(axis=0), len(rotations), 1.0
@@ -264,11 +290,11 @@ def sbs(point, motions, rotations, weights, heads):
         wanted = (translations[second] - translations[first]).ravel()
         u, sizes, vt = np.linalg.svd(equations, full_matrices=False)
         least = SAME_ROTATION * count
-        kept = sizes > least
-        inverse = np.where(kept, 1.0 / np.where(kept, sizes, 1.0), 0.0)
+        is_held = sizes > least
+        inverse = np.where(is_held, 1.0 / np.where(is_held, sizes, 1.0), 0.0)
         centre = start + vt.T @ (inverse * (u.T @ (wanted - equations @ start)))
         margin = np.abs(sizes / least - 1.0).min()
-    result, of_signs = about(centre, point, motions, rotations, weights, heads)
+    result, of_signs = about(centre, point, motions, rotations, weights, heads, kept)
     return result, min(margin, of_signs)
 
 
@@ -377,7 +403,7 @@ def deform(
     """Deformed points float64 [vertices, 3], and [vertices] how far each is from a tie of signs.
 
     vertex_data  as sinew.Binding takes it
-    parameters   as sinew.Deformer.deform takes them
+    parameters   as sinew.Deformer.deform takes them; with them METHOD.parents, its argument `parents`
 
     A vertex without influences, or with all weights zero, stays.
     """
@@ -390,6 +416,9 @@ def deform(
     rotations = np.array([rotation_of_bone(m, b) for m, b in zip(transforms, rest_bones, strict=True)])
     points = np.asarray(rest_points, np.float64).copy()
     margins = np.ones(len(points))
+    parents = values.pop("parents", np.full(len(transforms), -1))
+    along = values.pop("signs", "blender") == "hierarchy"
+    quaternions, of_chain = along_chain(transforms, parents) if along else (None, None)
     for vertex in range(len(points)):
         span = slice(offsets[vertex], offsets[vertex + 1])
         share = np.asarray(weights[span], np.float64)
@@ -404,7 +433,11 @@ def deform(
                 its = rows[:, 1].astype(int)
                 if len(rows):
                     more.append((rows[:, 2:], transforms[its], rotations[its], rest_bones[its, :3, 3]))
+            if quaternions is not None:
+                values["kept"] = quaternions[of]
             points[vertex], margins[vertex] = METHODS[method](
                 points[vertex], transforms[of], rotations[of], share / share.sum(), *more, **values
             )
+            if quaternions is not None:
+                margins[vertex] = min(margins[vertex], of_chain[of].min())
     return points, margins

@@ -69,7 +69,9 @@ def test_every_method_and_stage_is_there(reader, path):
         assert values, owner.name
         for parameter in owner.parameters:
             if parameter.kind == "enum":
-                assert {each[parameter.id] for each in values} == set(parameter.choices)
+                assert {each.get(parameter.id, parameter.default) for each in values} == set(
+                    parameter.choices
+                )
     listed = {name: f"{array.dtype} {list(array.shape)}" for name, array in np.load(path).items()}
     assert about["arrays"] == listed
 
@@ -77,6 +79,7 @@ def test_every_method_and_stage_is_there(reader, path):
 def test_no_two_results_of_a_case_are_the_same(reader):
     """Detects readers that confuse methods."""
     case, about = reader.read(FOLDER / "weights.npz")
-    names = [result["array"] for result in about["results"]]
+    # No two bones of this case are more than half a turn apart.
+    names = [r["array"] for r in about["results"] if r["parameters"].get("signs") != "hierarchy"]
     for a, b in itertools.combinations(names, 2):
         assert np.abs(case[a] - case[b]).max() > 1e-3, (a, b)

@@ -65,6 +65,8 @@ def stored_influences(case, vertex, point):
 
 
 def is_for_shaders(result):
+    if result["parameters"].get("signs", "blender") != "blender":
+        return False
     mixed = [values["method"] for values in result["stages"].values() if "method" in values]
     return {result["method"], *mixed} <= set(METHODS) and set(result["stages"]) <= {"mix"}
 

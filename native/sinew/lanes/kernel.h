@@ -69,6 +69,9 @@ struct Kernel {
     /// The rows in Palette::bones of a bone that does not move. Every bone there has as many.
     std::span<const Float4> rest_row;
 
+    /// How many Float4 of a row change sign with the rotation; 0 if the signs can not be kept.
+    std::size_t signed_float4s = 0;
+
     /// Writes the rows of bones.used, all of which are posed, and their sizes. A method that blends rotations
     /// treats every bone as rigid, and adds the indices of those that are not to palette.scaled.
     OfTargets<OfBones> bone_rows{};
@@ -103,7 +106,9 @@ struct Kernel {
     }
 
 /// Fills `palette`. Bones that the pose lacks stay at rest.
-void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bones,
+///
+/// keeps_signs  give rows the signs of bones.rotations, and keep them
+void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bones, bool keeps_signs,
                   Palette& palette) noexcept;
 
 }  // namespace sinew

@@ -181,10 +181,16 @@ HWY_INLINE Vec<D> squared_norm(const Vec<D>* q) {
     return hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
 }
 
+/// The squared length of a sum of quaternions, as a divisor: finite results also where it cancels.
+template <class D>
+HWY_INLINE Vec<D> squared_length(D d, const Vec<D>* q) {
+    return hn::Max(squared_norm<D>(q), hn::Set(d, static_cast<float>(kDegenerateBlend * kDegenerateBlend)));
+}
+
 /// `start` plus the displacement of `v` under the rotation by the quaternion `q` [4], which may have any length.
 template <class D>
 HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, const Points<D>& v) {
-    const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm<D>(q));
+    const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_length(d, q));
     const Points<D> axis{q[1], q[2], q[3]};
     const Points<D> inner = add_scaled<D>(cross<D>(axis, v), q[0], v);
     return add_scaled<D>(start, scale, cross<D>(axis, inner));

@@ -33,6 +33,24 @@ bool is_identity(const Affine<float>& a) noexcept {
 
 namespace {
 
+/// Whether `rotation`, of the bone with this number, has the other sign than bones.rotations.
+bool is_away(const Bones& bones, std::size_t number, const Quat<double>& rotation) noexcept {
+    if (number >= bones.rotations.size()) return rotation.w < 0.0;
+    return glm::dot(Quat<double>(bones.rotations[number]), rotation) < 0.0;
+}
+
+/// Gives rows the signs of bones.rotations.
+void take_signs(const Kernel& kernel, const Bones& bones, const Palette& palette) noexcept {
+    for (std::size_t i = 0; i < bones.used.size(); ++i) {
+        Float4* const row = palette.bones + kernel.rest_row.size() * i;
+        const auto& [w, x, y, z] = row->value;
+        if (!is_away(bones, static_cast<std::size_t>(bones.used[i]), Quat<double>(w, x, y, z))) continue;
+        for (std::size_t k = 0; k < kernel.signed_float4s; ++k) {
+            for (float& number : row[k].value) number = -number;
+        }
+    }
+}
+
 /// Prepares all bones one by one, for rows of sets.
 void prepare_posed(const Bones& bones, Palette& palette) noexcept {
     for (std::size_t bone = 0; bone < bones.used.size(); ++bone) {
@@ -42,16 +60,19 @@ void prepare_posed(const Bones& bones, Palette& palette) noexcept {
         palette.posed[bone] =
             scaled_rigid(cast<double>(bones.posed_from_rest[number]), bones.rest_bone(bone));
         palette.any_scale = palette.any_scale || palette.posed[bone].has_scale;
+        Quat<double>& rotation = palette.posed[bone].rigid.rotation;
+        if (palette.keeps_signs && is_away(bones, number, rotation)) rotation = -rotation;
     }
     if (palette.any_scale) std::fill_n(palette.has_scale, bones.sets->bones.size(), std::uint8_t{0});
 }
 
 }  // namespace
 
-void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bones,
+void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bones, bool keeps_signs,
                   Palette& palette) noexcept {
     palette.scaled_count = 0;
     palette.any_scale = false;
+    palette.keeps_signs = keeps_signs && kernel.signed_float4s > 0;
     if (kernel.set_rows != nullptr) {
         prepare_posed(bones, palette);
         kernel.set_rows(bones, palette);
@@ -73,6 +94,7 @@ void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bon
     }
     kernel.bone_rows[target_in_use()](of_pose, palette);
     if (kernel.scaled_bone_rows != nullptr) kernel.scaled_bone_rows(of_pose, palette);
+    if (palette.keeps_signs) take_signs(kernel, of_pose, palette);
     const std::size_t size = kernel.rest_row.size();
     for (std::size_t i = posed; i < bones.used.size(); ++i) {
         std::ranges::copy(kernel.rest_row, palette.bones + size * i);

@@ -56,6 +56,7 @@ struct Palette {
     PosedBone* posed = nullptr;         // each bone, for Kernel::set_rows
     std::size_t scaled_count = 0;
     bool any_scale = false;
+    bool keeps_signs = false;  // whether rows are added with the signs that they have
 };
 
 struct BoneSets;
@@ -68,7 +69,8 @@ struct Bones {
     std::span<const Affine<float>> posed_from_rest;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity
     Affine<float> bones_from_model;
-    const BoneSets* sets;  // empty unless a kernel has rows for sets
+    const BoneSets* sets;                    // empty unless a kernel has rows for sets
+    std::span<const Quat<float>> rotations;  // DeformOptions::rotations
 
     /// Orthonormal, for an index into `used`.
     [[nodiscard]] Affine<double> rest_bone(std::size_t bone) const noexcept {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Deforms blocks with a rigid method; agrees with methods/NAME/NAME.h. Compiled once for each instruction set.
 //
-// Rows of bones are summed as described at Palette; `finish` computes points from the sums. Blends can not cancel
-// here: every term is added in the hemisphere of the sum before it, so |sum|^2 >= the sum of squared weights >= 1
-// / influences, which reaches kDegenerateBlend only with 1e12 influences.
+// Rows of bones are summed as described at Palette; `finish` computes points from the sums. Blends cancel only where
+// signs are kept: else every term is added in the hemisphere of the sum before it, so |sum|^2 >= the sum of squared
+// weights >= 1 / influences, which reaches kDegenerateBlend only with 1e12 influences.
 #if defined(SINEW_LANES_RIGID_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_LANES_RIGID_INL_H_
 #undef SINEW_LANES_RIGID_INL_H_
@@ -79,11 +79,13 @@ HWY_INLINE Vec<D> dot(D d, const float* a, const Vec<D>* b) {
 
 /// Adds the weighted difference of `row` from `base`, with `row` in the hemisphere of the blend. `base` is the
 /// first row, or kNoBase. Returns the weight, negative where the row was negated.
+///
+/// keeps_signs  Palette::keeps_signs
 template <class Rigid, class D>
-HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight,
+HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight, bool keeps_signs,
                                Blend<D, Rigid::kNumbers>& blend) {
     Vec<D>* const quaternion = blend.quaternion;
-    const auto away = hn::Lt(dot(d, row, quaternion), hn::Zero(d));
+    const auto away = hn::Lt(keeps_signs ? hn::Zero(d) : dot(d, row, quaternion), hn::Zero(d));
     const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
     for (std::size_t i = 0; i < Rigid::kNumbers; ++i) {
         const Vec<D> difference = hn::Set(d, row[i] - base[i]);
@@ -146,8 +148,8 @@ HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
     return hn::Add(pairs, hn::Shuffle2301(pairs));
 }
 
-/// Copies rows of the palette, each in the hemisphere of the first. Returns the smallest of their absolute
-/// cosines with the first.
+/// Copies rows of the palette, each in the hemisphere of the first, unless signs are kept. Returns the smallest of
+/// their absolute cosines with the first.
 ///
 /// kDifferences  copy the differences from the first row, for all rows but the first
 template <class Rigid, bool kDifferences>
@@ -164,10 +166,11 @@ HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones,
         hn::Store(first[q], d, rows + 4 * q);
     }
     Vec<Four> least = hn::Set(d, 1.0f);
+    const Vec<Four> free_sign = palette.keeps_signs ? hn::Zero(d) : hn::SignBit(d);
     for (std::size_t k = 1; k < count; ++k) {
         Vec<Four> float4 = float4_of(k, 0);
         const Vec<Four> cosine = dot(float4, first[0]);
-        const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
+        const Vec<Four> sign = hn::And(cosine, free_sign);
         least = hn::Min(least, hn::Abs(cosine));
         for (std::size_t q = 0; q < kFloat4s; ++q) {
             if (q > 0) float4 = float4_of(k, q);
@@ -190,7 +193,7 @@ float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_
                     sizeof(Float4) * kRowFloat4s<Rigid>);
         const float cosine = dot(row, rows);
         least = std::min(least, std::abs(cosine));
-        if (cosine < 0.0f) {
+        if (cosine < 0.0f && !palette.keeps_signs) {
             for (std::size_t i = 0; i < 4 * Rigid::kSignedFloat4s; ++i) row[i] = -row[i];
         }
     }
@@ -214,7 +217,7 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
     }
     // Within 45 degrees of the first, all are within 90 degrees of each other.
     const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
-    if (Rigid::kSignedFloat4s == 0 || least > kCosine45) return true;
+    if (Rigid::kSignedFloat4s == 0 || least > kCosine45 || palette.keeps_signs) return true;
     if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
     if (!signs_agree(rows, Rigid::kNumbers, count)) return false;
     if (!kPlain) subtract_first<Rigid::kNumbers>(rows, count);
@@ -326,8 +329,8 @@ HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, cons
     Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
     for (std::size_t k = 1; k < count; ++k) {
         const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
-        const Vec<D> signed_weight =
-            add_to_blend<Rigid>(d, base, row_of<kNumbers>(palette, bones[k]), weight, blend);
+        const Vec<D> signed_weight = add_to_blend<Rigid>(d, base, row_of<kNumbers>(palette, bones[k]), weight,
+                                                         palette.keeps_signs, blend);
         Rigid::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
     }
     return blend.sum;
@@ -498,6 +501,7 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
     V4 sum[kRowFloat4s<Rigid>];
     for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) sum[q] = hn::Load(d, first[q].value.data());
     V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
+    const V4 free_sign = palette.keeps_signs ? hn::Zero(d) : hn::SignBit(d);
     if (kPlain) {
         for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
     }
@@ -506,7 +510,7 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
         const V4 weight = hn::Set(d, weights[kLanes * k]);
         const V4 quaternion = hn::Load(d, row->value.data());
         const auto below = hn::Lt(dot(quaternion, quaternions), hn::Zero(d));
-        const V4 away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
+        const V4 away = hn::And(free_sign, hn::VecFromMask(d, below));
         for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
             V4 by = hn::Load(d, row[q].value.data());
             if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);

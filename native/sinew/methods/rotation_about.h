@@ -4,6 +4,7 @@
 #include <span>
 
 #include "sinew/mesh/influence.h"
+#include "sinew/methods/signs.h"
 #include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
@@ -31,17 +32,21 @@ template <class T>
 /// Rotates `rest` by the blended quaternion about `centre`, which is moved by linear blending of the rigid
 /// motions. The displacements by the bones' scales are rotated by each bone and added.
 ///
+/// parameters  empty, or the index in Signs::kChoices
+///
 /// Other arguments and degenerate results as described in methods.h.
 template <class T, class Bone>
 [[nodiscard]] Vec3<T> rotated_about(const Vec3<T>& centre, std::span<const Bone> bones,
-                                    std::span<const Influence<T>> influences, const Vec3<T>& rest) noexcept {
+                                    std::span<const Influence<T>> influences, const Vec3<T>& rest,
+                                    std::span<const double> parameters) noexcept {
+    const bool are_kept = Signs::are_kept(parameters);
     Quat<T> rotation(T(0), T(0), T(0), T(0));
     // Summing displacements returns the rest pose unchanged to the last bit.
     Vec3<T> displacement{T(0)};
     for (const Influence<T>& influence : influences) {
         const Bone& bone = bones[static_cast<std::size_t>(influence.bone)];
         const Quat<T>& q = bone.rigid.rotation;
-        const T sign = glm::dot(q, rotation) < T(0) ? T(-1) : T(1);
+        const T sign = !are_kept && glm::dot(q, rotation) < T(0) ? T(-1) : T(1);
         rotation = rotation + (sign * influence.weight) * q;
         Vec3<T> moved = rotation_displacement(q, centre) + bone.rigid.translation;
         if (bone.has_scale) moved += rotate(q, bone.scale_displacement(rest));

@@ -49,7 +49,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace sinew {
 
-SINEW_KERNEL(Cor, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+SINEW_KERNEL(Cor, .rest_row = kCentreRestRow, .signed_float4s = 1, .bone_rows = SINEW_TARGETS(bone_rows),
              .scaled_bone_rows = scaled_bone_rows<Cor, 4, write_centre_bone>,
              .pack_vertex_data = VertexNumbers<Cor::info.vertex_floats>::pack)
 

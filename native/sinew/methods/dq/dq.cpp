@@ -42,7 +42,7 @@ struct DqKernel {
     static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
         const Vec<D>* const real = sum.value;
         const Vec<D>* const dual = sum.value + 4;
-        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm<D>(real));
+        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_length(d, real));
         const Points<D> axis{real[1], real[2], real[3]};
         const Points<D> translation{dual[1], dual[2], dual[3]};
         const Points<D> inner = add_cross<D>(add_scaled<D>(translation, real[0], p), axis, p);
@@ -90,7 +90,7 @@ void write_bone(const Dq::Bone<double>& bone, Float4* row, Float4* scale) {
 
 }  // namespace
 
-SINEW_KERNEL(Dq, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+SINEW_KERNEL(Dq, .rest_row = kRestRow, .signed_float4s = 2, .bone_rows = SINEW_TARGETS(bone_rows),
              .scaled_bone_rows = scaled_bone_rows<Dq, 2, write_bone>)
 
 }  // namespace sinew

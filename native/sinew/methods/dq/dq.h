@@ -5,6 +5,7 @@
 
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
+#include "sinew/methods/signs.h"
 #include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
@@ -19,7 +20,8 @@ struct Dq {
         MethodGroup::blender,
         "Keeps the volume of twisted joints anywhere on the body; strong bends bulge outwards",
         "Kavan, Collins, Zara, O'Sullivan 2008",
-        Needs::rest_bones};
+        Needs::rest_bones,
+        Signs::kParameters};
     static const Kernel& kernel() noexcept;
 
     template <class T>
@@ -34,14 +36,17 @@ struct Dq {
     }
 
     /// The order of influences decides the sign of a term that is perpendicular to the sum of the terms before it.
+    ///
+    /// parameters  empty, or the index in Signs::kChoices
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
-                                               std::span<const Influence<T>> influences,
-                                               const Vec3<T>& rest) noexcept {
+                                               std::span<const Influence<T>> influences, const Vec3<T>& rest,
+                                               std::span<const double> parameters = {}) noexcept {
+        const bool are_kept = Signs::are_kept(parameters);
         DualQuat<T> sum{Quat<T>(T(0), T(0), T(0), T(0)), Quat<T>(T(0), T(0), T(0), T(0))};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
-            const T sign = glm::dot(bone.rigid.real, sum.real) < T(0) ? T(-1) : T(1);
+            const T sign = !are_kept && glm::dot(bone.rigid.real, sum.real) < T(0) ? T(-1) : T(1);
             const T weight = sign * influence.weight;
             sum.real = sum.real + weight * bone.rigid.real;
             sum.dual = sum.dual + weight * dual_at(bone, rest);

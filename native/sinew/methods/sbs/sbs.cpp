@@ -94,7 +94,7 @@ void set_rows(const Bones& bones, Palette& palette) {
 
 }  // namespace
 
-SINEW_KERNEL(Sbs, .rest_row = kRestRow, .set_rows = set_rows)
+SINEW_KERNEL(Sbs, .rest_row = kRestRow, .signed_float4s = 1, .set_rows = set_rows)
 
 }  // namespace sinew
 #endif

@@ -38,7 +38,8 @@ struct Sbs {
         "Dual quaternions' shape where two bones share a joint; tears where sets of "
         "three or more bones change",
         "Kavan, Zara 2005",
-        Needs::rest_bones};
+        Needs::rest_bones,
+        Signs::kParameters};
     static const Kernel& kernel() noexcept;
 
     template <class T>
@@ -65,10 +66,11 @@ struct Sbs {
     template <class BoneAt>
     [[nodiscard]] static Vec3<double> rotation_centre(std::size_t count, const BoneAt& bone_at) noexcept;
 
+    /// parameters  empty, or the index in Signs::kChoices
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
-                                               std::span<const Influence<T>> influences,
-                                               const Vec3<T>& rest) noexcept {
+                                               std::span<const Influence<T>> influences, const Vec3<T>& rest,
+                                               std::span<const double> parameters = {}) noexcept {
         std::size_t count = 0;
         for (const Influence<T>& influence : influences) count += influence.weight > T(0) ? 1 : 0;
         const auto bone_at = [&](std::size_t wanted) {
@@ -77,7 +79,7 @@ struct Sbs {
             return cast<double>(bones[static_cast<std::size_t>(influences[i].bone)]);
         };
         const Vec3<T> centre(rotation_centre(count, bone_at));
-        return rotated_about(centre, bones, influences, rest);
+        return rotated_about(centre, bones, influences, rest, parameters);
     }
 
 private:

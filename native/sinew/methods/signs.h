@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "sinew/methods/method_info.h"
+
+namespace sinew {
+
+/// The parameter of methods that sum quaternions: which of its two quaternions stands for a rotation.
+struct Signs {
+    static constexpr std::string_view kChoices[] = {"blender", "hierarchy"};
+    static constexpr Parameter kParameters[] = {
+        {.id = "signs",
+         .label = "Signs",
+         .description =
+             "Which way a vertex turns between bones that are more than half a turn apart: the shorter "
+             "one, as in Blender, or through the bones between them, for chains that twist or coil",
+         .unit = "",
+         .kind = ParameterKind::choice,
+         .choices = kChoices}};
+
+    /// Whether quaternions are summed with the signs that they have: those of DeformOptions::rotations. Else each
+    /// has the sign that brings it nearer to the sum of those before it.
+    [[nodiscard]] static constexpr bool are_kept(std::span<const double> parameters) noexcept {
+        return !parameters.empty() && parameters[0] == 1.0;
+    }
+};
+
+}  // namespace sinew

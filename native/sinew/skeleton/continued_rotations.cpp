@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/skeleton/continued_rotations.h"
+
+#include <algorithm>
+
+#include "sinew/transform/split_scale.h"
+
+namespace sinew {
+namespace {
+
+Quat<double> rotation_of(const Mat3<double>& linear) {
+    Mat3<double> axes = linear;
+    for (int i = 0; i < 3; ++i) {
+        const double length = glm::length(axes[i]);
+        axes[i] *= length > 0.0 ? 1.0 / length : 0.0;
+    }
+    return quat_of_columns(axes);
+}
+
+}  // namespace
+
+std::vector<Quat<float>> continued_rotations(const Skeleton& skeleton,
+                                             std::span<const Affine<float>> posed_from_rest) {
+    const std::size_t count = std::min(skeleton.bone_count(), posed_from_rest.size());
+    std::vector<Quat<double>> rotations;
+    std::vector<Quat<float>> result;
+    for (std::size_t bone = 0; bone < count; ++bone) {
+        const std::int32_t parent = skeleton.parents()[bone];
+        const Quat<double> before =
+            parent < 0 ? Quat<double>(1.0, 0.0, 0.0, 0.0) : rotations[static_cast<std::size_t>(parent)];
+        const Mat3<double> linear(posed_from_rest[bone].linear);
+        const Quat<double> rotation = glm::determinant(linear) < 0.0 ? before : rotation_of(linear);
+        rotations.push_back(glm::dot(rotation, before) < 0.0 ? -rotation : rotation);
+        result.push_back(Quat<float>(rotations.back()));
+    }
+    return result;
+}
+
+}  // namespace sinew

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Signs of quaternions along the hierarchy: a chain that twists on beyond half a turn is not torn."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.attach import properties
+from sinew_addon.deform import small_meshes
+
+BONES, RADIUS = 6, 0.25
+# At 60 degrees a bone, no two bones of a vertex are more than half a turn apart.
+DEGREES = 60.0, 120.0, 170.0
+
+
+def make_tentacle() -> tuple[bpy.types.Object, bpy.types.Object, np.ndarray]:
+    """Returns a tube, its armature of bones that are one long, and its weights [vertices, bones]."""
+    data = bpy.data.armatures.new("Tentacle")
+    armature = bpy.data.objects.new("Tentacle", data)
+    bpy.context.scene.collection.objects.link(armature)
+    scenes.enter(armature, "EDIT")
+    above = None
+    for number in range(BONES):
+        bone = data.edit_bones.new(f"Bone {number}")
+        bone.head, bone.tail, bone.parent = (0, 0, number), (0, 0, number + 1), above
+        above = bone
+    scenes.enter(armature, "OBJECT")
+    around = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    heights = np.linspace(0, BONES, 20 * BONES + 1)
+    height, angle = (each.ravel() for each in np.meshgrid(heights, around, indexing="ij"))
+    points = np.stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), height], axis=1)
+    ring = np.arange(12)
+    first = np.stack([ring, np.roll(ring, -1), np.roll(ring, -1) + 12, ring + 12], axis=1)
+    faces = (first + 12 * np.arange(len(heights) - 1)[:, None, None]).reshape(-1, 4)
+    mesh = bpy.data.meshes.new("Tube")
+    mesh.from_pydata(points.tolist(), [], faces.tolist())
+    obj = bpy.data.objects.new("Tube", mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    distance = np.abs(height[:, None] - np.arange(BONES) - 0.5) / 2
+    weights = np.where(distance < 1, (1 - distance**2) ** 2, 0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    for number in range(BONES):
+        group = obj.vertex_groups.new(name=f"Bone {number}")
+        for vertex in np.flatnonzero(weights[:, number] > 1e-6):
+            group.add([int(vertex)], float(weights[vertex, number]), "REPLACE")
+    modifier = obj.modifiers.new("Armature", "ARMATURE")
+    modifier.object = armature
+    modifier.use_deform_preserve_volume = True
+    return obj, armature, weights
+
+
+def twist(armature: bpy.types.Object, degrees: float) -> None:
+    for bone in armature.pose.bones:
+        bone.rotation_mode = "AXIS_ANGLE"
+        bone.rotation_axis_angle = np.radians(degrees), 0, 1, 0
+    bpy.context.view_layer.update()
+
+
+def blended(points: np.ndarray, weights: np.ndarray, degrees: float) -> np.ndarray:
+    """The normalised sum of quaternions about one axis, with angles that add up along the chain."""
+    half = 0.5 * np.radians(degrees) * np.arange(1, BONES + 1)
+    angle = 2 * np.arctan2(weights @ np.sin(half), weights @ np.cos(half))
+    x, y, z = points.T
+    return np.stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle), z], axis=1)
+
+
+def longest_edge(obj: bpy.types.Object, points: np.ndarray) -> float:
+    """The largest ratio of an edge's length to that at rest."""
+    edges = np.array([edge.vertices[:] for edge in obj.data.edges])
+    rest = scenes.rest_points(obj)
+    lengths = (np.linalg.norm(np.subtract(*p[edges].transpose(1, 0, 2)), axis=1) for p in (points, rest))
+    return float(np.divide(*lengths).max())
+
+
+@pytest.mark.parametrize("method", ["dq", "cor", "sbs"])
+def test_turns_add_up_along_the_chain(method: str):
+    obj, armature, weights = make_tentacle()
+    by_modifier = {}
+    for degrees in DEGREES:
+        twist(armature, degrees)
+        by_modifier[degrees] = scenes.final_points(obj)
+    scenes.add_sinew(obj, method)
+    settings = properties.of(obj)
+    for degrees in DEGREES:
+        twist(armature, degrees)
+        getattr(settings, method).signs = "blender"
+        bpy.context.view_layer.update()
+        shorter = scenes.final_points(obj)
+        # About one axis all three methods give one shape.
+        assert scenes.worst(shorter, by_modifier[degrees]) < 2e-6 * scenes.diagonal(obj)
+        getattr(settings, method).signs = "hierarchy"
+        bpy.context.view_layer.update()
+        points = scenes.final_points(obj)
+        expected = blended(scenes.rest_points(obj).astype(float), weights, degrees)
+        assert scenes.worst(points, expected) < 4e-6 * scenes.diagonal(obj)
+        if degrees == DEGREES[0]:
+            assert scenes.worst(points, shorter) < 2e-6 * scenes.diagonal(obj)
+        else:
+            assert longest_edge(obj, points) < 1.5 < 3 < longest_edge(obj, shorter)
+
+
+def test_a_small_mesh_is_not_left_to_the_modifier(small_meshes_as_users_have_them, monkeypatch):
+    monkeypatch.setattr(small_meshes, "is_used", True)
+    obj, armature, _weights = make_tentacle()
+    scenes.add_sinew(obj, "dq")
+    settings = properties.of(obj)
+    twist(armature, DEGREES[-1])
+    shorter = scenes.final_points(obj)
+    assert scenes.states_of(obj)[0][1].plan.uses_builtin
+    settings.dq.signs = "hierarchy"
+    bpy.context.view_layer.update()
+    assert not scenes.states_of(obj)[0][1].plan.uses_builtin
+    assert scenes.worst(scenes.final_points(obj), shorter) > 0.1
+
+
+def test_the_rest_pose_and_a_turned_armature_change_nothing():
+    obj, armature, _weights = make_tentacle()
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).dq.signs = "hierarchy"
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) < 1e-6
+    twist(armature, DEGREES[-1])
+    before = scenes.final_points(obj)
+    armature.pose.bones[0].rotation_axis_angle = np.radians(DEGREES[-1] + 200), 0, 1, 0
+    bpy.context.view_layer.update()
+    x, y, z = before.T
+    c, s = np.cos(np.radians(200)), np.sin(np.radians(200))
+    assert scenes.worst(scenes.final_points(obj), np.stack([c * x - s * y, s * x + c * y, z], axis=1)) < 1e-5
