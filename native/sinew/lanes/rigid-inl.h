@@ -489,7 +489,7 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 ///
 /// weights  of each influence, kLanes apart
 /// sums     receives the sum's Float4s, 4 * kLanes apart
-template <class Rigid, bool kPlain>
+template <class Rigid, bool kPlain, bool kKeepsSigns>
 HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
                              const float* weights, float* sums) {
     const Four d;
@@ -501,7 +501,6 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
     V4 sum[kRowFloat4s<Rigid>];
     for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) sum[q] = hn::Load(d, first[q].value.data());
     V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
-    const V4 free_sign = palette.keeps_signs ? hn::Zero(d) : hn::SignBit(d);
     if (kPlain) {
         for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
     }
@@ -509,8 +508,11 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
         const Float4* const row = row_at(k);
         const V4 weight = hn::Set(d, weights[kLanes * k]);
         const V4 quaternion = hn::Load(d, row->value.data());
-        const auto below = hn::Lt(dot(quaternion, quaternions), hn::Zero(d));
-        const V4 away = hn::And(free_sign, hn::VecFromMask(d, below));
+        V4 away = hn::Zero(d);
+        if (!kKeepsSigns) {
+            const auto below = hn::Lt(dot(quaternion, quaternions), hn::Zero(d));
+            away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
+        }
         for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
             V4 by = hn::Load(d, row[q].value.data());
             if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);
@@ -523,14 +525,14 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
 }
 
 /// Not inlined, so that its registers do not burden the usual case.
-template <class Rigid>
+template <class Rigid, bool kKeepsSigns>
 HWY_NOINLINE void blend_vertex_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
                                        const float* weights, float* sums) {
-    blend_vertex<Rigid, true>(palette, bones, count, weights, sums);
+    blend_vertex<Rigid, true, kKeepsSigns>(palette, bones, count, weights, sums);
 }
 
 /// Deforms a block whose vertices have own bones. The sums of all vertices are transposed into lanes.
-template <class Rigid>
+template <class Rigid, bool kKeepsSigns>
 void deform_own_bones(const Frame& frame, std::size_t b) {
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = frame.spaces;
@@ -543,9 +545,9 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
         const float* const weights = weights_of_block + lane;
         float* const to = sums[0] + 4 * lane;
         if (is_added_plainly(palette, bones, block.influences)) {
-            blend_vertex_plainly<Rigid>(palette, bones, block.influences, weights, to);
+            blend_vertex_plainly<Rigid, kKeepsSigns>(palette, bones, block.influences, weights, to);
         } else {
-            blend_vertex<Rigid, false>(palette, bones, block.influences, weights, to);
+            blend_vertex<Rigid, false, kKeepsSigns>(palette, bones, block.influences, weights, to);
         }
     }
     const Full d;
@@ -561,7 +563,7 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
 
 #else
 
-template <class Rigid>
+template <class Rigid, bool>
 void deform_own_bones(const Frame& frame, std::size_t b) {
     deform_one_by_one<Rigid>(frame, b);
 }
@@ -570,12 +572,13 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
 
 template <RigidKernel Rigid>
 void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
-    const bool scaled = frame.palette->any_scale;
+    const auto of_block = frame.palette->any_scale     ? &deform_one_by_one<Rigid>
+                          : frame.palette->keeps_signs ? &deform_own_bones<Rigid, true>
+                                                       : &deform_own_bones<Rigid, false>;
     for_each_set(
         frame, begin, end,
         [&](std::size_t b, std::size_t after) HWY_ATTR { deform_set<Rigid>(frame, b, after); },
-        [&](std::size_t b)
-            HWY_ATTR { scaled ? deform_one_by_one<Rigid>(frame, b) : deform_own_bones<Rigid>(frame, b); });
+        [&](std::size_t b) HWY_ATTR { of_block(frame, b); });
 }
 
 // Defines the functions of a kernel that are compiled for each instruction set, for one that is deform_rigid().
