@@ -86,9 +86,14 @@ void Job::for_each(std::size_t count, std::size_t chunk,
     std::atomic<std::size_t> next{0};
     std::mutex mutex;
     std::exception_ptr error;
-    const auto take_chunks = [&] {
+    // A thread that waits leaves its processor, and its share of caches, to Blender while frames are deformed.
+    const auto take_chunks = [&](bool waits) {
         try {
             while (!is_cancelled_.load(std::memory_order_relaxed)) {
+                if (waits && is_in_use() && next.load(std::memory_order_relaxed) < count) {
+                    std::this_thread::sleep_for(std::chrono::milliseconds{20});
+                    continue;
+                }
                 const std::size_t begin = next.fetch_add(chunk, std::memory_order_relaxed);
                 if (begin >= count) return;
                 work(begin, std::min(begin + chunk, count));
@@ -103,9 +108,10 @@ void Job::for_each(std::size_t count, std::size_t chunk,
     std::vector<std::thread> helpers(std::min(threads_, (count + chunk - 1) / chunk));
     // This thread is one of them.
     for (std::size_t i = 1; i < helpers.size(); ++i) {
-        if (!start(helpers[i], gives_way_, take_chunks)) break;
+        const bool waits = gives_way_ && i >= (helpers.size() + 1) / 2;
+        if (!start(helpers[i], gives_way_, [&take_chunks, waits] { take_chunks(waits); })) break;
     }
-    take_chunks();
+    take_chunks(false);
     for (std::thread& helper : helpers) {
         if (helper.joinable()) helper.join();
     }
