@@ -98,7 +98,7 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     settings = [job_file.settings_of(job.source, action.settings.overridden_by(given)) for job in jobs]
     for job, wanted in zip(jobs, settings, strict=True):
         if action.methods and wanted.method is None:
-            raise WrongUse(f"no method for {job.source}: give --method, or one in a job file")
+            raise WrongUse(f"no method for {job.source}: give --method or --preset, or one in a job file")
     for rule in job_file.files:
         if not any(rule.matches(job.source) for job in jobs):
             console.note(f"{action.job}:{rule.line}: no file matches {', '.join(rule.match)}")

@@ -78,19 +78,12 @@ def _draw_mix(
     only: str,
 ) -> None:
     mix = settings.mix
-    row = named(layout, "Mix")
-    row.prop(mix, "method", text="")
-    if mix.method == properties.OFF:
-        _draw_auto_mix(row, only)
-        return
-    named(layout, "By").prop_search(mix, "group", obj, "vertex_groups", text="")
-    if not mix.group:
-        draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
-    _draw_make_group(layout, settings, obj, "mix", only)
-    _draw_auto_mix(layout, only)
-
-
-def _draw_auto_mix(layout: bpy.types.UILayout, only: str) -> None:
+    named(layout, "Mix").prop(mix, "method", text="")
+    if mix.method != properties.OFF:
+        named(layout, "By").prop_search(mix, "group", obj, "vertex_groups", text="")
+        if not mix.group:
+            draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
+        _draw_make_group(layout, settings, obj, "mix", only)
     if not stepped.draw_progress(layout, "sinew.auto_mix"):
         layout.operator_menu_enum("sinew.auto_mix", "over", text="Auto-Mix").name = only
 

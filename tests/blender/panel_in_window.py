@@ -99,6 +99,30 @@ def start() -> Iterator[None]:
     yield from window.wait()
 
 
+def auto_mixed() -> Iterator[None]:
+    """Esc leaves nothing behind, and one undo step takes back what it made."""
+
+    def mixes() -> list[tuple[str, bool]]:
+        return [(obj.sinew.mix.method, "Mix" in obj.vertex_groups) for obj in meshes()]
+
+    def mix(last_frame: int) -> None:
+        scene().frame_end = last_frame
+        with window.in_view3d():
+            bpy.ops.sinew.auto_mix("INVOKE_DEFAULT", True, over="SCENE")
+
+    choose("lbs")
+    mix(last_frame=2000)
+    yield from window.wait(4)
+    window.press("ESC", VIEW)
+    yield from window.wait()
+    check("a mix, stopped", mixes(), [("OFF", False)] * 5)
+    mix(last_frame=12)
+    yield from window.until(lambda: mixes() == [("dq", True)] * 5, "the mix")
+    yield from undo()
+    check("a mix, undone", mixes(), [("OFF", False)] * 5)
+    choose("dq")
+
+
 def recommended_by_click() -> Iterator[None]:
     """Method and stages of all, in one undo step."""
     from bl_ext.user_default.sinew.features.suggest.feature import _View
@@ -478,6 +502,7 @@ def steps() -> Iterator[None]:
     yield from off_greys()
     yield from progress_in_the_status_bar()
     yield from suggested_by_click()
+    yield from auto_mixed()
     yield from recommended_by_click()
     yield from mends_by_clicks()
     yield from corrective_keys()
