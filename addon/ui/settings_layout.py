@@ -34,15 +34,17 @@ def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, p
 
 
 def draw_parameters(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object, signs: bool = False
 ) -> None:
     """Draws the parameters of all methods in use.
 
-    obj  whose settings these are; for a character, its lead
+    obj    whose settings these are; for a character, its lead
+    signs  only the signs, which are among the stages; else all others
     """
     for name in bound.methods_of(obj):
         for parameter in properties.METHODS[name].parameters:
-            _draw_parameter(layout, getattr(settings, name), parameter, obj)
+            if (parameter.id == "signs") == signs:
+                _draw_parameter(layout, getattr(settings, name), parameter, obj)
 
 
 def draw_stages(
@@ -52,7 +54,7 @@ def draw_stages(
     obj: bpy.types.Object,
     only: str = "",
 ) -> None:
-    """Draws the stages, the scale rule, and who computes normals.
+    """Draws the stages, the signs, the scale rule, and who computes normals.
 
     only  the name of the mesh that buttons act on; empty for the character
     """
@@ -63,6 +65,7 @@ def draw_stages(
             if stage.name == "twist_spread" and settings.twist_spread.enabled:
                 _draw_twists(layout, context, obj)
     _draw_take_over(layout, context, obj, only)
+    draw_parameters(layout, settings, obj, signs=True)
     named(layout, "Scale").prop(settings, "scale_rule", text="")
     if normals.ARE_SUPPORTED:
         named(layout, "Normals").prop(settings, "normals", text="")
