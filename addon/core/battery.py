@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import sinew
 
 from .rig import Bones
 from .twists import LOWER, OWN_TWIST, UPPER
@@ -311,9 +312,7 @@ class _Battery:
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:
     """float64 [3, 3]"""
-    x, y, z = axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.identity(3) + math.sin(angle) * skew + (1.0 - math.cos(angle)) * (skew @ skew)
+    return sinew.affine.from_axis_angle(axis, angle)[:3, :3]
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

@@ -456,19 +456,22 @@ class Measured:
         return dots(self.shape.normals, self._pose.rotated_normals) < 0.0
 
     @cached_property
+    def _limb_changes(self) -> np.ndarray:
+        """float64 [limbs]: the volume that each loses or gains."""
+        return np.abs(self._pose.skin.limbs.volumes(self.shape.points) - self._pose.rest_limbs)
+
+    @cached_property
     def limb_change(self) -> float:
         """The volume that limbs lose or gain, as a part of all; NaN where they have none at rest."""
-        at_rest = self._pose.rest_limbs
-        change = float(np.abs(self._pose.skin.limbs.volumes(self.shape.points) - at_rest).sum())
-        whole = float(np.abs(at_rest).sum())
-        return change / whole if whole > 0.0 else float("nan")
+        whole = float(np.abs(self._pose.rest_limbs).sum())
+        return float(self._limb_changes.sum()) / whole if whole > 0.0 else float("nan")
 
     @cached_property
     def limb_losses(self) -> np.ndarray:
         """float64 [vertices]: the volume that the limbs around each lose or gain, as a part of their own, at
         most 1."""
         skin, at_rest = self._pose.skin, self._pose.rest_limbs
-        change = np.abs(skin.limbs.volumes(self.shape.points) - at_rest)
+        change = self._limb_changes
         # Flat parts have hardly any.
         own = np.maximum(np.abs(at_rest), LEAST_LIMB * np.abs(at_rest).sum())
         return skin.by_weights(np.divide(change, own, out=np.zeros_like(own), where=own > 0.0).clip(max=1.0))
@@ -521,9 +524,8 @@ class Measured:
         folds, of_all = (np.bincount(of_triangles[taken], each[taken], count) for each in (folded, areas))
         squares = np.bincount(bones[bent], self.bulge[bent].clip(min=0.0) ** 2, count)
         swollen = squares / np.maximum(np.bincount(bones[bent], minlength=count), 1)
-        volume, limbs = np.zeros(count), pose.skin.limbs
+        volume, changes = np.zeros(count), self._limb_changes
         numbers = np.unique(of_triangles[of_triangles >= 0])
-        changes = np.abs(limbs.volumes(self.shape.points) - pose.rest_limbs)
         volume[numbers] = np.divide(
             changes, np.abs(pose.rest_limbs), out=np.zeros_like(changes), where=pose.rest_limbs != 0.0
         )

@@ -73,5 +73,5 @@ def fingerprint(obj: bpy.types.Object) -> list[str]:
     settings = properties.of(obj)
     modifiers = [obj.modifiers.get(replaced.name) for replaced in settings.replaced_modifiers]
     methods = [attach.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
-    own = [settings.method, settings.scale_rule, settings.dq.signs]
+    own = [settings.method, settings.scale_rule, str(stage_settings.has_defaults(settings, VERTICES))]
     return [*own, *stage_settings.names_on(settings), *methods]

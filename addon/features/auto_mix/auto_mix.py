@@ -12,7 +12,6 @@ from mathutils.kdtree import KDTree
 from ...attach import properties, stage_settings
 from ...core.auto_mix import VertexErrors, shares
 from ...core.errors import SinewError
-from ...core.metrics import Shape
 from ...core.vectors import transformed
 from ...deform import group_uses, session
 from ...io import mesh_io
@@ -20,7 +19,7 @@ from ...ui import stepped
 from ...ui.translations import tr
 from ..heat import live
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
-from ..suggest.suggest import CROSSING_FRAMES, crossing_triangles
+from ..suggest.suggest import crossings, frames_to_count
 
 STAGE = stage_settings.STAGES["mix"]
 # The second method where none is chosen: linear blending collapses where rotations bulge, and the reverse.
@@ -64,8 +63,7 @@ class AutoMix:
         check_measurable(self.objects)
         armatures = armatures_of(self.objects)
         frames = stepped.frames_over(self.scene, armatures, self.over)
-        places = np.linspace(0, len(frames) - 1, min(len(frames), CROSSING_FRAMES)).round().astype(int)
-        counted = {frames[place] for place in places}
+        counted = frames_to_count(frames)
         found: VertexErrors | None = None
         with stepped.kept_frame(self.scene, armatures):
             for number, frame in enumerate(frames):
@@ -77,11 +75,11 @@ class AutoMix:
                     raise SinewError(
                         f"Its vertices are others at frame {frame}: a modifier in front changes them"
                     )
-                crossings = None
+                crossing = None
                 if frame in counted:
-                    at_rest = _crossings(subject.gauge.rest)
-                    crossings = tuple(_triangles(_crossings(each.shape) - at_rest) for each in measured)
-                found.add(measured, crossings)
+                    at_rest = crossings(subject.gauge.rest)
+                    crossing = tuple(_triangles(crossings(each.shape) - at_rest) for each in measured)
+                found.add(measured, crossing)
                 yield (number + 1) / len(frames)
         assert found is not None
         meshes = self._meshes
@@ -140,10 +138,6 @@ class AutoMix:
             for obj in self.objects:
                 mix = properties.of(obj).mix
                 mix.method, mix.group = second_method(obj), groups[obj.data].name
-
-
-def _crossings(shape: Shape) -> set[tuple[int, int]]:
-    return crossing_triangles(shape.points.T, shape.surface.triangles)
 
 
 def _triangles(pairs: set[tuple[int, int]]) -> np.ndarray:

@@ -41,6 +41,16 @@ CROSSING_FRAMES = 8
 suggestions: dict[int, Suggestion] = {}
 
 
+def frames_to_count(frames: Sequence[float]) -> set[float]:
+    """Returns those of the frames at which crossings are counted."""
+    places = np.linspace(0, len(frames) - 1, min(len(frames), CROSSING_FRAMES)).round().astype(int)
+    return {frames[place] for place in places}
+
+
+def crossings(shape: Shape) -> set[tuple[int, int]]:
+    return crossing_triangles(shape.points.T, shape.surface.triangles)
+
+
 def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str) -> Iterator[float]:
     """Yields the progress; then suggestions[scene.session_uid] has the result. The objects' own methods do
     not change.
@@ -50,8 +60,7 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     check_measurable(objects)
     armatures = armatures_of(objects)
     frames = stepped.frames_over(scene, armatures, over)
-    places = np.linspace(0, len(frames) - 1, min(len(frames), CROSSING_FRAMES)).round().astype(int)
-    counted = {frames[place] for place in places}
+    counted = frames_to_count(frames)
     labels = {name: method.label for name, method in properties.METHODS.items()}
     suggestion = Suggestion(labels.copy(), frames, 0.0)
     off = [each for each in recommendation.STAGES if not any(_is_on(obj, each.name) for obj in objects)]
@@ -61,14 +70,14 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     with stepped.kept_frame(scene, armatures):
         for frame in frames:
             subject, depsgraph = measure_at(scene, objects, properties.BLENDER, frame)
-            at_rest = _crossings(subject.gauge.rest) if frame in counted else None
+            at_rest = crossings(subject.gauge.rest) if frame in counted else None
             suggestion.diagonal = subject.measured.rest.diagonal
             moments.append(Moment(frame, live.Moment.of(subject, depsgraph), at_rest))
             for method in labels:
                 measured = live.measured_under(subject, method, depsgraph)
                 _add(suggestion, method, frame, measured)
                 if at_rest is not None:
-                    new = len(_crossings(measured.shape) - at_rest)
+                    new = len(crossings(measured.shape) - at_rest)
                     suggestion.add(method, "crossings", new, frame)
                 done += 1
                 yield done / of_all
@@ -122,7 +131,7 @@ def _add_stages(
             measured = moment.measured(method, more=more)
             _add(suggestion, stage.name, frame, measured)
             if at_rest is not None:
-                new = len(_crossings(measured.shape) - at_rest)
+                new = len(crossings(measured.shape) - at_rest)
                 suggestion.add(stage.name, "crossings", new, frame)
             values = recommendation.values_of(measured, None)
             gains.append(recommendation.gain(known, values, suggestion.diagonal, own))
@@ -138,7 +147,3 @@ def _add(suggestion: Suggestion, method: str, frame: float, measured: Measured) 
             suggestion.add(method, name, measured.entry(entry), frame)
     if not np.isfinite(measured.shape.points).all():
         suggestion.add(method, LONGEST, np.inf, frame)
-
-
-def _crossings(shape: Shape) -> set[tuple[int, int]]:
-    return crossing_triangles(shape.points.T, shape.surface.triangles)
