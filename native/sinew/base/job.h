@@ -33,7 +33,8 @@ public:
     /// Reports the completed share, and rests where the job gives way. Returns false once the job was cancelled.
     bool go_on(double done) noexcept;
     /// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), and returns when all are
-    /// done, or when the job was cancelled. The first exception is rethrown; some chunks may then have been skipped.
+    /// done, or when the job was cancelled. Where it gives way, half of its threads wait while frames are deformed. The
+    /// first exception is rethrown; some chunks may then have been skipped.
     void for_each(std::size_t count, std::size_t chunk,
                   const std::function<void(std::size_t, std::size_t)>& work);
 
