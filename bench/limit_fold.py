@@ -15,7 +15,11 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 import sinew
+from sinew_addon.core import battery
+from sinew_addon.core.rig import Bones
+from sinew_addon.core.vectors import transformed
 from sinew_addon.features.suggest.suggest import crossing_triangles
+from sinew_addon.io import armature_io, mesh_io
 
 MARGIN = 0.2  # of the distance from the plane at rest: how near to it a vertex may come
 JOINTS = {"elbow": ("lowerarm_l", (0.0, -1.0, 0.0)), "knee": ("calf_l", (0.0, 1.0, 0.0))}
@@ -24,32 +28,25 @@ DEGREES = 90.0, 120.0, 140.0, 155.0
 
 @dataclass
 class Human:
+    bones: Bones
     points: np.ndarray
     triangles: np.ndarray
     weights: np.ndarray  # [vertices, bones], of sum 1
-    names: list[str]
-    parents: list[int]
-    heads: np.ndarray
-    tails: np.ndarray
+
+    def joint(self, bone: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The bone's head, and the directions of its parent and of itself."""
+        rest, parent = self.bones.rest.astype(float), self.bones.parents[bone]
+        return rest[bone, :3, 3], unit(rest[bone, :3, 3] - rest[parent, :3, 3]), rest[bone, :3, 1]
 
     def bent(self, bone: int, degrees: float, towards: np.ndarray) -> np.ndarray:
         """Motions float32 [bones, 4, 4] where the bone and its parent make this angle."""
-        before = unit(self.heads[bone] - self.heads[self.parents[bone]])
-        along = unit(self.tails[bone] - self.heads[bone])
+        _head, before, along = self.joint(bone)
         axis, angle = np.cross(before, along), np.arccos(np.clip(before @ along, -1, 1))
         if np.linalg.norm(axis) < 0.15:
             axis, angle = np.cross(along, towards), 0.0
-        motion = np.eye(4)
-        turn = sinew.quat.from_axis_angle(unit(axis), np.radians(degrees) - angle)
-        motion[:3, :3] = sinew.quat.to_rotation_matrix(turn)
-        motion[:3, 3] = self.heads[bone] - motion[:3, :3] @ self.heads[bone]
-        motions = np.tile(np.eye(4), (len(self.names), 1, 1))
-        for child, parent in enumerate(self.parents):
-            if parent >= 0:
-                motions[child] = motions[parent]
-            if child == bone:
-                motions[child] = motions[child] @ motion
-        return motions.astype(np.float32)
+        turn = sinew.affine.from_axis_angle(unit(axis), np.radians(degrees) - angle)[:3, :3]
+        pose = battery.posed(self.bones, battery.Pose("bent", {bone: turn}))
+        return (pose @ np.linalg.inv(self.bones.rest)).astype(np.float32)
 
     def deformed(self, method: str, motions: np.ndarray) -> np.ndarray:
         used = self.weights > 0
@@ -60,8 +57,7 @@ class Human:
 
     def kept_apart(self, posed: np.ndarray, bone: int, motions: np.ndarray, every: bool) -> np.ndarray:
         """every: also vertices of one of the two bones alone"""
-        parent, joint = self.parents[bone], self.heads[bone]
-        before, after = unit(joint - self.heads[parent]), unit(self.tails[bone] - joint)
+        parent, (joint, before, after) = self.bones.parents[bone], self.joint(bone)
         at_rest = (self.points - joint) @ unit(before + after)
         of_two = self.weights[:, [parent, bone]]
         share = of_two.sum(axis=1) ** 2
@@ -86,29 +82,18 @@ def read(path: str) -> Human:
     bpy.ops.wm.open_mainfile(filepath=path)
     skinned = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature()]
     obj = max(skinned, key=lambda each: len(each.data.vertices))
-    armature, mesh = obj.find_armature(), obj.data
-    bones = armature.data.bones
+    armature = obj.find_armature()
+    bones = armature_io.read_bones(armature.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     space = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
-    points = np.array([vertex.co for vertex in mesh.vertices]) @ space[:3, :3].T + space[:3, 3]
-    number = {bone.name: index for index, bone in enumerate(bones) if bone.use_deform}
-    weights = np.zeros((len(points), len(bones)))
-    for vertex in mesh.vertices:
+    of_groups = bones.of_groups([group.name for group in obj.vertex_groups])
+    weights = np.zeros((len(obj.data.vertices), len(bones.names)))
+    for vertex in obj.data.vertices:
         for entry in vertex.groups:
-            name = obj.vertex_groups[entry.group].name
-            if name in number:
-                weights[vertex.index, number[name]] += entry.weight
+            if of_groups[entry.group] >= 0:
+                weights[vertex.index, of_groups[entry.group]] += entry.weight
     weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
-    mesh.calc_loop_triangles()
-    names = [bone.name for bone in bones]
-    return Human(
-        points.astype(np.float32),
-        np.array([triangle.vertices[:] for triangle in mesh.loop_triangles]),
-        weights,
-        names,
-        [names.index(bone.parent.name) if bone.parent else -1 for bone in bones],
-        np.array([bone.head_local for bone in bones]),
-        np.array([bone.tail_local for bone in bones]),
-    )
+    points = transformed(mesh_io.read_points(obj.data), space).astype(np.float32)
+    return Human(bones, points, mesh_io.read_triangles(obj.data), weights)
 
 
 def main() -> None:
@@ -117,7 +102,7 @@ def main() -> None:
     print("pairs of triangles that cross, without those at rest")
     print(f"{'':20}{'before':>8}{'vertices of both bones':>24}{'of either':>12}")
     for joint, (name, towards) in JOINTS.items():
-        bone = human.names.index(name)
+        bone = human.bones.names.index(name)
         for degrees in DEGREES:
             motions = human.bent(bone, degrees, np.array(towards))
             for method in ("lbs", "dq"):
