@@ -30,6 +30,8 @@ def check() -> float | None:
     if phase.is_saving or phase.is_rendering:
         return SECONDS
     has_ended = is_outdated = False
+    # Asked before the objects are, so that what ends in between is looked at once more.
+    was_running = bool(precomputations.running)
     for obj, skinned in list(current.pairs):
         try:
             # A render may have computed it meanwhile.
@@ -42,7 +44,7 @@ def check() -> float | None:
     if has_ended:
         session.refresh_between_steps(bpy.context)
     notify(subscribers.precomputation_shown)
-    return SECONDS if is_outdated or precomputations.running else None
+    return SECONDS if was_running or is_outdated or precomputations.running else None
 
 
 def _see_to_outdated(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:

@@ -16,6 +16,7 @@ import scenes
 import sinew
 from program import run_sinew
 from sinew_addon.attach import attach, properties, stored_vertex_data
+from sinew_addon.attach.subscribers import subscribers
 from sinew_addon.core import interrupt, vertex_data
 from sinew_addon.core.file_cache import FileCache
 from sinew_addon.core.precompute import precomputations
@@ -57,6 +58,9 @@ class BehindGate:
     @property
     def has_ended(self) -> bool:
         return self._is_cancelled or (self._gate.is_open and self._run.has_ended)
+
+    def ends_behind_gate(self) -> bool:
+        return self._run.wait(60)
 
     def cancel(self) -> None:
         self._is_cancelled = not self.has_ended
@@ -178,6 +182,20 @@ def test_stopped_it_waits_for_the_button(gate, in_window):
     look_until_done()
     assert plan_of(obj).state is State.IN_DEPSGRAPH
     assert gate.count == 2
+
+
+def test_a_result_that_comes_while_the_watcher_looks(gate, in_window):
+    gate.close()
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "cor")
+    assert precomputations.running[0].ends_behind_gate()
+    # Between the watcher's look at the object and its last, at what still runs.
+    subscribers.precomputation_shown.append(gate.open)
+    try:
+        look_until_done()
+    finally:
+        subscribers.precomputation_shown.remove(gate.open)
+    assert plan_of(obj).state is State.IN_DEPSGRAPH
 
 
 def test_a_render_waits(gate, route, rendered_points):
