@@ -13,7 +13,7 @@ from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
-from ..core.output import folder_to_write, write_text
+from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import page, require_jinja
 from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
@@ -27,7 +27,7 @@ HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
     "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
     "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.json and "
-    "the pictures."
+    "the pictures. --viewer writes a page in which the character moves and turns."
 )
 
 
@@ -64,8 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--size", type=pixels, default=480, help="pixels of each picture (default: %(default)s)"
     )
     add_engine(parser)
+    parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="folder for the pages")
     parser.add_argument(
-        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the pages"
+        "--viewer",
+        type=partial(file_to_write, endings=(".html",)),
+        metavar="PAGE.html",
+        help="write a page in which the character of the file moves and turns in the browser; without --out "
+        "it alone",
     )
     add_set(parser)
 
@@ -77,14 +82,23 @@ def run(args: argparse.Namespace, console: Console) -> int:
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     characters.check_methods([*methods, args.reference])
     characters.set_parameters(args.set)
-    require_jinja()
+    if args.out is None and args.viewer is None:
+        raise WrongUse("expected --out, --viewer or both")
+    if args.viewer is not None and len(args.files) > 1:
+        raise WrongUse(f"{args.viewer}: --viewer writes the page of a single file")
+    if args.out is not None:
+        require_jinja()
     frames = parse_frames(args.frames) if args.frames is not None else None
     _check_names(args.files)
-    engine = render.chosen_engine(args.engine) if args.pictures else None
+    engine = render.chosen_engine(args.engine) if args.pictures and args.out is not None else None
     failed = False
     for path in args.files:
         try:
-            complete = _compare(path, methods, frames, engine, args, console)
+            complete = True
+            if args.viewer is not None:
+                complete = _write_viewer(path, methods, frames, args, console)
+            if args.out is not None:
+                complete &= _compare(path, methods, frames, engine, args, console)
         except SinewError as error:
             console.complain(error)
             complete = False
@@ -98,6 +112,35 @@ def _check_names(files: list[Path]) -> None:
         other = known.setdefault(path.stem, path)
         if other is not path:
             raise WrongUse(f"{other} and {path} would both be written to {path.stem}.html")
+
+
+def _write_viewer(
+    path: Path, methods: list[str], frames: list[float] | None, args: argparse.Namespace, console: Console
+) -> bool:
+    """Writes the page that turns; returns False where a mesh was left out."""
+    import bpy
+
+    from ..attach import properties
+    from ..deform import characters
+    from ..features.pages import viewer
+    from ..io import files
+
+    console.note_on(path, files.open_file(path))
+    scene = bpy.context.scene
+    frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
+    # The painted mix is that of the file.
+    own = {obj: properties.of(obj).method for obj in scene.objects if properties.has_sinew(obj)}
+    meshes, left_out = characters.deformable_meshes(scene, path, [*methods, viewer.PLAYED], args.object)
+    characters.use_methods([(obj, own.get(obj, viewer.PLAYED)) for obj in meshes])
+    steps = viewer.page(scene, path.stem, dict.fromkeys(meshes, ()), methods, frames, left_out)
+    text = ""
+    for step in console.progress(steps, len(frames) + 1, f"Reading {path.name}"):
+        text = step if isinstance(step, str) else text
+    for reason in left_out:
+        console.complain(f"{path}: left out: {reason}")
+    write_text(args.viewer, text)
+    console.say(str(args.viewer))
+    return not left_out
 
 
 def _compare(

@@ -31,6 +31,7 @@ def test_the_wheel_has_every_module(tmp_path):
         "translations/de.po",
         "core/templates/page.html",
         "core/templates/report.html",
+        *(path.relative_to(ADDON).as_posix() for path in ADDON.glob("core/templates/viewer/*")),
         *(f"ui/pictures/{method.name}.png" for method in sinew.methods()),
     }
     assert inside == {f"sinew_addon/{name}" for name in files}

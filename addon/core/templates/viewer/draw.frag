@@ -1,0 +1,35 @@
+#version 300 es
+// SPDX-License-Identifier: GPL-3.0-or-later
+precision highp float;
+
+uniform vec3 eye;
+uniform vec3 right;
+uniform vec3 up;
+uniform sampler2D ramp;
+uniform bool has_heat;
+uniform bool is_logarithmic;
+uniform vec2 range;  // the values at both ends of the ramp
+
+in vec3 position;
+in vec3 normal;
+in float value;
+out vec4 colour;
+
+void main() {
+    vec3 view = normalize(eye - position);
+    vec3 n = normalize(normal);
+    n = dot(n, view) < 0.0 ? -n : n;
+    // Two lights that go with the camera, and light from above.
+    float key = max(dot(n, normalize(view - 0.6 * right + 0.7 * up)), 0.0);
+    float fill = max(dot(n, normalize(view + 0.9 * right + 0.1 * up)), 0.0);
+    float light = 0.26 + 0.62 * key + 0.16 * fill + 0.1 * n.z;
+    vec3 base = vec3(0.80, 0.765, 0.72);
+    if (has_heat) {
+        vec2 ends = is_logarithmic ? log(range) : range;
+        float at = is_logarithmic ? log(max(value, 1e-12)) : value;
+        float share = clamp((at - ends.x) / (ends.y - ends.x), 0.0, 1.0);
+        base = texture(ramp, vec2(share, 0.5)).rgb;
+        light = 0.5 + 0.5 * light;
+    }
+    colour = vec4(base * min(light, 1.15), 1.0);
+}

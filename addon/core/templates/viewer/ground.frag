@@ -1,0 +1,12 @@
+#version 300 es
+// SPDX-License-Identifier: GPL-3.0-or-later
+precision highp float;
+
+uniform vec3 line;
+
+in float share;
+out vec4 colour;
+
+void main() {
+    colour = vec4(line, 0.4 * share);
+}

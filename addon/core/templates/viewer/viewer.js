@@ -1,0 +1,611 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A character that the browser skins and draws: core/viewer.py writes the page, docs/viewer.md describes it.
+"use strict";
+
+(async () => {
+const find = (id) => document.getElementById(id);
+const header = JSON.parse(find("header").textContent);
+const sources = JSON.parse(find("shaders").textContent);
+const prefersDark = matchMedia("(prefers-color-scheme: dark)");
+// Of textures with a texel for each vertex, corner or influence.
+const WIDTH = 1024;
+const METHODS = { lbs: 0, dq: 1, cor: 2 };
+// Of the grid: lines each way, each in pieces that fade out.
+const LINES = 31, PIECES = 12, GROUND_VERTICES = 2 * 2 * LINES * PIECES;
+
+function fail(text) {
+  find("message").textContent = text;
+  find("message").hidden = false;
+}
+
+// --- The arrays
+
+async function readArrays() {
+  const packed = Uint8Array.from(atob(find("arrays").textContent), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const types = { float32: Float32Array, uint16: Uint16Array, uint32: Uint32Array, int32: Int32Array };
+  return header.parts.map((part) => Object.fromEntries(Object.entries(part.arrays).map(([name, place]) => {
+    const count = place.shape.reduce((a, b) => a * b, 1);
+    return [name, new types[place.type](buffer, place.offset, count)];
+  })));
+}
+
+// --- WebGL
+
+const canvas = find("view");
+const gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: false });
+if (!gl || !gl.getExtension("EXT_color_buffer_float")) {
+  fail("This page needs WebGL 2 with textures of floats, which this browser does not offer.");
+  return;
+}
+if (typeof DecompressionStream === "undefined") {
+  fail("This page needs a newer browser: Chromium 80, Firefox 113 or Safari 16.4.");
+  return;
+}
+
+const programs = new Map();
+
+function program(vertex, fragment, defines = "") {
+  const key = vertex + fragment + defines;
+  if (programs.has(key)) return programs.get(key);
+  const made = gl.createProgram();
+  for (const [name, type] of [[vertex, gl.VERTEX_SHADER], [fragment, gl.FRAGMENT_SHADER]]) {
+    const shader = gl.createShader(type);
+    const text = sources[name].replace('#include "sinew.glsl"', () => sources["sinew.glsl"]);
+    gl.shaderSource(shader, text.replace("\n", `\n#define WIDTH ${WIDTH}\n#define LINES ${LINES}\n#define PIECES ${PIECES}\n${defines}\n`));
+    gl.compileShader(shader);
+    gl.attachShader(made, shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(name + ": " + gl.getShaderInfoLog(shader));
+  }
+  gl.linkProgram(made);
+  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
+  const places = {};
+  for (let i = 0; i < gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS); ++i) {
+    const { name } = gl.getActiveUniform(made, i);
+    places[name] = gl.getUniformLocation(made, name);
+  }
+  programs.set(key, { made, places });
+  return programs.get(key);
+}
+
+// Sets uniforms: textures are objects with `texture`, whole numbers come as { int }, the rest by their length.
+function use(its, values) {
+  gl.useProgram(its.made);
+  let unit = 0;
+  for (const [name, value] of Object.entries(values)) {
+    const place = its.places[name];
+    if (place === undefined) continue;
+    if (value.texture) {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, value.texture);
+      gl.uniform1i(place, unit++);
+    } else if (value.int !== undefined) gl.uniform1i(place, value.int);
+    else if (value.length === 16) gl.uniformMatrix4fv(place, false, value);
+    else if (value.length === 9) gl.uniformMatrix3fv(place, false, value);
+    else if (value.length === 3) gl.uniform3fv(place, value);
+    else if (value.length === 2) gl.uniform2fv(place, value);
+    else gl.uniform1f(place, value);
+  }
+}
+
+const FORMATS = {
+  rgba: [gl.RGBA32F, gl.RGBA, gl.FLOAT, 4, Float32Array],
+  rg: [gl.RG32F, gl.RG, gl.FLOAT, 2, Float32Array],
+  whole4: [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 4, Uint32Array],
+  whole2: [gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, 2, Uint32Array],
+  whole1: [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT, 1, Uint32Array],
+};
+
+// A texture with `values` in rows of `width` texels; null for `count` texels to draw to.
+function texture(format, values, count, width = WIDTH) {
+  const [inside, outside, type, components, Kind] = FORMATS[format];
+  const height = Math.max(Math.ceil(count / width), 1);
+  let data = null;
+  if (values) {
+    data = new Kind(width * height * components);
+    data.set(values);
+  }
+  const made = { texture: gl.createTexture(), width, height, outside, type };
+  gl.bindTexture(gl.TEXTURE_2D, made.texture);
+  gl.texImage2D(gl.TEXTURE_2D, 0, inside, width, height, 0, outside, type, data);
+  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+  for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
+  if (!values) {
+    made.frame = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, made.frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, made.texture, 0);
+  }
+  return made;
+}
+
+function drawTo(target, its, values) {
+  gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+  gl.viewport(0, 0, target.width, target.height);
+  gl.disable(gl.DEPTH_TEST);
+  gl.disable(gl.SCISSOR_TEST);
+  gl.disable(gl.BLEND);
+  use(its, values);
+  gl.drawArrays(gl.TRIANGLES, 0, 3);
+}
+
+// --- Meshes
+
+// What lies around each vertex: rows of `list`, `width` numbers each, sorted by the vertex that each belongs to.
+function sorted(count, owners, list, width) {
+  const first = new Uint32Array(count + 1);
+  for (const owner of owners) first[owner + 1]++;
+  for (let v = 0; v < count; ++v) first[v + 1] += first[v];
+  const next = first.slice(), rows = new Uint32Array(list.length);
+  owners.forEach((owner, k) => {
+    const to = next[owner]++;
+    for (let i = 0; i < width; ++i) rows[to * width + i] = list[k * width + i];
+  });
+  return { first, rows };
+}
+
+class Mesh {
+  constructor(about, arrays) {
+    Object.assign(this, { about, arrays, packed: new Map() });
+    this.count = arrays.rest.length / 3;
+    this.bones = about.arrays.palettes.shape[1];
+    this.most = 1;
+    for (let v = 0; v < this.count; ++v) this.most = Math.max(this.most, arrays.offsets[v + 1] - arrays.offsets[v]);
+    const wide = (points, last) => {
+      const found = new Float32Array(4 * this.count);
+      for (let v = 0; v < this.count; ++v) {
+        for (let i = 0; i < 3; ++i) found[4 * v + i] = points[3 * v + i];
+        found[4 * v + 3] = last ? last[v] : 0;
+      }
+      return texture("rgba", found, this.count);
+    };
+    this.rest = wide(arrays.rest, arrays.shares);
+    this.centres = wide(arrays.centres || arrays.rest);
+    this.palette = texture("rgba", arrays.palettes.subarray(0, 16 * this.bones), 4 * this.bones, 4);
+    this.drawAround(arrays.triangles, arrays.edges);
+    const target = () => texture("rgba", null, this.count);
+    this.panes = [0, 1].map(() => ({ points: target(), surface: target() }));
+    this.reference = target();
+    this.vertices = gl.createVertexArray();
+    gl.bindVertexArray(this.vertices);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, arrays.triangles, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+  }
+
+  drawAround(triangles, edges) {
+    const others = new Uint32Array(2 * triangles.length), ends = new Uint32Array(edges.length);
+    for (let k = 0; k < triangles.length; ++k) {
+      const start = k - k % 3;
+      others[2 * k] = triangles[start + (k + 1) % 3];
+      others[2 * k + 1] = triangles[start + (k + 2) % 3];
+    }
+    for (let k = 0; k < edges.length; ++k) ends[k] = edges[k ^ 1];
+    const corners = sorted(this.count, triangles, others, 2), links = sorted(this.count, edges, ends, 1);
+    const spans = new Uint32Array(4 * this.count);
+    for (let v = 0; v < this.count; ++v) {
+      [corners, links].forEach(({ first }, i) => spans.set([first[v], first[v + 1] - first[v]], 4 * v + 2 * i));
+    }
+    this.around = texture("whole4", spans, this.count);
+    this.corners = texture("whole2", corners.rows, triangles.length);
+    this.ends = texture("whole1", links.rows, edges.length);
+  }
+
+  // The `most` heaviest influences of each vertex, in the order that they have in Blender.
+  influences(most) {
+    const number = Math.min(most, this.most);
+    if (!this.packed.has(number)) {
+      const { offsets, bones, weights } = this.arrays;
+      const rows = new Float32Array(2 * number * this.count);
+      for (let v = 0; v < this.count; ++v) {
+        let own = Array.from({ length: offsets[v + 1] - offsets[v] }, (_, i) => offsets[v] + i);
+        if (own.length > number) {
+          own = own.sort((a, b) => weights[b] - weights[a] || a - b).slice(0, number).sort((a, b) => a - b);
+        }
+        own.forEach((k, i) => rows.set([bones[k], weights[k]], 2 * (v * number + i)));
+      }
+      this.packed.set(number, texture("rg", rows, number * this.count));
+    }
+    return { number, influences: this.packed.get(number) };
+  }
+
+  setFrame(index) {
+    const size = 16 * this.bones;
+    gl.bindTexture(gl.TEXTURE_2D, this.palette.texture);
+    const values = this.arrays.palettes.subarray(index * size, (index + 1) * size);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 4, this.bones, gl.RGBA, gl.FLOAT, values);
+    this.world = transposed(this.arrays.worlds.subarray(16 * index, 16 * index + 16));
+    this.turn = [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => this.world[i]);
+  }
+
+  skin(method, most, target) {
+    let [first, second] = [method, method];
+    if (method === "mix" && this.about.mix) [first, second] = this.about.mix;
+    else if (method === "cor" ? !this.arrays.centres : !(method in METHODS)) first = second = this.about.blender;
+    const { number, influences } = this.influences(most);
+    drawTo(target, program("screen.vert", "skin.frag", `#define SINEW_INFLUENCES ${number}`), {
+      sinew_bones: this.palette, rest: this.rest, centres: this.centres, influences,
+      method: { int: METHODS[first] }, second_method: { int: METHODS[second] },
+    });
+  }
+
+  measure(pane, measure) {
+    drawTo(pane.surface, program("screen.vert", "surface.frag"), {
+      points: pane.points, reference: this.reference, rest: this.rest, around: this.around,
+      corners: this.corners, ends: this.ends, world_from_armature: this.turn, measure: { int: measure },
+    });
+  }
+}
+
+// --- Matrices by columns, as WebGL takes them
+
+function transposed(m) {
+  return Float32Array.from(m, (_, i) => m[(i % 4) * 4 + (i >> 2)]);
+}
+
+function product(a, b) {
+  return Float32Array.from(a, (_, i) => {
+    const [row, column] = [i % 4, i >> 2];
+    return [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + row] * b[4 * column + k], 0);
+  });
+}
+
+const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
+const plus = (a, b, factor = 1) => a.map((x, i) => x + factor * b[i]);
+
+// --- The state
+
+const names = Object.keys(header.methods), last = header.frames.length - 1;
+const state = {
+  frame: header.start, playing: false, panes: names.length > 1 && innerWidth > 720 ? 2 : 1, methods: [names[0], names[names.length - 1]],
+  measure: 0, most: Infinity, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
+};
+
+// Where the character is at a frame. One that walks away is followed; others stay where they are.
+function boxOver(frames) {
+  const pick = (of, choose) => [0, 1, 2].map((i) => frames.reduce((a, f) => choose(a, of[f][i]), of[frames[0]][i]));
+  return [pick(header.low, Math.min), pick(header.high, Math.max)];
+}
+const whole = boxOver(header.frames.map((_, f) => f));
+const extent = (box) => plus(box[1], box[0], -1);
+const tallest = [0, 1, 2].map((i) => Math.max(...header.frames.map((_, f) => header.high[f][i] - header.low[f][i])));
+const isTravelling = Math.hypot(...extent(whole)) > 1.8 * Math.hypot(...tallest);
+const [wide, deep, tall] = (isTravelling ? tallest : extent(whole)).map((x) => x / 2);
+const radius = Math.hypot(wide, deep, tall) || 1;
+
+function camera(aspect) {
+  const box = isTravelling ? boxOver([state.frame]) : whole;
+  const middle = plus(box[0], box[1]).map((x) => x / 2);
+  const [cy, sy, cp, sp] = [Math.cos(state.yaw), Math.sin(state.yaw), Math.cos(state.pitch), Math.sin(state.pitch)];
+  const back = [sy * cp, -cy * cp, sp], right = [cy, sy, 0], up = [-sy * sp, cy * sp, cp];
+  // The character fits however it is turned about the vertical.
+  const half = Math.tan(Math.PI / 12), around = Math.hypot(wide, deep) || radius;
+  const distance = (1.06 * Math.max(tall / half, around / (half * aspect)) + 0.7 * around) / state.zoom;
+  const eye = plus(plus(middle, state.offset), back, distance);
+  const near = Math.max(distance - 4 * radius, 0.02 * distance), far = distance + 12 * radius;
+  const view = [right, up, back].map((axis) => [...axis, -dot(axis, eye)]).concat([[0, 0, 0, 1]]).flat();
+  const depth = near - far;
+  const lens = [1 / (half * aspect), 0, 0, 0, 0, 1 / half, 0, 0, 0, 0, (far + near) / depth, -1, 0, 0, 2 * far * near / depth, 0];
+  return { eye, right, up, middle, distance, half, clip_from_world: product(Float32Array.from(lens), transposed(view)) };
+}
+
+let arrays;
+try {
+  arrays = await readArrays();
+} catch (error) {
+  fail("The data of this page is damaged: " + error.message);
+  return;
+}
+const meshes = header.parts.map((about, i) => new Mesh(about, arrays[i]));
+const most = Math.max(...meshes.map((mesh) => mesh.most));
+const ramps = header.measures.map(({ ramp }) => {
+  const made = { texture: gl.createTexture() };
+  gl.bindTexture(gl.TEXTURE_2D, made.texture);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB8, ramp.length / 3, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, Uint8Array.from(ramp));
+  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.LINEAR);
+  for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
+  return made;
+});
+
+// --- Drawing
+
+function skinAll() {
+  for (const mesh of meshes) {
+    mesh.setFrame(state.frame);
+    if (state.measure === 1) mesh.skin(mesh.about.blender, Infinity, mesh.reference);
+    mesh.panes.slice(0, state.panes).forEach((pane, i) => {
+      mesh.skin(state.methods[i], state.most, pane.points);
+      mesh.measure(pane, state.measure);
+    });
+  }
+}
+
+function drawPane(index, width, height) {
+  const its = camera(width / height), measure = header.measures[state.measure - 1];
+  gl.viewport(index * width, 0, width, height);
+  gl.scissor(index * width, 0, width, height);
+  for (const mesh of meshes) {
+    use(program("draw.vert", "draw.frag"), {
+      ...its, ...mesh.panes[index], world_from_armature: mesh.world,
+      ramp: ramps[Math.max(state.measure - 1, 0)], has_heat: { int: state.measure ? 1 : 0 },
+      is_logarithmic: { int: measure && measure.isLogarithmic ? 1 : 0 }, range: measure ? [measure.low, measure.high] : [0, 1],
+    });
+    gl.bindVertexArray(mesh.vertices);
+    gl.drawElements(gl.TRIANGLES, mesh.arrays.triangles.length, gl.UNSIGNED_INT, 0);
+  }
+  gl.bindVertexArray(null);
+  gl.enable(gl.BLEND);
+  gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  gl.depthMask(false);
+  use(program("ground.vert", "ground.frag"), {
+    ...its, middle: [its.middle[0], its.middle[1], whole[0][2]], spacing: 10 ** Math.round(Math.log10(radius / 3.5)),
+    radius: 3 * radius, line: prefersDark.matches ? [0.9, 0.92, 0.95] : [0.35, 0.37, 0.4],
+  });
+  gl.drawArrays(gl.LINES, 0, GROUND_VERTICES);
+  gl.depthMask(true);
+  gl.disable(gl.BLEND);
+}
+
+// Four samples a pixel, where they are wanted: in software they take longer than all else.
+const smooth = { frame: gl.createFramebuffer(), colour: gl.createRenderbuffer(), depth: gl.createRenderbuffer(), size: "" };
+
+function bindSmooth(width, height) {
+  gl.bindFramebuffer(gl.FRAMEBUFFER, smooth.frame);
+  if (smooth.size === `${width} ${height}`) return;
+  smooth.size = `${width} ${height}`;
+  const kinds = [["colour", gl.RGBA8, gl.COLOR_ATTACHMENT0], ["depth", gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT]];
+  for (const [name, format, place] of kinds) {
+    gl.bindRenderbuffer(gl.RENDERBUFFER, smooth[name]);
+    gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, width, height);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, smooth[name]);
+  }
+}
+
+function draw(isSmooth = false) {
+  const density = Math.min(devicePixelRatio, 2);
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  skinAll();
+  if (isSmooth) bindSmooth(width, height);
+  else gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.disable(gl.SCISSOR_TEST);
+  gl.clearColor(0, 0, 0, 0);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  gl.enable(gl.DEPTH_TEST);
+  gl.enable(gl.SCISSOR_TEST);
+  for (let i = 0; i < state.panes; ++i) drawPane(i, Math.floor(width / state.panes), height);
+  if (!isSmooth) return;
+  gl.disable(gl.SCISSOR_TEST);
+  gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+  gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+}
+
+// The points of a mesh, four numbers each, in armature space: for tests and for the curious.
+function points(part, method, frame, influences = Infinity) {
+  const mesh = meshes[part];
+  mesh.setFrame(frame);
+  mesh.skin(method, influences, mesh.reference);
+  const { width, height } = mesh.reference, read = new Float32Array(4 * width * height);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, read);
+  changed();
+  return read.subarray(0, 4 * mesh.count);
+}
+
+// --- The page
+
+const SLOW_MILLISECONDS = 20, STILL_MILLISECONDS = 150;
+let isWaiting = false, playedFrom = null, isFast = null, whenStill = 0;
+
+// Whether a smooth frame is drawn fast enough to draw none but smooth ones.
+function measureSpeed() {
+  draw(true);
+  const started = performance.now();
+  draw(true);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  return performance.now() - started < SLOW_MILLISECONDS;
+}
+
+function changed() {
+  if (isWaiting) return;
+  isWaiting = true;
+  requestAnimationFrame((now) => {
+    isWaiting = false;
+    if (state.playing) {
+      playedFrom ??= { now, frame: state.frame };
+      const passed = Math.floor((now - playedFrom.now) * header.rate / 1000);
+      state.frame = (playedFrom.frame + passed) % (last + 1);
+      showFrame();
+    }
+    isFast ??= measureSpeed();
+    draw(isFast);
+    clearTimeout(whenStill);
+    if (state.playing) changed();
+    else if (!isFast) whenStill = setTimeout(() => draw(true), STILL_MILLISECONDS);
+  });
+}
+
+const methodLabel = (name) => header.methods[name];
+
+function say(text) {
+  find("said").textContent = text;
+}
+
+function showFrame() {
+  find("frame").value = state.frame;
+  find("frame").setAttribute("aria-valuetext", `frame ${header.frames[state.frame]}`);
+  find("frame-shown").textContent = header.frames[state.frame];
+}
+
+// The stops of the slider.
+const stops = [1, 2, 3, 4, 8].filter((n) => n < most).concat(Infinity);
+
+function show() {
+  showFrame();
+  document.body.classList.toggle("playing", state.playing);
+  find("play").setAttribute("aria-label", state.playing ? "Pause" : "Play");
+  for (const input of document.querySelectorAll("[name=panes]")) input.checked = Number(input.value) === state.panes;
+  for (const input of document.querySelectorAll("[name=measure]")) input.checked = Number(input.value) === state.measure;
+  state.methods.forEach((name, i) => {
+    find(`method-${i}`).value = name;
+    find(`label-${i}`).textContent = state.panes === 2 ? ["Left", "Right"][i] : ["Shown", "Flip to"][i];
+    const pane = find(`pane-${i}`);
+    pane.textContent = methodLabel(name);
+    pane.hidden = i >= state.panes;
+    pane.style.left = `${100 * (i + 0.5) / state.panes}%`;
+  });
+  find("stage").classList.toggle("has-two", state.panes === 2);
+  const shown = state.methods.slice(0, state.panes).map(methodLabel).join(" and ");
+  const measure = header.measures[state.measure - 1];
+  canvas.setAttribute("aria-label", `${header.title}: ${shown}${measure ? `, ${measure.label}` : ""}`);
+  find("legend").hidden = !measure;
+  if (measure) {
+    const colours = [];
+    for (let i = 0; i < measure.ramp.length; i += 3) colours.push(`rgb(${measure.ramp.slice(i, i + 3)})`);
+    find("ramp").style.background = `linear-gradient(to right, ${colours})`;
+    find("measure-text").textContent = measure.text;
+    find("ticks").replaceChildren(...[0, 2, 4].map((i) => {
+      const tick = document.createElement("span");
+      tick.textContent = measure.ticks[i];
+      return tick;
+    }));
+  }
+  find("influences").value = stops.indexOf(state.most);
+  const bones = state.most === Infinity ? `all (${most})` : String(state.most);
+  find("influences-shown").textContent = bones;
+  find("influences").setAttribute("aria-valuetext", bones);
+  changed();
+}
+
+function set(values) {
+  Object.assign(state, values);
+  if ("frame" in values || "playing" in values) playedFrom = null;
+  show();
+}
+
+function flip() {
+  set({ methods: [state.methods[1], state.methods[0]] });
+  say(`Now ${state.methods.slice(0, state.panes).map(methodLabel).join(" and ")}`);
+}
+
+const actions = {
+  " ": () => set({ playing: !state.playing }),
+  ",": () => set({ playing: false, frame: (state.frame + last) % (last + 1) }),
+  ".": () => set({ playing: false, frame: (state.frame + 1) % (last + 1) }),
+  f: flip,
+  h: () => {
+    set({ measure: (state.measure + 1) % (header.measures.length + 1) });
+    say(state.measure ? header.measures[state.measure - 1].label : "No heat map");
+  },
+  "+": () => zoomBy(1.15),
+  "=": () => zoomBy(1.15),
+  "-": () => zoomBy(1 / 1.15),
+  Home: () => set({ yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0] }),
+};
+
+function zoomBy(factor) {
+  set({ zoom: Math.min(Math.max(state.zoom * factor, 0.3), 60) });
+}
+
+function orbit(dx, dy) {
+  set({ yaw: state.yaw - dx, pitch: Math.min(Math.max(state.pitch + dy, -1.5), 1.5) });
+}
+
+// By shares of the pane's shorter side.
+function pan(dx, dy) {
+  const its = camera(1), reach = 2 * its.half * its.distance;
+  set({ offset: plus(plus(state.offset, its.right, -dx * reach), its.up, dy * reach) });
+}
+
+function connect() {
+  for (const i of [0, 1]) {
+    find(`method-${i}`).replaceChildren(...names.map((name) => new Option(methodLabel(name), name)));
+    find(`method-${i}`).addEventListener("change", (event) => {
+      set({ methods: state.methods.map((name, k) => (k === i ? event.target.value : name)) });
+    });
+  }
+  find("measures").replaceChildren(...["None", ...header.measures.map(({ label }) => label)].map((text, i) => {
+    const label = document.createElement("label"), input = document.createElement("input");
+    Object.assign(input, { type: "radio", name: "measure", value: i });
+    label.append(input, ` ${text}`);
+    return label;
+  }));
+  find("panel").addEventListener("change", ({ target }) => {
+    if (target.name === "panes" || target.name === "measure") set({ [target.name]: Number(target.value) });
+  });
+  for (const form of ["panel", "time"]) find(form).addEventListener("submit", (event) => event.preventDefault());
+  find("flip").addEventListener("click", flip);
+  find("play").addEventListener("click", actions[" "]);
+  find("frame").max = last;
+  find("frame").addEventListener("input", ({ target }) => set({ playing: false, frame: Number(target.value) }));
+  find("time").hidden = last === 0;
+  find("influences").max = stops.length - 1;
+  find("influences-set").hidden = stops.length === 1;
+  find("influences").addEventListener("input", ({ target }) => set({ most: stops[Number(target.value)] }));
+  find("notes").replaceChildren(...header.notes.map((text) => {
+    const item = document.createElement("li");
+    item.textContent = text;
+    return item;
+  }));
+  const vertices = meshes.reduce((sum, mesh) => sum + mesh.count, 0);
+  const frames = last ? `${last + 1} frames` : `frame ${header.frames[0]}`;
+  find("facts").textContent = `${vertices.toLocaleString("en")} vertices, ${frames}`;
+}
+
+function connectKeys() {
+  const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const tag = event.target.tagName, isTyped = tag === "SELECT" || tag === "INPUT";
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    // A button has a space of its own, and a slider and a list their keys.
+    if (key === " " && (tag === "BUTTON" || tag === "SUMMARY" || isTyped)) return;
+    if (isTyped && (tag === "SELECT" || key.length > 1)) return;
+    if (arrows[key] && tag === "CANVAS") {
+      const [x, y] = arrows[key];
+      if (event.shiftKey) pan(0.05 * x, 0.05 * y);
+      else orbit(0.09 * x, 0.09 * y);
+    } else if (actions[key]) actions[key]();
+    else return;
+    event.preventDefault();
+  });
+}
+
+function connectPointers() {
+  const pointers = new Map();
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, event);
+  });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => pointers.delete(event.pointerId));
+  canvas.addEventListener("pointermove", (event) => {
+    const before = pointers.get(event.pointerId);
+    if (!before) return;
+    const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
+    const shorter = Math.min(canvas.clientWidth / state.panes, canvas.clientHeight);
+    const other = [...pointers.values()].find((pointer) => pointer.pointerId !== event.pointerId);
+    pointers.set(event.pointerId, event);
+    if (other) {
+      const apart = (pointer) => Math.hypot(pointer.clientX - other.clientX, pointer.clientY - other.clientY) || 1;
+      zoomBy(apart(event) / apart(before));
+      pan(dx / shorter / 2, dy / shorter / 2);
+    } else if (event.shiftKey || event.buttons > 1) pan(dx / shorter, dy / shorter);
+    else orbit(dx / 140, dy / 140);
+  });
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoomBy(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)));
+  }, { passive: false });
+}
+
+connect();
+connectKeys();
+connectPointers();
+new ResizeObserver(changed).observe(canvas);
+prefersDark.addEventListener("change", changed);
+canvas.addEventListener("webglcontextlost", () => fail("The browser took the graphics away. Load the page again."));
+show();
+window.sinew = { header, state, set, draw, points, gl };
+})();

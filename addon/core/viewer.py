@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A page with a character that turns: one HTML file in which the browser skins and draws it by the shaders
+for engines (templates/viewer/).
+
+Its arrays are zlib-compressed, in base64, at the offsets that the header says: docs/viewer.md.
+"""
+
+import base64
+import json
+import re
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sinew
+
+from .heat import HeatScale
+from .influences import Influences
+from .metrics import METRICS
+from .page import legend_texts
+from .vectors import rotations_of, transformed
+
+# Methods that the shaders have, in the order of the page's lists.
+METHODS = ("lbs", "dq", "cor")
+BLENDER, MIX = "blender", "mix"
+FOLDER = Path(__file__).parent / "templates/viewer"
+_SHADERS = (".glsl", ".vert", ".frag")
+_RAMP_STOPS = 64
+_TEXTS = {"distance": "The distance of each vertex from where Blender's Armature modifier takes it."}
+
+
+def bone_buffer(posed: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """What the shaders read of bones, float32 [bones, 4, 4]: the rows of the 3x4 matrix of each motion, then
+    its rotation as a quaternion x, y, z, w: see docs/engines.md.
+
+    posed, rest  float [bones, 4, 4], from the bone's own axes to armature space, Y along the bone
+    """
+    posed, rest = posed.astype(np.float64), rest.astype(np.float64)
+    buffer = np.empty((len(posed), 4, 4), dtype=np.float32)
+    buffer[:, :3] = (posed @ np.linalg.inv(rest))[:, :3]
+    q = rotations_of(_perpendicular(posed) @ _perpendicular(rest).swapaxes(1, 2))
+    # With w >= 0, as Blender has them.
+    buffer[:, 3] = np.roll(np.where(q[0] < 0.0, -q, q), -1, axis=0).T
+    return buffer
+
+
+def _perpendicular(matrices: np.ndarray) -> np.ndarray:
+    """Axes of unit length in columns, right-handed: Y as it is, X as near as it can be."""
+    y = matrices[:, :3, 1]
+    x = matrices[:, :3, 0]
+    y = y / np.maximum(np.linalg.norm(y, axis=1, keepdims=True), 1e-30)
+    x = x - y * (x * y).sum(axis=1, keepdims=True)
+    x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-30)
+    return np.stack([x, y, np.cross(x, y)], axis=2)
+
+
+@dataclass
+class Part:
+    """A mesh of the character and its motion, in armature space.
+
+    rest        float32 [vertices, 3]
+    rest_bones  float32 [bones, 4, 4], from each bone's own axes
+    blender     the method of its Armature modifier, one of METHODS
+    centres     float32 [vertices, 3], for `cor`; None without it
+    mix         the two methods of the painted mix, and float32 [vertices], the share of the second; None
+                without it
+    """
+
+    name: str
+    rest: np.ndarray
+    influences: Influences
+    triangles: np.ndarray
+    edges: np.ndarray
+    rest_bones: np.ndarray
+    blender: str
+    centres: np.ndarray | None = None
+    mix: tuple[str, str, np.ndarray] | None = None
+    _palettes: list[np.ndarray] = field(default_factory=list)
+    _worlds: list[np.ndarray] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        # Only bones that move a vertex are in the page.
+        self._used, bones = np.unique(self.influences.bones, return_inverse=True)
+        inverse = bones.reshape(-1).astype(np.int32)
+        self.influences = Influences(self.influences.offsets, inverse, self.influences.weights)
+        self.rest_bones = self.rest_bones[self._used]
+        self._rest_inverses = np.linalg.inv(self.rest_bones.astype(np.float64))
+        data = {} if self.centres is None else {"cor": self.centres}
+        self._binding = sinew.Binding(
+            self.rest,
+            self.influences.offsets,
+            self.influences.bones,
+            self.influences.weights,
+            rest_bones=self.rest_bones,
+            vertex_data=data,
+        )
+        self._deformers: dict[str, sinew.Deformer] = {}
+
+    def has(self, method: str) -> bool:
+        wanted = {MIX: self.mix, "cor": self.centres}
+        return wanted.get(method, self.rest) is not None
+
+    def add_frame(self, posed: np.ndarray, world: np.ndarray) -> None:
+        """posed: float32 [all bones, 4, 4], in armature space; world: [4, 4], from armature space."""
+        self._posed = np.ascontiguousarray(posed[self._used])
+        self._palettes.append(bone_buffer(self._posed, self.rest_bones))
+        self._worlds.append(np.asarray(world, dtype=np.float64))
+
+    def world_points(self, method: str) -> np.ndarray:
+        """float64 [vertices, 3], of the frame that was added last; those of Blender's method where it lacks
+        what `method` needs."""
+        if method == BLENDER or not self.has(method):
+            method = self.blender
+        if method not in self._deformers:
+            if method == MIX and self.mix is not None:
+                first, second, shares = self.mix
+                deformer = sinew.Deformer(self._binding, first, mix=(second, shares))
+            else:
+                deformer = sinew.Deformer(self._binding, method)
+            self._deformers[method] = deformer
+        points = self._deformers[method].deform(self._posed, rest_inverses=self._rest_inverses)
+        return transformed(points, self._worlds[-1])
+
+    def world_rest(self) -> np.ndarray:
+        """float64 [vertices, 3], where the frame that was added last has the mesh without its bones."""
+        return transformed(self.rest, self._worlds[-1])
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What the page has of it."""
+        found = {
+            "rest": self.rest,
+            "offsets": self.influences.offsets,
+            "bones": self.influences.bones.astype(np.uint16),
+            "weights": self.influences.weights,
+            "triangles": self.triangles.astype(np.uint32),
+            "edges": self.edges.astype(np.uint32),
+            "palettes": np.array(self._palettes),
+            "worlds": np.array(self._worlds, dtype=np.float32),
+        }
+        if self.centres is not None:
+            found["centres"] = self.centres
+        if self.mix is not None:
+            found["shares"] = self.mix[2]
+        return found
+
+
+class _Range:
+    """The least and the largest value of a measure."""
+
+    def __init__(self, neutral: float) -> None:
+        self.least = self.most = neutral
+
+    def add(self, values: np.ndarray) -> None:
+        self.least = min(self.least, float(values.min(initial=self.least)))
+        self.most = max(self.most, float(values.max(initial=self.most)))
+
+
+class Viewer:
+    """The parts and frames of a page.
+
+    methods  the names of those to choose from, of METHODS, MIX and BLENDER, with their labels
+    rate     frames a second
+    unit     of lengths: "m", or "units"
+    notes    sentences on what the page leaves out
+    """
+
+    def __init__(
+        self,
+        title: str,
+        parts: Sequence[Part],
+        methods: dict[str, str],
+        rate: float,
+        unit: str,
+        notes: Sequence[str] = (),
+    ) -> None:
+        self.title, self.parts, self.methods, self.rate, self.unit = title, parts, methods, rate, unit
+        self.notes = list(notes)
+        self.frames: list[float] = []
+        self._distance, self._stretch = _Range(0.0), _Range(1.0)
+        self._worst, self._start = -1.0, 0
+        self._boxes: list[np.ndarray] = []
+        self._diagonal = 0.0
+
+    def add_frame(self, frame: float) -> None:
+        """Call it when all parts have it."""
+        rest = [part.world_rest() for part in self.parts]
+        self._diagonal = self._diagonal or float(np.linalg.norm(np.ptp(np.concatenate(rest), axis=0)))
+        references = [part.world_points(BLENDER) for part in self.parts]
+        shape = np.concatenate(references)
+        self._boxes.append(np.array([shape.min(axis=0), shape.max(axis=0)]))
+        worst = 0.0
+        for method in self.methods:
+            for part, at_rest, reference in zip(self.parts, rest, references, strict=True):
+                points = part.world_points(method)
+                distances = np.linalg.norm(points - reference, axis=1)
+                self._distance.add(distances)
+                worst = max(worst, float(distances.max(initial=0.0)))
+                self._stretch.add(_stretches(part.edges, points, at_rest))
+        if worst > self._worst:
+            self._worst, self._start = worst, len(self.frames)
+        self.frames.append(frame)
+
+    def page(self) -> str:
+        """The text of the file."""
+        blob, places = bytearray(), []
+        for part in self.parts:
+            of_part = {}
+            for name, array in part.arrays().items():
+                array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
+                of_part[name] = {"type": array.dtype.name, "shape": array.shape, "offset": len(blob)}
+                blob += array.tobytes()
+                # Each begins where the browser can look at it as numbers.
+                blob += bytes(-len(blob) % 4)
+            places.append(of_part)
+        data = base64.b64encode(zlib.compress(bytes(blob), 9)).decode("ascii")
+        texts = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.iterdir()}
+        values = {
+            "TITLE": escape(self.title),
+            "STYLE": texts["style.css"],
+            "HEADER": _in_script(self._header(places)),
+            "ARRAYS": data,
+            "SHADERS": _in_script({name: texts[name] for name in texts if name.endswith(_SHADERS)}),
+            "SCRIPT": texts["viewer.js"],
+        }
+        return re.sub("%([A-Z]+)%", lambda match: values[match[1]], texts["viewer.html"])
+
+    def _header(self, places: list[dict[str, Any]]) -> dict[str, Any]:
+        scales = [
+            HeatScale.over_values(
+                METRICS["distance"], self._distance.least, self._distance.most, self._diagonal
+            ),
+            HeatScale.over_values(
+                METRICS["stretch"], self._stretch.least, self._stretch.most, self._diagonal
+            ),
+        ]
+        boxes = np.array(self._boxes)
+        return {
+            "title": self.title,
+            "methods": self.methods,
+            "frames": self.frames,
+            "start": self._start,
+            "rate": self.rate,
+            "low": boxes[:, 0].tolist(),
+            "high": boxes[:, 1].tolist(),
+            "notes": self.notes,
+            "measures": [self._measure(scale) for scale in scales],
+            "parts": [
+                {
+                    "name": part.name,
+                    "blender": part.blender,
+                    "mix": part.mix and part.mix[:2],
+                    "arrays": arrays,
+                }
+                for part, arrays in zip(self.parts, places, strict=True)
+            ],
+        }
+
+    def _measure(self, scale: HeatScale) -> dict[str, Any]:
+        stops = np.round(255 * scale.ramp(np.linspace(0.0, 1.0, _RAMP_STOPS))).astype(int)
+        return {
+            "name": scale.metric.name,
+            "label": scale.metric.label,
+            "text": _TEXTS.get(scale.metric.name, scale.metric.text),
+            "low": scale.low,
+            "high": scale.high,
+            "isLogarithmic": scale.metric.scale == "log",
+            "ramp": stops.ravel().tolist(),
+            "ticks": legend_texts(scale, self.unit),
+        }
+
+
+def _stretches(edges: np.ndarray, points: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """[edges]: length / length at rest, 1 where that is 0."""
+    now, before = (np.linalg.norm(of[edges[:, 0]] - of[edges[:, 1]], axis=1) for of in (points, rest))
+    return np.divide(now, before, out=np.ones_like(now), where=before > 0.0)
+
+
+def _in_script(value: object) -> str:
+    """JSON that can not end a <script>."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads what a page that turns needs from the open file: meshes, influences, centres, poses.
+
+Meshes are those of Sinew's objects: of the mesh itself or, where Sinew is off there, of a copy of it.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...attach import attach, properties, upstream_proxy
+from ...core.errors import SinewError
+from ...core.scale_rule import BLENDER_4
+from ...core.vectors import transformed
+from ...core.vertex_data import VertexData
+from ...core.viewer import BLENDER, METHODS, MIX, Part, Viewer
+from ...deform import characters, session, source
+from ...deform.bound import Bound
+from ...io import armature_io, mesh_io, spaces
+
+# The method of meshes that have none of their own; any of Sinew's would do.
+PLAYED = "dq"
+LEAVES_OUT = (
+    "Methods that engines' shaders have are shown; for the others and for stages after the blend, compare in "
+    "Blender."
+)
+
+
+@dataclass
+class _Skinned:
+    """A mesh of the page.
+
+    obj       the object that Sinew deforms, the mesh itself or a copy
+    armature  of its Armature modifier
+    rest      float32 [vertices, 3], object space, of the first frame
+    """
+
+    obj: bpy.types.Object
+    armature: bpy.types.Object
+    bound: Bound
+    rest: np.ndarray
+    part: Part
+
+
+def page(
+    scene: bpy.types.Scene,
+    title: str,
+    meshes: Mapping[bpy.types.Object, Sequence[bpy.types.Object]],
+    methods: Sequence[str],
+    frames: Sequence[float],
+    left_out: Sequence[str] = (),
+) -> Iterator[float | str]:
+    """Yields the progress, at the end the text of the page. Sets frames; restoring is the caller's.
+
+    meshes    each with the objects that Sinew may deform in its place
+    methods   those to choose from; the shaders lack some, which the page says
+    left_out  sentences on other meshes
+
+    Raises SinewError where no mesh or method can be shown.
+    """
+    shown = [name for name in methods if name in (*METHODS, BLENDER)]
+    if not shown:
+        raise SinewError(f"the page has {', '.join(METHODS)} and blender: choose one of them")
+    characters.set_frame(scene, frames[0])
+    skinned, notes = [], [LEAVES_OUT, *left_out]
+    for obj, stand_ins in meshes.items():
+        try:
+            skinned.append(_read(obj, [obj, *stand_ins], shown))
+        except SinewError as error:
+            notes.append(f"{obj.name}: left out: {error}")
+    if not skinned:
+        raise SinewError("; ".join(notes[1:]))
+    labels = {name: properties.method_label(name) for name in shown}
+    if any(each.part.mix is not None for each in skinned):
+        labels[MIX] = "Painted Mix"
+    missing = [properties.method_label(name) for name in methods if name not in shown]
+    if missing:
+        notes.append(f"Not in this page: {', '.join(missing)}.")
+    rate = scene.render.fps / scene.render.fps_base
+    parts = [each.part for each in skinned]
+    viewer = Viewer(title, parts, labels, rate, characters.length_unit(scene), notes)
+    moved = set()
+    for number, frame in enumerate(frames):
+        characters.set_frame(scene, frame)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for each in skinned:
+            armature = each.armature.evaluated_get(depsgraph)
+            pose = armature_io.read_pose(armature, each.bound.first_deformer.bones)
+            if not np.isfinite(pose).all():
+                raise SinewError(f"{each.part.name}: a bone's pose is not finite at frame {frame}")
+            each.part.add_frame(pose, np.array(armature.matrix_world))
+            if not np.array_equal(_rest_points(each, depsgraph), each.rest):
+                moved.add(each.part.name)
+        viewer.add_frame(frame)
+        yield (number + 1) / len(frames)
+    viewer.notes += [
+        f"{name}: shape keys and modifiers before the Armature modifier stay as at frame {frames[0]}."
+        for name in sorted(moved)
+    ]
+    yield viewer.page()
+
+
+def _rest_points(each: _Skinned, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    return source.rest_points(each.obj, each.bound.source, depsgraph)
+
+
+def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: Sequence[str]) -> _Skinned:
+    """objects: those that Sinew may deform in the place of `obj`, and itself."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = session.states_of([each for each in objects if properties.has_sinew(each)], depsgraph)
+    if not found:
+        raise SinewError("Sinew deforms neither it nor a copy of it")
+    obj_of_state, state = found[0]
+    settings, bound = properties.of(obj_of_state), state.bound
+    stages = bound.skin_stack.skin_stages
+    if len(stages) != 1 or stages[0].mask is not None:
+        raise SinewError("several Armature modifiers deform it, or one with a vertex group")
+    if settings.scale_rule != BLENDER_4.name:
+        raise SinewError(f"its rule for scale is not {BLENDER_4.label}")
+    modifier, replaced = attach.replaced_modifiers(obj_of_state)[0]
+    armature = replaced.armature
+    space = spaces.bones_from_model_in(depsgraph, obj_of_state, armature)
+    if space is None:
+        raise SinewError("a scale of it or of its armature is 0")
+    weighting, its_source = bound.first_deformer.weighting, bound.source
+    rest = source.rest_points(obj_of_state, its_source, depsgraph)
+    points = transformed(rest, space).astype(np.float32)
+    influences = weighting.influences_over_joints(points)
+    mesh = obj_of_state.data
+    if its_source.from_upstream:
+        mesh = upstream_proxy.evaluated_mesh(obj_of_state, depsgraph)
+    triangles = mesh_io.read_triangles(mesh)
+    mix = _mix_of(obj, bound)
+    centres = None
+    if "cor" in methods or (mix is not None and "cor" in mix[:2]):
+        data = VertexData(weighting, its_source.surface_points, triangles, its_source.stored)
+        found_centres = data.of("cor", space)
+        assert found_centres is not None
+        centres = transformed(found_centres, space).astype(np.float32)
+    part = Part(
+        obj.name,
+        points,
+        influences,
+        triangles,
+        its_source.topology.edges,
+        weighting.bones.rest_axes,
+        attach.method_of(modifier),
+        centres,
+        mix,
+    )
+    return _Skinned(obj_of_state, armature, bound, rest.copy(), part)
+
+
+def _mix_of(obj: bpy.types.Object, bound: Bound) -> tuple[str, str, np.ndarray] | None:
+    """Returns the painted mix that the mesh itself has, where the shaders have both methods."""
+    if not properties.has_sinew(obj):
+        return None
+    settings, shares = properties.of(obj), bound.first_deformer.mix_weights
+    first, second = settings.method, settings.mixed_method
+    if shares is None or first == second or not {first, second} <= set(METHODS):
+        return None
+    return first, second, np.clip(shares, 0.0, 1.0)

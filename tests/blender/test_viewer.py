@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page that turns: its data, read by a separate program (shaders/read_page.py), is the character that
+`sinew points` computes; the file needs no other. tests/browsers has the page itself."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+import numpy as np
+import pytest
+import read_page
+import scenes
+from bone_buffer import bone_buffer
+from conftest import REPOSITORY
+from mathutils import Euler
+from program import run_sinew
+from sinew_addon.core import viewer
+
+FRAMES = [1, 6, 11]
+GROUP = "Painted"
+
+
+def make_character(**options):
+    """An arm, moved, rotated and scaled as one, with a scaled bone."""
+    obj, armature = scenes.make_arm(bones=3, **options)
+    armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), Euler((0.5, 0.2, -0.3))
+    armature.scale = (1.3, 1.3, 1.3)
+    obj.parent = armature
+    obj.location, obj.rotation_euler, obj.scale = (0.1, 0.0, 0.05), Euler((0.0, 0.1, 0.2)), (1.1, 0.9, 1.0)
+    scenes.key(armature.pose.bones[1], "scale", [(1, (1.0, 1.0, 1.0)), (11, (1.2, 0.9, 1.1))])
+    bpy.context.view_layer.update()
+    return obj
+
+
+def save(folder):
+    path = folder / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def write_page(path, *options):
+    page = path.with_suffix(".html")
+    run_sinew("compare", path, *options, "--viewer", page)
+    return page
+
+
+def points_of(path, method, name="Arm"):
+    out = path.with_name(f"{method}.npz")
+    run_sinew("points", path, "--method", method, "--frames", ",".join(map(str, FRAMES)), "--out", out)
+    return np.load(out)[name]
+
+
+def assert_has_points(page, expected, method, obj):
+    """expected: [frames, vertices, 3], in the object's space."""
+    header, meshes = read_page.read(page)
+    assert header["frames"] == FRAMES
+    to_world = np.array(obj.matrix_world)
+    for frame in range(len(FRAMES)):
+        points = read_page.points(header["parts"][0], meshes[0], method, frame)
+        world = meshes[0]["worlds"][frame].astype(np.float64)
+        found = points @ world[:3, :3].T + world[:3, 3]
+        wanted = expected[frame] @ to_world[:3, :3].T + to_world[:3, 3]
+        diagonal = np.linalg.norm(np.ptp(wanted, axis=0))
+        assert np.abs(found - wanted).max() <= 1e-5 * diagonal, (method, frame)
+
+
+@pytest.mark.parametrize("is_bendy", [False, True], ids=["straight", "bendy"])
+def test_the_data_is_what_points_computes(tmp_path, is_bendy):
+    obj = make_character()
+    if is_bendy:
+        obj.parent.data.bones[1].bbone_segments = 4
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "blender,lbs,dq,cor", "--frames", "1,6,11")
+    for method in ("lbs", "dq", "cor"):
+        assert_has_points(page, points_of(path, method), method, obj)
+
+
+def test_the_painted_mix_is_that_of_the_file(tmp_path):
+    obj = make_character()
+    scenes.add_sinew(obj, "dq")
+    heights = np.array([vertex.co.z for vertex in obj.data.vertices])
+    group = obj.vertex_groups.new(name=GROUP)
+    for vertex, share in enumerate((heights - heights.min()) / np.ptp(heights)):
+        group.add([vertex], float(share), "REPLACE")
+    obj.sinew.mix.method, obj.sinew.mix.group = "cor", GROUP
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "lbs,dq", "--frames", "1,6,11")
+    header, _meshes = read_page.read(page)
+    assert header["methods"] == {"lbs": "Linear Blend", "dq": "Dual Quaternion", "mix": "Painted Mix"}
+    assert header["parts"][0]["mix"] == ["dq", "cor"]
+    assert_has_points(page, points_of(path, "dq"), "mix", obj)
+
+
+def test_a_modifier_in_front_gives_the_mesh(tmp_path):
+    obj = make_character()
+    scenes.put_in_front(obj)
+    path = save(tmp_path)
+    expected = points_of(path, "dq")
+    assert expected.shape[1] > len(obj.data.vertices)
+    assert_has_points(write_page(path, "--methods", "dq", "--frames", "1,6,11"), expected, "dq", obj)
+
+
+def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
+    obj = make_character()
+    scenes.key_shape(obj)
+    second, _armature = scenes.make_arm(name="Masked</script>")
+    scenes.modifiers(second)[0].vertex_group = "bone.1"
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "lbs,qv,dq", "--frames", "1,6,11")
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r"(src|href)\s*=|url\(|@import|https?://", text)
+    header, _meshes = read_page.read(page)
+    assert list(header["methods"]) == ["lbs", "dq"]
+    assert [part["name"] for part in header["parts"]] == ["Arm"]
+    notes = "\n".join(header["notes"])
+    assert "Quaternion-Vector" in notes
+    assert "Masked</script>: left out: " in notes
+    assert "Arm: shape keys" in notes
+    for measure in header["measures"]:
+        assert measure["low"] < measure["high"]
+        assert len(measure["ticks"]) == 5
+    # Where the methods differ most.
+    assert header["frames"][header["start"]] == 11
+
+
+def test_a_page_alone_needs_no_folder_and_has_one_file(tmp_path):
+    make_character()
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "lbs", "--frames", "1")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["arm.blend", "arm.html"]
+    assert len(page.read_bytes()) < 100_000
+    for words, text in (
+        ((path,), "expected --out, --viewer or both"),
+        ((path, path, "--viewer", page), "a single file"),
+        ((path, "--methods", "qv", "--viewer", page), "choose one of them"),
+        ((path, "--viewer", tmp_path / "page.txt"), "expected a name ending in .html"),
+    ):
+        done = run_sinew("compare", *words, status=1 if "choose" in text else 2)
+        assert text in done.stderr
+
+
+def test_bones_are_as_the_shaders_read_them():
+    rng = np.random.default_rng(1)
+    posed, rest = (np.tile(np.eye(4), (200, 1, 1)) for _ in range(2))
+    rest[:, :3] = rng.normal(size=(200, 3, 4))
+    posed[:, :3] = rng.normal(size=(200, 3, 4))
+    mine, its = viewer.bone_buffer(posed, rest), bone_buffer(posed, rest)
+    np.testing.assert_allclose(mine[:, :3], its[:, :3], rtol=1e-6, atol=1e-6)
+    same = (mine[:, 3] * its[:, 3]).sum(axis=1)
+    np.testing.assert_allclose(np.abs(same), 1.0, atol=1e-6)
+    clear = np.abs(its[:, 3, 3]) > 1e-3
+    np.testing.assert_allclose(mine[clear, 3], its[clear, 3], atol=1e-5)
+
+
+def test_the_shader_is_that_of_engines():
+    assert (viewer.FOLDER / "sinew.glsl").read_bytes() == (REPOSITORY / "shaders/sinew.glsl").read_bytes()
