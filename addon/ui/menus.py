@@ -133,6 +133,7 @@ class SINEW_MT_compare(_Submenu, bpy.types.Menu):
     entries = (
         Entry("sinew.compare", "Compare Methods\u2026", icon="MOD_ARRAY"),
         Entry("sinew.flip_comparison"),
+        Entry("sinew.save_comparison", "Save as Page\u2026", icon="URL"),
         Entry("sinew.end_comparison"),
         Entry("sinew.recommend", icon="SOLO_ON"),
         *_over("sinew.suggest", "Suggest a Method"),

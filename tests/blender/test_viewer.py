@@ -54,13 +54,13 @@ def points_of(path, method, name="Arm"):
 def assert_has_points(page, expected, method, obj):
     """expected: [frames, vertices, 3], in the object's space."""
     header, meshes = read_page.read(page)
-    assert header["frames"] == FRAMES
     to_world = np.array(obj.matrix_world)
-    for frame in range(len(FRAMES)):
-        points = read_page.points(header["parts"][0], meshes[0], method, frame)
-        world = meshes[0]["worlds"][frame].astype(np.float64)
+    for frame, shape in zip(FRAMES, expected, strict=True):
+        place = header["frames"].index(frame)
+        points = read_page.points(header["parts"][0], meshes[0], method, place)
+        world = meshes[0]["worlds"][place].astype(np.float64)
         found = points @ world[:3, :3].T + world[:3, 3]
-        wanted = expected[frame] @ to_world[:3, :3].T + to_world[:3, 3]
+        wanted = shape @ to_world[:3, :3].T + to_world[:3, 3]
         diagonal = np.linalg.norm(np.ptp(wanted, axis=0))
         assert np.abs(found - wanted).max() <= 1e-5 * diagonal, (method, frame)
 
@@ -138,6 +138,29 @@ def test_a_page_alone_needs_no_folder_and_has_one_file(tmp_path):
     ):
         done = run_sinew("compare", *words, status=1 if "choose" in text else 2)
         assert text in done.stderr
+
+
+def test_a_comparison_is_saved_as_a_page(tmp_path):
+    """Sinew is on the copies alone. The scene stays at its frame, with a pose that differs from its keys."""
+    obj = make_character()
+    path = save(tmp_path)
+    expected = {method: points_of(path, method) for method in ("lbs", "cor")}
+    assert not bpy.ops.sinew.save_comparison.poll()
+    assert bpy.ops.sinew.compare(methods={"lbs", "cor", "log"}) == {"FINISHED"}
+    bpy.context.scene.frame_set(6)
+    scenes.bend(obj.parent, 40.0)
+    before = scenes.final_points(obj)
+    page = tmp_path / "saved.html"
+    assert bpy.ops.sinew.save_comparison(filepath=str(page)) == {"FINISHED"}
+    assert bpy.context.scene.frame_current == 6
+    assert np.array_equal(scenes.final_points(obj), before)
+    header, _meshes = read_page.read(page)
+    assert (header["title"], header["frames"]) == ("saved", list(range(1, 12)))
+    assert list(header["methods"]) == ["lbs", "cor"]
+    for method, points in expected.items():
+        assert_has_points(page, points, method, obj)
+    with pytest.raises(RuntimeError, match=r"ending in \.html"):
+        bpy.ops.sinew.save_comparison(filepath=str(tmp_path / "saved.txt"))
 
 
 def test_bones_are_as_the_shaders_read_them():

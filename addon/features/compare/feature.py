@@ -8,10 +8,11 @@ from ...attach import attach, properties
 from ...attach.feature import Feature
 from ...core.errors import SinewError
 from ...deform import characters
-from ...ui import operators
+from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from . import comparison, comparison_labels, comparison_state, framing
+from .save_page import SINEW_OT_save_comparison
 
 
 def character(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -204,6 +205,8 @@ class SINEW_PT_comparison(Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("sinew.compare", text="Methods…")
         row.operator("sinew.end_comparison", icon="X")
+        if not stepped.draw_progress(layout, SINEW_OT_save_comparison.bl_idname):
+            layout.operator("sinew.save_comparison", icon="URL")
 
 
 def _draw_arrangement(
@@ -230,6 +233,7 @@ FEATURE = Feature(
     (
         *comparison_state.CLASSES,
         *(SinewComparisonChoice, SINEW_OT_compare, SINEW_OT_flip_comparison, SINEW_OT_end_comparison),
+        SINEW_OT_save_comparison,
         SINEW_PT_comparison,
     ),
     {"Scene.sinew_comparison": bpy.props.PointerProperty(type=comparison_state.SinewComparison)},
