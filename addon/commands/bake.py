@@ -37,7 +37,8 @@ alembic     an .abc of the final meshes, with UVs and materials
 usd         a .usdc of the same
 bones       a .blend whose armatures have helper bones with keys, and meshes with weights of all bones: linear
             blending, as every engine and glTF and FBX files have it, comes as near as the errors say;
-            with --motion pose they have constraints instead, and follow other animation, too
+            with --motion pose they have constraints instead, and follow other animation, too; n + 1 plain
+            bones replace a bendy bone of n segments
 
 In a .blend the Armature modifiers stay, switched off (bones: on). Between frames that are not neighbours
 shapes move in straight lines."""

@@ -19,7 +19,7 @@ SUMMARY = "write a .glb whose skins have Sinew's method and centres of rotation"
 HELP = (
     "Writes a .glb by Blender's own exporter: bones, weights and actions as ever, and in "
     "extras and attributes of each mesh that an armature deforms what an engine needs to skin it as "
-    "Sinew does."
+    "Sinew does. Plain bones replace bendy ones."
 )
 
 
@@ -40,6 +40,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     from ..attach import attach, properties
     from ..deform import characters
+    from ..features.bake import bake_bones
     from ..features.gltf import export
     from ..io import files
 
@@ -55,9 +56,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
             left_out += [str(error) for error in errors if error is not None]
             for sentence in characters.sentences():
                 console.note(f"{args.file}: {sentence}")
-        if not any(properties.has_sinew(obj) and properties.of(obj).enabled for obj in meshes):
+        skinned = [obj for obj in meshes if properties.has_sinew(obj) and properties.of(obj).enabled]
+        if not skinned:
             reason = left_out[0] if left_out else "no mesh has Sinew; choose a method by --method"
             raise SinewError(f"{args.file}: {reason}")
+        frames = range(scene.frame_start, scene.frame_end + 1)
+        reports, kept = bake_bones.replace_bendy_bones(skinned, frames, args.influences)
+        left_out += kept
+        for report in reports:
+            console.note(f"{args.file}: {report.sentence(characters.length_unit(scene))}")
         scene.sinew_gltf.skinning = True
         with _known_to_exporters():
             try:

@@ -15,6 +15,8 @@ from .influences import Influences
 # The curved mapping's smoothing: its width at the middle plane, how fast the correction towards the ideal
 # slope grows, and how sharply it ends.
 WIDTH, SLOPE, SHARPNESS = 0.222, 3.0, 7.0
+# Of an interval, until it is as short as float32 tells.
+_HALVINGS = 30
 
 
 def spread_over_joints(
@@ -71,6 +73,38 @@ def spread_over_joints(
     return Influences(
         offsets, targets.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32)
     )
+
+
+def points_of_joints(joints: np.ndarray, rest: np.ndarray, length: float, is_curved: bool) -> np.ndarray:
+    """Returns float64 [segments + 1, 3]: for each joint of a bendy bone a point of the same space that is
+    mapped to this joint alone.
+
+    joints, rest  float [segments + 1, 4, 4] and [4, 4], the joints and the bone at rest, Y along it
+    is_curved     as in spread_over_joints()
+    """
+    segments = len(joints) - 1
+    numbers = np.arange(segments + 1) / segments
+    if not is_curved:
+        return rest[:3, 3] + numbers[:, None] * (length * rest[:3, 1].astype(np.float64))
+    joints = joints.astype(np.float64)
+    centres = joints[:, :3, 3]
+    size = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
+    ends = joints[[0, -1], :3, 1] / np.linalg.norm(joints[[0, -1], :3, 1], axis=1, keepdims=True)
+    # Far beyond its ends, where smoothing moves nothing, and between joints on the curve.
+    line = np.vstack([centres[0] - size * ends[0], centres, centres[-1] + size * ends[1]])
+    positions = np.array([-1.0, *numbers, 2.0])
+
+    def on_line(at: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(at, positions, axis) for axis in line.T], axis=1)
+
+    low, high = np.append(-1.0, numbers[:-1]), np.append(numbers[1:], 2.0)
+    for _step in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        is_before = share_along_curve(on_line(middle), joints) < numbers
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    found = high
+    found[0], found[-1] = -1.0, 2.0
+    return on_line(found)
 
 
 def share_along_curve(points: np.ndarray, joints: np.ndarray) -> np.ndarray:

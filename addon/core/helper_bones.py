@@ -18,6 +18,7 @@ from . import simplex
 from .errors import SinewError
 from .influences import Influences
 from .phrases import Phrase, phrase
+from .segment_bones import SegmentReport
 
 # At most this many of the rig's bones, and of the helper bones, are tried for a vertex.
 OWN_CANDIDATES, HELPER_CANDIDATES = 8, 8
@@ -31,6 +32,7 @@ _LAST_SWEEPS = 24
 # The last sweeps end when this many gain less than this share of the error.
 _SWEEPS_WITHOUT_GAIN, _SMALL_GAIN = 4, 0.01
 _SMALLEST_WEIGHT = 1e-4
+_ROUNDING = 5e-7
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class Motion:
     bones       float64 [frames, bones, 3, 4]: each bone's motion from rest
     influences  of bones; vertices without influences stay at rest
     segments    float64 [bones, 2, 3], heads and tails at rest
+    owners      int [bones]: each bone itself, or the bendy bone that it stands for; None where none is
     """
 
     rest: np.ndarray
@@ -49,6 +52,7 @@ class Motion:
     bones: np.ndarray
     influences: Influences
     segments: np.ndarray
+    owners: np.ndarray | None = None
 
     @property
     def diagonal(self) -> float:
@@ -142,7 +146,8 @@ class HelperOptions:
 
     def of(self, motion: Motion) -> Wanted:
         # Each weighted bone except the first has a joint with another.
-        joints = max(len(np.unique(motion.influences.bones)) - 1, 0)
+        bones = motion.influences.bones
+        joints = max(len(np.unique(bones if motion.owners is None else motion.owners[bones])) - 1, 0)
         return Wanted(self.helpers or 2 * joints, self.error / 100.0 * motion.diagonal, self.influences)
 
 
@@ -156,6 +161,7 @@ class Report:
     diagonal                     of the meshes' bounding box at rest
     before, after                over the frames
     unseen_before, unseen_after  where helper bones follow the pose: over poses that they were not solved for
+    segments                     of bendy bones, where there are any
     """
 
     armature: str
@@ -166,6 +172,7 @@ class Report:
     after: Errors
     unseen_before: Errors | None = None
     unseen_after: Errors | None = None
+    segments: SegmentReport | None = None
 
     @classmethod
     def of(
@@ -181,16 +188,23 @@ class Report:
         unit    of armature space, in scene units
         unseen  before and after, over poses that the solution was not made from
         """
-        errors = [
-            Errors(unit * each.rms, unit * each.worst)
-            for each in (solution.before, solution.after, *(unseen or ()))
-        ]
+
+        def scaled(errors: Errors) -> Errors:
+            return Errors(unit * errors.rms, unit * errors.worst)
+
         most = int((solution.weights > 0.0).sum(axis=1).max(initial=0))
-        return cls(armature, len(solution.parents), most, diagonal, *errors)
+        report = cls(
+            armature, len(solution.parents), most, diagonal, scaled(solution.before), scaled(solution.after)
+        )
+        if unseen is None:
+            return report
+        return replace(report, unseen_before=scaled(unseen[0]), unseen_after=scaled(unseen[1]))
 
     def sentences(self, unit: str) -> list[Phrase]:
         """unit: the name of a scene unit."""
         said = [self._sentence(unit)]
+        if self.segments is not None:
+            said.insert(0, self.segments.sentence(unit))
         if self.unseen_before is not None and self.unseen_after is not None:
             numbers = (
                 self.unseen_after.rms,
@@ -245,7 +259,7 @@ def solve(
     rounds = _rounds(wanted.helpers)
     steps = len(rounds) + _LAST_SWEEPS
     for number, count in enumerate(rounds):
-        if solver.errors().rms <= wanted.error:
+        if solver.errors().rms <= max(wanted.error, solver.rounding):
             break
         if not len(solver.own):
             raise SinewError(
@@ -307,7 +321,7 @@ class Solver:
     def __post_init__(self) -> None:
         influences = self.motion.influences
         self.deformed = np.flatnonzero(influences.counts > 0)
-        own, weights = _padded(influences)
+        own, weights = influences.padded()
         self.own, self.own_weights = own[self.deformed], weights[self.deformed]
         self.own_weights /= self.own_weights.sum(axis=1, keepdims=True)
         self.rest = np.ascontiguousarray(self.motion.rest[:, self.deformed].transpose(1, 0, 2), np.float64)
@@ -321,6 +335,8 @@ class Solver:
         self.still = np.flatnonzero(still)
         apart = np.square(self.motion.rest[:, still] - self.motion.targets[:, still].astype(np.float64))
         self.still_squares = apart.sum(axis=2).T
+        # What float32 leaves of an exact solution.
+        self.rounding = _ROUNDING * float(np.abs(self.targets).max(initial=0.0))
         self.bones, self.weights = self.own, self.own_weights
         self.residual = self._residual_of(self.bones, self.weights)
 
@@ -505,13 +521,15 @@ class Solver:
             errors[rows, slots] = self._moved(self._motion_of(int(bone)), at) - self.targets[at]
         grams = errors @ errors.transpose(0, 2, 1)
         weights = simplex.sparse_weights(grams, candidates >= 0, self.most)
-        before = self._weights_of(vertices, candidates)
-        # After the limit of influences, the result can be worse than that of the last round.
-        is_better = simplex.objective(grams, before) < simplex.objective(grams, weights)
-        is_better &= ((before > 0.0).sum(axis=1) <= self.most) & (before.sum(axis=1) > 0.999)
-        weights = np.where(is_better[:, None], before, weights)
         weights[weights < _SMALLEST_WEIGHT] = 0.0
         weights /= weights.sum(axis=1, keepdims=True)
+        before = self._weights_of(vertices, candidates)
+        # After the limit of influences, the result can be worse than that of the last round. Weights that are
+        # exact stay as they are, to the last digit.
+        exact = self.targets.shape[1] / 3 * self.rounding**2
+        is_better = simplex.objective(grams, before) < np.maximum(simplex.objective(grams, weights), exact)
+        is_better &= ((before > 0.0).sum(axis=1) <= self.most) & (before.sum(axis=1) > 0.999)
+        weights = np.where(is_better[:, None], before, weights)
         self.residual[vertices] = (weights[:, None] @ errors)[:, 0]
         order = np.argsort(-weights, axis=1, kind="stable")[:, : self.most]
         weights = np.take_along_axis(weights, order, axis=1)
@@ -520,7 +538,7 @@ class Solver:
     def _candidates(self, vertices: np.ndarray) -> np.ndarray:
         """int [vertices, candidates], -1 for none: each vertex's bones of the rig, its helper bones, and the
         helper bones that reduce its error most."""
-        own = self.own[vertices, :OWN_CANDIDATES]
+        own = self.own[vertices, : max(OWN_CANDIDATES, self.most)]
         if not self.helpers:
             return own
         first = self.motion.bones.shape[1]
@@ -609,15 +627,3 @@ def _share(residual: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.nda
     length = np.einsum("vx,vx->v", change, change)
     share = np.clip(toward / np.maximum(length, 1e-30), 0.0, 1.0)
     return share, share * (2.0 * toward - share * length)
-
-
-def _padded(influences: Influences) -> tuple[np.ndarray, np.ndarray]:
-    """int and float64 [vertices, slots]: bones and weights, the heaviest first, padded with -1 and 0."""
-    counts = influences.counts
-    vertices = np.repeat(np.arange(len(counts)), counts)
-    order = np.lexsort((-influences.weights, vertices))
-    slots = np.arange(len(vertices)) - np.repeat(influences.offsets[:-1], counts)
-    bones = np.full((len(counts), counts.max(initial=1)), -1)
-    weights = np.zeros(bones.shape)
-    bones[vertices, slots], weights[vertices, slots] = influences.bones[order], influences.weights[order]
-    return bones, weights

@@ -99,6 +99,47 @@ class Influences:
         signed = np.concatenate([self.weights, -other.weights])
         return float(np.abs(np.bincount(at, signed, minlength=len(found))).max(initial=0.0))
 
+    def padded(self) -> tuple[np.ndarray, np.ndarray]:
+        """int and float64 [vertices, slots]: bones and weights, the heaviest first and equal ones in their
+        order, padded with -1 and 0."""
+        counts = self.counts
+        vertices = np.repeat(np.arange(len(counts)), counts)
+        order = np.lexsort((-self.weights, vertices))
+        slots = np.arange(len(vertices)) - np.repeat(self.offsets[:-1], counts)
+        bones = np.full((len(counts), counts.max(initial=1)), -1)
+        weights = np.zeros(bones.shape)
+        bones[vertices, slots], weights[vertices, slots] = self.bones[order], self.weights[order]
+        return bones, weights
+
+    def heaviest(self, most: int) -> Influences:
+        """Without those of each vertex that `most` of its others exceed."""
+        bones, weights = self.padded()
+        kept = bones[:, :most] >= 0
+        offsets = np.zeros(len(bones) + 1, dtype=np.int32)
+        np.cumsum(kept.sum(axis=1), out=offsets[1:])
+        return Influences(
+            offsets, bones[:, :most][kept].astype(np.int32), weights[:, :most][kept].astype(np.float32)
+        )
+
+    def blended(self, motions: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """float64 [vertices, 3]: linear blend skinning. Vertices without influences stay.
+
+        motions  float64 [bones, 3, 4] or [bones, 4, 4], from rest, in the space of the points
+        points   [vertices, 3]
+        """
+        counts = self.counts
+        vertices = np.repeat(np.arange(len(counts)), counts)
+        weights = self.weights.astype(np.float64)
+        weights /= np.bincount(vertices, weights, minlength=len(counts))[vertices]
+        result = points.astype(np.float64)
+        moved = motions[self.bones, :3, 3] + np.einsum(
+            "nij,nj->ni", motions[self.bones, :3, :3], result[vertices]
+        )
+        result[counts > 0] = 0.0
+        for axis in range(3):
+            result[:, axis] += np.bincount(vertices, weights * moved[:, axis], minlength=len(counts))
+        return result
+
 
 def joined(parts: Sequence[Influences], bone_counts: Sequence[int]) -> Influences:
     """Returns the influences of several meshes as one; vertices and bones are concatenated.

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -63,6 +63,16 @@ class Bones(OfArrays):
     def bending(self) -> list[tuple[int, int]]:
         """The bendy bones in the order of their joints, each with its number of segments."""
         return [(int(bone), int(self.segments[bone])) for bone in np.flatnonzero(self.segments > 1)]
+
+    @cached_property
+    def owners(self) -> np.ndarray:
+        """int [bones + joints]: each bone itself, and the bendy bone of each joint."""
+        joints = [np.full(segments + 1, bone) for bone, segments in self.bending]
+        return np.concatenate([np.arange(len(self.names)), *joints])
+
+    def names_with(self, joints: Mapping[int, str]) -> list[str]:
+        """Names of bones and joints; empty for a joint that is given none."""
+        return [*self.names, *(joints.get(joint, "") for joint in range(len(self.names), len(self.rest)))]
 
     @cached_property
     def rest_axes(self) -> np.ndarray:

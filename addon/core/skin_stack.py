@@ -106,6 +106,15 @@ class SkinDeformer:
         return [self.bones.names[bone] for bone in bones]
 
     @property
+    def bends(self) -> bool:
+        """Whether one of these bends in segments."""
+        return self.bones.bend and any(
+            self.bones.segments[bone] > 1
+            for bone, name in enumerate(self.bones.names)
+            if name in self.moving_bones
+        )
+
+    @property
     def last_frame(self) -> Frame | None:
         """The frame that was computed last."""
         return self._last

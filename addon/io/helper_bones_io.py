@@ -6,7 +6,9 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
+from ..core.bendy import points_of_joints
 from ..core.helper_bones import Blend
 from ..core.pose_samples import Joints
 from ..core.rig import Bones
@@ -38,31 +40,37 @@ def read_joints(rig: bpy.types.Object, bones: Bones) -> Joints:
     return Joints(bones.rest[: len(bones.names)], parents, limits)
 
 
+HELPER, CENTRE, SEGMENT = "Helper", "Centre", "Segment"
+
+
 def add_bones(
     rig: bpy.types.Object,
     parents: Sequence[str],
     heads: np.ndarray,
-    hanging: bool = True,
-    kind: str = "Helper",
+    hanging: Sequence[bool] | None = None,
+    kind: str = HELPER,
+    axes: np.ndarray | None = None,
 ) -> list[str]:
-    """Gives an armature object a helper bone for each of the `parents`. Returns their names.
+    """Gives an armature object a bone for each of the `parents`. Returns their names.
 
     heads    float [helpers, 3], armature space
-    hanging  they become children of these; otherwise they have no parent
-    kind     how their names begin: a Helper moves vertices, others move helpers
+    hanging  whether each becomes the child of its parent, or else has none; None: all do
+    kind     how their names begin; a CENTRE moves helpers, the others vertices
+    axes     float [helpers, 4, 4], armature space; None: those of the parents
     """
     names = []
     with _editing(rig) as armature:
         collection = armature.collections.get(COLLECTION) or armature.collections.new(COLLECTION)
-        for parent_name, head in zip(parents, heads, strict=True):
+        for number, (parent_name, head) in enumerate(zip(parents, heads, strict=True)):
             parent = armature.edit_bones[parent_name]
             bone = armature.edit_bones.new(_free_name(armature, kind, parent_name))
             bone.head, bone.tail = (0.0, 0.0, 0.0), (0.0, _LENGTH * parent.length, 0.0)
-            placed = parent.matrix.to_3x3().to_4x4()
+            placed = (parent.matrix if axes is None else Matrix(axes[number])).to_3x3().to_4x4()
             placed.translation = head
             bone.matrix = placed
-            bone.parent, bone.use_connect = parent if hanging else None, False
-            bone.use_deform = kind == "Helper"
+            is_child = hanging is None or hanging[number]
+            bone.parent, bone.use_connect = parent if is_child else None, False
+            bone.use_deform = kind != CENTRE
             # The motion is rigid except for the parent's size.
             bone.inherit_scale = "AVERAGE"
             collection.assign(bone)
@@ -70,6 +78,46 @@ def add_bones(
     for name in names:
         rig.pose.bones[name].rotation_mode = "QUATERNION"
     return names
+
+
+def add_segments(
+    rig: bpy.types.Object, bones: Bones, bendy: np.ndarray, hanging: Sequence[bool] | None = None
+) -> dict[int, str]:
+    """Gives an armature object a plain bone for each joint of bendy bones. Returns their names, by the index
+    of the joint in `bones`.
+
+    hanging  whether those of each bendy bone are its children, and are given keys; None: they have no
+             parents, and constraints have them follow the joints
+    """
+    names: dict[int, str] = {}
+    for number, bone in enumerate(bendy):
+        name, joints = bones.names[bone], np.flatnonzero(bones.owners == bone)[1:]
+        rest = bones.rest[joints]
+        # Where the Armature constraint, as the modifier does, takes this joint's motion alone.
+        heads = rest[:, :3, 3]
+        if hanging is None:
+            own = bones.rest[bone], float(bones.lengths[bone]), bool(bones.curved[bone])
+            heads = points_of_joints(rest, *own)
+        is_child = hanging is not None and hanging[number]
+        made = add_bones(
+            rig, [name] * len(joints), heads, [is_child] * len(joints), SEGMENT, bones.rest_axes[joints]
+        )
+        names.update(zip(map(int, joints), made, strict=True))
+        for segment in made if hanging is None else ():
+            target = rig.pose.bones[segment].constraints.new("ARMATURE").targets.new()
+            target.target, target.subtarget = rig, name
+    return names
+
+
+def without_shear(motions: np.ndarray, bones: Bones, joints: np.ndarray) -> np.ndarray:
+    """Returns `motions` [bones + joints, 4, 4], from rest, where the poses of some joints have what keys
+    have: a location, a rotation and a scale."""
+    result = motions.copy()
+    for joint, rest in zip(joints, bones.rest_axes[joints].astype(np.float64), strict=True):
+        to_rest = np.linalg.inv(rest)
+        channels = Matrix(to_rest @ motions[joint] @ rest).decompose()
+        result[joint] = rest @ np.array(Matrix.LocRotScale(*channels)) @ to_rest
+    return result
 
 
 def use_copy_of_armature(rig: bpy.types.Object) -> None:
@@ -102,7 +150,7 @@ def add_constraints(
     centred = [(name, blend) for name, blend in zip(names, blends, strict=True) if blend.is_centre]
     parents = [bones[blend.bones[blend.weights.argmax()]] for _name, blend in centred]
     heads = np.array([blend.head for _name, blend in centred])
-    centres = add_bones(rig, parents, heads, hanging=False, kind="Centre")
+    centres = add_bones(rig, parents, heads, [False] * len(parents), CENTRE)
     for (name, blend), centre in zip(centred, centres, strict=True):
         _blend(rig, centre, blend, bones, preserve_volume=False)
         follow = rig.pose.bones[name].constraints.new("COPY_LOCATION")

@@ -371,7 +371,7 @@ def test_fbx_plays_to_the_stated_error_once_it_is_imported(arm, tmp_path):
     assert_states(report, played, expected)
 
 
-@pytest.mark.parametrize("of", ["two modifiers", "in front", "bendy", "linked"])
+@pytest.mark.parametrize("of", ["two modifiers", "in front", "linked"])
 def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
     obj, path = arm
     rig = obj.modifiers["Armature"].object
@@ -379,8 +379,6 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
         obj.modifiers.new("Second", "ARMATURE").object = rig
     elif of == "in front":
         scenes.put_in_front(obj, "MIRROR", "Mirror")
-    elif of == "bendy":
-        rig.data.bones[0].bbone_segments = 4
     else:
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -393,7 +391,6 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
     sentence = {
         "two modifiers": "has several Armature modifiers",
         "in front": "Mirror changes the mesh ahead of the armature",
-        "bendy": "bone.0 bends in segments",
         "linked": "is linked, and can not have bones of its own",
     }[of]
     with pytest.raises(SinewError, match=sentence):

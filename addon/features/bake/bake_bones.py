@@ -2,7 +2,7 @@
 """A bake to bones: helper bones in addition to a rig's own, and weights, which Blender's Armature modifier
 and every engine can play. Helper bones have plain keys, or follow the pose by Blender's constraints."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -12,13 +12,13 @@ import numpy as np
 from ...attach import properties, stack, upstream_proxy
 from ...core import helper_bones, pose_helpers, pose_samples
 from ...core.errors import SinewError
-from ...core.helper_bones import POSE, HelperOptions, Motion, Report
+from ...core.helper_bones import POSE, Errors, HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
-from ...core.skin_stack import SkinStack, SkinStageFrame
+from ...core.segment_bones import SegmentErrors, SegmentReport
+from ...core.skin_stack import SkinDeformer, SkinStack, SkinStageFrame
 from ...core.stages import StageValues
 from ...core.vectors import transformed
-from ...deform import characters
-from ...deform.skinned_object import SkinnedObject
+from ...deform import characters, session
 from ...io import helper_bones_io, mesh_io
 from . import bake_state, shape_animation
 from .bake_state import Started, take_off
@@ -27,6 +27,7 @@ from .bake_state import Started, take_off
 _SAMPLING = 0.2
 # Envelopes' weights, which are computed again in each frame, may differ by this.
 _SAME_WEIGHT = 1e-3
+_SAME_SIZE = 1e-4
 # The number of random poses, besides the frames, for which helper bones are solved, and of those for testing.
 _POSES, _UNSEEN_POSES = 64, 32
 
@@ -47,10 +48,10 @@ class BoneBake(Started):
         with characters.kept_frame(bpy.context.scene):
             characters.set_frame(bpy.context.scene, frames[0])
             for obj in meshes:
-                _check_bones(obj, bake_state.posed_state_of(obj))
+                bake_state.posed_state_of(obj)
                 rigs.setdefault(_rig_of(obj), []).append(obj)
         self.frames, self.options, self.what = frames, options, ", ".join(obj.name for obj in meshes)
-        self._rigs = [_Rig(rig, own) for rig, own in rigs.items()]
+        self._rigs = [_Rig(rig, own, options) for rig, own in rigs.items()]
         self.reports: list[Report] = []
 
     def sample(self) -> Generator[float, None, None]:
@@ -62,7 +63,7 @@ class BoneBake(Started):
                     rig.take()
                 yield _SAMPLING * (number + 1) / len(self.frames)
         for number, rig in enumerate(self._rigs):
-            for share in _naming(rig.meshes, rig.solve(self.options)):
+            for share in _naming(rig.meshes, rig.solve()):
                 yield _SAMPLING + (1.0 - _SAMPLING) * (number + share) / len(self._rigs)
         self.reports = [rig.report for rig in self._rigs]
 
@@ -77,8 +78,8 @@ class BoneBake(Started):
 class _Rig:
     """An armature, and those of its meshes that are baked."""
 
-    def __init__(self, rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> None:
-        self.rig, self.meshes = rig, meshes
+    def __init__(self, rig: bpy.types.Object, meshes: list[bpy.types.Object], options: HelperOptions) -> None:
+        self.rig, self.meshes, self._options = rig, meshes, options
         self._targets: list[np.ndarray] = []
         self._rest: list[np.ndarray] = []
         self._poses: list[np.ndarray] = []
@@ -101,6 +102,10 @@ class _Rig:
             self._check_same(influences)
         else:
             self._bones, self._influences = deformers[0].bones, influences
+            self._from_rest = np.linalg.inv(self._bones.rest.astype(np.float64))
+            self._segments = SegmentErrors(
+                self._bones, _over_joints(deformers, rest), self._options.influences
+            )
             scale = np.array(self.rig.matrix_world, dtype=np.float64)[:3, :3]
             self._unit = float(np.cbrt(abs(np.linalg.det(scale))))
             self._stacks = [state.bound.skin_stack.another() for state in states]
@@ -116,6 +121,11 @@ class _Rig:
         # While only the armature moves the meshes, all frames share one array.
         is_same = bool(self._rest) and np.array_equal(together, self._rest[-1])
         self._rest.append(self._rest[-1] if is_same else together)
+        if len(self._segments.bendy):
+            motions = self._poses[-1] @ self._from_rest
+            plain = helper_bones_io.without_shear(motions, self._bones, self._segments.joints)
+            now = None if self._rest[-1] is self._rest[0] else _over_joints(deformers, rest)
+            self._segments.take(self._targets[-1], self._rest[-1], motions, plain, now)
         points = [
             self._shapes[-1][number][0] if is_same else state.shown.rest_points.copy()
             for number, state in enumerate(states)
@@ -132,15 +142,16 @@ class _Rig:
                     "to mdd or pc2"
                 )
 
-    def solve(self, options: HelperOptions) -> Generator[float, None, None]:
+    def solve(self) -> Generator[float, None, None]:
+        options = self._options
         at_frames = self._motion(self._rest, self._targets, self._poses)
         diagonal = self._unit * at_frames.diagonal
         if options.motion != POSE:
             self._targets.clear()
             self._solution = yield from helper_bones.solve(at_frames, options.of(at_frames))
-            self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal)
+            self._report(diagonal)
             return
-        rest = self._bones.rest
+        rest = self._bones.rest_axes
         motion = self._with(at_frames, _POSES, seed=1)
         solution = yield from pose_helpers.solve(motion, options.of(motion), rest)
         before, after, errors, errors_before = pose_helpers.errors_of(solution, at_frames, rest)
@@ -148,19 +159,33 @@ class _Rig:
             solution, before=before, after=after, errors=errors, errors_before=errors_before
         )
         unseen = pose_helpers.errors_of(solution, self._with(None, _UNSEEN_POSES, seed=2), rest)
-        self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal, unseen[:2])
+        self._report(diagonal, unseen[:2])
         self._targets.clear()
 
+    def _report(self, diagonal: float, unseen: tuple[Errors, Errors] | None = None) -> None:
+        self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal, unseen)
+        if len(self._segments.bendy):
+            self.report = replace(self.report, segments=self._segments.report(self.rig.name, self._unit))
+
     def _motion(self, rest: list[np.ndarray], targets: list[np.ndarray], poses: list[np.ndarray]) -> Motion:
-        from_rest = np.linalg.inv(self._bones.rest.astype(np.float64))
         moves = any(each is not rest[0] for each in rest)
         return Motion(
             np.array(rest if moves else rest[:1]),
             np.array(targets),
-            np.array([(pose @ from_rest)[:, :3] for pose in poses]),
-            joined(self._influences, [0] * len(self._influences)),
-            np.stack([self._bones.envelopes.heads, self._bones.envelopes.tails], axis=1).astype(np.float64),
+            np.array([(pose @ self._from_rest)[:, :3] for pose in poses]),
+            self._segments.influences,
+            self._heads_and_tails(),
+            self._bones.owners,
         )
+
+    def _heads_and_tails(self) -> np.ndarray:
+        """float64 [bones + joints, 2, 3]: heads and tails; a joint's tail is the next joint's head."""
+        envelopes, heads = self._bones.envelopes, self._bones.rest[:, :3, 3]
+        tails = np.append(heads[1:], heads[-1:], axis=0)
+        last = np.diff(self._bones.owners, append=-1) != 0
+        tails[last] = heads[last]
+        tails[: len(envelopes.tails)] = envelopes.tails
+        return np.stack([heads, tails], axis=1).astype(np.float64)
 
     def _with(self, at_frames: Motion | None, count: int, seed: int) -> Motion:
         """Adds random poses, after those of the frames if these are given."""
@@ -169,6 +194,11 @@ class _Rig:
         seen = np.array(self._poses)
         poses = seen[np.arange(count) % frames]
         poses[:, :bones] = pose_samples.sampled(seen[:, :bones], joints, count, seed)
+        # A bendy bone's joints move along with it, bent as at the frame.
+        owners, at_frames_of = self._bones.owners[bones:], seen[np.arange(count) % frames]
+        poses[:, bones:] = (
+            poses[:, owners] @ np.linalg.pinv(at_frames_of[:, owners]) @ at_frames_of[:, bones:]
+        )
         rest = [self._rest[number % frames] for number in range(count)]
         targets = [self._shape_in(pose, number % frames) for number, pose in enumerate(poses)]
         if at_frames is None:
@@ -186,34 +216,60 @@ class _Rig:
 
     def place(self, frames: Sequence[float]) -> None:
         solution, bones = self._solution, self._bones
-        own = [bones.names[bone] for bone in solution.parents]
-        follows_pose = bool(solution.blends)
+        poses, follows_pose = np.array(self._poses), self._options.motion == POSE
         # Only visible objects can be edited.
         with nullcontext() if self.rig.visible_get() else characters.shown([self.rig]):
             helper_bones_io.use_copy_of_armature(self.rig)
-            names = helper_bones_io.add_bones(self.rig, own, solution.heads, hanging=not follows_pose)
+            bendy = self._segments.bendy
+            hanging = None if follows_pose else [_has_one_size(poses[:, bone]) for bone in bendy]
+            segments = helper_bones_io.add_segments(self.rig, bones, bendy, hanging)
+            movers = bones.names_with(segments)
+            own = [movers[bone] for bone in solution.parents]
+            unparented = [False] * len(own) if follows_pose else None
+            helpers = helper_bones_io.add_bones(self.rig, own, solution.heads, unparented)
             if follows_pose:
-                helper_bones_io.add_constraints(self.rig, names, solution.blends, bones.names)
+                helper_bones_io.add_constraints(self.rig, helpers, solution.blends, movers)
         if not follows_pose:
-            motions = np.zeros((*solution.motions.shape[:2], 4, 4))
-            motions[:, :, :3], motions[:, :, 3, 3] = solution.motions, 1.0
-            parents = np.array(self._poses)[:, solution.parents]
+            joints = np.array(list(segments), dtype=int)
+            motions = np.zeros((len(poses), len(joints) + len(helpers), 4, 4))
+            motions[:, : len(joints)] = poses[:, joints] @ self._from_rest[joints]
+            motions[:, len(joints) :, :3], motions[:, len(joints) :, 3, 3] = solution.motions, 1.0
+            parents = poses[:, [*bones.owners[joints], *solution.parents]]
             times = shape_animation.key_times(frames)
-            helper_bones_io.write_keys(self.rig, names, motions, parents, times)
-        first = 0
-        for obj in self.meshes:
-            count = len(obj.data.vertices)
-            rows = slice(first, first + count)
-            first += count
+            helper_bones_io.write_keys(self.rig, [*segments.values(), *helpers], motions, parents, times)
+        for obj, rows in self._rows():
             _use_armature_modifier(obj, self.rig)
             helper_bones_io.write_weights(
-                obj, bones, [*bones.names, *names], solution.bones[rows], solution.weights[rows]
+                obj, bones, [*movers, *helpers], solution.bones[rows], solution.weights[rows]
             )
             for name, errors in (
                 (helper_bones_io.ERRORS, solution.errors),
                 (helper_bones_io.ERRORS_BEFORE, solution.errors_before),
             ):
                 mesh_io.write_values(obj.data, name, self._unit * errors[rows])
+
+    def _rows(self) -> Iterator[tuple[bpy.types.Object, slice]]:
+        """The meshes, each with its vertices among those of all."""
+        first = 0
+        for obj in self.meshes:
+            end = first + len(obj.data.vertices)
+            yield obj, slice(first, end)
+            first = end
+
+    def replace_bendy_bones(self) -> list[SegmentReport]:
+        """Has plain bones that follow the joints of bendy bones move the meshes, which Sinew still deforms;
+        empty where none bends."""
+        if not len(self._segments.bendy):
+            return []
+        with nullcontext() if self.rig.visible_get() else characters.shown([self.rig]):
+            helper_bones_io.use_copy_of_armature(self.rig)
+            names = helper_bones_io.add_segments(self.rig, self._bones, self._segments.bendy)
+        movers, (slots, weights) = self._bones.names_with(names), self._segments.influences.padded()
+        for obj, rows in self._rows():
+            if obj.data.users > 1:
+                bake_state.use_copy_of_mesh(obj)
+            helper_bones_io.write_weights(obj, self._bones, movers, slots[rows], weights[rows])
+        return [self._segments.report(self.rig.name, self._unit)]
 
 
 def _naming(
@@ -258,10 +314,49 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
     return rig
 
 
-def _check_bones(obj: bpy.types.Object, state: SkinnedObject) -> None:
-    """Raises SinewError for bendy bones, which no engine has."""
-    deformer = state.bound.first_deformer
-    bendy = [name for name, n in zip(deformer.bones.names, deformer.bones.segments, strict=True) if n > 1]
-    found = [name for name in bendy if name in deformer.moving_bones]
-    if found:
-        raise SinewError(f"{obj.name}: {', '.join(found)} bends in segments; bake to mdd or pc2")
+def _over_joints(deformers: Sequence[SkinDeformer], rest: Sequence[np.ndarray]) -> Influences:
+    """The influences of meshes of one armature, of its bones and of the joints of bendy bones.
+
+    rest  float [vertices, 3] of each, armature space
+    """
+    found = [d.weighting.influences_over_joints(points) for d, points in zip(deformers, rest, strict=True)]
+    return joined(found, [0] * len(found))
+
+
+def _has_one_size(poses: np.ndarray) -> bool:
+    """Whether a bone's axes have one length and are perpendicular in all poses [frames, 4, 4], so that its
+    children are not sheared."""
+    axes = poses[:, :3, :3]
+    products = axes.transpose(0, 2, 1) @ axes
+    sizes = products[:, :1, :1]
+    return bool((np.abs(products - sizes * np.identity(3)) <= _SAME_SIZE * sizes).all())
+
+
+def replace_bendy_bones(
+    meshes: Sequence[bpy.types.Object], frames: Sequence[float], influences: int
+) -> tuple[list[SegmentReport], list[str]]:
+    """Puts plain bones in place of bendy ones, for an exporter. They follow the joints by constraints, so
+    that all actions move them. Returns, for each armature, what that leaves of the shapes at the frames; and
+    a sentence for each mesh that keeps its bendy bones.
+
+    influences  of a vertex, at most, that will be exported
+    """
+    found: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+    kept: list[str] = []
+    for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+        try:
+            if state.shown.frames[0] is not None and state.bound.first_deformer.bends:
+                found.setdefault(_rig_of(obj), []).append(obj)
+        except SinewError as error:
+            kept.append(f"{error}; its bendy bones are exported as straight ones")
+    scene, reports = bpy.context.scene, []
+    rigs = [_Rig(rig, own, HelperOptions(influences=influences)) for rig, own in found.items()]
+    with characters.kept_frame(scene):
+        for frame in frames if rigs else ():
+            characters.set_frame(scene, frame)
+            for rig in rigs:
+                rig.take()
+    for rig in rigs:
+        reports += rig.replace_bendy_bones()
+    session.refresh(bpy.context)
+    return reports, kept

@@ -80,6 +80,11 @@ def collect(context: bpy.types.Context) -> tuple[list[Skinning], list[str]]:
             continue
         try:
             found.append(_skinning_of(obj, depsgraph))
+            if session.states_of([obj], depsgraph)[0][1].bound.first_deformer.bends:
+                left_out.append(
+                    f"{obj.name}: exported without the bends of its bendy bones; run `sinew export`, or bake "
+                    "to bones first"
+                )
         except SinewError as error:
             left_out.append(f"{obj.name}: exported without Sinew's skinning data: {error}")
     return found, left_out
