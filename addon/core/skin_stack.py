@@ -38,6 +38,7 @@ class Frame:
     scale_rule        name of a scale rule
     mix               name of the second method, mixed in by the mix weights; empty for none
     parameters        values of parameters of both methods, by their full names
+    turns             float32 [bones, 4], as sinew.Deformer.deform takes them; None: unknown, or not asked for
     """
 
     method: str
@@ -47,6 +48,7 @@ class Frame:
     scale_rule: str = BLENDER_4.name
     mix: str = ""
     parameters: dict[str, Value] = field(default_factory=dict)
+    turns: np.ndarray | None = None
 
 
 @dataclass(slots=True)
@@ -175,6 +177,7 @@ class SkinDeformer:
             rest_inverses=self._rest_from_armature,
             parameters=frame.parameters or None,
             parents=self._parents_of(frame),
+            turns=frame.turns,
         )
         return True
 
@@ -243,12 +246,13 @@ class SkinDeformer:
             rest_inverses=rest_inverses,
             parameters=frame.parameters or None,
             parents=self._parents_of(frame),
+            turns=frame.turns,
         )
 
     def _parents_of(self, frame: Frame) -> np.ndarray | None:
         """Returns each bone's parent where signs come from the hierarchy."""
-        signs = (frame.parameters.get(f"{name}.signs") for name in (frame.method, frame.mix))
-        return self.bones.twists.parents if "hierarchy" in signs else None
+        follows = follows_hierarchy(frame.method, frame.mix, frame.parameters)
+        return self.bones.twists.parents if follows else None
 
     def _take_new_data(self, frame: Frame) -> bool:
         """Whether the methods' vertex data has changed; meshes are then packed again."""
@@ -300,6 +304,11 @@ class SkinDeformer:
         )
 
 
+def follows_hierarchy(method: str, mix: str, parameters: Mapping[str, Value]) -> bool:
+    """Whether signs of rotations come from the hierarchy."""
+    return any(parameters.get(f"{name}.signs") == "hierarchy" for name in (method, mix))
+
+
 def _same(a: Frame, b: Frame) -> bool:
     return (
         (a.method, a.mix, a.parameters) == (b.method, b.mix, b.parameters)
@@ -307,6 +316,7 @@ def _same(a: Frame, b: Frame) -> bool:
         and are_equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
         and are_equal(a.bones_from_model, b.bones_from_model)
+        and np.array_equal(a.turns, b.turns)
     )
 
 
@@ -330,6 +340,7 @@ class SkinStageFrame:
     model_from_bones  given where a scale is 0: as in Blender, all vertices are then at the origin of armature
                       space before the bones move them
     twists            inputs of the stage twist_spread, of the first that takes part; empty where it is off
+    turns             as in Frame
     """
 
     method: str
@@ -340,6 +351,7 @@ class SkinStageFrame:
     parameters: dict[str, Value] = field(default_factory=dict)
     model_from_bones: np.ndarray | None = None
     twists: TwistInputs = ()
+    turns: np.ndarray | None = None
 
 
 def _twists(frames: Sequence[SkinStageFrame | None]) -> list[TwistInputs]:
@@ -475,7 +487,7 @@ class SkinStack:
                 before = self._frames[number] if number < len(self._frames) else None
                 changed |= before is None or not are_equal(back, before.model_from_bones)
             is_end = skin_stage.deformer is self._end
-            own = (frame.scale_rule, frame.mix, frame.parameters)
+            own = (frame.scale_rule, frame.mix, frame.parameters, frame.turns)
             changed |= skin_stage.deformer.deform(
                 Frame(frame.method, frame.pose, frame.bones_from_model, start, *own),
                 out if is_end else None,

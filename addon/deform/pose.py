@@ -12,7 +12,7 @@ from ..core import icons, parameters
 from ..core.errors import SinewError
 from ..core.rig import Bones
 from ..core.scale_rule import BLENDER_4
-from ..core.skin_stack import NO_STAGES, SkinStageFrame
+from ..core.skin_stack import NO_STAGES, SkinStageFrame, follows_hierarchy
 from ..core.stages import ORDER, StageValues
 from ..core.twist_spread import TwistInputs
 from ..core.vectors import SAME_SPACE
@@ -79,7 +79,10 @@ def read(
         if settings.twist_spread.enabled and all(frame is None for frame in frames):
             # The stage follows the bones of the first that takes part.
             twists = armature_io.read_twists(armature, stage.deformer.bones)
-        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values, back, twists))
+        turns = None
+        if follows_hierarchy(own, mix, values):
+            turns = armature_io.read_turns(armature, stage.deformer.bones)
+        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values, back, twists, turns))
     return frames
 
 

@@ -129,6 +129,34 @@ def read_twists(evaluated_armature: bpy.types.Object, bones: Bones) -> TwistInpu
     return tuple(inputs)
 
 
+def read_turns(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray | None:
+    """Returns float32 [bones, 4]: the rotation against its parent, in armature space, of each bone whose own
+    Euler angles or axis and angle may go beyond half a turn, as sinew.Deformer.deform takes it. None for none."""
+    pose_bones, count = evaluated_armature.pose.bones, len(bones.names)
+    modes = np.empty(count, np.int32)
+    eulers, around_axes = np.empty((count, 3), np.float32), np.empty((count, 4), np.float32)
+    pose_bones.foreach_get("rotation_mode", modes)
+    pose_bones.foreach_get("rotation_euler", eulers.ravel())
+    pose_bones.foreach_get("rotation_axis_angle", around_axes.ravel())
+    # Three angles of at most a quarter of a turn do not add up to more than half.
+    by_euler = (modes > 0) & (np.abs(eulers).max(axis=1) > np.pi / 2)
+    by_axis = (modes < 0) & (np.abs(around_axes[:, 0]) > np.pi / 2)
+    turns = np.zeros((count, 4), np.float32)
+    for bone in np.flatnonzero(by_euler | by_axis):
+        told = _rotation_told(pose_bones[bone])
+        turns[bone] = told[0], *(bones.rest[bone, :3, :3] @ told[1:])
+    return turns if turns.any() else None
+
+
+def _rotation_told(bone: bpy.types.PoseBone) -> np.ndarray:
+    """Returns the rotation of a bone's channels as (w, x, y, z), where w < 0 is the longer way."""
+    if bone.rotation_mode != "AXIS_ANGLE":
+        return np.array(bone.rotation_euler.to_quaternion())
+    angle, *axis = bone.rotation_axis_angle
+    # A Quaternion of mathutils would take the shorter way.
+    return np.array([np.cos(angle / 2), *(np.sin(angle / 2) * Vector(axis).normalized())])
+
+
 def read_limits(armature: bpy.types.Object) -> dict[str, np.ndarray]:
     """Returns the limits of rotation of each bone that has some, as battery.Limits: those of inverse
     kinematics, or of a Limit Rotation in its own space."""

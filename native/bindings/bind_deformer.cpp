@@ -277,6 +277,18 @@ Parameters checked_parameters(const Deformer& deformer, const py::object& parame
     return values;
 }
 
+std::vector<Quat<float>> checked_turns(const py::object& turns) {
+    std::vector<Quat<float>> result;
+    if (turns.is_none()) return result;
+    const auto rows = checked_rows<float>(turns, "turns", 4, "None or float32 [bones, 4]");
+    for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+        const float* const row = rows.data(i, 0);
+        check_finite(row, 4, "turns", i);
+        result.emplace_back(row[0], row[1], row[2], row[3]);
+    }
+    return result;
+}
+
 }  // namespace
 
 void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_t least) {
@@ -288,7 +300,7 @@ void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
                                const py::object& threads, const py::object& bones_from_model,
                                const py::object& rest_inverses, const py::object& parameters,
-                               const py::object& parents) {
+                               const py::object& parents, const py::object& turns) {
     DeformArguments arguments;
     arguments.bones = rest_inverses.is_none() ? checked_affines(bone_transforms, "bone_transforms")
                                               : posed_from_rest(bone_transforms, rest_inverses);
@@ -300,7 +312,8 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
     options.mix_parameters = arguments.values.of_mix;
     if (!parents.is_none()) {
         const auto of_bones = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
-        arguments.rotations = continued_rotations(Skeleton(as_span(of_bones)), arguments.bones);
+        arguments.rotations =
+            continued_rotations(Skeleton(as_span(of_bones)), arguments.bones, checked_turns(turns));
         options.rotations = arguments.rotations;
     }
     options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
@@ -315,9 +328,9 @@ namespace {
 py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone_transforms, const Out& out,
                           const Threads& threads, const OptionalArrayLike& bones_from_model,
                           const OptionalArrayLike& rest_inverses, const ParameterValues& parameters,
-                          const OptionalArrayLike& parents) {
+                          const OptionalArrayLike& parents, const OptionalArrayLike& turns) {
     const DeformArguments arguments = checked_deform(deformer, bone_transforms, threads, bones_from_model,
-                                                     rest_inverses, parameters, parents);
+                                                     rest_inverses, parameters, parents, turns);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const auto to = as_points_to_write(points);
     deformer.call([&] { static_cast<void>(deformer.deform(arguments.bones, arguments.options, to)); });
@@ -392,7 +405,7 @@ mix: None, or (name of another method, weights): weights float32 [vertices] are 
 Other threads may deform meanwhile: each of their results has either the old points or the new ones.)")
         .def("deform", &deform, "bone_transforms"_a, "out"_a = py::none(), "threads"_a = py::none(),
              "bones_from_model"_a = py::none(), "rest_inverses"_a = py::none(), "parameters"_a = py::none(),
-             "parents"_a = py::none(),
+             "parents"_a = py::none(), "turns"_a = py::none(),
              R"(The deformed points, float32 [vertices, 3], model space.
 
 bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
@@ -405,6 +418,9 @@ parameters: a dict of values of methods' parameters by their full names, METHOD.
     effect.
 parents: int32 [bones], the parent of each bone, which precedes it, -1 for none: where the parameter `signs` is
     "hierarchy", rotations add up along chains, beyond half a turn. None: each bone turns the shorter way.
+turns: float32 [bones, 4] or fewer bones, the rotation of each against its parent in the space of the bones, as
+    its channels give it: a unit quaternion (w, x, y, z) whose sign says whether the bone went the longer way. 0:
+    unknown. One that is over 5 degrees from the bone has no effect, nor has any without `parents`.
 
 A vertex without influences is not moved.)");
 }

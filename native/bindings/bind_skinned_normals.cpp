@@ -37,9 +37,10 @@ using Deformed = Typed<
 Deformed deform(const Timed<SkinnedNormals>& skinned, const ArrayLike& bone_transforms,
                 const Threads& threads, const OptionalArrayLike& bones_from_model,
                 const OptionalArrayLike& rest_inverses, const ParameterValues& parameters,
-                const OptionalArrayLike& parents) {
-    const DeformArguments arguments = checked_deform(skinned.deformer(), bone_transforms, threads,
-                                                     bones_from_model, rest_inverses, parameters, parents);
+                const OptionalArrayLike& parents, const OptionalArrayLike& turns) {
+    const DeformArguments arguments =
+        checked_deform(skinned.deformer(), bone_transforms, threads, bones_from_model, rest_inverses,
+                       parameters, parents, turns);
     const std::size_t frames = skinned.frame_count();
     auto points = checked_out(py::none(), skinned.deformer().vertex_count());
     auto normals = checked_out(py::none(), frames);
@@ -58,9 +59,10 @@ py::array_t<float> deform_normals(const Timed<SkinnedNormals>& skinned, const Ar
                                   const ArrayLike& posed_points, const Out& out, const Threads& threads,
                                   const OptionalArrayLike& bones_from_model,
                                   const OptionalArrayLike& rest_inverses, const ParameterValues& parameters,
-                                  const OptionalArrayLike& parents) {
-    const DeformArguments arguments = checked_deform(skinned.deformer(), bone_transforms, threads,
-                                                     bones_from_model, rest_inverses, parameters, parents);
+                                  const OptionalArrayLike& parents, const OptionalArrayLike& turns) {
+    const DeformArguments arguments =
+        checked_deform(skinned.deformer(), bone_transforms, threads, bones_from_model, rest_inverses,
+                       parameters, parents, turns);
     const auto points = checked_points(posed_points, "points", skinned.deformer().vertex_count());
     auto normals = checked_out(out, skinned.frame_count());
     check_apart(normals, points);
@@ -99,7 +101,7 @@ method, mix: as for Deformer.)")
         .def(
             "deform", &deform, "bone_transforms"_a, "threads"_a = py::none(),
             "bones_from_model"_a = py::none(), "rest_inverses"_a = py::none(), "parameters"_a = py::none(),
-            "parents"_a = py::none(),
+            "parents"_a = py::none(), "turns"_a = py::none(),
             R"((points, normals, tangents): the deformed points, float32 [vertices, 3]; normals of unit length, float32
 [frames, 3]; the same for tangents, or None.
 
@@ -108,7 +110,7 @@ order of a face's vertices. Where the blend collapses the plane of a normal to a
         .def(
             "deform_normals", &deform_normals, "bone_transforms"_a, "points"_a, "out"_a = py::none(),
             "threads"_a = py::none(), "bones_from_model"_a = py::none(), "rest_inverses"_a = py::none(),
-            "parameters"_a = py::none(), "parents"_a = py::none(),
+            "parameters"_a = py::none(), "parents"_a = py::none(), "turns"_a = py::none(),
             R"(The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
 
 points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.

@@ -70,6 +70,6 @@ void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
                                const py::object& threads, const py::object& bones_from_model,
                                const py::object& rest_inverses, const py::object& parameters,
-                               const py::object& parents);
+                               const py::object& parents, const py::object& turns);
 
 }  // namespace sinew::bindings

@@ -516,12 +516,16 @@ def add_further_armatures(
 
 
 def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
-    rng = numbers(seed, "pose")
+    rng, turning = numbers(seed, "pose"), numbers(seed, "turns")
     scaled, mirrored = has(seed, "scale", features), has(seed, "mirror", features, share=0.2)
     for bone in armature.pose.bones:
         bone.rotation_mode = "QUATERNION"
         bone.rotation_quaternion = rng.normal(0, 1, 4)
         bone.rotation_quaternion.normalize()
+        if turning.random() < 0.2:
+            bone.rotation_mode = str(turning.choice(["XYZ", "ZYX", "AXIS_ANGLE"]))
+            bone.rotation_euler = turning.uniform(-4, 4, 3)
+            bone.rotation_axis_angle = turning.uniform(-6, 6), *turning.normal(0, 1, 3)
         bone.location = rng.normal(0, 0.2, 3)
         scale, sign, chosen = rng.uniform(0.5, 1.8, 3), rng.choice((1, -1), 3), rng.random()
         if scaled and chosen < 0.6:
@@ -631,7 +635,8 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
         check_coordinates(obj, expected, outcome, route)
         settings = properties.of(obj)
         settings.sdef.interpolation = str(numbers(seed, "sdef").choice(["nlerp", "slerp"]))
-        settings.cor.signs = settings.sbs.signs = str(numbers(seed, "signs").choice(["blender", "hierarchy"]))
+        signs = str(numbers(seed, "signs").choice(["blender", "hierarchy"]))
+        settings.cor.signs = settings.sbs.signs = settings.dib.signs = signs
         for method in OTHERS:
             try:
                 error = error_to_reference(obj, armature, method, seed, outcome, route)

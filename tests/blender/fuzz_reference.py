@@ -221,7 +221,8 @@ def _by_one_method(
             frame.pose.astype(np.float64) @ np.linalg.inv(deformer.bones.rest.astype(np.float64)),
             deformer.bones.rest_axes.astype(np.float64),
             data,
-            frame.parameters | {f"{method}.parents": deformer.bones.twists.parents},
+            frame.parameters
+            | {f"{method}.parents": deformer.bones.twists.parents, f"{method}.turns": frame.turns},
         )
 
     deformed, margins = by(data)

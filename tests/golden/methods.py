@@ -158,8 +158,8 @@ def integral(vector):  # takes the linear part of a twist of this rotation vecto
     return np.eye(3) + (1 - np.cos(angle)) / angle**2 * k + (angle - np.sin(angle)) / angle**3 * k @ k
 
 
-def logarithm(q, translation):  # of a rigid motion: rotation vector, at most 180 degrees, and linear part
-    q = -q if q[0] < 0 else q
+def logarithm(q, translation, is_kept=False):  # of a rigid motion: rotation vector and linear part
+    q = -q if q[0] < 0 and not is_kept else q  # at most 180 degrees, unless the sign is kept
     sine = np.linalg.norm(q[1:])
     vector = 2 * np.arctan2(sine, q[0]) / sine * q[1:] if sine > 1e-12 else 2 * q[1:]
     return vector, np.linalg.solve(integral(vector), translation)
@@ -177,17 +177,18 @@ def log(x, of, w, pose, kept):
     return rotation_of(q) @ x + t
 
 
-def dib(x, of, w, pose, kept):
+def dib(x, of, w, pose, kept, signs="blender"):
     """From the blend of dq on: corrected by the mean of the motions that are left, until nothing is."""
-    real, dual = dual_blend(x, of, w, pose)
+    is_kept = signs == "hierarchy"
+    real, dual = dual_blend(x, of, w, pose, signs)
     length = np.linalg.norm(real)
     q, t = real / length, 2 * multiply(dual, real * [1, -1, -1, -1])[1:] / length**2
     moved = translations(x, of, pose)
     for _step in range(100):
         inverse, rotation = q * [1, -1, -1, -1], rotation_of(q)
         left = [
-            logarithm(multiply(inverse, each), rotation.T @ (to - t))
-            for each, to in zip(pose.quaternion[of], moved, strict=True)
+            logarithm(multiply(inverse, each), rotation.T @ (to - t), is_kept)
+            for each, to in zip(signed(of, w, pose, signs), moved, strict=True)
         ]
         vector, linear = (w @ np.array(part) for part in zip(*left, strict=True))
         step, by = exponential(vector, linear)

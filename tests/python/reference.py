@@ -144,19 +144,32 @@ def in_one_hemisphere(quaternions, weights):
     return np.array(signs), margin
 
 
-def along_chain(transforms, parents):
+def along_chain(transforms, parents, turns=None):
     """Quaternions [bones, 4] with the signs that continue the parents', and how far each, and those before
-    it, are from a tie. A bone that mirrors has its parent's."""
+    it, are from a tie. A bone that mirrors has its parent's.
+
+    turns  [bones, 4] or fewer, as sinew.Deformer.deform takes them: within 5 degrees of a bone their signs
+           count
+    """
     quaternions, margins = [], []
-    for matrix, parent in zip(transforms[:, :3, :3], parents, strict=True):
+    told = np.zeros((len(transforms), 4))
+    if turns is not None:
+        told[: len(turns)] = turns
+    for matrix, parent, turn in zip(transforms[:, :3, :3], parents, told, strict=True):
         at_root = np.array([1.0, 0, 0, 0]), 1.0
         before, margin = at_root if parent < 0 else (quaternions[parent], margins[parent])
         q = before
         if np.linalg.det(matrix) >= 0.0:
             lengths = np.linalg.norm(matrix, axis=0)
             q = quaternion_by_blender(matrix / np.where(lengths > 0.0, lengths, 1.0))
-        quaternions.append(-q if q @ before < 0.0 else q)
-        margins.append(min(margin, abs(q @ before)))
+        along = q @ before
+        if turn.any():
+            by_turn = q @ (left_multiplication(before) @ turn) / np.linalg.norm(turn)
+            if abs(by_turn) > np.cos(np.radians(2.5)):
+                along = by_turn
+            margin = min(margin, 1e3 * abs(abs(by_turn) - np.cos(np.radians(2.5))))
+        quaternions.append(-q if along < 0.0 else q)
+        margins.append(min(margin, abs(along)))
     return np.array(quaternions), np.array(margins)
 
 
@@ -298,10 +311,16 @@ def sbs(point, motions, rotations, weights, heads, kept=None):
     return result, min(margin, of_signs)
 
 
-def logarithms(rotations, translations):
+def logarithms(rotations, translations, longer=None):
     """Of rigid motions [n]: rotation vectors, by scipy, and what the exponential's integral over unit time
-    takes to the translations."""
+    takes to the translations.
+
+    longer  bool [n]: those that take the longer way
+    """
     vectors = Rotation.from_matrix(rotations).as_rotvec()
+    if longer is not None:
+        angles = np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
+        vectors = np.where(longer[:, None], vectors * (1.0 - 2.0 * np.pi / angles), vectors)
     return vectors, np.linalg.solve(integral(vectors), translations[..., None])[..., 0]
 
 
@@ -315,18 +334,28 @@ def integral(vectors):
     return np.eye(3) + (1.0 - np.cos(angle)) / angle**2 * k + (angle - np.sin(angle)) / angle**3 * (k @ k)
 
 
-def dib(point, motions, rotations, weights):
-    """Iterated to the end. The ties are at 180 degrees from the result, and where the iteration is slow."""
+def dib(point, motions, rotations, weights, kept=None):
+    """Iterated to the end. The ties are at 180 degrees from the result, at 360 where signs are kept, and where
+    the iteration is slow."""
     quaternions, shifts = rigid_terms(point, motions, rotations)
-    rotated, translated, margin = blended_motion(quaternions, shifts, weights)
+    rotated, translated, margin = blended_motion(quaternions, shifts, weights, kept)
+    most, longer, blended = np.pi, None, None
+    if kept is not None:
+        signs, _margin = signs_of(quaternions, weights, kept)
+        most, quaternions = 2.0 * np.pi, signs[:, None] * quaternions
+        blended = weights @ quaternions
     steps = 0
     while steps < 200:
         steps += 1
-        angular, linear = logarithms(rotated.T @ rotations, (shifts - translated) @ rotated)
+        if blended is not None:
+            near = quaternion(rotated)
+            blended = -near if near @ blended < 0.0 else near
+            longer = quaternions @ blended < 0.0
+        angular, linear = logarithms(rotated.T @ rotations, (shifts - translated) @ rotated, longer)
         vector, along = weights @ angular, weights @ linear
         translated = translated + rotated @ (integral(vector[None])[0] @ along)
         rotated = rotated @ Rotation.from_rotvec(vector).as_matrix()
-        margin = min(margin, np.pi - np.linalg.norm(angular, axis=1).max())
+        margin = min(margin, most - np.linalg.norm(angular, axis=1).max())
         if max(np.abs(vector).max(), np.abs(along).max() / max(1.0, np.abs(linear).max())) < 1e-9:
             break
     return rotated @ point + translated, margin if steps < 40 else 0.0
@@ -403,7 +432,7 @@ def deform(
     """Deformed points float64 [vertices, 3], and [vertices] how far each is from a tie of signs.
 
     vertex_data  as sinew.Binding takes it
-    parameters   as sinew.Deformer.deform takes them; with them METHOD.parents, its argument `parents`
+    parameters   as sinew.Deformer.deform takes them; with them METHOD.parents and METHOD.turns, its arguments
 
     A vertex without influences, or with all weights zero, stays.
     """
@@ -417,8 +446,9 @@ def deform(
     points = np.asarray(rest_points, np.float64).copy()
     margins = np.ones(len(points))
     parents = values.pop("parents", np.full(len(transforms), -1))
+    turns = values.pop("turns", None)
     along = values.pop("signs", "blender") == "hierarchy"
-    quaternions, of_chain = along_chain(transforms, parents) if along else (None, None)
+    quaternions, of_chain = along_chain(transforms, parents, turns) if along else (None, None)
     for vertex in range(len(points)):
         span = slice(offsets[vertex], offsets[vertex + 1])
         share = np.asarray(weights[span], np.float64)

@@ -458,7 +458,7 @@ def plain_mesh(values):
 def test_meshes(data):
     vertices = data.draw(st.sampled_from([0, 1, 2, 5, 20]))
     each, bones = data.draw(st.integers(0, 4)), data.draw(st.integers(1, 4))
-    d = Draw(data.draw, 16)
+    d = Draw(data.draw, 18)
     mesh = [*d.skin(vertices, each, bones), d.array(bones, 4, 4, optional=True)]
     binding = made(sinew.Binding, [*(given for given, _ in mesh), LINEAR])
     if binding is None:
@@ -475,20 +475,26 @@ def test_meshes(data):
     inverses = d.array(binding.bone_count, 4, 4, optional=True)
     key = st.sampled_from(["sdef.interpolation", "sdef", "", "dq.interpolation", b"sdef", 3, None, (1,)])
     value = d.one(st.just("slerp"))
-    parameters = d.one(st.sampled_from([None, {}, {"sdef.interpolation": value}, {data.draw(key): value}]))
-    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0], parameters])
+    of_chain = {f"{name}.signs": "hierarchy" for name in ("dq", "cor", "sbs", "dib")}
+    chosen = [None, {}, of_chain, {"sdef.interpolation": value}, {data.draw(key): value}]
+    parameters = d.one(st.sampled_from(chosen))
+    count = binding.bone_count
+    parents = d.one(st.sampled_from([None, [*range(-1, count - 1)], [-1], [0] * count]))
+    turns = d.array(count, 4, optional=True)
+    options = [parameters, parents, turns[0]]
+    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0], *options])
     if result is None:
         return
     assert result.shape == (binding.vertex_count, 3)
     plain = sinew.Deformer(sinew.Binding(*plain_mesh(mesh), LINEAR), method, mix)
     if moved:
         plain.set_rest_points(np.array(points[1], np.float32, order="C"))
-    types = (np.float32, np.float32, np.float64)
-    pose, space, inverses = (
+    types = (np.float32, np.float32, np.float64, np.float32)
+    pose, space, inverses, turns = (
         given if array is None else np.array(array, dtype, order="C")
-        for (given, array), dtype in zip((pose, space, inverses), types, strict=True)
+        for (given, array), dtype in zip((pose, space, inverses, turns), types, strict=True)
     )
-    same(result, plain.deform(pose, None, 1, space, inverses, parameters))
+    same(result, plain.deform(pose, None, 1, space, inverses, parameters, parents, turns))
 
 
 SHEETS = {
@@ -546,7 +552,7 @@ def test_normals(data):
 @given(st.data())
 def test_skinned_normals(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 5, 20])), data.draw(st.integers(1, 4))
-    d = Draw(data.draw, 11)
+    d = Draw(data.draw, 13)
     mesh = np.zeros((vertices, 3)), range(vertices + 1), np.arange(vertices) % bones, np.ones(vertices)
     binding = sinew.Binding(*mesh, vertex_data=LINEAR)
     frames = data.draw(st.sampled_from([vertices, 3 * vertices]))
@@ -557,7 +563,7 @@ def test_skinned_normals(data):
     )
     if skinned is None:
         return
-    pose, options = d.array(bones, 4, 4)[0], [d.threads(), *(d.one(st.none()) for _ in range(3))]
+    pose, options = d.array(bones, 4, 4)[0], [d.threads(), *(d.one(st.none()) for _ in range(5))]
     result = attempt(skinned.deform, [pose, *options])
     if result is not None:
         assert (result[0].shape, result[1].shape) == ((vertices, 3), (skinned.frame_count, 3))

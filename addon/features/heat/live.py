@@ -157,6 +157,7 @@ class Moment:
                     frame,
                     pose=poses(stage.deformer.bones),
                     twists=tuple((*of_bone[:2], *NOT_TOLD) for of_bone in frame.twists),
+                    turns=None,
                 )
                 for stage, frame in zip(part.skin_stack.skin_stages, own, strict=False)
             ]

@@ -16,7 +16,8 @@ struct Signs {
          .label = "Signs",
          .description =
              "Which way a vertex turns between bones that are more than half a turn apart: the shorter "
-             "one, as in Blender, or through the bones between them, for chains that twist or coil",
+             "one, as in Blender, or through the bones between them and as far as their own angles say, for "
+             "chains that twist or coil",
          .unit = "",
          .kind = ParameterKind::choice,
          .choices = kChoices}};

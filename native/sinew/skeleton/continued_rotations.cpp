@@ -2,6 +2,7 @@
 #include "sinew/skeleton/continued_rotations.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "sinew/transform/split_scale.h"
 
@@ -17,10 +18,21 @@ Quat<double> rotation_of(const Mat3<double>& linear) {
     return quat_of_columns(axes);
 }
 
+/// Whether `rotation` is against `before` in the other hemisphere, or, where `turn` is known, in that of -turn.
+bool is_away(const Quat<double>& rotation, const Quat<double>& before, const Quat<double>& turn) {
+    const double length = glm::length(turn);
+    if (length > 0.0) {
+        const double along = glm::dot(before * turn, rotation) / length;
+        if (std::abs(along) > std::cos(0.5 * kTurnsAgree)) return along < 0.0;
+    }
+    return glm::dot(rotation, before) < 0.0;
+}
+
 }  // namespace
 
 std::vector<Quat<float>> continued_rotations(const Skeleton& skeleton,
-                                             std::span<const Affine<float>> posed_from_rest) {
+                                             std::span<const Affine<float>> posed_from_rest,
+                                             std::span<const Quat<float>> turns) {
     const std::size_t count = std::min(skeleton.bone_count(), posed_from_rest.size());
     std::vector<Quat<double>> rotations;
     std::vector<Quat<float>> result;
@@ -30,7 +42,8 @@ std::vector<Quat<float>> continued_rotations(const Skeleton& skeleton,
             parent < 0 ? Quat<double>(1.0, 0.0, 0.0, 0.0) : rotations[static_cast<std::size_t>(parent)];
         const Mat3<double> linear(posed_from_rest[bone].linear);
         const Quat<double> rotation = glm::determinant(linear) < 0.0 ? before : rotation_of(linear);
-        rotations.push_back(glm::dot(rotation, before) < 0.0 ? -rotation : rotation);
+        const Quat<double> turn(bone < turns.size() ? turns[bone] : Quat<float>(0.0f, 0.0f, 0.0f, 0.0f));
+        rotations.push_back(is_away(rotation, before, turn) ? -rotation : rotation);
         result.push_back(Quat<float>(rotations.back()));
     }
     return result;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -16,9 +17,17 @@ namespace sinew {
 /// a chain add up beyond half a turn. Bones without a parent are in that of the identity.
 ///
 /// posed_from_rest  [bones] as many as in the skeleton, or fewer; scale and shear are left out
+/// turns            [bones] or fewer: the rotation of each bone against its parent as its channels give it, in the
+///                  space of `posed_from_rest`, unit length. Of q and -q it is the one that says whether the bone
+///                  went the longer way, so that a single bone turns beyond half a turn, too. 0: unknown. One that
+///                  is over kTurnsAgree from the bone is not used, as something else turns the bone.
 ///
 /// A bone that mirrors has its parent's. One that is half a turn from its parent may have either sign.
 [[nodiscard]] SINEW_EXPORT std::vector<Quat<float>> continued_rotations(
-    const Skeleton& skeleton, std::span<const Affine<float>> posed_from_rest);
+    const Skeleton& skeleton, std::span<const Affine<float>> posed_from_rest,
+    std::span<const Quat<float>> turns = {});
+
+/// Radians.
+inline constexpr double kTurnsAgree = 5.0 / 180.0 * std::numbers::pi;
 
 }  // namespace sinew

@@ -23,20 +23,25 @@ template <class T>
     return {factor * a.angular, factor * a.linear};
 }
 
-/// The logarithm of `a`, with an angle of 0 to pi. At 180 degrees there are two, with opposite axes, and the
-/// signs of a.rotation decide (Murray, Li, Sastry 1994, section 2.3.3).
+/// The logarithm of the rotation by `angular`, of less than 360 degrees, with this translation.
 template <class T>
-[[nodiscard]] Twist<T> to_twist(const QuatVec<T>& a) noexcept {
+[[nodiscard]] Twist<T> to_twist(const Vec3<T>& angular, const Vec3<T>& translation) noexcept {
     using std::cos;
     using std::sin;
-    const Vec3<T> angular = rotation_vector(a.rotation);
     const T half = safe_length(angular) * T(0.5);
     // (1 - x cot x) / 4 x^2, which is finite up to 360 degrees; the series where the difference would cancel.
     const T x2 = half * half;
     const T factor = half < T(1e-2) ? T(1) / T(12) + x2 * (T(1) / T(180) + x2 / T(1890))
                                     : (T(1) - half * cos(half) / sin(half)) / (T(4) * x2);
-    const Vec3<T> sideways = glm::cross(angular, a.translation);
-    return {angular, a.translation - T(0.5) * sideways + factor * glm::cross(angular, sideways)};
+    const Vec3<T> sideways = glm::cross(angular, translation);
+    return {angular, translation - T(0.5) * sideways + factor * glm::cross(angular, sideways)};
+}
+
+/// The logarithm of `a`, with an angle of 0 to pi. At 180 degrees there are two, with opposite axes, and the
+/// signs of a.rotation decide (Murray, Li, Sastry 1994, section 2.3.3).
+template <class T>
+[[nodiscard]] Twist<T> to_twist(const QuatVec<T>& a) noexcept {
+    return to_twist(rotation_vector(a.rotation), a.translation);
 }
 
 template <template <class> class Transform, class T>

@@ -8,6 +8,8 @@
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/dib/dib.h"
 
+#include <numbers>
+
 #include "sinew/base/targets.h"
 #include "sinew/lanes/rigid_bones.h"
 
@@ -61,12 +63,20 @@ HWY_INLINE void multiply_by_conjugate(const Vec<D>* a, const Vec<D>* b, Vec<D>* 
     product[3] = vector.z;
 }
 
-/// The angular part of the logarithm of the rotation by `q`, along the shorter way, as in transform/twist.h.
+/// The sine of half the angle of `q`, at least that of a thousandth of a degree.
+template <class D>
+HWY_INLINE Vec<D> sine_of(D d, const Vec<D>* q) {
+    const Points<D> axis{q[1], q[2], q[3]};
+    return hn::Max(hn::Sqrt(dot<D>(axis, axis)), hn::Set(d, 1e-5f));
+}
+
+/// The angular part of the logarithm of the rotation by `q`, along the shorter way, as in transform/twist.h; along
+/// that of `q` itself where signs are kept.
 ///
 /// These functions return points, not structures of them, which GCC would copy in parts of vectors. Such parts can
 /// not be loaded as a whole vector at once.
 template <class D>
-HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q) {
+HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q, bool keeps_signs) {
     // angle / sin(angle / 2) as a polynomial in 1 - w of the quaternion with w >= 0, to 4e-8.
     static constexpr float kAngle[] = {2.0f,
                                        0.6666707396507263f,
@@ -79,20 +89,34 @@ HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q) {
                                        -0.0651833787560463f,
                                        0.022325647994875908f};
     const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
-    return times<D>(hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]), {q[1], q[2], q[3]});
+    Vec<D> by = hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]);
+    if (keeps_signs) {
+        const Vec<D> round = hn::Div(hn::Set(d, 2.0f * std::numbers::pi_v<float>), sine_of(d, q));
+        by = hn::IfThenElse(hn::Lt(q[0], hn::Zero(d)), hn::Add(round, by), by);
+    }
+    return times<D>(by, {q[1], q[2], q[3]});
 }
 
 /// The linear part, for the motion that rotates by `q`, then adds `translation`.
 template <class D>
-HWY_INLINE Points<D> linear_part(D d, const Vec<D>* q, const Points<D>& angular,
-                                 const Points<D>& translation) {
+HWY_INLINE Points<D> linear_part(D d, const Vec<D>* q, const Points<D>& angular, const Points<D>& translation,
+                                 bool keeps_signs) {
     // (1 - (angle / 2) cot(angle / 2)) / angle^2, in the same way.
     static constexpr float kThird[] = {0.083333320915699f,     0.011112410575151443f,   0.003941489849239588f,
                                        0.001828863169066608f,  -5.928325481363572e-05f, 0.001786231528967619f,
                                        -0.001323370961472392f, 0.0007015004521235824f};
     const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
+    Vec<D> third = polynomial(d, u, kThird);
+    if (keeps_signs) {
+        const Vec<D> squared = dot<D>(angular, angular);
+        const Vec<D> cotangent = hn::Div(q[0], sine_of(d, q));
+        const Vec<D> longer =
+            hn::Div(hn::NegMulAdd(hn::Mul(hn::Set(d, 0.5f), hn::Sqrt(squared)), cotangent, hn::Set(d, 1.0f)),
+                    squared);
+        third = hn::IfThenElse(hn::Lt(q[0], hn::Zero(d)), longer, third);
+    }
     const Points<D> across = cross<D>(angular, translation);
-    return add_scaled<D>(add_scaled<D>(translation, hn::Set(d, -0.5f), across), polynomial(d, u, kThird),
+    return add_scaled<D>(add_scaled<D>(translation, hn::Set(d, -0.5f), across), third,
                          cross<D>(angular, across));
 }
 
@@ -190,7 +214,8 @@ private:
 /// The blend of dual quaternions, which take the vertex as their origin.
 template <class D, class BonesOf, class WeightOf>
 HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, std::size_t count,
-                                       const WeightOf& weight_of, const Points<D>& rest, Image<D>& blend) {
+                                       const WeightOf& weight_of, const Points<D>& rest, bool keeps_signs,
+                                       Image<D>& blend) {
     const Vec<D> zero = hn::Zero(d);
     Vec<D> real[4] = {zero, zero, zero, zero};
     // Twice the dual part, (0, translation) times the real part.
@@ -203,14 +228,15 @@ HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, st
         const Vec<D> along = hn::Add(hn::Add(hn::Mul(q[0], real[0]), hn::Mul(q[2], real[2])),
                                      hn::Add(hn::Mul(q[1], real[1]), hn::Mul(q[3], real[3])));
         const Vec<D> weight = weight_of(k);
-        const Vec<D> by = hn::IfThenElse(hn::Lt(along, zero), hn::Neg(weight), weight);
+        const auto is_away = hn::Lt(keeps_signs ? zero : along, zero);
+        const Vec<D> by = hn::IfThenElse(is_away, hn::Neg(weight), weight);
         for (std::size_t i = 0; i < 4; ++i) real[i] = hn::MulAdd(by, q[i], real[i]);
         const Points<D> translation = times<D>(by, subtract<D>(m.point, rest));
         const Points<D> axis{q[1], q[2], q[3]};
         scalar = hn::Sub(scalar, dot<D>(translation, axis));
         vector = add_cross<D>(add_scaled<D>(vector, q[0], translation), translation, axis);
     }
-    const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared_norm<D>(real)));
+    const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared_length(d, real)));
     for (std::size_t i = 0; i < 4; ++i) blend.rotation[i] = hn::Mul(scale, real[i]);
     const Points<D> axis{blend.rotation[1], blend.rotation[2], blend.rotation[3]};
     const Points<D> translation =
@@ -241,14 +267,14 @@ HWY_INLINE hn::Mask<D> has_more_to_do(D d, const Points<D>& angular, const Point
 /// first_weight  of the first influence; those of the others are at `weights`, kLanes apart
 template <class D, class BonesOf>
 HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t count,
-                                       const float* first_weight, const float* weights,
-                                       const Points<D>& rest) {
+                                       const float* first_weight, const float* weights, const Points<D>& rest,
+                                       bool keeps_signs) {
     const auto weight_of = [&](std::size_t k) HWY_ATTR {
         return hn::Load(d, k == 0 ? first_weight : weights + kLanes * (k - 1));
     };
     const Images<D, BonesOf> images(d, bones, count, rest);
     Image<D> blend;
-    blend_dual_quaternions(d, images, count, weight_of, rest, blend);
+    blend_dual_quaternions(d, images, count, weight_of, rest, keeps_signs, blend);
     hn::Mask<D> active = hn::Eq(rest.x, rest.x);
     Image<D> space;
     for (int step = 0; step < IterativeDq::kSteps && !hn::AllFalse(d, active); ++step) {
@@ -261,9 +287,9 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
             const Image<D>& image = images.at(d, k, space);
             Vec<D> rotation[4];
             multiply_by_conjugate<D>(image.rotation, blend.rotation, rotation);
-            const Points<D> own_angular = angular_part(d, rotation);
+            const Points<D> own_angular = angular_part(d, rotation, keeps_signs);
             const Points<D> own_linear =
-                linear_part(d, rotation, own_angular, subtract<D>(image.point, blend.point));
+                linear_part(d, rotation, own_angular, subtract<D>(image.point, blend.point), keeps_signs);
             const Vec<D> weight = weight_of(k);
             angular = add_scaled<D>(angular, weight, own_angular);
             linear = add_scaled<D>(linear, weight, own_linear);
@@ -276,13 +302,14 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
     return blend.point;
 }
 
+/// keeps_signs  Palette::keeps_signs
 template <class D, class BonesOf>
 HWY_INLINE void deform_lanes(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
                              std::size_t lane, const BonesOf& bones, std::size_t count,
-                             const float* first_weight, const float* weights) {
+                             const float* first_weight, const float* weights, bool keeps_signs) {
     const Points<D> rest = load_rest(d, pointers, spaces, b, lane);
     store_in_model(d, pointers, spaces, b, lane,
-                   blend_iteratively(d, bones, count, first_weight, weights, rest));
+                   blend_iteratively(d, bones, count, first_weight, weights, rest, keeps_signs));
 }
 
 /// Deforms blocks [begin, end) with the same bones.
@@ -290,6 +317,7 @@ void deform_shared(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = frame.spaces;
+    const bool keeps_signs = frame.palette->keeps_signs;
     const std::size_t influences = pointers.blocks[begin].influences;
     const SharedBones<Full> bones{*frame.palette, frame.bones + pointers.blocks[begin].first_bone};
     for (std::size_t b = begin; b < end; ++b) {
@@ -297,7 +325,7 @@ void deform_shared(const Frame& frame, std::size_t begin, std::size_t end) {
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             deform_lanes(d, pointers, spaces, b, lane, bones, influences, first_weights_of(frame, b) + lane,
-                         weights + lane);
+                         weights + lane, keeps_signs);
         }
     }
 }
@@ -308,6 +336,7 @@ void deform_own(const Frame& frame, std::size_t b) {
     const One one;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = frame.spaces;
+    const bool keeps_signs = frame.palette->keeps_signs;
     const Block& block = pointers.blocks[b];
     const float* const weights = weights_of(pointers, b);
     const std::int32_t* const bones = frame.bones + block.first_bone;
@@ -315,7 +344,7 @@ void deform_own(const Frame& frame, std::size_t b) {
         for (std::size_t lane = 0; lane < block.vertices; ++lane) {
             const SharedBones<One> of_vertex{*frame.palette, bones + block.influences * lane};
             deform_lanes(one, pointers, spaces, b, lane, of_vertex, block.influences, weights + lane,
-                         weights + kLanes + lane);
+                         weights + kLanes + lane, keeps_signs);
         }
         return;
     }
@@ -323,7 +352,7 @@ void deform_own(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const OwnBones<Full> of_lanes{*frame.palette, bones + block.influences * lane, block.influences};
         deform_lanes(d, pointers, spaces, b, lane, of_lanes, block.influences, weights + lane,
-                     weights + kLanes + lane);
+                     weights + kLanes + lane, keeps_signs);
     }
 }
 
@@ -350,7 +379,8 @@ void write_bone(const IterativeDq::Bone<double>& bone, Float4* row, Float4* scal
 
 }  // namespace
 
-SINEW_KERNEL(IterativeDq, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
+SINEW_KERNEL(IterativeDq, .rest_row = kCentreRestRow, .signed_float4s = 1,
+             .bone_rows = SINEW_TARGETS(bone_rows),
              .scaled_bone_rows = scaled_bone_rows<IterativeDq, 4, write_bone>)
 
 }  // namespace sinew

@@ -16,8 +16,8 @@ namespace sinew {
 /// blend of Dq, it finds the motion relative to which the weighted logarithms of all bones' motions sum to 0.
 /// With two bones this is ScLERP. Twists are spread evenly, and a rotation of the whole character rotates the
 /// result with it.
-/// Where a bone passes 180 degrees from the blend, the shorter way to it changes and the result jumps. If the
-/// iteration has not converged after kSteps, the result is the last iterate, which is finite.
+/// Where a bone passes 180 degrees from the blend, the shorter way to it changes and the result jumps; with signs
+/// that are kept it is at 360 degrees. If the iteration has not converged after kSteps, the result is the last iterate, which is finite.
 struct IterativeDq {
     static constexpr MethodInfo info{
         7,
@@ -27,7 +27,8 @@ struct IterativeDq {
         "Dual quaternions with twists spread evenly along the limb; bulges as they do, at "
         "several times the cost",
         "Kavan, Collins, Zara, O'Sullivan 2008",
-        Needs::rest_bones};
+        Needs::rest_bones,
+        Signs::kParameters};
     static const Kernel& kernel() noexcept;
 
     /// The maximum number of iterations. Among thousands of blends of twelve random rotations, the slowest took
@@ -45,10 +46,12 @@ struct IterativeDq {
         return {to_dual_quat(bone.rigid), bone.scale, bone.has_scale};
     }
 
+    /// parameters  empty, or the index in Signs::kChoices
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
-                                               std::span<const Influence<T>> influences,
-                                               const Vec3<T>& rest) noexcept {
+                                               std::span<const Influence<T>> influences, const Vec3<T>& rest,
+                                               std::span<const double> parameters = {}) noexcept {
+        const bool are_kept = Signs::are_kept(parameters);
         const auto motion_of = [&](const Influence<T>& influence) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
             DualQuat<T> motion = bone.rigid;
@@ -60,7 +63,7 @@ struct IterativeDq {
         DualQuat<T> sum{Quat<T>(T(0), T(0), T(0), T(0)), Quat<T>(T(0), T(0), T(0), T(0))};
         for (const Influence<T>& influence : influences) {
             const DualQuat<T> motion = motion_of(influence);
-            const T sign = glm::dot(motion.real, sum.real) < T(0) ? T(-1) : T(1);
+            const T sign = !are_kept && glm::dot(motion.real, sum.real) < T(0) ? T(-1) : T(1);
             sum.real = sum.real + (sign * influence.weight) * motion.real;
             sum.dual = sum.dual + (sign * influence.weight) * motion.dual;
         }
@@ -74,7 +77,10 @@ struct IterativeDq {
             T longest = T(0);
             for (const Influence<T>& influence : influences) {
                 if (influence.weight == T(0)) continue;
-                const Twist<T> twist = to_twist(inverse(blend) * motion_of(influence));
+                const QuatVec<T> relative = to_quat_vec(inverse(blend) * motion_of(influence));
+                const Twist<T> twist =
+                    are_kept ? to_twist(longer_rotation_vector(relative.rotation), relative.translation)
+                             : to_twist(relative);
                 correction = correction + influence.weight * twist;
                 longest = std::max(longest, glm::length(twist.linear));
             }
@@ -85,6 +91,16 @@ struct IterativeDq {
             }
         }
         return rest + (rotation_displacement(blend.real, rest) + translation(blend));
+    }
+
+private:
+    /// The rotation vector of `q` itself, which takes the longer way where w is negative.
+    template <class T>
+    [[nodiscard]] static Vec3<T> longer_rotation_vector(const Quat<T>& q) noexcept {
+        const Vec3<T> v = vector_part(q);
+        const T length = safe_length(v);
+        return q.w < T(0) && length > T(0) ? (T(2) * std::atan2(length, q.w) / length) * v
+                                           : rotation_vector(q);
     }
 };
 
