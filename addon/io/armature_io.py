@@ -131,7 +131,8 @@ def read_twists(evaluated_armature: bpy.types.Object, bones: Bones) -> TwistInpu
 
 def read_turns(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray | None:
     """Returns float32 [bones, 4]: the rotation against its parent, in armature space, of each bone whose own
-    Euler angles or axis and angle may go beyond half a turn, as sinew.Deformer.deform takes it. None for none."""
+    Euler angles or axis and angle may go beyond half a turn, as sinew.Deformer.deform takes it. None where
+    there is none."""
     pose_bones, count = evaluated_armature.pose.bones, len(bones.names)
     modes = np.empty(count, np.int32)
     eulers, around_axes = np.empty((count, 3), np.float32), np.empty((count, 4), np.float32)

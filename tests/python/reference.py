@@ -335,8 +335,8 @@ def integral(vectors):
 
 
 def dib(point, motions, rotations, weights, kept=None):
-    """Iterated to the end. The ties are at 180 degrees from the result, at 360 where signs are kept, and where
-    the iteration is slow."""
+    """Iterated to the end. The ties are at 180 degrees from the result, at 360 where signs are kept, and
+    where the iteration is slow."""
     quaternions, shifts = rigid_terms(point, motions, rotations)
     rotated, translated, margin = blended_motion(quaternions, shifts, weights, kept)
     most, longer, blended = np.pi, None, None

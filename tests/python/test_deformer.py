@@ -389,7 +389,7 @@ def test_memory_is_reserved_for_one_thread(method):
     binding = sinew.Binding(rest, numbers, numbers[:-1], np.ones(count, np.float32), vertex_data=LINEAR)
 
     def reserved():
-        # Of memory that can be written: the C library sets 64 MiB of others aside for a thread's first allocation.
+        # What can be written: the C library sets 64 MiB more aside when a thread first allocates.
         return int(Path("/proc/self/statm").read_text().split()[5]) * os.sysconf("SC_PAGE_SIZE")
 
     before = reserved()

@@ -201,7 +201,7 @@ class Deformer:
         """Constructs its own binding, from the arguments of Binding."""
     def __repr__(self) -> str: ...
     def __setstate__(self, arg0: typing.Any) -> None: ...
-    def deform(self, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None, parents: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
+    def deform(self, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None, parents: numpy.typing.ArrayLike | None = None, turns: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
         """The deformed points, float32 [vertices, 3], model space.
 
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.
@@ -214,6 +214,9 @@ class Deformer:
             effect.
         parents: int32 [bones], the parent of each bone, which precedes it, -1 for none: where the parameter `signs` is
             "hierarchy", rotations add up along chains, beyond half a turn. None: each bone turns the shorter way.
+        turns: float32 [bones, 4] or fewer bones, the rotation of each against its parent in the space of the bones, as
+            its channels give it: a unit quaternion (w, x, y, z) whose sign says whether the bone went the longer way. 0:
+            unknown. One that is over 5 degrees from the bone has no effect, nor has any without `parents`.
 
         A vertex without influences is not moved.
         """
@@ -418,14 +421,14 @@ class SkinnedNormals:
         method, mix: as for Deformer.
         """
     def __repr__(self) -> str: ...
-    def deform(self, bone_transforms: numpy.typing.ArrayLike, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None, parents: numpy.typing.ArrayLike | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32] | None]:
+    def deform(self, bone_transforms: numpy.typing.ArrayLike, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None, parents: numpy.typing.ArrayLike | None = None, turns: numpy.typing.ArrayLike | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32] | None]:
         """(points, normals, tangents): the deformed points, float32 [vertices, 3]; normals of unit length, float32
         [frames, 3]; the same for tangents, or None.
 
         The arguments are those of Deformer.deform(). Where the blend mirrors, a normal points to the side given by the
         order of a face's vertices. Where the blend collapses the plane of a normal to a line, that normal is 0.
         """
-    def deform_normals(self, bone_transforms: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None, parents: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
+    def deform_normals(self, bone_transforms: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, threads: typing.SupportsIndex | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, rest_inverses: numpy.typing.ArrayLike | None = None, parameters: collections.abc.Mapping[str, float | bool | str] | None = None, parents: numpy.typing.ArrayLike | None = None, turns: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
         """The normals alone, float32 [frames, 3], where the points are known; saves a quarter of the time.
 
         points: float32 [vertices, 3], as computed by deform() or a Deformer for the same arguments.
