@@ -316,7 +316,7 @@ def _same(a: Frame, b: Frame) -> bool:
         and are_equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
         and are_equal(a.bones_from_model, b.bones_from_model)
-        and np.array_equal(a.turns, b.turns)
+        and are_equal(a.turns, b.turns)
     )
 
 
