@@ -41,6 +41,9 @@ SMALL = (
     "pictures --only wrist --out {0}/pictures; report --quick --out {0}/report; "
     "bench --quick --kernels --name=small"
 )
+# Debian's packages, by the programs that tests of pages need.
+BROWSERS = {"chromium": "chromium", "chromedriver": "chromium-driver", "firefox-esr": "firefox-esr"}
+BROWSERS |= {"Xvfb": "xvfb"}
 PROCESSORS = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 LOGS = ROOT / "build/test-logs"
 # A Blender that hangs must not prevent the others' results from being shown.
@@ -153,12 +156,13 @@ for _version in ("3.11", "3.12", "3.13", "3.14"):
             os.utime(wheel_of(version), (start, start))
 
 
+OTHERS = ("browsers", "cross", "lint", "shaders")
 # Name, lock, Python, whether it has the library, whether the extension. bpy contains Blender's program for
 # zips; what makes the site and the stub imports the library.
 ENVIRONMENTS = [(f"bpy-{bpy}", f"bpy-{bpy}", python, True, True) for bpy, python in BLENDERS.items()]
 ENVIRONMENTS += [("bundle", f"bpy-{EVERYDAY}", EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [("site", "site", EVERYDAY_PYTHON, True, False)]
-ENVIRONMENTS += [(name, name, EVERYDAY_PYTHON, False, False) for name in ("cross", "lint", "shaders")]
+ENVIRONMENTS += [(name, name, EVERYDAY_PYTHON, False, False) for name in OTHERS]
 for _name, _lock, _version, _library, _addon in ENVIRONMENTS:
     _wheel = [f"wheel-{_version}"] * _library
 
@@ -307,6 +311,19 @@ for _bpy in BLENDERS:
         pytest(session, f"bpy-{bpy}", "tests/blender", "not window" * (is_whole and is_newest), env=env)
 
 
+@job("browser")
+def browser(session: nox.Session) -> None:
+    """All: the page that turns, in real browsers, which the system's package manager brings where it can."""
+    missing = [package for program, package in BROWSERS.items() if not shutil.which(program)]
+    if missing and shutil.which("apt-get") and (os.geteuid() == 0 or shutil.which("sudo")):
+        start = ["sudo"] * (os.geteuid() != 0)
+        start += ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq", "-o", "DPkg::Lock::Timeout=900"]
+        for words in (["update"], ["install", "-y", "--no-install-recommends", *missing]):
+            # Where that fails, the tests say what is missing.
+            session.run(*start, *words, silent=True, success_codes=range(256))
+    pytest(session, "browsers", "tests/browsers")
+
+
 @job("installed")
 def installed(session: nox.Session) -> None:
     """Both wheels in an environment of their own, away from the checkout, and what README says of them."""
@@ -379,7 +396,7 @@ def test(words: list[str]) -> int:
     wanted = [*BLENDERS] if is_all else [EVERYDAY] if is_quick else [OLDEST, EVERYDAY, NEWEST]
     pythons = {version for version in {BLENDERS[b] for b in wanted} if python_of(version) or bring(version)}
     tested = [bpy for bpy, python in BLENDERS.items() if bpy in wanted and python in pythons]
-    others = ["experiments-programs"] * is_all + ["lint"] * is_whole
+    others = ["experiments-programs", "browsers"] * is_all + ["lint"] * is_whole
     environments = [f"bpy-{bpy}" for bpy in tested]
     set_up("fetch", *environments, "site", "shaders", *others, "--", *environments)
     os.environ |= {"SINEW_PACKAGE": str(PACKAGE), "SINEW_TESTED": " ".join(tested)}
@@ -389,7 +406,7 @@ def test(words: list[str]) -> int:
     # The longest first.
     jobs = ["native"] * (not options) + ["window"] * is_whole
     jobs += [*(f"blender-{bpy}" for bpy in reversed(tested)), "python", "shader"]
-    jobs += ["installed", "commands"] * is_whole
+    jobs += ["browser"] * is_all + ["installed", "commands"] * is_whole
     for name in {"SINEW_RIGS", "SINEW_FULL_BLENDER"} - {*os.environ}:
         say(f"{name} is not set: tests that need it are skipped")
     shutil.rmtree(LOGS, ignore_errors=True)

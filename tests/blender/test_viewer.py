@@ -15,7 +15,7 @@ from bone_buffer import bone_buffer
 from conftest import REPOSITORY
 from mathutils import Euler
 from program import run_sinew
-from sinew_addon.core import viewer
+from sinew_addon.core import heat, viewer
 
 FRAMES = [1, 6, 11]
 GROUP = "Painted"
@@ -174,6 +174,25 @@ def test_bones_are_as_the_shaders_read_them():
     np.testing.assert_allclose(np.abs(same), 1.0, atol=1e-6)
     clear = np.abs(its[:, 3, 3]) > 1e-3
     np.testing.assert_allclose(mine[clear, 3], its[clear, 3], atol=1e-5)
+
+
+def luminance(colour):
+    digits = colour * 2 if len(colour) == 3 else colour
+    shares = np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)]) / 255.0
+    return heat.linear(shares) @ (0.2126, 0.7152, 0.0722)
+
+
+def test_texts_have_contrast():
+    """At least 4.5 to 1 (WCAG 2.2, 1.4.3), light and dark."""
+    style = (viewer.FOLDER / "style.css").read_text(encoding="utf-8")
+    themes = re.findall(r":root \{(.*?)\}", style, re.DOTALL)
+    assert len(themes) == 2
+    for theme in themes:
+        colours = dict(re.findall(r"--(\w+): #(\w{3}|\w{6})\b", theme))
+        for text in ("text", "faint", "accent"):
+            for back in ("back", "panel", "stage"):
+                dark, light = sorted([luminance(colours[text]), luminance(colours[back])])
+                assert (light + 0.05) / (dark + 0.05) >= 4.5, (text, back)
 
 
 def test_the_shader_is_that_of_engines():

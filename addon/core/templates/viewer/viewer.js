@@ -280,7 +280,7 @@ function camera(aspect) {
   const back = [sy * cp, -cy * cp, sp], right = [cy, sy, 0], up = [-sy * sp, cy * sp, cp];
   // The character fits however it is turned about the vertical.
   const half = Math.tan(Math.PI / 12), around = Math.hypot(wide, deep) || radius;
-  const distance = (1.06 * Math.max(tall / half, around / (half * aspect)) + 0.7 * around) / state.zoom;
+  const distance = Math.max(1.04 * tall / half + 0.3 * around, 1.06 * around / (half * aspect) + 0.7 * around) / state.zoom;
   const eye = plus(plus(middle, state.offset), back, distance);
   const near = Math.max(distance - 4 * radius, 0.02 * distance), far = distance + 12 * radius;
   const view = [right, up, back].map((axis) => [...axis, -dot(axis, eye)]).concat([[0, 0, 0, 1]]).flat();
@@ -381,15 +381,32 @@ function draw(isSmooth = false) {
   gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
 }
 
-// The points of a mesh, four numbers each, in armature space: for tests and for the curious.
-function points(part, method, frame, influences = Infinity) {
-  const mesh = meshes[part];
-  mesh.setFrame(frame);
-  mesh.skin(method, influences, mesh.reference);
-  const { width, height } = mesh.reference, read = new Float32Array(4 * width * height);
-  gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, read);
+// --- For tests and for the curious
+
+function read(target, mesh) {
+  const { width, height } = target, found = new Float32Array(4 * width * height);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, found);
   changed();
-  return read.subarray(0, 4 * mesh.count);
+  return found.subarray(0, 4 * mesh.count);
+}
+
+// The points of a mesh in armature space, four numbers each, of which the last is 1.
+function points(part, method, frame, influences = Infinity) {
+  const mesh = meshes[part], target = mesh.panes[0].points;
+  mesh.setFrame(frame);
+  mesh.skin(method, influences, target);
+  return read(target, mesh);
+}
+
+// The normals of a mesh in the world, and as fourth number the value of a measure: 1 for the first one.
+function values(part, method, frame, measure) {
+  const mesh = meshes[part], pane = mesh.panes[0];
+  mesh.setFrame(frame);
+  mesh.skin(mesh.about.blender, Infinity, mesh.reference);
+  mesh.skin(method, Infinity, pane.points);
+  mesh.measure(pane, measure);
+  return read(pane.surface, mesh);
 }
 
 // --- The page
@@ -607,5 +624,5 @@ new ResizeObserver(changed).observe(canvas);
 prefersDark.addEventListener("change", changed);
 canvas.addEventListener("webglcontextlost", () => fail("The browser took the graphics away. Load the page again."));
 show();
-window.sinew = { header, state, set, draw, points, gl };
+window.sinew = { header, state, set, draw, points, values, gl };
 })();

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pages made by the command of the everyday environment, and what reads them: imported by name."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import browsers
+import numpy as np
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+sys.path.append(str(REPOSITORY / "shaders"))
+SINEW = REPOSITORY / ".venv" / "bin" / "sinew"
+
+
+@pytest.fixture(scope="module", params=browsers.ALL, ids=lambda kind: kind.__name__.lower())
+def browser(request):
+    missing = request.param.missing()
+    if missing:
+        sentence = f"install {missing} to test the page in this browser"
+        # What runs for each change is to have it.
+        (pytest.fail if "CI" in os.environ else pytest.skip)(sentence)
+    with request.param() as opened:
+        yield opened
+
+
+def sinew(*words):
+    done = subprocess.run([SINEW, *map(str, words)], capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+class Made:
+    """A page, and what `sinew points` has for it."""
+
+    def __init__(self, folder, source, frames, methods, options=(), first="dq"):
+        self.page, self.frames = folder / f"{source.stem}-{len(options)}.html", frames
+        sinew("compare", source, "--methods", ",".join(methods), "--viewer", self.page, *options)
+        self.points = {}
+        for method in [first] if options else methods:
+            out = folder / f"{self.page.stem}-{method}.npz"
+            words = "--frames", ",".join(map(str, frames)), "--out", out
+            sinew("points", source, "--method", method, *words, *options)
+            arrays = np.load(out)
+            (name,) = set(arrays.files) - {"frames"}
+            self.points["mix" if options else method] = arrays[name]
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory):
+    """By name: files whose meshes are in armature space, so that it is the space of `sinew points`."""
+    folder, files = tmp_path_factory.mktemp("pages"), REPOSITORY / "blend_files"
+    methods = ["blender", "lbs", "dq", "cor"]
+    mix = "--set", "mix.method=cor", "--set", "mix.group=Hand"
+    found = {
+        "wrist": Made(folder, files / "wrist.blend", [1, 12, 24], methods),
+        "mix": Made(folder, files / "wrist.blend", [12, 24], ["dq"], mix),
+        "shoulder": Made(folder, files / "shoulder.blend", [1, 12, 24], methods),
+    }
+    rigs = Path(os.environ.get("SINEW_RIGS", "/none"), "human.blend")
+    if rigs.exists():
+        found["human"] = Made(folder, rigs, [1, 16, 40], methods)
+    return found

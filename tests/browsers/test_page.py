@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page that turns, in browsers: its points are those of `sinew points`, its heat maps those of
+docs/metrics.md; keys and controls do what they say; it fits on small screens.
+
+SINEW_PICTURES  a folder for pictures, to look at
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import read_page
+
+KEYS_ARE_NAMED = """
+return [...document.querySelectorAll("button, input, select, canvas")].filter((one) =>
+  !(one.labels && one.labels.length) && !one.getAttribute("aria-label") && !one.textContent.trim()).length
+"""
+# Of each pane, the share of pixels that are not transparent.
+DRAWN = """
+const { gl, draw, state } = window.sinew;
+draw();
+const [width, height] = [gl.canvas.width, gl.canvas.height];
+const found = new Uint8Array(4 * width * height), counts = Array(state.panes).fill(0);
+gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, found);
+for (let k = 3; k < found.length; k += 4) {
+  if (found[k] === 255) counts[Math.floor((((k >> 2) % width) * state.panes) / width)]++;
+}
+return counts.map((count) => count / width / height * state.panes)
+"""
+
+
+def points(browser, *arguments):
+    return browser.floats(f"window.sinew.points({', '.join(map(str, arguments))})").reshape(-1, 4)[:, :3]
+
+
+@pytest.mark.parametrize("name", ["wrist", "mix", "shoulder", "human"])
+def test_points_are_those_of_sinew(browser, made, name):
+    if name not in made:
+        pytest.skip("human.blend is in no folder SINEW_RIGS")
+    page = made[name]
+    browser.show(page.page)
+    header, _meshes = read_page.read(page.page)
+    for method, expected in page.points.items():
+        for frame, shape in zip(page.frames, expected, strict=True):
+            found = points(browser, 0, f"'{method}'", header["frames"].index(frame))
+            diagonal = np.linalg.norm(np.ptp(shape, axis=0))
+            assert np.abs(found - shape).max() <= 1e-5 * diagonal, (method, frame)
+
+
+def test_fewer_influences_are_the_heaviest(browser, made):
+    page = made.get("human") or made["wrist"]
+    browser.show(page.page)
+    header, meshes = read_page.read(page.page)
+    arrays, most, frame = meshes[0], 2 if "human" in made else 1, header["start"]
+    spans = zip(arrays["offsets"], arrays["offsets"][1:], strict=False)
+    kept = [
+        first + np.sort(np.argsort(-arrays["weights"][first:end], kind="stable")[:most])
+        for first, end in spans
+    ]
+    own = np.concatenate(kept)
+    fewer = {
+        **arrays,
+        "offsets": np.cumsum([0, *map(len, kept)]),
+        "bones": arrays["bones"][own],
+        "weights": arrays["weights"][own],
+    }
+    for method in ("lbs", "dq", "cor"):
+        expected = read_page.points(header["parts"][0], fewer, method, frame)
+        found = points(browser, 0, f"'{method}'", frame, most)
+        assert np.abs(found - expected).max() <= 1e-5 * np.linalg.norm(np.ptp(expected, axis=0)), method
+        assert np.abs(found - points(browser, 0, f"'{method}'", frame)).max() > 1e-3
+
+
+def test_heat_maps_show_the_measures(browser, made):
+    page = made["wrist"]
+    browser.show(page.page)
+    header, (arrays,) = read_page.read(page.page)
+    part, frame = header["parts"][0], header["start"]
+    world = arrays["worlds"][frame, :3, :3].astype(np.float64)
+    own, reference = (read_page.points(part, arrays, method, frame) for method in ("dq", part["blender"]))
+    distances, stretches = (
+        browser.floats(f"window.sinew.values(0, 'dq', {frame}, {measure})").reshape(-1, 4)[:, 3]
+        for measure in (1, 2)
+    )
+    diagonal = np.linalg.norm(np.ptp(own, axis=0))
+    expected = np.linalg.norm((own - reference) @ world.T, axis=1)
+    np.testing.assert_allclose(distances, expected, atol=2e-5 * diagonal)
+    assert expected.max() == pytest.approx(header["measures"][0]["high"], rel=1e-4)
+    ends = arrays["edges"].astype(np.int64)
+    lengths = [
+        np.linalg.norm((of[ends[:, 0]] - of[ends[:, 1]]) @ world.T, axis=1) for of in (own, arrays["rest"])
+    ]
+    ratios, worst = np.log(lengths[0] / lengths[1]), np.zeros(len(own))
+    for side in (0, 1):
+        for edge in np.argsort(np.abs(ratios)):
+            if abs(ratios[edge]) > abs(worst[ends[edge, side]]):
+                worst[ends[edge, side]] = ratios[edge]
+    # Of two edges stretched and squeezed alike, rounding decides.
+    np.testing.assert_allclose(np.abs(np.log(stretches)), np.abs(worst), atol=2e-3)
+
+
+def test_keys_and_controls(browser, made):
+    browser.show(made["wrist"].page)
+    assert browser.run("return performance.getEntriesByType('resource').length") == 0
+    assert browser.run(KEYS_ARE_NAMED) == 0
+    assert browser.run("return window.sinew.state.panes") == 2
+    methods = list(browser.run("return window.sinew.state.methods"))
+    frame = browser.run("return window.sinew.state.frame")
+    browser.press("f")
+    assert browser.run("return window.sinew.state.methods") == methods[::-1]
+    assert "Now " in browser.run("return document.getElementById('said').textContent")
+    browser.press(".")
+    assert browser.run("return window.sinew.state.frame") == frame + 1
+    shown = browser.run("return document.getElementById('frame-shown').textContent")
+    assert shown == str(browser.run(f"return window.sinew.header.frames[{frame + 1}]"))
+    browser.press(" ")
+    browser.wait(f"window.sinew.state.frame !== {frame + 1}")
+    browser.press(" ")
+    assert browser.run("return window.sinew.state.playing") is False
+    assert browser.run("return document.getElementById('legend').hidden") is True
+    browser.press("h")
+    assert browser.run("return window.sinew.state.measure") == 1
+    assert browser.run("return document.getElementById('ticks').childElementCount") == 3
+    browser.run("document.getElementById('view').focus()")
+    yaw, zoom = browser.run("return [window.sinew.state.yaw, window.sinew.state.zoom]")
+    browser.press("+")
+    browser.press("\ue014")
+    after = browser.run("return [window.sinew.state.yaw, window.sinew.state.zoom]")
+    assert after[0] != yaw
+    assert after[1] > zoom
+    assert browser.run("return window.sinew.gl.getError()") == 0
+
+
+@pytest.mark.parametrize("is_dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 400])
+def test_it_fits_and_is_drawn(browser, made, width, is_dark):
+    page = made.get("human") or made["wrist"]
+    browser.show(page.page, width, 800, is_dark)
+    panes = 2 if width > 720 else 1
+    shares = browser.run(DRAWN)
+    assert len(shares) == panes
+    for share in shares:
+        assert 0.01 < share < 0.9
+    # Firefox has a least width of a window.
+    inner = browser.run("return innerWidth")
+    assert browser.run("return document.documentElement.scrollWidth") <= inner
+    folder = os.environ.get("SINEW_PICTURES")
+    if folder:
+        name = f"{type(browser).__name__.lower()}-{width}-{'dark' if is_dark else 'light'}.png"
+        Path(folder, name).write_bytes(browser.picture())
