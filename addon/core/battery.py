@@ -37,8 +37,9 @@ class Move(NamedTuple):
     """One line of the table.
 
     role     which bones
-    action   "bend": as the limb bends; "aim": to `degrees` from hanging down; "twist": about its own axis;
-             "turn": about the figure's upright axis; "open": against "bend"
+    action   "bend": as the limb bends, an elbow, a knee or a finger that is bent at rest to `degrees` in all;
+             "aim": to `degrees` from hanging down; "twist": about its own axis; "turn": about the figure's
+             upright axis; "open": against "bend"
     toward   where "aim" and "bend" lead: "out", "in", "across", "front", "back", "up" or "down"
     shared   the bones of a chain share the degrees
     """
@@ -296,18 +297,21 @@ class _Battery:
             axis = np.cross(along, aim)
             sine, cosine = float(np.linalg.norm(axis)), float(along @ aim)
             return _about(axis / sine, math.atan2(sine, cosine)) if sine > 1e-6 else None
-        hinge = self._hinge(bone, toward)
-        return None if hinge is None else _about(hinge, -angle if move.action == "open" else angle)
+        axis, at_rest = self._hinge(bone, toward)
+        if axis is None:
+            return None
+        return _about(axis, -angle if move.action == "open" else max(angle - at_rest, 0.0))
 
-    def _hinge(self, bone: int, toward: np.ndarray) -> np.ndarray | None:
-        """The axis that a limb bends about: as it is bent at rest, else toward a direction."""
+    def _hinge(self, bone: int, toward: np.ndarray) -> tuple[np.ndarray | None, float]:
+        """The axis that a limb bends about: as it is bent at rest, else toward a direction; and the angle by
+        which it is bent at rest, in radians."""
         along, above = self._along[bone], int(self._bones.carriers[bone])
         bent = np.cross(self._along[above], along)
         is_limb = self._roles[bone] in ("forearm", "shin", "finger", "thumb")
         if is_limb and self._roles[above] != "hand" and np.linalg.norm(bent) > math.sin(math.radians(8.0)):
-            return _unit(bent)
+            return _unit(bent), math.atan2(np.linalg.norm(bent), self._along[above] @ along)
         axis = np.cross(along, _unit(toward))
-        return _unit(axis) if np.linalg.norm(axis) > 0.1 else None
+        return (_unit(axis) if np.linalg.norm(axis) > 0.1 else None), 0.0
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:

@@ -53,7 +53,7 @@ METHODS = (
 )
 STAGES = (
     Candidate("twist_spread", 0.05, "twists spread along the limbs"),
-    Candidate("bulge_limit", 0.1, "bent joints bulge less"),
+    Candidate("bulge_limit", 0.05, "bent joints bulge less"),
     Candidate("delta_mush", 0.2, "creases are smoothed", crude=True, often=0.25),
 )
 STAGE_NAMES = tuple(each.name for each in STAGES)

@@ -100,11 +100,11 @@ def rig(bones):
     return Bones(names, ~flags, rest, lengths, segments, flags, first, envelopes, parents)
 
 
-def figure(naming="rigify"):
+def figure(naming="rigify", limbs=LIMBS):
     """Returns the bones, and the number of each by its plain name and side."""
     made, plain = {}, {}
     for side, sign in (("", 1), ("L", 1), ("R", -1)):
-        for name, (parent, head, tail) in (LIMBS if side else TRUNK).items():
+        for name, (parent, head, tail) in (limbs if side else TRUNK).items():
             own = named(naming, name, side)
             mirrored = [tuple(np.multiply(point, (sign, 1, 1))) for point in (head, tail)]
             above = named(naming, parent, side if parent in LIMBS else "") if parent else ""
@@ -148,6 +148,23 @@ def test_a_figure_bends_as_people_do(naming):
         np.testing.assert_allclose(tail[:3], poses["Elbows bent"][hand, :3, 3], atol=1e-6)
     turned = poses["Neck turned"][number["head", ""], :3, :3] @ rest[number["head", ""], :3, :3].T
     assert math.degrees(math.acos((np.trace(turned) - 1) / 2)) == pytest.approx(80.0, abs=0.05)
+
+
+def test_an_elbow_that_is_bent_at_rest_bends_as_far():
+    slope = math.radians(40.0)
+    wrist = (0.5 + 0.3 * math.cos(slope), -0.3 * math.sin(slope), 1.45)
+    finger = (wrist[0] + 0.1 * math.cos(slope), wrist[1] - 0.1 * math.sin(slope), 1.45)
+    limbs = LIMBS | {
+        "forearm": ("upper_arm", (0.5, 0, 1.45), wrist),
+        "hand": ("forearm", wrist, finger),
+        "index": ("hand", finger, np.add(finger, (0.05, 0, 0))),
+    }
+    bones, number = figure(limbs=limbs)
+    elbow = directions(poses_of(bones)["Elbows bent"])
+    for side in "LR":
+        arm, fore = number["upper_arm", side], number["forearm", side]
+        assert math.degrees(math.acos(elbow[arm] @ elbow[fore])) == pytest.approx(130.0, abs=0.01)
+        assert elbow[fore][1] < -0.7, "to the front"
 
 
 def test_limits_come_first():
