@@ -297,10 +297,10 @@ class _Battery:
             axis = np.cross(along, aim)
             sine, cosine = float(np.linalg.norm(axis)), float(along @ aim)
             return _about(axis / sine, math.atan2(sine, cosine)) if sine > 1e-6 else None
-        axis, at_rest = self._hinge(bone, toward)
-        if axis is None:
+        hinge, at_rest = self._hinge(bone, toward)
+        if hinge is None:
             return None
-        return _about(axis, -angle if move.action == "open" else max(angle - at_rest, 0.0))
+        return _about(hinge, -angle if move.action == "open" else max(angle - at_rest, 0.0))
 
     def _hinge(self, bone: int, toward: np.ndarray) -> tuple[np.ndarray | None, float]:
         """The axis that a limb bends about: as it is bent at rest, else toward a direction; and the angle by
