@@ -35,7 +35,7 @@ COMMANDS = (
         "bake",
         "export",
     ),
-    *("compare", "render"),
+    *("compare", "flex", "render"),
 )
 # Batches start Blenders of their own, or prepare this one later.
 WITHOUT_BLENDER = ("methods", "check", "reskin", "restore")

@@ -76,6 +76,41 @@ FIGURE: dict[str, tuple[Move, ...]] = {
 }
 """What a figure that stands upright can do."""
 
+JOINTS: dict[str, tuple[Move, ...]] = {
+    role: tuple(Move(role, *move) for move in moves)
+    for role, moves in {
+        "forearm": (("bend", 100.0),),
+        "hand": (("bend", 60.0, "in"), ("open", 60.0, "in"), ("twist", 80.0), ("twist", -80.0)),
+        "upper_arm": (
+            ("aim", 130.0, "out"),
+            ("aim", 80.0, "front"),
+            ("aim", 15.0, "out"),
+            ("twist", 60.0),
+            ("twist", -60.0),
+        ),
+        "shoulder": (("bend", 25.0, "up"), ("bend", 20.0, "front")),
+        "finger": (("bend", 75.0, "in"),),
+        "thumb": (("bend", 35.0),),
+        "thigh": (("aim", 90.0, "front"), ("aim", 50.0, "out"), ("aim", 30.0, "back"), ("twist", 40.0)),
+        "shin": (("bend", 110.0, "back"),),
+        "foot": (("bend", 25.0, "up"), ("open", 40.0, "up")),
+        "toe": (("bend", 40.0, "up"),),
+        "neck": (("turn", 70.0, "", True), ("bend", 50.0, "front", True), ("bend", 40.0, "back", True)),
+        "spine": (
+            ("turn", 50.0, "", True),
+            ("bend", 60.0, "front", True),
+            ("bend", 30.0, "back", True),
+            ("bend", 40.0, "left", True),
+        ),
+        "jaw": (("bend", 25.0, "down"),),
+        "face": (("swing", 10.0),),
+        "still": (),
+        "other": (("swing", 30.0), ("twist", 30.0)),
+    }.items()
+}
+"""What one joint can do by itself. "face" is what the head carries, "other" what nothing is known of;
+"swing" is about both axes that are perpendicular to a bone, to and fro."""
+
 SWING, TWIST = 60.0, 90.0
 """Degrees of a joint that nothing else is known of."""
 
@@ -105,6 +140,48 @@ def poses(bones: Bones, limits: Limits, moving: np.ndarray) -> list[Pose]:
     moving  bool [bones], those that move vertices
     """
     return _Battery(bones, limits, moving).poses()
+
+
+COMBINED = ("Arms crossed", "Squat", "Back bent", "Back turned", "Neck turned")
+"""Figures in which joints that depend on each other bend at once."""
+
+
+def combined(bones: Bones, limits: Limits, moving: np.ndarray) -> list[Pose]:
+    """Returns those poses of figures that bend several joints at once."""
+    return [pose for pose in poses(bones, limits, moving) if pose.name in COMBINED]
+
+
+def joint_poses(
+    bones: Bones, limits: Limits, moving: np.ndarray, table: Mapping[str, tuple[Move, ...]] = JOINTS
+) -> list[tuple[int, Pose]]:
+    """Returns the poses of single joints, each with its bone. Arguments as of poses(); `table` is by role."""
+    return list(_Battery(bones, limits, moving).of_joints(table))
+
+
+def roles(bones: Bones) -> list[str]:
+    """Returns the role of each bone; "" for all in a rig that is no figure that stands upright."""
+    battery = _Battery(bones, {}, np.zeros(len(bones.names), bool))
+    return [battery.role_of(bone) if battery.is_figure else "" for bone in range(len(bones.names))]
+
+
+def sides(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns int [bones], 1 for left, -1 for right, 0 for neither; and int [bones], the bone that has the
+    same name but for its side, -1 for none."""
+    words = [_words(name) for name in names]
+    side = np.array([_side_of(word) for word in words], int).reshape(-1)
+    mirror = np.full(len(words), -1)
+    # Some exporters number all bones.
+    for pattern in (r"$^", r"_\d+$"):
+        by_word: dict[tuple[str, int], list[int]] = {}
+        for bone, word in enumerate(words):
+            if side[bone]:
+                key = re.sub(f"{_LEFT}|{_RIGHT}", "*", re.sub(pattern, "", word))
+                by_word.setdefault((key, int(side[bone])), []).append(bone)
+        for (key, sign), found in by_word.items():
+            others = by_word.get((key, -sign), [])
+            if len(found) == len(others) == 1 and mirror[found[0]] < 0:
+                mirror[found[0]] = others[0]
+    return side, mirror
 
 
 def posed(bones: Bones, pose: Pose) -> np.ndarray:
@@ -150,7 +227,7 @@ class _Battery:
         self._axes, self._heads = rest[:, :3, :3], rest[:, :3, 3]
         self._along = self._axes[:, :, 1]
         self._joints = [int(bone) for bone in np.flatnonzero(moving) if bones.carriers[bone] >= 0]
-        self._words = [re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in bones.names]
+        self._words = [_words(name) for name in bones.names]
 
     def poses(self) -> list[Pose]:
         limited = [bone for bone in self._joints if self._bones.names[bone] in self._limits]
@@ -164,6 +241,46 @@ class _Battery:
             free = [bone for bone in free if not self._roles[bone] and bone not in face]
         found += self._general(free)
         return [pose for pose in found if pose.rotations]
+
+    def of_joints(self, table: Mapping[str, tuple[Move, ...]]) -> Iterator[tuple[int, Pose]]:
+        for bone in self._joints:
+            if self._bones.names[bone] in self._limits:
+                found = list(self._within_limits([bone]))
+            else:
+                role = self.role_of(bone) if self.is_figure else "other"
+                moves = table.get(self._bones.names[bone], table.get(role or "other", ()))
+                found = [pose for move in moves for pose in self._of_move(move, bone)]
+            for pose in found:
+                if pose.rotations:
+                    yield bone, pose
+
+    @property
+    def is_figure(self) -> bool:
+        return self._directions is not None
+
+    def role_of(self, bone: int) -> str:
+        above = any(self._roles[each] == "neck" for each in self._above(bone)[1:])
+        return self._roles[bone] or ("face" if above else "")
+
+    def _of_move(self, move: Move, bone: int) -> Iterator[Pose]:
+        angle = math.radians(move.degrees)
+        if move.action == "swing":
+            for axis, letter in ((0, "X"), (2, "Z")):
+                for sign in (1, -1):
+                    name = f"{letter} {sign * move.degrees:g}"
+                    yield Pose(name, {bone: _about(self._axes[bone][:, axis], sign * angle)})
+            return
+        if move.action == "twist":
+            rotation: np.ndarray | None = _about(self._along[bone], angle)
+        elif self.is_figure:
+            chain = self._chain(bone, self._of_role(move.role)) if move.shared else 1
+            angle /= chain
+            rotation = self._rotation(move, bone, angle)
+        else:
+            rotation = None
+        if rotation is not None:
+            toward = f" {move.toward}" if move.action in ("aim", "bend", "open") else ""
+            yield Pose(f"{move.action} {math.degrees(angle):.3g}{toward}", {bone: rotation})
 
     def _within_limits(self, bones: Sequence[int]) -> Iterator[Pose]:
         for axis, letter in enumerate("XYZ"):
@@ -224,8 +341,7 @@ class _Battery:
 
     def _side(self, bone: int) -> int:
         """1 for left, -1 for right, 0 for neither."""
-        word = self._words[bone]
-        return int(bool(re.search(_LEFT, word))) - int(bool(re.search(_RIGHT, word)))
+        return _side_of(self._words[bone])
 
     def _of_role(self, *roles: str) -> list[int]:
         return [bone for bone, role in enumerate(self._roles) if role in roles]
@@ -312,6 +428,14 @@ class _Battery:
             return _unit(bent), math.atan2(np.linalg.norm(bent), self._along[above] @ along)
         axis = np.cross(along, _unit(toward))
         return (_unit(axis) if np.linalg.norm(axis) > 0.1 else None), 0.0
+
+
+def _words(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
+def _side_of(word: str) -> int:
+    return int(bool(re.search(_LEFT, word))) - int(bool(re.search(_RIGHT, word)))
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:

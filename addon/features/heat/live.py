@@ -170,6 +170,24 @@ class Moment:
         rest = _in_world(self.rest_points, self.worlds)
         return self.subject.gauge.pose_of(_frame_of_rig(self.subject, self.armatures, rest, self.frames))
 
+    def points(self, methods: Sequence[str | None]) -> np.ndarray:
+        """float64 [vertices, 3], world space.
+
+        methods  of each part: one with the stages that are shown, None for the method that is shown, too, or
+                 properties.BLENDER for the Armature modifiers
+        """
+        shapes = []
+        for part, method, rest_points, own, shown in zip(
+            self.subject.parts, methods, self.rest_points, self.frames, self.stages, strict=True
+        ):
+            frames, values = own, shown
+            if method == properties.BLENDER:
+                frames, values = pose.of_modifiers(part.obj, own), corrective_smooth.stage_values(part.obj)
+            elif method is not None:
+                frames = _under(part, own, method)
+            shapes.append(_Other(part.skin_stack, rest_points, frames, values).points().copy())
+        return _in_world(shapes, self.worlds)
+
     def measured(
         self, method: str, stages: StageValues | None = None, more: StageValues = NO_STAGES
     ) -> Measured:

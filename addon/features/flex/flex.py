@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads characters for core.flex, and bends them without their bones: no action, control or driver takes
+part, and the file stays as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import bpy
+import numpy as np
+
+from ...attach import properties
+from ...core import battery
+from ...core.errors import SinewError
+from ...core.flex.character import Character, Skeleton
+from ...core.flex.limits import Table
+from ...core.flex.verdict import OWN, Pose, Verdict, judge
+from ...core.metrics import FrameOfRig
+from ...core.rig import Bones
+from ...deform import session
+from ...io import armature_io
+from ..heat import live
+from ..suggest.suggest import crossing_triangles
+
+
+@dataclass
+class _Rig:
+    """An armature, and the meshes that it deforms.
+
+    first   the number of its first bone in the skeleton
+    moving  names of the bones that move vertices
+    world   float64 [4, 4]
+    """
+
+    armature: bpy.types.Object
+    bones: Bones
+    first: int
+    moving: set[str]
+    world: np.ndarray
+
+    @property
+    def is_moving(self) -> np.ndarray:
+        return np.array([name in self.moving for name in self.bones.names], bool)
+
+    def rest(self) -> np.ndarray:
+        return self.world @ self.bones.rest[: len(self.bones.names)].astype(np.float64)
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """See core.flex.verdict.Posed. own: the methods of the meshes, as of live.Moment.points()."""
+
+    moment: live.Moment
+    own: Sequence[str | None]
+
+    @property
+    def frame(self) -> FrameOfRig:
+        return self.moment.pose.frame
+
+    def points(self, method: str) -> np.ndarray:
+        return self.moment.points(self.own if method == OWN else [method] * len(self.own))
+
+
+def flex(
+    objects: Sequence[bpy.types.Object],
+    methods: Sequence[str],
+    table: Table,
+    own: Mapping[bpy.types.Object, str | None],
+) -> Generator[float, None, Verdict]:
+    """Yields the progress; returns the verdict on the objects' own methods.
+
+    objects  those that Sinew deforms
+    methods  others to try
+    own      as of live.Moment.points(), for objects that are to be judged otherwise than they are shown
+
+    Raises SinewError where there is nothing to bend.
+    """
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    subject = live.measure(session.states_of(objects, depsgraph), properties.BLENDER, depsgraph)
+    if subject is None:
+        raise SinewError("Nothing to bend: Sinew deforms none of the chosen meshes")
+    now = live.Moment.of(subject, depsgraph)
+    rigs = _rigs(now)
+    own_methods = [own.get(part.obj) for part in subject.parts]
+    poses = list(_poses(now, rigs, table, own_methods))
+    return (yield from judge(_character(now, rigs), poses, [OWN, *methods], table.limits, crossing_triangles))
+
+
+def _rigs(now: live.Moment) -> list[_Rig]:
+    found: dict[int, _Rig] = {}
+    first = 0
+    for part, world in zip(now.subject.parts, now.armatures, strict=True):
+        armature, deformer = properties.of(part.obj).armature, part.bound.first_deformer
+        if armature is None:
+            raise SinewError(f"{part.obj.name}: its armature is missing")
+        if armature.session_uid not in found:
+            found[armature.session_uid] = _Rig(armature, deformer.bones, first, set(), world)
+            first += len(deformer.bones.names)
+        found[armature.session_uid].moving.update(deformer.moving_bones)
+    return list(found.values())
+
+
+def _character(now: live.Moment, rigs: Sequence[_Rig]) -> Character:
+    columns = []
+    for part in now.subject.parts:
+        rig = next(each for each in rigs if each.armature == properties.of(part.obj).armature)
+        owner = np.arange(len(rig.bones.rest))
+        for bone, segments in rig.bones.bending:
+            first = rig.bones.first_joints[bone]
+            owner[first : first + segments + 1] = bone
+        columns.append(owner + rig.first)
+    surface, rest = now.subject.gauge.surface, now.pose.rest
+    return Character(
+        surface,
+        np.ascontiguousarray(rest.points.T),
+        now.pose.skin.influences,
+        np.concatenate(columns),
+        _skeleton(rigs),
+        [(part.obj.name, part.surface.vertex_count) for part in now.subject.parts],
+    )
+
+
+def _skeleton(rigs: Sequence[_Rig]) -> Skeleton:
+    names: list[str] = []
+    roles: list[str] = []
+    parts = []
+    for number, rig in enumerate(rigs):
+        bones, rest = rig.bones, rig.rest()
+        names += bones.names
+        roles += battery.roles(bones)
+        side, mirror = battery.sides(bones.names)
+        parts.append(
+            (
+                rest,
+                rest[:, :3, 3] + bones.lengths[:, None] * rest[:, :3, 1],
+                np.where(bones.carriers >= 0, bones.carriers + rig.first, -1),
+                bones.deform,
+                side,
+                np.where(mirror >= 0, mirror + rig.first, -1),
+                np.full(len(side), number),
+            )
+        )
+    rest, tails, above, deform, side, mirror, rig_of = map(np.concatenate, zip(*parts, strict=True))
+    return Skeleton(tuple(names), rest, tails, above, deform, tuple(roles), side, mirror, rig_of)
+
+
+def _poses(
+    now: live.Moment, rigs: Sequence[_Rig], table: Table, own: Sequence[str | None]
+) -> Generator[Pose, None, None]:
+    for rig in rigs:
+        limits = armature_io.read_limits(rig.armature)
+        single = battery.joint_poses(rig.bones, limits, rig.is_moving, table.joints)
+        found = [((bone,), pose) for bone, pose in single]
+        found += [
+            (tuple(pose.rotations), pose) for pose in battery.combined(rig.bones, limits, rig.is_moving)
+        ]
+        for bones, pose in found:
+            make: Callable[[], _Posed] = partial(_posed, now, rig.bones, pose, own)
+            yield Pose(pose.name, tuple(bone + rig.first for bone in bones), make)
+
+
+def _posed(now: live.Moment, bones: Bones, pose: battery.Pose, own: Sequence[str | None]) -> _Posed:
+    def matrices(of: Bones) -> np.ndarray:
+        return battery.posed(of, pose) if of is bones or of.names == bones.names else of.rest
+
+    return _Posed(now.posed(matrices), own)
