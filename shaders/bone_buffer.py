@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: MIT
 """What the shaders read of bones, made of their poses: for an engine to write in its own language."""
 
 import numpy as np

@@ -1,5 +1,5 @@
 #version 310 es
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // A compute shader with eight influences a vertex; bones and vertices are in storage buffers.
 precision highp float;
 precision highp int;

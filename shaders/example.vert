@@ -1,5 +1,5 @@
 #version 300 es
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // A vertex shader with four influences a vertex. The line of #include is for the engine, or whoever, to replace.
 precision highp float;
 precision highp int;

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // A compute shader; the text of sinew.wgsl comes before this.
 
 struct Vertex {

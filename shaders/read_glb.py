@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: MIT
 """A character of a .glb, skinned as the shaders do, with numpy: the mesh and its attributes as trimesh reads
 them, the skin and the animation by glTF 2.0.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: MIT
 """The data of a page of `sinew compare --viewer`, skinned as the shaders do, with numpy: docs/viewer.md."""
 
 import base64

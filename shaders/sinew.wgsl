@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // Linear blending, dual quaternions, centres of rotation and the painted mix of two, as Sinew computes them in Blender.
 // For WGSL; copy this file before your entry points. docs/engines.md has the layout.
 //

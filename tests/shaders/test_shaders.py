@@ -3,7 +3,11 @@
 other."""
 
 import re
+import shutil
+import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import methods as reader_methods
 import numpy as np
@@ -168,20 +172,17 @@ def test_glsl_compute_shader(gl, mesh):
         mesh.assert_is(result, np.frombuffer(out.read(), np.float32).reshape(-1, 4)[:, :3])
 
 
-@pytest.mark.parametrize("influences", [4, MOST])
-def test_wgsl_compute_shader(gpu, mesh, influences):
+def skinned(gpu, module, mesh, influences):
+    """Yields each result of the golden set with the points and normals by the entry point `skin`, float32
+    [2, vertices, 3]."""
     import wgpu
 
-    text = (SHADERS / "sinew.wgsl").read_text() + (SHADERS / "example.wgsl").read_text()
-    text, changed = re.subn(r"SINEW_INFLUENCES: u32 = 4u;", f"SINEW_INFLUENCES: u32 = {influences}u;", text)
-    assert changed == 1
-    module = gpu.create_shader_module(code=text)
     pipeline = gpu.create_compute_pipeline(layout="auto", compute={"module": module, "entry_point": "skin"})
     count, storage = len(mesh.points), wgpu.BufferUsage.STORAGE
     normals = np.column_stack([mesh.normals, np.zeros(count)]).astype(np.float32)
     out = gpu.create_buffer(size=32 * count, usage=storage | wgpu.BufferUsage.COPY_SRC)
     for result in mesh.results:
-        chosen = np.array([*numbers(result), 0, 0], np.uint32)
+        chosen = np.array([*numbers(result), count, 0], np.uint32)
         buffers = [
             gpu.create_buffer_with_data(data=mesh.palette, usage=storage),
             gpu.create_buffer_with_data(data=packed(mesh, influences), usage=storage),
@@ -198,9 +199,41 @@ def test_wgsl_compute_shader(gpu, mesh, influences):
         run.dispatch_workgroups(-(-count // 64))
         run.end()
         gpu.queue.submit([encoder.finish()])
-        read = np.frombuffer(gpu.queue.read_buffer(out), np.float32).reshape(-1, 2, 4)[:, :, :3]
-        mesh.assert_is(result, read[:, 0])
-        assert np.abs(read[:, 1] - mesh.expected_normals()).max() < 1e-5
+        read = np.frombuffer(gpu.queue.read_buffer(out), np.float32).reshape(-1, 2, 4)
+        yield result, read[:, :, :3].swapaxes(0, 1)
+
+
+def wgsl(gpu, influences):
+    text = (SHADERS / "sinew.wgsl").read_text() + (SHADERS / "example.wgsl").read_text()
+    text, changed = re.subn(r"SINEW_INFLUENCES: u32 = 4u;", f"SINEW_INFLUENCES: u32 = {influences}u;", text)
+    assert changed == 1
+    return gpu.create_shader_module(code=text)
+
+
+def hlsl(gpu, influences):
+    """By the reference compiler for shaders of Vulkan."""
+    compiler = shutil.which("glslangValidator")
+    if compiler is None:
+        pytest.skip("no glslangValidator: install glslang-tools to test the shaders of HLSL")
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "skin.spv"
+        options = ["-D", "-S", "comp", "-e", "skin", "-V", f"-DSINEW_INFLUENCES={influences}"]
+        found = subprocess.run(
+            [compiler, *options, "-o", str(target), str(SHADERS / "example.hlsl")],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert found.returncode == 0, found.stdout + found.stderr
+        return gpu.create_shader_module(code=target.read_bytes())
+
+
+@pytest.mark.parametrize("influences", [4, MOST])
+@pytest.mark.parametrize("made", [wgsl, hlsl])
+def test_compute_shader(gpu, mesh, made, influences):
+    for result, (points, normals) in skinned(gpu, made(gpu, influences), mesh, influences):
+        mesh.assert_is(result, points)
+        assert np.abs(normals - mesh.expected_normals()).max() < 1e-5
 
 
 def test_each_method_is_tested(mesh):
@@ -217,6 +250,7 @@ def mixed_methods(result):
     ("name", "pattern"),
     [
         ("sinew.glsl", r"const int SINEW_(LBS|DQ|COR) = (\d);"),
+        ("sinew.hlsl", r"const int SINEW_(LBS|DQ|COR) = (\d);"),
         ("sinew.wgsl", r"const SINEW_(LBS|DQ|COR): u32 = (\d)u;"),
     ],
 )
