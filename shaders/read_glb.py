@@ -142,7 +142,7 @@ def _mesh_at(file, scene, node, world):
     # By columns; their inverses are the joints' axes at rest.
     from_rest = file.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
     bones = bone_buffer(world[skin["joints"]], np.linalg.inv(from_rest.astype(np.float64)))
-    extras = mesh.get("extras", {}).get("sinew", {"method": "lbs"})
+    skinning = mesh.get("extensions", {}).get("SINEW_skinning", {"method": "lbs"})
     # trimesh has a geometry for each primitive, in the order of the file.
     before = sum(len(each["primitives"]) for each in file.header["meshes"][: node["mesh"]])
     geometries = list(scene.geometry.values())[before:]
@@ -151,10 +151,10 @@ def _mesh_at(file, scene, node, world):
         own = geometry.vertex_attributes
         joints, weights = influences(file, primitive["attributes"])
         arguments = (np.asarray(geometry.vertices), own.get("_SINEW_CENTRE"), joints, weights, bones)
-        points = skinned(extras["method"], *arguments)
-        if "mix" in extras:
+        points = skinned(skinning["method"], *arguments)
+        if "mix" in skinning:
             share = np.asarray(own["_SINEW_MIX"]).reshape(-1, 1)
-            points += share * (skinned(extras["mix"], *arguments) - points)
+            points += share * (skinned(skinning["mix"], *arguments) - points)
         parts.append(points)
     x, y, z = np.vstack(parts).T
     return np.column_stack([x, -z, y])

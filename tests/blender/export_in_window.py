@@ -38,7 +38,7 @@ def export(path: Path, clicked: tuple[tuple[int, int], ...]) -> Iterator[None]:
 def of_sinew(path: Path) -> dict[str, object]:
     return {
         mesh["name"]: [
-            mesh.get("extras", {}).get("sinew", {}).get("method"),
+            mesh.get("extensions", {}).get("SINEW_skinning", {}).get("method"),
             "_SINEW_CENTRE" in mesh["primitives"][0]["attributes"],
         ]
         for mesh in header(path)["meshes"]

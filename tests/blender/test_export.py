@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -11,6 +12,7 @@ import sys
 from pathlib import Path
 
 import bpy
+import jsonschema
 import numpy as np
 import pytest
 import read_glb
@@ -22,6 +24,7 @@ from sinew_addon import cli
 from sinew_addon.deform import characters
 from sinew_addon.features.gltf import export
 
+SCHEMA = json.loads((REPOSITORY / "docs" / "SINEW_skinning.schema.json").read_text(encoding="utf-8"))
 FRAMES = [1, 6, 11]
 GROUP = "Painted"
 
@@ -112,7 +115,10 @@ def test_it_plays_elsewhere_as_here(tmp_path, method, mixed):
     file = write(tmp_path / "a.glb")
     (mesh,) = file.header["meshes"]
     signs = {f"{name}.signs": "blender" for name in (method, mixed) if name in ("dq", "cor")}
-    assert mesh["extras"]["sinew"] == {
+    assert file.header["extensionsUsed"] == ["SINEW_skinning"]
+    assert "extensionsRequired" not in file.header
+    jsonschema.validate(mesh["extensions"]["SINEW_skinning"], SCHEMA)
+    assert mesh["extensions"]["SINEW_skinning"] == {
         "version": 1,
         "method": method,
         **({"mix": mixed} if mixed else {}),
@@ -159,7 +165,7 @@ def test_without_the_check_box_the_file_is_as_before(tmp_path):
     use(obj, "cor")
     bpy.ops.export_scene.gltf(filepath=str(tmp_path / "a.glb"), export_attributes=True)
     header = read_glb.File(tmp_path / "a.glb").header
-    assert "sinew" not in header["meshes"][0].get("extras", {})
+    assert "SINEW_skinning" not in str(header)
     assert {"_NUMBER"} == {n for n in header["meshes"][0]["primitives"][0]["attributes"] if n.startswith("_")}
 
 
@@ -221,9 +227,10 @@ def test_custom_properties_stay(tmp_path):
     obj.data["tailor"] = "Ann"
     # Saved files store centres in the mesh.
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    extras = write(tmp_path / "a.glb", export_extras=True).header["meshes"][0]["extras"]
-    assert extras.pop("sinew") == {"version": 1, "method": "cor", "parameters": {"cor.signs": "blender"}}
-    assert extras["tailor"] == "Ann"
+    mesh = write(tmp_path / "a.glb", export_extras=True).header["meshes"][0]
+    content = {"version": 1, "method": "cor", "parameters": {"cor.signs": "blender"}}
+    assert mesh["extensions"] == {"SINEW_skinning": content}
+    assert mesh["extras"]["tailor"] == "Ann"
 
 
 def test_off_is_not_exported(tmp_path):
@@ -231,7 +238,7 @@ def test_off_is_not_exported(tmp_path):
     use(obj, "cor")
     obj.sinew.enabled = False
     file = write(tmp_path / "a.glb")
-    assert "sinew" not in file.header["meshes"][0].get("extras", {})
+    assert "SINEW_skinning" not in str(file.header)
     assert export.left_out() == []
 
 
@@ -251,15 +258,16 @@ def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
     }
     assert "_SINEW_CENTRE" in nodes["Arm"]["primitives"][0]["attributes"]
     assert "_SINEW_CENTRE" not in nodes["Other"]["primitives"][0]["attributes"]
-    assert "sinew" not in nodes["Other"].get("extras", {})
+    assert "extensions" not in nodes["Other"]
 
 
 def test_parameters_and_stages_are_named(tmp_path):
     obj = make_character()
     characters.set_parameters({"ddm.variant": "2", "ddm.radius": 0.25, "bulge_limit.enabled": True})
     characters.use_method(obj, "ddm")
-    extras = write(tmp_path / "a.glb").header["meshes"][0]["extras"]["sinew"]
-    assert extras == {
+    content = write(tmp_path / "a.glb").header["meshes"][0]["extensions"]["SINEW_skinning"]
+    jsonschema.validate(content, SCHEMA)
+    assert content == {
         "version": 1,
         "method": "ddm",
         "parameters": {"ddm.variant": "2", "ddm.radius": 0.25, "ddm.weld": True},

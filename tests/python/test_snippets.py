@@ -8,6 +8,7 @@ import re
 import subprocess
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 import sinew
@@ -38,8 +39,16 @@ def test_the_mesh_in_gltf():
     (primitive,) = mesh["primitives"]
     own = [name for name in primitive["attributes"] if name.startswith("_")]
     assert own
-    for name in (*mesh["extras"], *mesh["extras"]["sinew"], *own):
+    for name in (*mesh["extensions"], *own):
         assert f'"{name}"' in writer, name
+    schema = json.loads((ROOT / "docs/SINEW_skinning.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(mesh["extensions"]["SINEW_skinning"], schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(mesh["extensions"]["SINEW_skinning"] | {"mix": "none"}, schema)
+    methods, stages = (schema["properties"][name] for name in ("method", "stages"))
+    assert methods["enum"] == [method.name for method in sinew.methods()]
+    assert stages["items"]["enum"] == [stage.name for stage in sinew.stages() if stage.name != "mix"]
 
 
 def test_the_variables_of_flamenco():

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes how Sinew deforms a mesh to a glTF file: extras of the mesh name the method, and
-application-specific vertex attributes (glTF 2.0, 3.7.2.1: names that begin with an underscore) have the
+"""Writes how Sinew deforms a mesh to a glTF file: the extension SINEW_skinning of the mesh names the method,
+and application-specific vertex attributes (glTF 2.0, 3.7.2.1: names that begin with an underscore) have the
 method's vertex data.
 
 Meshes have these attributes only during an export, as the exporter splits vertices at seams, and copies
@@ -27,7 +27,7 @@ from ...io import mesh_io, spaces
 # Raised when readers of earlier files could not read new ones correctly.
 VERSION = 1
 CENTRE, SHARE = "_SINEW_CENTRE", "_SINEW_MIX"
-EXTRAS = "sinew"
+EXTENSION = "SINEW_skinning"
 
 # In glTF's axes: x, z, -y.
 _Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
@@ -37,13 +37,13 @@ _Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtyp
 class Skinning:
     """How one mesh is deformed.
 
-    extras   as written to the file
+    content  of the extension
     centres  float32 [vertices, 3], object space; None where its methods have none
     shares   float32 [vertices], of the mixed method; None without one
     """
 
     obj: bpy.types.Object
-    extras: dict[str, Any]
+    content: dict[str, Any]
     centres: np.ndarray | None = None
     shares: np.ndarray | None = None
 
@@ -52,8 +52,8 @@ class Skinning:
 class _Export:
     """The current export, or the last one.
 
-    written     extras by the names of objects
-    left_out    a sentence for each object without extras
+    written     contents of the extension by the names of objects
+    left_out    a sentence for each object without the extension
     meshes      that have attributes during the export
     all_custom  the artist exports the meshes' other attributes that begin with an underscore, too
     """
@@ -105,11 +105,11 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
         mixed = ""
     skinning = Skinning(obj, {"version": VERSION, "method": settings.method})
     if mixed:
-        skinning.extras["mix"] = mixed
+        skinning.content["mix"] = mixed
         skinning.shares = deformer.mix_weights
     parameters = stage_settings.method_values(settings, [settings.method, mixed])
     stages = [name for name in stage_settings.names_on(settings) if name != "mix"]
-    skinning.extras |= {
+    skinning.content |= {
         name: value for name, value in (("parameters", parameters), ("stages", stages)) if value
     }
     if "cor" in (settings.method, mixed):
@@ -149,7 +149,7 @@ def _add(skinning: Skinning, y_up: bool) -> None:
             "single user (Object > Relations)"
         )
         return
-    _current.written[obj.name] = skinning.extras
+    _current.written[obj.name] = skinning.content
     if skinning.centres is not None:
         # In world space, as the exporter writes the positions of a skin.
         space = np.array(obj.matrix_world, dtype=np.float64)
@@ -188,12 +188,12 @@ def _is_exporting() -> bool:
 
 
 def written() -> dict[str, dict[str, Any]]:
-    """The extras of the last export, by the names of objects."""
+    """What the extension says in the last export, by the names of objects."""
     return dict(_current.written)
 
 
 def left_out() -> list[str]:
-    """A sentence for each object of the last export without extras."""
+    """A sentence for each object of the last export without the extension."""
     return list(_current.left_out)
 
 
@@ -209,9 +209,12 @@ class GltfExtension:
         self, gltf_mesh: Any, _mesh: bpy.types.Mesh, obj: bpy.types.Object | None, *_: Any
     ) -> None:
         """obj: the object that the mesh is exported for, None for one without a skin."""
-        extras = _current.written.get(obj.name) if obj is not None else None
-        if extras is not None:
-            gltf_mesh.extras = {**(gltf_mesh.extras or {}), EXTRAS: extras}
+        content = _current.written.get(obj.name) if obj is not None else None
+        if content is not None:
+            from io_scene_gltf2.io.com.gltf2_io_extensions import Extension
+
+            made = Extension(EXTENSION, content, required=False)
+            gltf_mesh.extensions = {**(gltf_mesh.extensions or {}), EXTENSION: made}
             return
         # The attributes belong to another object with this mesh.
         for primitive in gltf_mesh.primitives:
