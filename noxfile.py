@@ -451,7 +451,8 @@ def site(words: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="./dev site")
     parser.add_argument("--out", type=Path, default="build/site")
     out = parser.parse_args(words).out.resolve()
-    set_up("site")
+    # The command of the latter makes pages that turn.
+    set_up("site", f"bpy-{EVERYDAY}")
     # Leaves out an announcement. Not --quiet: mkdocs then counts no warnings, and strict has no effect.
     os.environ["NO_MKDOCS_2_WARNING"] = "1"
     call(f"{python_in('site')} -m mkdocs build --site-dir", out, must=True)

@@ -106,7 +106,9 @@ def photograph(page: Path, target: Path, width: int, height: int) -> None:
     with tempfile.TemporaryDirectory() as profile:
         subprocess.run(
             [
-                *("chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"),
+                *("chromium", "--headless", "--no-sandbox", "--hide-scrollbars"),
+                # WebGL in software, and time for what a page does after it has loaded.
+                *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--virtual-time-budget=9000"),
                 *("--force-device-scale-factor=1", f"--user-data-dir={profile}"),
                 *(f"--window-size={width},{height}", f"--screenshot={target}", page.as_uri()),
             ],
@@ -136,6 +138,16 @@ def photograph_page(target: Path) -> None:
         photograph(Path(place, "human.html"), target, 1300, 1310)
 
 
+def photograph_viewer(target: Path) -> None:
+    """The page that turns, with the stretch of edges on one side of a wrist as on the other."""
+    with tempfile.TemporaryDirectory() as place:
+        page = Path(place, "wrist.html")
+        sinew("compare", find("wrist.blend"), "--methods", "lbs,dq,cor", "--viewer", page)
+        text = page.read_text(encoding="utf-8").replace("measure: 0,", "measure: 2,")
+        page.write_text(text, encoding="utf-8")
+        photograph(page, target, 1180, 640)
+
+
 def photograph_heat_map(target: Path) -> None:
     """Of a page, the section on the stretch of edges."""
     with tempfile.TemporaryDirectory() as place:
@@ -156,6 +168,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     **dict.fromkeys(SHEETS, draw_sheet),
     "batch-report.png": photograph_report,
     "page.png": photograph_page,
+    "viewer.png": photograph_viewer,
     "heat.png": photograph_heat_map,
     "elbows": draw_elbows,
 }

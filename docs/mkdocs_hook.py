@@ -7,8 +7,10 @@ the site as in the repository; and mkdocs, which checks links, finds those that 
 
 from __future__ import annotations
 
+import os
 import posixpath
 import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +19,7 @@ from mkdocs.structure.files import File, Files
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -33,6 +36,12 @@ OUTSIDE = {
     "tests/golden/README.md": "golden.html",
 }
 
+# Files whose characters turn on the site, in the order of docs/viewer.md. Made by the command of .venv; the
+# site has those that are there.
+TURNING = [ROOT / "blend_files" / name for name in ("wrist.blend", "elbow.blend", "shoulder.blend")]
+TURNING.append(Path(os.environ.get("SINEW_RIGS", ROOT / "rigs"), "human.blend"))
+PICTURE = "![Two methods on a wrist, with the stretch of edges as colours](viewer.png)"
+
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """All files by their paths in the repository, with what is elsewhere and what is made."""
@@ -47,6 +56,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         made = File.generated(config, f"docs/{name}.md", content=text)
         made.dest_uri = f"{name}.html"
         known.append(made)
+    for path in _turning():
+        known.append(
+            File(f"live/{path.name}", str(path.parents[1]), config.site_dir, use_directory_urls=False)
+        )
     for source in sorted(_linked(known)):
         if known.get_file_from_path(source) is None and (ROOT / source).is_file():
             known.append(_file(config, source, source.removeprefix("docs/")))
@@ -65,6 +78,30 @@ def _made() -> list[tuple[str, str]]:
     finally:
         sys.path.pop(0)
     return [(name, make()) for name, make in make_reference.PAGES.items()]
+
+
+def _turning() -> list[Path]:
+    """Pages of TURNING, in build/live."""
+    sinew, folder = ROOT / ".venv/bin/sinew", ROOT / "build" / "live"
+    pages = []
+    for path in TURNING:
+        if sinew.exists() and path.exists():
+            pages.append(folder / f"{path.stem}.html")
+            words = [sinew, "compare", path, "--methods", "lbs,dq,cor", "--viewer", pages[-1]]
+            subprocess.run(words, check=True, capture_output=True)
+    return pages
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """In the place of its picture, the page that turns has a character that turns."""
+    pages = [file.src_uri for file in files if file.src_uri.startswith("live/")]
+    if page.file.src_uri != "docs/viewer.md" or not pages:
+        return markdown
+    assert PICTURE in markdown
+    others = ", ".join(f"[{Path(uri).stem}](../{uri})" for uri in pages)
+    style = "width:100%;height:44rem;border:0"
+    frame = f'<iframe src="{pages[0]}" title="A wrist that turns" style="{style}"></iframe>'
+    return markdown.replace(PICTURE, f"{frame}\n\nEach with a page of its own: {others}.")
 
 
 def _linked(files: Files) -> set[str]:

@@ -14,7 +14,7 @@ out vec3 normal;
 out float value;
 
 void main() {
-    ivec2 place = ivec2(gl_VertexID % WIDTH, gl_VertexID / WIDTH);
+    ivec2 place = ivec2(gl_VertexID & (WIDTH - 1), gl_VertexID >> SHIFT);
     vec4 own = texelFetch(surface, place, 0);
     vec4 world = world_from_armature * vec4(texelFetch(points, place, 0).xyz, 1.0);
     position = world.xyz;

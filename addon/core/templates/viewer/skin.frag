@@ -22,7 +22,7 @@ void main() {
     float weights[SINEW_INFLUENCES];
     for (int i = 0; i < SINEW_INFLUENCES; ++i) {
         int k = first + i;
-        vec2 influence = texelFetch(influences, ivec2(k % WIDTH, k / WIDTH), 0).xy;
+        vec2 influence = texelFetch(influences, ivec2(k & (WIDTH - 1), k >> SHIFT), 0).xy;
         bones[i] = int(influence.x);
         weights[i] = influence.y;
     }

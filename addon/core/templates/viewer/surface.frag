@@ -18,7 +18,7 @@ uniform int measure;         // 1: distance, 2: edge stretch
 out vec4 surface;
 
 ivec2 place_of(int k) {
-    return ivec2(k % WIDTH, k / WIDTH);
+    return ivec2(k & (WIDTH - 1), k >> SHIFT);
 }
 
 vec3 to(sampler2D shape, uint vertex, vec3 from) {

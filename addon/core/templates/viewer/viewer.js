@@ -8,7 +8,7 @@ const header = JSON.parse(find("header").textContent);
 const sources = JSON.parse(find("shaders").textContent);
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 // Of textures with a texel for each vertex, corner or influence.
-const WIDTH = 1024;
+const SHIFT = 10, WIDTH = 1 << SHIFT;
 const METHODS = { lbs: 0, dq: 1, cor: 2 };
 // Of the grid: lines each way, each in pieces that fade out.
 const LINES = 31, PIECES = 12, GROUND_VERTICES = 2 * 2 * LINES * PIECES;
@@ -53,7 +53,7 @@ function program(vertex, fragment, defines = "") {
   for (const [name, type] of [[vertex, gl.VERTEX_SHADER], [fragment, gl.FRAGMENT_SHADER]]) {
     const shader = gl.createShader(type);
     const text = sources[name].replace('#include "sinew.glsl"', () => sources["sinew.glsl"]);
-    gl.shaderSource(shader, text.replace("\n", `\n#define WIDTH ${WIDTH}\n#define LINES ${LINES}\n#define PIECES ${PIECES}\n${defines}\n`));
+    gl.shaderSource(shader, text.replace("\n", `\n#define WIDTH ${WIDTH}\n#define SHIFT ${SHIFT}\n#define LINES ${LINES}\n#define PIECES ${PIECES}\n${defines}\n`));
     gl.compileShader(shader);
     gl.attachShader(made, shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(name + ": " + gl.getShaderInfoLog(shader));
@@ -257,7 +257,7 @@ const plus = (a, b, factor = 1) => a.map((x, i) => x + factor * b[i]);
 
 const names = Object.keys(header.methods), last = header.frames.length - 1;
 const state = {
-  frame: header.start, playing: false, panes: names.length > 1 && innerWidth > 720 ? 2 : 1, methods: [names[0], names[names.length - 1]],
+  frame: header.start, playing: false, panes: names.length > 1 && innerWidth > 560 ? 2 : 1, methods: [names[0], names[names.length - 1]],
   measure: 0, most: Infinity, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
 };
 
@@ -310,7 +310,13 @@ const ramps = header.measures.map(({ ramp }) => {
 
 // --- Drawing
 
+// What the points on the graphics card were made for: a camera that moves needs no others.
+let skinnedFor = "";
+
 function skinAll() {
+  const wanted = [state.frame, state.panes, ...state.methods, state.measure, state.most].join();
+  if (wanted === skinnedFor) return;
+  skinnedFor = wanted;
   for (const mesh of meshes) {
     mesh.setFrame(state.frame);
     if (state.measure === 1) mesh.skin(mesh.about.blender, Infinity, mesh.reference);
@@ -387,6 +393,7 @@ function read(target, mesh) {
   const { width, height } = target, found = new Float32Array(4 * width * height);
   gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, found);
+  skinnedFor = "";
   changed();
   return found.subarray(0, 4 * mesh.count);
 }
