@@ -98,7 +98,7 @@ def _parts() -> tuple[Feature, ...]:
 
 def _features() -> tuple[Feature, ...]:
     names = (
-        *("suggest", "action_copy", "inbetween", "blend", "ik", "corrective", "compare"),
+        *("suggest", "action_copy", "inbetween", "blend", "ik", "corrective", "compare", "flex"),
         *("heat", "auto_mix", "diagnose", "gltf", "bake"),
     )
     return tuple(import_module(f".features.{name}.feature", __package__).FEATURE for name in names)

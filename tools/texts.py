@@ -14,6 +14,7 @@ import sinew_addon
 from bl_ui.utils import PresetPanel
 from sinew_addon import registration
 from sinew_addon.core import battery, metrics, recommendation, suggestion
+from sinew_addon.core.flex import limits
 from sinew_addon.core.vertex_data import PROVIDERS
 from sinew_addon.features.diagnose import mending
 from sinew_addon.features.heat import heat_panel
@@ -45,7 +46,7 @@ TYPES = (
 def shown() -> dict[str, str]:
     """Each text, and one position in the code where it occurs."""
     found: dict[str, str] = {}
-    for source in (_of_classes(), _of_data(), _of_lists(), _of_code(), _of_phrases()):
+    for source in (_of_classes(), _of_data(), _of_lists(), _of_limits(), _of_code(), _of_phrases()):
         for text, where in source:
             # Texts without letters are the same in all languages.
             if any(letter.isalpha() for letter in text):
@@ -118,6 +119,12 @@ def _of_lists() -> Iterator[tuple[str, str]]:
         yield text, "heat_panel"
     for entry in menus.entries():
         yield entry.text, "menus"
+
+
+def _of_limits() -> Iterator[tuple[str, str]]:
+    for limit in limits.LIMITS.values():
+        for text in (limit.label, limit.meaning, limit.advice, limit.unit):
+            yield text, "LIMITS"
 
 
 def _of_code() -> Iterator[tuple[str, str]]:

@@ -102,5 +102,5 @@ def _report(path: Path, table: Table, args: argparse.Namespace, console: Console
             try:
                 show(next(steps))
             except StopIteration as end:
-                return FileReport(str(path), end.value, tuple(left_out))
+                return FileReport(str(path), end.value.verdict, tuple(left_out))
             interrupt.check()

@@ -29,6 +29,7 @@ _SECTIONS = {
     "bpy.ops.sinew.*heat*": "heat-map",
     "bpy.ops.sinew.worst_frames*": "heat-map",
     "bpy.ops.sinew.go_to_frame*": "heat-map",
+    "bpy.ops.sinew.flex*": "flex",
     "bpy.ops.sinew.check*": "diagnostics",
     "bpy.ops.sinew.*finding*": "diagnostics",
     "bpy.ops.sinew.mend*": "diagnostics",

@@ -137,6 +137,7 @@ class SINEW_MT_compare(_Submenu, bpy.types.Menu):
         Entry("sinew.end_comparison"),
         Entry("sinew.recommend", icon="SOLO_ON"),
         *_over("sinew.suggest", "Suggest a Method"),
+        Entry("sinew.flex", "Flex: Bend Every Joint"),
     )
 
 

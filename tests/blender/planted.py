@@ -116,7 +116,7 @@ def verdict() -> Verdict:
         try:
             next(steps)
         except StopIteration as end:
-            return end.value
+            return end.value.verdict
 
 
 def found(of: Verdict) -> set[tuple[str, str]]:

@@ -123,12 +123,12 @@ def test_nothing_is_changed():
     )
 
 
-def _result(steps: Generator[float, None, Verdict], shares: list[float] | None = None) -> Verdict:
+def _result(steps: Generator[float, None, flex.Result], shares: list[float] | None = None) -> Verdict:
     while True:
         try:
             share = next(steps)
         except StopIteration as end:
-            return end.value
+            return end.value.verdict
         if shares is not None:
             shares.append(share)
 

@@ -56,6 +56,7 @@ class Bent:
             none * 0,
             none,
             none * 0,
+            ("Rig",),
         )
         tube = self.tube
         count = len(tube.rest)

@@ -28,6 +28,7 @@ class Skeleton:
     side     int [bones], 1 for left, -1 for right, 0 for neither
     mirror   int [bones], the bone of the other side; -1 for none
     rig      int [bones], the armature of each
+    rigs     names of armatures
     """
 
     names: tuple[str, ...]
@@ -39,6 +40,7 @@ class Skeleton:
     side: np.ndarray
     mirror: np.ndarray
     rig: np.ndarray
+    rigs: tuple[str, ...]
 
     @property
     def heads(self) -> np.ndarray:

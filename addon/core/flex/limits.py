@@ -39,12 +39,14 @@ class Limit:
     def is_beyond(self, value: float) -> bool:
         return value < self.value if self.least else value > self.value
 
-    def text(self, value: float) -> str:
+    def number(self, value: float) -> str:
+        """Without its unit."""
         if self.unit == "%":
-            return f"{100.0 * value:.0f} %"
-        return (
-            f"{value:.0f} {self.unit}" if self.unit in ("vertices", "degrees") else f"{value:.2f} {self.unit}"
-        )
+            return f"{100.0 * value:.0f}"
+        return f"{value:.0f}" if self.unit in ("vertices", "degrees") else f"{value:.2f}"
+
+    def text(self, value: float) -> str:
+        return f"{self.number(value)} {self.unit}"
 
 
 LIMITS: dict[str, Limit] = {
@@ -81,7 +83,7 @@ LIMITS: dict[str, Limit] = {
             3.0,
             "girths",
             "Vertices follow this bone most, though others are much nearer.",
-            "Select the place; assign it to the bones around it, or Diagnostics > From Neighbours.",
+            "Select the place, and assign it to the bones around it.",
         ),
         Limit(
             "other_side",
@@ -97,7 +99,7 @@ LIMITS: dict[str, Limit] = {
             0.25,
             "%",
             "The mesh is the same on both sides, and the weights are not.",
-            "Mirror the weights from the good side: Weights > Mirror, or Diagnostics > From Other Side.",
+            "Mirror the weights from the good side (Weights > Mirror).",
         ),
         Limit(
             "roll",
@@ -121,7 +123,7 @@ LIMITS: dict[str, Limit] = {
             0.5,
             "%",
             "The limb collapses at the bend.",
-            "Methods dq or cor keep volume; --methods tries them.",
+            "Methods dq and cor keep volume; or widen the blend between the two bones.",
             posed=True,
         ),
         Limit(
@@ -130,7 +132,7 @@ LIMITS: dict[str, Limit] = {
             0.4,
             "%",
             "The limb swells at the bend.",
-            "Methods lbs or cor, or the stage Limit Bulge; check the weights and the bone's head.",
+            "Use method lbs or cor, or the stage Limit Bulge; check the weights and the bone's head.",
             posed=True,
         ),
         Limit(
@@ -139,7 +141,7 @@ LIMITS: dict[str, Limit] = {
             0.5,
             "of that at rest",
             "The limb is squeezed, as a wrapper that is twisted.",
-            "Method dq or cor, the stage Twist Spread, or twist bones.",
+            "Use method dq or cor, the stage Twist Spread, or twist bones.",
             least=True,
             posed=True,
         ),
@@ -149,7 +151,7 @@ LIMITS: dict[str, Limit] = {
             4.5,
             "times",
             "The surface is torn between vertices that follow different bones.",
-            "Smooth the weights there (Weights > Smooth; Diagnostics > Smooth), or the stage Delta Mush.",
+            "Smooth the weights there (Weights > Smooth), or use the stage Delta Mush.",
             posed=True,
         ),
         Limit(
@@ -158,7 +160,7 @@ LIMITS: dict[str, Limit] = {
             0.75,
             "girths",
             "The surface leaves the bone's axis.",
-            "Method cor, or the stage Limit Bulge; check the weights there.",
+            "Use method cor or the stage Limit Bulge; check the weights there.",
             posed=True,
         ),
         Limit(
@@ -167,7 +169,7 @@ LIMITS: dict[str, Limit] = {
             0.35,
             "%",
             "The surface is folded inside out.",
-            "Smooth the weights there, or method dq or cor.",
+            "Smooth the weights there, or use method dq or cor.",
             posed=True,
         ),
         Limit(
@@ -176,7 +178,7 @@ LIMITS: dict[str, Limit] = {
             0.5,
             "%",
             "The surface goes through itself, and does not at rest.",
-            "Widen the blend between the two bones, or the stage Limit Fold.",
+            "Widen the blend between the two bones, or bend the joint less.",
             posed=True,
         ),
     )

@@ -105,6 +105,7 @@ class Joint:
     """
 
     name: str
+    armature: str
     role: str
     poses: int = 0
     values: dict[str, dict[str, tuple[float, str]]] = field(default_factory=dict)
@@ -117,6 +118,7 @@ class Joint:
     def to_dict(self) -> dict[str, Any]:
         return {
             "joint": self.name,
+            "armature": self.armature,
             "role": self.role,
             "passed": self.is_good,
             "poses": self.poses,
@@ -200,12 +202,20 @@ class _Judging:
                         self._add(bone, method, name, _Worst(value, pose.name, place))
 
     def verdict(self) -> Verdict:
-        names, roles = self._character.skeleton.names, self._character.skeleton.roles
+        skeleton = self._character.skeleton
         own = self._methods[0]
         beyond = {key for key, worst in self._worst.items() if self._limits[key[2]].is_beyond(worst.value)}
         bones = {int(bone) for bone in np.flatnonzero(self._character.moving)}
         bones |= {bone for bone, method, _name in beyond if method == own}
-        joints = {bone: Joint(names[bone], roles[bone], self._poses[bone]) for bone in sorted(bones)}
+        joints = {
+            bone: Joint(
+                skeleton.names[bone],
+                skeleton.rigs[skeleton.rig[bone]],
+                skeleton.roles[bone],
+                self._poses[bone],
+            )
+            for bone in sorted(bones)
+        }
         for key, worst in self._worst.items():
             bone, method, name = key
             if bone in joints:

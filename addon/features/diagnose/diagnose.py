@@ -137,6 +137,12 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
     Raises SinewError where that is not possible.
     """
     _found, finding = finding_of(obj, name)
+    select_vertices(obj, finding.vertices, context)
+    return len(finding.vertices)
+
+
+def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.types.Context) -> None:
+    """Enters edit mode with exactly these vertices selected. Raises SinewError where that is not possible."""
     if obj.name not in context.view_layer.objects or not obj.visible_get():
         raise SinewError(f"{obj.name} is hidden; show it to edit it")
     active = context.view_layer.objects.active
@@ -149,7 +155,7 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
     context.view_layer.objects.active = obj
     mesh = obj.data
     chosen = np.zeros(len(mesh.vertices), dtype=bool)
-    chosen[finding.vertices] = True
+    chosen[vertices] = True
     hidden = np.empty(len(mesh.vertices), dtype=bool)
     mesh.vertices.foreach_get("hide", hidden)
     # Hidden vertices cannot be selected.
@@ -163,11 +169,10 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
         for element in elements:
             element.select = False
     edited.verts.ensure_lookup_table()
-    for index in finding.vertices:
+    for index in vertices:
         edited.verts[index].select = True
     edited.select_flush_mode()
     bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
-    return len(finding.vertices)
 
 
 def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> _Reading:

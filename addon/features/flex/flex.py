@@ -4,7 +4,7 @@ part, and the file stays as it is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -49,6 +49,18 @@ class _Rig:
 
 
 @dataclass(frozen=True)
+class Result:
+    """
+    poses    by armature, joint and name: rotations of bones, as of battery.Pose, by the bones' names
+    methods  those that were tried beside the objects' own
+    """
+
+    verdict: Verdict
+    poses: Mapping[tuple[str, str, str], Mapping[str, np.ndarray]]
+    methods: Sequence[str]
+
+
+@dataclass(frozen=True)
 class _Posed:
     """See core.flex.verdict.Posed. own: the methods of the meshes, as of live.Moment.points()."""
 
@@ -68,7 +80,7 @@ def flex(
     methods: Sequence[str],
     table: Table,
     own: Mapping[bpy.types.Object, str | None],
-) -> Generator[float, None, Verdict]:
+) -> Generator[float, None, Result]:
     """Yields the progress; returns the verdict on the objects' own methods.
 
     objects  those that Sinew deforms
@@ -84,8 +96,17 @@ def flex(
     now = live.Moment.of(subject, depsgraph)
     rigs = _rigs(now)
     own_methods = [own.get(part.obj) for part in subject.parts]
-    poses = list(_poses(now, rigs, table, own_methods))
-    return (yield from judge(_character(now, rigs), poses, [OWN, *methods], table.limits, crossing_triangles))
+    poses: list[Pose] = []
+    rotations: dict[tuple[str, str, str], Mapping[str, np.ndarray]] = {}
+    for rig, bones, pose in _poses(rigs, table):
+        make: Callable[[], _Posed] = partial(_posed, now, rig.bones, pose, own_methods)
+        poses.append(Pose(pose.name, tuple(bone + rig.first for bone in bones), make))
+        names = rig.bones.names
+        of_names = {names[bone]: rotation for bone, rotation in pose.rotations.items()}
+        rotations |= {(rig.armature.name, names[bone], pose.name): of_names for bone in bones}
+    tried = [OWN, *methods]
+    verdict = yield from judge(_character(now, rigs), poses, tried, table.limits, crossing_triangles)
+    return Result(verdict, rotations, methods)
 
 
 def _rigs(now: live.Moment) -> list[_Rig]:
@@ -143,22 +164,18 @@ def _skeleton(rigs: Sequence[_Rig]) -> Skeleton:
             )
         )
     rest, tails, above, deform, side, mirror, rig_of = map(np.concatenate, zip(*parts, strict=True))
-    return Skeleton(tuple(names), rest, tails, above, deform, tuple(roles), side, mirror, rig_of)
+    rig_names = tuple(rig.armature.name for rig in rigs)
+    return Skeleton(tuple(names), rest, tails, above, deform, tuple(roles), side, mirror, rig_of, rig_names)
 
 
-def _poses(
-    now: live.Moment, rigs: Sequence[_Rig], table: Table, own: Sequence[str | None]
-) -> Generator[Pose, None, None]:
+def _poses(rigs: Sequence[_Rig], table: Table) -> Iterator[tuple[_Rig, tuple[int, ...], battery.Pose]]:
+    """Yields each pose with the bones that it bends."""
     for rig in rigs:
         limits = armature_io.read_limits(rig.armature)
-        single = battery.joint_poses(rig.bones, limits, rig.is_moving, table.joints)
-        found = [((bone,), pose) for bone, pose in single]
-        found += [
-            (tuple(pose.rotations), pose) for pose in battery.combined(rig.bones, limits, rig.is_moving)
-        ]
-        for bones, pose in found:
-            make: Callable[[], _Posed] = partial(_posed, now, rig.bones, pose, own)
-            yield Pose(pose.name, tuple(bone + rig.first for bone in bones), make)
+        for bone, pose in battery.joint_poses(rig.bones, limits, rig.is_moving, table.joints):
+            yield rig, (bone,), pose
+        for pose in battery.combined(rig.bones, limits, rig.is_moving):
+            yield rig, tuple(pose.rotations), pose
 
 
 def _posed(now: live.Moment, bones: Bones, pose: battery.Pose, own: Sequence[str | None]) -> _Posed:

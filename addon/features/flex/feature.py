@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Flex: a panel with the joints that do not deform well, and for each fault its place and its pose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...attach import properties, stack
+from ...attach.feature import Feature
+from ...attach.subscribers import subscribers
+from ...core.errors import SinewError
+from ...core.flex.limits import Table
+from ...core.flex.verdict import Finding, Joint
+from ...ui import operators, stepped
+from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.sidebar import Sidebar, draw_text
+from ...ui.translations import tr
+from ..diagnose import diagnose
+from ..heat.worst_frames import check_measurable
+from . import flex
+
+# What is tried beside a character's own method.
+OTHERS = ("lbs", "dq", "cor")
+JOINTS_SHOWN = 8
+
+# By the session_uid of the scene. Nothing is stored in files.
+results: dict[int, flex.Result] = {}
+
+
+class SINEW_OT_flex(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
+    bl_label = "Flex"
+    bl_description = (
+        "Bend every joint of the character by itself, beside its pose, and list those that do not deform well"
+    )
+    bl_options = {"REGISTER"}
+    saying = "Sinew bends every joint"
+
+    others: bpy.props.BoolProperty(
+        name="Try Methods",
+        description="Also try linear blending, dual quaternions and centres of rotation, and say which "
+        "mend a joint",
+        options={"SKIP_SAVE"},
+    )
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        objects = sinew_targets(context)
+        check_measurable(objects)
+        shown = {properties.of(obj).method for obj in objects}
+        others = [name for name in OTHERS if self.others and {name} != shown]
+        self.result = yield from flex.flex(objects, others, Table(), {})
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        results[context.scene.session_uid] = self.result
+        self.report({"INFO"}, _headline(self.result))
+        return {"FINISHED"}
+
+
+class _OnFinding(operators.Acting):
+    """An operator on a fault of a joint: that of the list, by their numbers."""
+
+    joint: bpy.props.IntProperty(options={"HIDDEN"})
+    finding: bpy.props.IntProperty(options={"HIDDEN"})
+
+    def found(self, context: bpy.types.Context) -> tuple[flex.Result, Joint, Finding]:
+        result = results.get(context.scene.session_uid)
+        try:
+            joint = result.verdict.joints[self.joint]
+            return result, joint, joint.findings[self.finding]
+        except (AttributeError, IndexError):
+            raise SinewError("No such fault is known; press Flex again") from None
+
+
+class SINEW_OT_flex_place(_OnFinding, bpy.types.Operator):
+    bl_label = "Select"
+    bl_description = "Enter edit mode with the vertex selected where this is worst, in the middle of the view"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        _result, _joint, finding = self.found(context)
+        obj = context.scene.objects.get(finding.mesh)
+        if obj is None or finding.vertex >= len(obj.data.vertices) or stack.upstream_changes(obj):
+            raise SinewError(f"{finding.mesh} has other vertices than those that were bent")
+        if not obj.data.is_editable:
+            raise SinewError(f"{obj.name}: its mesh is linked from another file and can only be edited there")
+        diagnose.select_vertices(obj, np.array([finding.vertex]), context)
+        for area in context.screen.areas if context.screen is not None else ():
+            regions = [region for region in area.regions if region.type == "WINDOW"]
+            if area.type == "VIEW_3D" and regions:
+                with context.temp_override(area=area, region=regions[0]):
+                    bpy.ops.view3d.view_selected()
+        return {"FINISHED"}
+
+
+class SINEW_OT_flex_pose(_OnFinding, bpy.types.Operator):
+    bl_label = "Pose"
+    bl_description = (
+        "Rotate these bones as they were when this was found; keys stay as they are. Undo takes it back"
+    )
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        result, joint, finding = self.found(context)
+        armature = context.scene.objects.get(joint.armature)
+        rotations = result.poses.get((joint.armature, joint.name, finding.pose), {})
+        bones = armature.pose.bones if armature is not None and armature.pose is not None else {}
+        if not rotations or not set(rotations) <= set(bones.keys()):
+            raise SinewError("No such fault is known; press Flex again")
+        for name, rotation in rotations.items():
+            own = bones[name]
+            axes = np.array(own.bone.matrix_local)[:3, :3]
+            location, _rotation, scale = own.matrix_basis.decompose()
+            turned = Matrix((np.linalg.inv(axes) @ rotation @ axes).tolist()).to_quaternion()
+            own.matrix_basis = Matrix.LocRotScale(location, turned, scale)
+        if any(not constraint.mute for name in rotations for constraint in bones[name].constraints):
+            self.report({"WARNING"}, "Constraints hold these bones: pose their controls instead")
+        return {"FINISHED"}
+
+
+class SINEW_PT_flex(Sidebar, bpy.types.Panel):
+    bl_label = "Flex"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return operators.has_sinew_targets(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.active = operators.are_any_on(context)
+        row = layout.row(align=True)
+        if not stepped.draw_progress(row, "sinew.flex"):
+            row.operator("sinew.flex", text="Bend Every Joint", icon="CON_ROTLIMIT")
+            row.operator("sinew.flex", text="Try Methods").others = True
+        result = results.get(context.scene.session_uid)
+        if result is None:
+            return
+        is_good = result.verdict.is_good
+        draw_text(layout, context, _headline(result), icon="CHECKMARK" if is_good else "ERROR")
+        bad = [(number, joint) for number, joint in enumerate(result.verdict.joints) if not joint.is_good]
+        told: set[str] = set()
+        for number, joint in bad[:JOINTS_SHOWN]:
+            _draw_joint(layout.box().column(), context, number, joint, told)
+        if len(bad) > JOINTS_SHOWN:
+            text = tr("and {count} more: `sinew flex` lists all", count=len(bad) - JOINTS_SHOWN)
+            draw_text(layout, context, text)
+
+
+def _headline(result: flex.Result) -> str:
+    joints = result.verdict.joints
+    return tr(
+        "{good} of {count} joints deform well", good=sum(each.is_good for each in joints), count=len(joints)
+    )
+
+
+def _draw_joint(
+    layout: bpy.types.UILayout, context: bpy.types.Context, number: int, joint: Joint, told: set[str]
+) -> None:
+    """told: names of limits whose advice is above"""
+    layout.label(text=joint.name, icon="BONE_DATA", translate=False)
+    for place, finding in enumerate(joint.findings):
+        limit = finding.limit
+        text = tr(limit.label)
+        if limit.name != "inert":
+            value = f"{limit.number(finding.value)} {tr(limit.unit)}"
+            text = tr("{what}: {value}", what=text, value=value)
+        draw_text(layout, context, text)
+        if finding.mends:
+            names = ", ".join(tr(properties.METHODS[name].label) for name in finding.mends)
+            draw_text(layout, context, tr("Not under {methods}", methods=names), icon="SOLO_ON")
+        elif limit.name not in told:
+            told.add(limit.name)
+            draw_text(layout, context, tr(limit.meaning))
+            draw_text(layout, context, tr(limit.advice))
+        row = layout.row(align=True)
+        if finding.mesh:
+            button = row.operator("sinew.flex_place", icon="RESTRICT_SELECT_OFF")
+            button.joint, button.finding = number, place
+        if finding.pose:
+            button = row.operator("sinew.flex_pose", icon="ARMATURE_DATA")
+            button.joint, button.finding = number, place
+
+
+FEATURE = Feature(
+    (SINEW_OT_flex, SINEW_OT_flex_place, SINEW_OT_flex_pose, SINEW_PT_flex),
+    subscriptions=((subscribers.loading, results.clear),),
+    end=results.clear,
+)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Flex: what it finds, where a click goes, and that the file stays as it is until then."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.core.flex.verdict import Finding
+from sinew_addon.features.flex import feature
+from sinew_addon.io import armature_io
+from whole_file import assert_same, content
+
+
+@pytest.fixture
+def arm_with_a_bare_patch():
+    """An arm whose last vertices have no weights, and whose elbow is hard; at rest."""
+    obj, armature = scenes.make_arm(sides=16, rings=81, weights="rigid")
+    armature.animation_data_clear()
+    bare = [vertex.index for vertex in obj.data.vertices][-5:]
+    for group in obj.vertex_groups:
+        group.remove(bare)
+    scenes.add_sinew(obj, "dq")
+    yield obj, armature, bare
+    feature.results.clear()
+
+
+def findings() -> dict[str, tuple[int, int, Finding]]:
+    """By name, each with the numbers of the joint and of the fault."""
+    result = feature.results[bpy.context.scene.session_uid]
+    return {
+        finding.limit.name: (number, place, finding)
+        for number, joint in enumerate(result.verdict.joints)
+        for place, finding in enumerate(joint.findings)
+    }
+
+
+def test_it_finds_the_faults_and_changes_nothing(arm_with_a_bare_patch):
+    _obj, _armature, bare = arm_with_a_bare_patch
+    before = content()
+    assert bpy.ops.sinew.flex(others=True) == {"FINISHED"}
+    assert_same(before)
+    found = findings()
+    assert {"unweighted", "stretch"} <= set(found)
+    assert found["unweighted"][2].vertices == len(bare)
+    assert set(feature.results[bpy.context.scene.session_uid].methods) == {"lbs", "cor"}
+
+
+def test_a_click_goes_to_the_place(arm_with_a_bare_patch):
+    obj, _armature, bare = arm_with_a_bare_patch
+    bpy.ops.sinew.flex()
+    joint, place, finding = findings()["unweighted"]
+    assert bpy.ops.sinew.flex_place(joint=joint, finding=place) == {"FINISHED"}
+    assert obj.mode == "EDIT"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert [vertex.index for vertex in obj.data.vertices if vertex.select] == [finding.vertex]
+    assert finding.vertex in bare
+
+
+def test_a_click_poses_the_bone_as_it_was_bent(arm_with_a_bare_patch):
+    obj, armature, _bare = arm_with_a_bare_patch
+    armature.pose.bones[0].rotation_mode = "XYZ"
+    armature.pose.bones[1].location = (0.0, 0.0, 0.0)
+    bpy.ops.sinew.flex()
+    joint, place, finding = findings()["stretch"]
+    for bone in armature.pose.bones:
+        bone.matrix_basis.identity()
+    assert bpy.ops.sinew.flex_pose(joint=joint, finding=place) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    # The shape of now is that in which the edge is longest.
+    result = feature.results[bpy.context.scene.session_uid]
+    name = result.verdict.joints[joint].name
+    bones = armature_io.read_bones(armature)
+    number = bones.names.index(name)
+    posed = np.array(armature.pose.bones[name].matrix)[:3, :3]
+    wanted = result.poses[armature.name, name, finding.pose][name] @ bones.rest[number, :3, :3]
+    np.testing.assert_allclose(posed, wanted, atol=1e-5)
+    points = scenes.final_points(obj)
+    edges = np.array([edge.vertices[:] for edge in obj.data.edges])
+    rest = scenes.rest_points(obj)
+    before, after = (np.linalg.norm(p[edges[:, 0]] - p[edges[:, 1]], axis=1) for p in (rest, points))
+    assert finding.vertex in edges[np.argsort(before - after)[:80]]
+
+
+def test_what_is_gone_is_said(arm_with_a_bare_patch):
+    obj, _armature, _bare = arm_with_a_bare_patch
+    with pytest.raises(RuntimeError, match="press Flex again"):
+        bpy.ops.sinew.flex_place(joint=0, finding=0)
+    bpy.ops.sinew.flex()
+    joint, place, _finding = findings()["unweighted"]
+    obj.name = "Renamed"
+    with pytest.raises(RuntimeError, match="other vertices"):
+        bpy.ops.sinew.flex_place(joint=joint, finding=place)
+    with pytest.raises(RuntimeError, match="press Flex again"):
+        bpy.ops.sinew.flex_pose(joint=joint, finding=place)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert feature.results == {}
