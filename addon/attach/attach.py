@@ -185,6 +185,14 @@ def notes(obj: bpy.types.Object) -> list[str]:
     return [phrase(text), *baked.notes(obj)]
 
 
+def hangs_on(obj: bpy.types.Object, armatures: Collection[bpy.types.Object]) -> bool:
+    """Whether an object is parented to one of the armatures or its bones, or to what is."""
+    parent = obj.parent
+    while parent is not None and parent not in armatures:
+        parent = parent.parent
+    return parent is not None
+
+
 def method_of(modifier: bpy.types.ArmatureModifier) -> str:
     """Returns the method of the modifier itself."""
     return "dq" if modifier.use_deform_preserve_volume else "lbs"

@@ -132,7 +132,9 @@ def _write_viewer(
     own = {obj: properties.of(obj).method for obj in scene.objects if properties.has_sinew(obj)}
     meshes, left_out = characters.deformable_meshes(scene, path, [*methods, viewer.PLAYED], args.object)
     characters.use_methods([(obj, own.get(obj, viewer.PLAYED)) for obj in meshes])
-    steps = viewer.page(scene, path.stem, dict.fromkeys(meshes, ()), methods, frames, left_out)
+    attached = viewer.attached_to(scene, meshes)
+    of_each = dict.fromkeys(meshes, ())
+    steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out)
     text = ""
     for step in console.progress(steps, len(frames) + 1, f"Reading {path.name}"):
         text = step if isinstance(step, str) else text

@@ -101,6 +101,26 @@ def test_a_modifier_in_front_gives_the_mesh(tmp_path):
     assert_has_points(write_page(path, "--methods", "dq", "--frames", "1,6,11"), expected, "dq", obj)
 
 
+def test_what_hangs_on_bones_goes_with_them(tmp_path):
+    obj = make_character()
+    bpy.ops.mesh.primitive_cube_add(size=0.2)
+    eye = bpy.context.object
+    eye.parent, eye.parent_type, eye.parent_bone = obj.parent, "BONE", "bone.2"
+    path = save(tmp_path)
+    worlds = []
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        world = np.array(eye.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+        worlds.append(scenes.final_points(eye) @ world[:3, :3].T + world[:3, 3])
+    assert np.abs(worlds[2] - worlds[0]).max() > 0.1
+    header, meshes = read_page.read(write_page(path, "--methods", "lbs,cor", "--frames", "1,6,11"))
+    assert [part["name"] for part in header["parts"]] == ["Arm", eye.name]
+    for frame, expected in enumerate(worlds):
+        points = read_page.points(header["parts"][1], meshes[1], "lbs", frame)
+        world = meshes[1]["worlds"][frame].astype(np.float64)
+        np.testing.assert_allclose(points @ world[:3, :3].T + world[:3, 3], expected, atol=1e-5)
+
+
 def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     obj = make_character()
     scenes.key_shape(obj)

@@ -25,15 +25,8 @@ def character(context: bpy.types.Context) -> list[bpy.types.Object]:
         if obj.type == "MESH" and not properties.is_copy(obj) and obj.visible_get(viewport=viewport)
     ]
     deformed = [obj for obj in attach.deformed_meshes(visible) if attach.armature_of(obj) in armatures]
-    attached = [obj for obj in visible if attach.armature_of(obj) is None and _hangs_on(obj, armatures)]
+    attached = [obj for obj in visible if attach.armature_of(obj) is None and attach.hangs_on(obj, armatures)]
     return [*deformed, *attached] if deformed else []
-
-
-def _hangs_on(obj: bpy.types.Object, armatures: list[bpy.types.Object]) -> bool:
-    parent = obj.parent
-    while parent is not None and parent not in armatures:
-        parent = parent.parent
-    return parent is not None
 
 
 def _viewport(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:

@@ -71,11 +71,12 @@ class SINEW_OT_save_comparison(stepped.WithDialog, bpy.types.Operator):
             for obj in meshes
             if attach.armature_of(obj) is not None
         }
+        attached = [obj for obj in meshes if obj not in of_each]
         armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in of_each))
         frames = stepped.frames_over(scene, armatures, self.over)
         methods = comparison_state.methods_of(state)
         with stepped.kept_frame(scene, armatures):
-            for step in viewer.page(scene, self._target.stem, of_each, methods, frames):
+            for step in viewer.page(scene, self._target.stem, of_each, attached, methods, frames):
                 if isinstance(step, str):
                     self._text = step
                 else:

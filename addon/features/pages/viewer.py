@@ -12,6 +12,7 @@ import numpy as np
 
 from ...attach import attach, properties, upstream_proxy
 from ...core.errors import SinewError
+from ...core.influences import Influences
 from ...core.scale_rule import BLENDER_4
 from ...core.vectors import transformed
 from ...core.vertex_data import VertexData
@@ -22,15 +23,16 @@ from ...io import armature_io, mesh_io, spaces
 
 # The method of meshes that have none of their own; any of Sinew's would do.
 PLAYED = "dq"
-LEAVES_OUT = (
-    "Methods that engines' shaders have are shown; for the others and for stages after the blend, compare in "
-    "Blender."
+NOTES = (
+    "The browser skins the meshes by the shaders that Sinew has for engines: Linear Blend, Dual Quaternion, "
+    "Centres of Rotation and the painted mix of two. For other methods and for stages, compare in Blender.",
+    "Shapes are those right after the skinning, without the modifiers behind it.",
 )
 
 
 @dataclass
 class _Skinned:
-    """A mesh of the page.
+    """A mesh that an armature deforms.
 
     obj       the object that Sinew deforms, the mesh itself or a copy
     armature  of its Armature modifier
@@ -42,12 +44,53 @@ class _Skinned:
     bound: Bound
     rest: np.ndarray
     part: Part
+    has_moved: bool = False
+
+    def add_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
+        armature = self.armature.evaluated_get(depsgraph)
+        pose = armature_io.read_pose(armature, self.bound.first_deformer.bones)
+        if not np.isfinite(pose).all():
+            raise SinewError(f"{self.part.name}: the pose of a bone is not finite")
+        self.part.add_frame(pose, np.array(armature.matrix_world))
+        rest = source.rest_points(self.obj, self.bound.source, depsgraph)
+        self.has_moved |= not np.array_equal(rest, self.rest)
+
+
+@dataclass
+class _Attached:
+    """A mesh that is parented to bones: it moves as a whole, with a single bone that stays at rest."""
+
+    obj: bpy.types.Object
+    part: Part
+    has_moved: bool = False
+
+    def add_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
+        world = np.array(self.obj.evaluated_get(depsgraph).matrix_world)
+        self.part.add_frame(_STILL, world)
+
+
+_STILL = np.identity(4, dtype=np.float32)[None]
+
+
+def attached_to(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Returns the visible meshes that are parented to the armatures of `meshes`, such as eyes."""
+    armatures = {attach.armature_of(obj) for obj in meshes}
+    return [
+        obj
+        for obj in scene.objects
+        if obj.type == "MESH"
+        and not properties.is_copy(obj)
+        and obj.visible_get()
+        and attach.armature_of(obj) is None
+        and attach.hangs_on(obj, armatures)
+    ]
 
 
 def page(
     scene: bpy.types.Scene,
     title: str,
     meshes: Mapping[bpy.types.Object, Sequence[bpy.types.Object]],
+    attached: Sequence[bpy.types.Object],
     methods: Sequence[str],
     frames: Sequence[float],
     left_out: Sequence[str] = (),
@@ -55,6 +98,7 @@ def page(
     """Yields the progress, at the end the text of the page. Sets frames; restoring is the caller's.
 
     meshes    each with the objects that Sinew may deform in its place
+    attached  meshes that bones move as they are
     methods   those to choose from; the shaders lack some, which the page says
     left_out  sentences on other meshes
 
@@ -64,46 +108,38 @@ def page(
     if not shown:
         raise SinewError(f"the page has {', '.join(METHODS)} and blender: choose one of them")
     characters.set_frame(scene, frames[0])
-    skinned, notes = [], [LEAVES_OUT, *left_out]
-    for obj, stand_ins in meshes.items():
+    skinned: list[_Skinned] = []
+    notes = [*NOTES, *left_out]
+    for obj, others in meshes.items():
         try:
-            skinned.append(_read(obj, [obj, *stand_ins], shown))
+            skinned.append(_read(obj, [obj, *others], shown))
         except SinewError as error:
             notes.append(f"{obj.name}: left out: {error}")
     if not skinned:
-        raise SinewError("; ".join(notes[1:]))
+        raise SinewError("; ".join(notes[len(NOTES) :]))
     labels = {name: properties.method_label(name) for name in shown}
     if any(each.part.mix is not None for each in skinned):
         labels[MIX] = "Painted Mix"
     missing = [properties.method_label(name) for name in methods if name not in shown]
     if missing:
         notes.append(f"Not in this page: {', '.join(missing)}.")
+    found = [*skinned, *(_read_attached(obj) for obj in attached)]
     rate = scene.render.fps / scene.render.fps_base
-    parts = [each.part for each in skinned]
+    parts = [each.part for each in found]
     viewer = Viewer(title, parts, labels, rate, characters.length_unit(scene), notes)
-    moved = set()
     for number, frame in enumerate(frames):
         characters.set_frame(scene, frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for each in skinned:
-            armature = each.armature.evaluated_get(depsgraph)
-            pose = armature_io.read_pose(armature, each.bound.first_deformer.bones)
-            if not np.isfinite(pose).all():
-                raise SinewError(f"{each.part.name}: a bone's pose is not finite at frame {frame}")
-            each.part.add_frame(pose, np.array(armature.matrix_world))
-            if not np.array_equal(_rest_points(each, depsgraph), each.rest):
-                moved.add(each.part.name)
+        for each in found:
+            each.add_frame(depsgraph)
         viewer.add_frame(frame)
         yield (number + 1) / len(frames)
+    moved = [each.part.name for each in found if each.has_moved]
     viewer.notes += [
         f"{name}: shape keys and modifiers before the Armature modifier stay as at frame {frames[0]}."
-        for name in sorted(moved)
+        for name in moved
     ]
     yield viewer.page()
-
-
-def _rest_points(each: _Skinned, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    return source.rest_points(each.obj, each.bound.source, depsgraph)
 
 
 def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: Sequence[str]) -> _Skinned:
@@ -151,6 +187,18 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         mix,
     )
     return _Skinned(obj_of_state, armature, bound, rest.copy(), part)
+
+
+def _read_attached(obj: bpy.types.Object) -> _Attached:
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    points, surface = mesh_io.read_points(mesh), mesh_io.read_surface(mesh)
+    count = len(points)
+    of_one = Influences(
+        np.arange(count + 1, dtype=np.int32),
+        np.zeros(count, dtype=np.int32),
+        np.ones(count, dtype=np.float32),
+    )
+    return _Attached(obj, Part(obj.name, points, of_one, surface.triangles, surface.edges, _STILL, "lbs"))
 
 
 def _mix_of(obj: bpy.types.Object, bound: Bound) -> tuple[str, str, np.ndarray] | None:

@@ -273,6 +273,10 @@ const isTravelling = Math.hypot(...extent(whole)) > 1.8 * Math.hypot(...tallest)
 const [wide, deep, tall] = (isTravelling ? tallest : extent(whole)).map((x) => x / 2);
 const radius = Math.hypot(wide, deep, tall) || 1;
 
+// Between the lines of the ground: 1, 2 or 5 of a power of ten.
+const power = 10 ** Math.floor(Math.log10(radius / 3));
+const spacing = [1, 2, 5].map((step) => step * power).findLast((step) => step <= radius / 3) ?? power;
+
 function camera(aspect) {
   const box = isTravelling ? boxOver([state.frame]) : whole;
   const middle = plus(box[0], box[1]).map((x) => x / 2);
@@ -345,7 +349,7 @@ function drawPane(index, width, height) {
   gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   gl.depthMask(false);
   use(program("ground.vert", "ground.frag"), {
-    ...its, middle: [its.middle[0], its.middle[1], whole[0][2]], spacing: 10 ** Math.round(Math.log10(radius / 3.5)),
+    ...its, middle: [its.middle[0], its.middle[1], whole[0][2]], spacing,
     radius: 3 * radius, line: prefersDark.matches ? [0.9, 0.92, 0.95] : [0.35, 0.37, 0.4],
   });
   gl.drawArrays(gl.LINES, 0, GROUND_VERTICES);
