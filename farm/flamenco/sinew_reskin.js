@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A job type for Flamenco 3.5 and newer: checks the .blend files of a folder, writes copies that Sinew deforms, and
-// checks that the farm's Blender can render these. docs/flamenco.md is its manual.
+// checks that the farm's Blender can render these; or bends every joint. docs/flamenco.md is its manual.
 
-const ACTIONS = ["re-skin", "check"];
+const ACTIONS = ["re-skin", "check", "flex"];
 // Where a worker has Sinew: as the extension of its Blender, or as the package sinew-blender, which a variable
 // `sinew` of the Manager names.
 const PROGRAMS = {
@@ -21,7 +21,8 @@ const JOB_TYPE = {
     label: "Sinew: Check and Re-Skin",
     settings: [
         { key: "action", type: "string", choices: ACTIONS, default: ACTIONS[0],
-          description: "Write copies that Sinew deforms, or only check whether the files can be rendered" },
+          description: "Write copies that Sinew deforms, only check whether the files can be rendered, or bend every "
+              + "joint" },
         { key: "folder", type: "string", subtype: "dir_path", required: true, visible: "submission",
           description: "All .blend files below this folder; workers see it under the same path" },
         { key: "method", type: "string", choices: METHODS, default: "dq",
@@ -31,7 +32,7 @@ const JOB_TYPE = {
         { key: "chunk_size", label: "Files per Task", type: "int32", default: 4, propargs: { min: 1 },
           visible: "submission", description: "Number of files that one task does" },
         { key: "options", type: "string", default: "", visible: "submission",
-          description: "More options of sinew reskin, such as --set mix=dq --no-pictures" },
+          description: "More options of sinew reskin or sinew flex, such as --set mix=dq --no-pictures" },
         { key: "program", type: "string", choices: Object.keys(PROGRAMS), default: "extension",
           visible: "submission", description: "Where workers have Sinew: as the extension of their Blender, or as "
               + "the package sinew-blender, at the path of the variable sinew" },
@@ -42,9 +43,16 @@ const JOB_TYPE = {
 
 function compileJob(job) {
     const settings = job.settings;
-    const writes = (settings.action || ACTIONS[0]) === "re-skin";
+    const action = settings.action || ACTIONS[0], writes = action === "re-skin";
+    const more = settings.options ? shellSplit(settings.options) : [];
     if (writes) checkOut(settings);
     for (const part of partsOf(settings)) {
+        if (action === "flex") {
+            const flex = author.Task(`flex ${part.name}`, "blender");
+            flex.addCommand(sinew(settings, ["flex", ...part.files, ...more]));
+            job.addTask(flex);
+            continue;
+        }
         const check = author.Task(`check ${part.name}`, "blender");
         check.addCommand(sinew(settings, ["check", ...part.files]));
         job.addTask(check);
@@ -54,7 +62,6 @@ function compileJob(job) {
         const reskin = author.Task(`re-skin ${part.name}`, "blender");
         // A task that Flamenco tries again does what is missing.
         const options = ["--method", settings.method || "dq", "--out", out, "--resume"];
-        const more = settings.options ? shellSplit(settings.options) : [];
         reskin.addCommand(sinew(settings, ["reskin", ...part.files, ...options, ...more]));
         // In the Blender that will render.
         reskin.addCommand(sinew({ program: "extension" }, ["check", out]));

@@ -132,6 +132,20 @@ def test_tasks_have_names_and_wait_for_their_checks():
         assert words == [f"/jobs/{name}" for name in ("hero.blend", *names)]
 
 
+def test_a_job_bends_every_joint(two_files):
+    job = {"action": "flex", "folder": str(two_files), "files": files_of(job_type(), two_files)}
+    tasks = compile_job(**job, options="--poses 'hard [1].toml'", program="package")["tasks"]
+    assert [(task["name"], task["dependencies"]) for task in tasks] == [
+        ("flex part-001", []),
+        ("flex shots/part-001", []),
+    ]
+    assert tasks[0]["commands"][0]["parameters"]["args"][2:] == ["--poses", "hard [1].toml"]
+    (first, _second) = compile_job(**job, program="package")["tasks"]
+    done = run_task(first, {"{sinew}": COMMAND})
+    assert "2 of 2 joints pass" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0
+
+
 def test_what_is_wrong_is_said():
     job = {"action": "re-skin", "folder": "S:\\jobs", "files": "a.blend", "program": "package"}
     assert compile_job(**job)["error"] == "There is no folder for the copies: set Folder of Copies."

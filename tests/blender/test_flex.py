@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from collections.abc import Generator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -186,3 +188,43 @@ def test_wrong_use(tmp_path):
         (("--junit", tmp_path / "a.txt"), ".xml"),
     ):
         assert said in run_sinew("flex", "a.blend", *arguments, status=2).stderr
+
+
+@pytest.mark.slow
+def test_the_fixture_fails_a_test_with_what_is_wrong(tmp_path):
+    skinned()
+    good = saved(tmp_path / "good.blend")
+    table = tmp_path / "table.toml"
+    table.write_text('[joints]\nother = ["twist 170"]\n')
+    (tmp_path / "conftest.py").write_text('pytest_plugins = ["sinew_addon.commands.pytest_flex"]\n')
+    (tmp_path / "test_characters.py").write_text(
+        f"""
+def test_good(sinew_flex):
+    assert sinew_flex({str(good)!r})["passed"]
+
+def test_known(sinew_flex):
+    bone = "{bpy.data.armatures[0].bones[1].name}"
+    sinew_flex({str(good)!r}, options=["--poses", {str(table)!r}], known=[bone])
+
+def test_bad(sinew_flex):
+    sinew_flex({str(good)!r}, options=["--poses", {str(table)!r}])
+
+def test_absent(sinew_flex):
+    sinew_flex("absent.blend")
+
+def test_wrong(sinew_flex):
+    sinew_flex({str(good)!r}, options=["--methods", "mush"])
+"""
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rfp", "test_characters.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert "3 failed, 2 passed" in done.stdout, done.stdout + done.stderr
+    for name, said in (("bad", "Radius: "), ("absent", "no such file"), ("wrong", "expected one of")):
+        assert f"test_{name}" in done.stdout
+        assert said in done.stdout

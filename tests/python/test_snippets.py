@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import subprocess
@@ -59,6 +60,30 @@ def test_the_variables_of_flamenco():
         assert "{" + name + "}" in script.read_text(encoding="utf-8")
         assert {value["platform"] for value in variable["values"]} <= {"linux", "windows", "darwin"}
         assert all(value["value"] for value in variable["values"])
+
+
+def test_the_workflow_gives_the_action_of_flex_what_it_takes():
+    (text,) = [text for language, text in blocks("docs/flex.md") if language == "yaml"]
+    action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    # YAML takes the word `on` for a truth.
+    (step,) = [step for step in yaml.safe_load(text)["jobs"]["flex"]["steps"] if "files" in step["with"]]
+    assert set(step["with"]) <= set(action["inputs"])
+    layout = next(text for language, text in blocks("docs/flex.md") if language == "text")
+    for word in step["with"]["options"].split():
+        assert word.startswith("--") or word in layout or word == "dq,cor"
+    used = {name for each in action["runs"]["steps"] for name in each.get("env", {})}
+    assert used == {"FILES", "OPTIONS", "VERSION"}
+
+
+def test_the_fixture_of_flex_is_there():
+    conftest, test = [text for language, text in blocks("docs/flex.md") if language == "python"]
+    module = re.search(r'"sinew_addon\.(\S+)"', conftest)[1].replace(".", "/")
+    source = (ROOT / "addon" / f"{module}.py").read_text(encoding="utf-8")
+    call = ast.parse(test).body[0].body[0].value
+    (fixture,) = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
+    (check,) = [node for node in fixture.body if isinstance(node, ast.FunctionDef)]
+    assert fixture.name == call.func.id
+    assert {keyword.arg for keyword in call.keywords} <= {argument.arg for argument in check.args.args}
 
 
 def test_the_python_program_deforms(capsys):

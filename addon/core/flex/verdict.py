@@ -84,6 +84,7 @@ class Finding:
     def to_dict(self) -> dict[str, Any]:
         return {
             "name": self.limit.name,
+            "text": f"{self.text} at {self.place}" if self.place else self.text,
             "value": self.value,
             "limit": self.limit.value,
             "pose": self.pose,
