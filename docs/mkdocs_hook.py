@@ -83,13 +83,14 @@ def _made() -> list[tuple[str, str]]:
 def _turning() -> list[Path]:
     """Pages of TURNING, in build/live."""
     sinew, folder = ROOT / ".venv/bin/sinew", ROOT / "build" / "live"
-    pages = []
-    for path in TURNING:
-        if sinew.exists() and path.exists():
-            pages.append(folder / f"{path.stem}.html")
-            words = [sinew, "compare", path, "--methods", "lbs,dq,cor", "--viewer", pages[-1]]
-            subprocess.run(words, check=True, capture_output=True)
-    return pages
+    pages = {path: folder / f"{path.stem}.html" for path in TURNING if sinew.exists() and path.exists()}
+    options = "--methods", "lbs,dq,cor", "--viewer"
+    commands = [[sinew, "compare", path, *options, page] for path, page in pages.items()]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    for process in [subprocess.Popen(command, **quiet) for command in commands]:
+        if process.wait():
+            raise subprocess.CalledProcessError(process.returncode, process.args)
+    return list(pages.values())
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:

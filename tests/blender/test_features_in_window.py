@@ -18,7 +18,7 @@ pytestmark = pytest.mark.window
 TOLERANCE = 2e-5
 
 
-PARTS = ("language", "lesson", "export", "blend", "precompute")
+PARTS = ("language", "lesson", "export", "page", "blend", "precompute")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def part_of(name: str):
     return part
 
 
-language, lesson, export, blend, precompute = map(part_of, PARTS)
+language, lesson, export, page, blend, precompute = map(part_of, PARTS)
 
 
 def test_blender_shows_german(language):
@@ -125,6 +125,12 @@ def test_the_exporter_for_gltf_has_a_check_box(export):
     assert export["attributes"] == []
     assert export["on"]
     assert all(export["on"])
+
+
+def test_a_comparison_is_saved_as_a_page(page):
+    """With the file browser, then in steps: Esc leaves no file, and the scene at its frame."""
+    assert page["stopped"] == [False, 3]
+    assert page["saved"] == [True, True, 3]
 
 
 def test_blending_actions(blend):
