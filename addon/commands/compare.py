@@ -15,6 +15,7 @@ from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import page, require_jinja
+from ..core.viewer import METHODS as SHADER_METHODS
 from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
 
@@ -35,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
     parser.add_argument(
         "--methods",
-        default=",".join(USUAL_METHODS),
-        help="of `sinew methods`, and blender for the Armature modifier (default: %(default)s)",
+        help="of `sinew methods`, and blender for the Armature modifier (default: "
+        f"{','.join(USUAL_METHODS)}; for --viewer alone {','.join(SHADER_METHODS)})",
     )
     parser.add_argument(
         "--reference",
@@ -79,7 +80,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..deform import characters
     from ..features.pages import render
 
-    methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
+    usual = USUAL_METHODS if args.out is not None else SHADER_METHODS
+    named = usual if args.methods is None else args.methods.split(",")
+    methods = list(dict.fromkeys(name.strip() for name in named))
     characters.check_methods([*methods, args.reference])
     characters.set_parameters(args.set)
     if args.out is None and args.viewer is None:

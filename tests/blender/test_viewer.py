@@ -147,7 +147,8 @@ def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
 def test_a_page_alone_needs_no_folder_and_has_one_file(tmp_path):
     make_character()
     path = save(tmp_path)
-    page = write_page(path, "--methods", "lbs", "--frames", "1")
+    page = write_page(path, "--frames", "1")
+    assert list(read_page.read(page)[0]["methods"]) == ["lbs", "dq", "cor"]
     assert sorted(each.name for each in tmp_path.iterdir()) == ["arm.blend", "arm.html"]
     assert len(page.read_bytes()) < 100_000
     for words, text in (

@@ -8,5 +8,5 @@ in float share;
 out vec4 colour;
 
 void main() {
-    colour = vec4(line, 0.4 * share);
+    colour = vec4(line, 0.3 * share);
 }

@@ -274,8 +274,8 @@ const [wide, deep, tall] = (isTravelling ? tallest : extent(whole)).map((x) => x
 const radius = Math.hypot(wide, deep, tall) || 1;
 
 // Between the lines of the ground: 1, 2 or 5 of a power of ten.
-const power = 10 ** Math.floor(Math.log10(radius / 3));
-const spacing = [1, 2, 5].map((step) => step * power).findLast((step) => step <= radius / 3) ?? power;
+const power = 10 ** Math.floor(Math.log10(radius / 1.5));
+const spacing = [1, 2, 5].map((step) => step * power).findLast((step) => step <= radius / 1.5) ?? power;
 
 function camera(aspect) {
   const box = isTravelling ? boxOver([state.frame]) : whole;
