@@ -26,6 +26,8 @@ from . import flex
 # What is tried beside a character's own method.
 OTHERS = ("lbs", "dq", "cor")
 JOINTS_SHOWN = 8
+# How far the view is from a place, in sizes of the mesh.
+NEAR = 0.3
 
 # By the session_uid of the scene. Nothing is stored in files.
 results: dict[int, flex.Result] = {}
@@ -87,11 +89,12 @@ class SINEW_OT_flex_place(_OnFinding, bpy.types.Operator):
         if not obj.data.is_editable:
             raise SinewError(f"{obj.name}: its mesh is linked from another file and can only be edited there")
         diagnose.select_vertices(obj, np.array([finding.vertex]), context)
+        # Blender's own operator would not come nearer to a single vertex.
         for area in context.screen.areas if context.screen is not None else ():
-            regions = [region for region in area.regions if region.type == "WINDOW"]
-            if area.type == "VIEW_3D" and regions:
-                with context.temp_override(area=area, region=regions[0]):
-                    bpy.ops.view3d.view_selected()
+            if area.type == "VIEW_3D" and area.spaces.active.region_3d is not None:
+                view = area.spaces.active.region_3d
+                view.view_location = finding.point
+                view.view_distance = min(view.view_distance, NEAR * max(obj.dimensions))
         return {"FINISHED"}
 
 
@@ -167,7 +170,14 @@ def _draw_joint(
         if limit.name != "inert":
             value = f"{limit.number(finding.value)} {tr(limit.unit)}"
             text = tr("{what}: {value}", what=text, value=value)
-        draw_text(layout, context, text)
+        row = layout.row(align=True)
+        row.label(text=text, translate=False)
+        if finding.pose:
+            button = row.operator("sinew.flex_pose", text="", icon="ARMATURE_DATA")
+            button.joint, button.finding = number, place
+        if finding.mesh:
+            button = row.operator("sinew.flex_place", text="", icon="RESTRICT_SELECT_OFF")
+            button.joint, button.finding = number, place
         if finding.mends:
             names = ", ".join(tr(properties.METHODS[name].label) for name in finding.mends)
             draw_text(layout, context, tr("Not under {methods}", methods=names), icon="SOLO_ON")
@@ -175,13 +185,6 @@ def _draw_joint(
             told.add(limit.name)
             draw_text(layout, context, tr(limit.meaning))
             draw_text(layout, context, tr(limit.advice))
-        row = layout.row(align=True)
-        if finding.mesh:
-            button = row.operator("sinew.flex_place", icon="RESTRICT_SELECT_OFF")
-            button.joint, button.finding = number, place
-        if finding.pose:
-            button = row.operator("sinew.flex_pose", icon="ARMATURE_DATA")
-            button.joint, button.finding = number, place
 
 
 FEATURE = Feature(
