@@ -14,6 +14,7 @@ import sinew_addon
 from bl_ui.utils import PresetPanel
 from sinew_addon import registration
 from sinew_addon.core import battery, metrics, recommendation, suggestion
+from sinew_addon.core.engines import METHODS
 from sinew_addon.core.flex import limits
 from sinew_addon.core.vertex_data import PROVIDERS
 from sinew_addon.features.diagnose import mending
@@ -94,10 +95,10 @@ def _of_property(prop: bpy.types.Property, where: str) -> Iterator[tuple[str, st
 
 def _of_lists() -> Iterator[tuple[str, str]]:
     """Texts that are drawn from lists."""
-    for owner in (*sinew.methods(), *sinew.stages()):
+    for owner in (*METHODS.values(), *sinew.stages()):
         yield owner.label, owner.name
         yield owner.description, owner.name
-    for method in sinew.methods():
+    for method in METHODS.values():
         yield method.group, method.name
     for metric in metrics.METRICS.values():
         yield metric.label, "METRICS"

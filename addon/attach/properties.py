@@ -7,15 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
-import sinew
 
+from ..core.engines import METHODS
 from ..core.icons import Situation
 from ..core.scale_rule import SCALE_RULES
 from . import property_groups, stage_settings
 from .feature import Feature
 from .stage_settings import OFF, OVERRIDABLE, method_items
 
-METHODS = {method.name: method for method in sinew.methods()}
 # A choice in addition to Sinew's methods: the Armature modifier as it is in the file.
 BLENDER = "blender"
 

@@ -10,13 +10,13 @@ from typing import Any
 import bpy
 import sinew
 
-from ..core import parameters
+from ..core import engines, parameters
 
 STAGES = {stage.name: stage for stage in sinew.stages()}
 # The parameter that switches each stage on: its first.
 _SWITCHES = {stage.name: stage.parameters[0].id for stage in STAGES.values()}
 # Methods that have parameters.
-METHODS = {method.name: method for method in sinew.methods() if method.parameters}
+METHODS = {name: method for name, method in engines.METHODS.items() if method.parameters}
 # What the library's list leaves open: of a choice, its label and its tooltip.
 _CHOICES = {
     "0": ("Nearest Rotation", "Variant 0 of the paper: the rotation that fits the neighbourhood best"),
@@ -33,7 +33,7 @@ OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
 def groups(
     kind: str,
-    owners: Mapping[str, sinew.Method | sinew.Stage],
+    owners: Mapping[str, sinew.Method | engines.Engine | sinew.Stage],
     update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None],
 ) -> dict[str, type]:
     """Returns a property group class for each of STAGES or METHODS, by its name. `update` is called at each
@@ -141,7 +141,7 @@ def method_items(first_number: int = 0) -> list[tuple[str, str, str, int]]:
     first_number  added to the numbers of methods, which start at 1
     """
     items = []
-    groups = groupby(sinew.methods(), lambda method: method.group)
+    groups = groupby(engines.METHODS.values(), lambda method: method.group)
     for number, (group, methods) in enumerate(groups, start=1):
         # Negative, so never the value of a property.
         items.append(("", group, "", -number))

@@ -7,6 +7,7 @@ import math
 
 import sinew
 
+from ..core.engines import METHODS, Engine
 from ..core.parameters import PRESETS
 from .arguments import add_json
 from .console import Console
@@ -20,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    methods, stages = sinew.methods(), sinew.stages()
+    methods, stages = list(METHODS.values()), sinew.stages()
     if args.json:
         rows = {
             "methods": [
@@ -46,13 +47,13 @@ def run(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def _facts(row: sinew.Method | sinew.Stage) -> dict:
+def _facts(row: sinew.Method | Engine | sinew.Stage) -> dict:
     """Returns the facts of a method or a stage; its parameters by the names that --set takes."""
     facts = {"name": row.name, "label": row.label, "description": row.description, "source": row.source}
     return facts | {"parameters": _parameters(row)}
 
 
-def _parameters(row: sinew.Method | sinew.Stage) -> dict[str, dict]:
+def _parameters(row: sinew.Method | Engine | sinew.Stage) -> dict[str, dict]:
     names = ("label", "description", "unit", "kind", "default")
     found = {}
     for each in row.parameters:
@@ -66,5 +67,5 @@ def _parameters(row: sinew.Method | sinew.Stage) -> dict[str, dict]:
     return found
 
 
-def _needs(method: sinew.Method) -> str:
+def _needs(method: sinew.Method | Engine) -> str:
     return ", ".join(method.needs).replace("_", " ") or "nothing more"

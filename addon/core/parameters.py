@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import sinew
 
+from .engines import METHODS, Number
 from .errors import WrongUse
 
 Value: TypeAlias = float | int | bool | str
@@ -23,9 +24,9 @@ PRESETS = {
 SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
 
-def by_full_name() -> dict[str, sinew.Parameter]:
+def by_full_name() -> dict[str, sinew.Parameter | Number]:
     """Every parameter by its full name."""
-    owners: list[sinew.Method | sinew.Stage] = [*sinew.methods(), *sinew.stages()]
+    owners = [*METHODS.values(), *sinew.stages()]
     return {f"{owner.name}.{each.id}": each for owner in owners for each in owner.parameters}
 
 
@@ -49,7 +50,7 @@ def parse(texts: Iterable[str]) -> dict[str, Value]:
     return values
 
 
-def _read(name: str, parameter: sinew.Parameter, text: str) -> Value:
+def _read(name: str, parameter: sinew.Parameter | Number, text: str) -> Value:
     if parameter.kind in ("float", "int"):
         return _read_number(name, parameter, text)
     if parameter.kind == "bool":
@@ -64,7 +65,7 @@ def _read(name: str, parameter: sinew.Parameter, text: str) -> Value:
     return text
 
 
-def _read_number(name: str, parameter: sinew.Parameter, text: str) -> float | int:
+def _read_number(name: str, parameter: sinew.Parameter | Number, text: str) -> float | int:
     try:
         number = int(text) if parameter.kind == "int" else float(text)
     except ValueError:

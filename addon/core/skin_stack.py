@@ -12,6 +12,7 @@ import numpy as np
 import sinew
 
 from .arrays import are_equal
+from .engines import ENGINES, METHODS, imported, influences_kept
 from .parameters import Value
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
@@ -19,7 +20,7 @@ from .stage_mesh import StageMesh
 from .stages import StagesAfter, StageValues
 from .twist_spread import TwistInputs
 from .vectors import is_same_space, transformed
-from .vertex_data import METHODS, PROVIDERS, VertexData
+from .vertex_data import PROVIDERS, VertexData
 
 LINEAR = "lbs"
 # The purpose of the deformer that gives a mesh its shape, where there is only one.
@@ -56,11 +57,13 @@ class _MethodDeformer:
     """A deformer, what it was made for, and its rest points.
 
     method, mix  as in Frame: reading the deformer's own takes longer
+    kept         from _kept()
     """
 
     deformer: sinew.Deformer
     method: str
     mix: str
+    kept: tuple[str, int]
     rest_points: np.ndarray
 
 
@@ -82,9 +85,9 @@ class SkinDeformer:
         self.vertex_data = vertex_data
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        # The packed mesh with its rest points, for each purpose and set of methods with vertex data; the
-        # deformer for each purpose.
-        self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
+        # The packed mesh with its rest points, for each purpose, set of methods with vertex data, and what an
+        # engine keeps of the influences; the deformer for each purpose.
+        self._packed: dict[tuple[str, frozenset[str], tuple[str, int]], tuple[sinew.Binding, np.ndarray]] = {}
         self._deformers: dict[str, _MethodDeformer] = {}
         # Skinned normals, with the deformer and the rest normals that they were made for.
         self._skinned: tuple[sinew.SkinnedNormals, sinew.Deformer, np.ndarray] | None = None
@@ -161,7 +164,7 @@ class SkinDeformer:
             return False
         deformer = self._deformers[MOTION].deformer
         if self._skinned is None or not (self._skinned[1] is deformer and self._skinned[2] is rest_normals):
-            packed, _points = self._packed[MOTION, frozenset(self._vertex_data_of(frame))]
+            packed, _points = self._packed[MOTION, frozenset(self._vertex_data_of(frame)), _kept(frame)]
             mixed = deformer.mixed_method
             mix = (mixed, self.mix_weights) if mixed and self.mix_weights is not None else None
             made = sinew.SkinnedNormals(
@@ -175,7 +178,7 @@ class SkinDeformer:
             out=out,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=self._rest_from_armature,
-            parameters=frame.parameters or None,
+            parameters=None if frame.method in ENGINES else frame.parameters or None,
             parents=self._parents_of(frame),
             turns=frame.turns,
         )
@@ -226,15 +229,17 @@ class SkinDeformer:
     ) -> None:
         """Deforms `rest_points` with the deformer of `purpose`, which is made again where it does not fit."""
         bound = self._deformers.get(purpose)
-        if bound is None or bound.method != frame.method or bound.mix != frame.mix:
+        if bound is None or (bound.method, bound.mix, bound.kept) != (frame.method, frame.mix, _kept(frame)):
             data = self._vertex_data_of(frame)
-            key = (purpose, frozenset(data))
+            key = (purpose, frozenset(data), _kept(frame))
             if key not in self._packed:
                 self._packed[key] = (self._pack(frame, rest_points, data), rest_points)
             packed, points = self._packed[key]
             mix = (frame.mix, self.mix_weights) if frame.mix and self.mix_weights is not None else None
-            deformer = sinew.Deformer(packed, frame.method, mix=mix)
-            bound = self._deformers[purpose] = _MethodDeformer(deformer, frame.method, frame.mix, points)
+            deformer = sinew.Deformer(packed, _native(frame.method), mix=mix)
+            bound = self._deformers[purpose] = _MethodDeformer(
+                deformer, frame.method, frame.mix, _kept(frame), points
+            )
         if bound.rest_points is not rest_points:
             bound.deformer.set_rest_points(rest_points)
             bound.rest_points = rest_points
@@ -244,7 +249,7 @@ class SkinDeformer:
             out=out,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=rest_inverses,
-            parameters=frame.parameters or None,
+            parameters=None if frame.method in ENGINES else frame.parameters or None,
             parents=self._parents_of(frame),
             turns=frame.turns,
         )
@@ -293,7 +298,11 @@ class SkinDeformer:
         points = frame.rest_points
         if self.weighting.depends_on_points:
             points = transformed(points, frame.bones_from_model)
-        influences = self.weighting.influences_over_joints(points)
+        engine = ENGINES.get(frame.method)
+        if engine is None:
+            influences = self.weighting.influences_over_joints(points)
+        else:
+            influences = imported(self.weighting.influences(points), engine, _kept(frame)[1])
         return sinew.Binding(
             rest_points,
             influences.offsets,
@@ -302,6 +311,18 @@ class SkinDeformer:
             rest_bones=self.bones.rest_axes,
             vertex_data=vertex_data,
         )
+
+
+def _native(method: str) -> str:
+    """Returns the library's method that computes it."""
+    return LINEAR if method in ENGINES else method
+
+
+def _kept(frame: Frame) -> tuple[str, int]:
+    """Returns the engine, and how many influences of a vertex it keeps; of nothing where it is none."""
+    if frame.method not in ENGINES:
+        return "", 0
+    return frame.method, influences_kept(frame.method, frame.parameters)
 
 
 def follows_hierarchy(method: str, mix: str, parameters: Mapping[str, Value]) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..attach import attach, properties, stage_settings
 from ..core import icons, parameters
+from ..core.engines import ENGINES
 from ..core.errors import SinewError
 from ..core.rig import Bones
 from ..core.scale_rule import BLENDER_4
@@ -75,6 +76,10 @@ def read(
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
         values = _parameters(evaluated, settings, own, mix)
+        if own in ENGINES:
+            mix = ""
+            if scale_rule == BLENDER_4.name:
+                pose = armature_io.decomposed(pose, stage.deformer.bones.parents)
         twists: TwistInputs = ()
         if settings.twist_spread.enabled and all(frame is None for frame in frames):
             # The stage follows the bones of the first that takes part.
@@ -134,7 +139,7 @@ def stage_values(settings: properties.SinewSettings) -> StageValues:
     Raises SinewError where a driver sets a choice that does not exist.
     """
     names = stage_settings.names_on(settings, among=ORDER)
-    if not names:
+    if not names or settings.method in ENGINES:
         return NO_STAGES
     values = {name: stage_settings.values_of(settings, name) for name in names}
     for name, of_stage in values.items():

@@ -5,13 +5,17 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from mathutils import Quaternion, Vector
+from mathutils import Matrix, Quaternion, Vector
 
 from ..core.envelopes import Envelopes
 from ..core.rig import Bones
 from ..core.twist_spread import NOT_TOLD, TwistInputs
 
 _CURVED = bpy.types.Bone.bl_rna.properties["bbone_mapping_mode"].enum_items["CURVED"].value
+# Of axes of unit length: less is the rounding of poses.
+_SHEAR = 1e-5
+# The determinant of a bone without size.
+_FLAT = 1e-20
 
 
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
@@ -156,6 +160,47 @@ def _rotation_told(bone: bpy.types.PoseBone) -> np.ndarray:
     angle, *axis = bone.rotation_axis_angle
     # A Quaternion of mathutils would take the shorter way.
     return np.array([np.cos(angle / 2), *(np.sin(angle / 2) * Vector(axis).normalized())])
+
+
+def decomposed(pose: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """Returns a pose in which each bone has a translation, a rotation and a scale against its parent, as
+    engines store it: what shears a bone against its parent is lost.
+
+    pose     float32 [bones + joints, 4, 4], armature space
+    parents  int32 [bones]
+    """
+    count = len(parents)
+    above = np.where((parents >= 0)[:, None, None], pose[parents], np.identity(4)).astype(np.float64)
+    # A bone without size hides what it carries.
+    is_flat = np.abs(np.linalg.det(above[:, :3, :3])) < _FLAT
+    above[is_flat] = np.identity(4)
+    local = np.linalg.inv(above) @ pose[:count]
+    axes = local[:, :3, :3]
+    lengths = np.linalg.norm(axes, axis=1)
+    unit = axes / np.where(lengths == 0.0, 1.0, lengths)[:, None]
+    across = np.abs(unit.swapaxes(1, 2) @ unit * (1.0 - np.identity(3))).max(axis=(1, 2))
+    is_sheared = (across > _SHEAR) & ~is_flat
+    if not is_sheared.any():
+        return pose
+    for bone in np.flatnonzero(is_sheared):
+        # As Blender's exporters do it.
+        local[bone] = Matrix.LocRotScale(*Matrix(local[bone].tolist()).decompose())
+    result = pose.astype(np.float64)
+    order = sorted(range(count), key=lambda bone: _depth(parents, bone))
+    for bone in order:
+        parent = int(parents[bone])
+        if parent >= 0 and not is_flat[bone]:
+            result[bone] = result[parent] @ local[bone]
+        elif is_sheared[bone]:
+            result[bone] = local[bone]
+    return result.astype(np.float32)
+
+
+def _depth(parents: np.ndarray, bone: int) -> int:
+    depth = 0
+    while parents[bone] >= 0:
+        bone, depth = int(parents[bone]), depth + 1
+    return depth
 
 
 def read_limits(armature: bpy.types.Object) -> dict[str, np.ndarray]:

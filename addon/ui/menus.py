@@ -13,6 +13,7 @@ import rna_keymap_ui
 
 from ..attach import properties
 from ..attach.feature import Feature
+from ..core.engines import ENGINES
 from . import character, operators
 from .stepped import OVER
 
@@ -88,7 +89,8 @@ def _draw_methods(
         for method in methods:
             row = names.row()
             if pictures is not None:
-                pictures.template_icon(_pictures[0][method.name].icon_id, scale=PICTURE_HEIGHT)
+                picture = "lbs" if method.name in ENGINES else method.name
+                pictures.template_icon(_pictures[0][picture].icon_id, scale=PICTURE_HEIGHT)
                 row.scale_y = PICTURE_HEIGHT
             is_used = lead is not None and properties.of(lead).method == method.name
             row.operator(operator, text=method.label, depress=is_used).method = method.name

@@ -261,6 +261,13 @@ def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
     assert "extensions" not in nodes["Other"]
 
 
+def test_a_preview_of_an_engine_is_linear(tmp_path):
+    obj = make_character()
+    use(obj, "unreal", "dq")
+    mesh = write(tmp_path / "a.glb").header["meshes"][0]
+    assert mesh["extensions"]["SINEW_skinning"] == {"version": 1, "method": "lbs"}
+
+
 def test_parameters_and_stages_are_named(tmp_path):
     obj = make_character()
     characters.set_parameters({"ddm.variant": "2", "ddm.radius": 0.25, "bulge_limit.enabled": True})

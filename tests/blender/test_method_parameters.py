@@ -11,6 +11,7 @@ import scenes
 import sinew
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
+from sinew_addon.core.engines import METHODS
 from sinew_addon.core.parameters import parse
 from sinew_addon.deform import characters, session
 from test_sdef import make_model
@@ -39,7 +40,7 @@ def shape_of_each(obj: bpy.types.Object) -> dict[str, np.ndarray]:
 
 
 def test_the_library_decides_what_there_is():
-    for method in sinew.methods():
+    for method in METHODS.values():
         group = getattr(properties.SinewSettings.bl_rna.properties.get(method.name), "fixed_type", None)
         assert (group is not None) == bool(method.parameters), method.name
         for parameter in method.parameters:
@@ -54,13 +55,13 @@ def test_the_library_decides_what_there_is():
 def test_the_menu_has_the_groups_of_the_list():
     items = stage_settings.method_items()
     headings = [label for name, label, _text, _number in items if not name]
-    assert headings == list(dict.fromkeys(m.group for m in sinew.methods()))
+    assert headings == list(dict.fromkeys(m.group for m in METHODS.values()))
     shown = properties.SinewSettings.bl_rna.properties["method"].enum_items
-    assert [i.identifier for i in shown if i.identifier] == [m.name for m in sinew.methods()]
-    assert [i.description for i in shown if i.identifier] == [m.description for m in sinew.methods()]
+    assert [i.identifier for i in shown if i.identifier] == list(METHODS)
+    assert [i.description for i in shown if i.identifier] == [m.description for m in METHODS.values()]
     # Values as files store them.
     assert {i.identifier: i.value for i in shown if i.identifier} == {
-        m.name: m.number for m in sinew.methods()
+        m.name: m.number for m in METHODS.values()
     }
     obj, _armature = scenes.make_arm()
     assert properties.of(obj).method == "lbs"

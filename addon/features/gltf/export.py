@@ -19,7 +19,9 @@ import numpy as np
 
 from ...attach import properties, stage_settings
 from ...attach.updates import may_change_file
+from ...core.engines import ENGINES
 from ...core.errors import SinewError
+from ...core.skin_stack import LINEAR
 from ...core.vectors import transformed
 from ...deform import session
 from ...io import mesh_io, spaces
@@ -101,13 +103,15 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
     settings = properties.of(obj)
     deformer = states[0][1].bound.first_deformer
     mixed = settings.mixed_method
-    if deformer.mix_weights is None or mixed == settings.method:
+    if deformer.mix_weights is None or mixed == settings.method or settings.method in ENGINES:
         mixed = ""
-    skinning = Skinning(obj, {"version": VERSION, "method": settings.method})
+    # What an engine makes of the skin is for itself to do.
+    method = LINEAR if settings.method in ENGINES else settings.method
+    skinning = Skinning(obj, {"version": VERSION, "method": method})
     if mixed:
         skinning.content["mix"] = mixed
         skinning.shares = deformer.mix_weights
-    parameters = stage_settings.method_values(settings, [settings.method, mixed])
+    parameters = stage_settings.method_values(settings, [method, mixed])
     stages = [name for name in stage_settings.names_on(settings) if name != "mix"]
     skinning.content |= {
         name: value for name, value in (("parameters", parameters), ("stages", stages)) if value

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
+import sinew
 from mathutils.bvhtree import BVHTree
 
 from ...attach import properties, stage_settings
@@ -61,7 +62,7 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     armatures = armatures_of(objects)
     frames = stepped.frames_over(scene, armatures, over)
     counted = frames_to_count(frames)
-    labels = {name: method.label for name, method in properties.METHODS.items()}
+    labels = {method.name: method.label for method in sinew.methods()}
     suggestion = Suggestion(labels.copy(), frames, 0.0)
     off = [each for each in recommendation.STAGES if not any(_is_on(obj, each.name) for obj in objects)]
     moments: list[Moment] = []
