@@ -76,10 +76,10 @@ def read(
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
         values = _parameters(evaluated, settings, own, mix)
+        own_rule = scale_rule
         if own in ENGINES:
-            mix = ""
-            if scale_rule == BLENDER_4.name:
-                pose = armature_io.decomposed(pose, stage.deformer.bones.parents)
+            mix, own_rule = "", BLENDER_4.name
+            pose = armature_io.decomposed(pose, stage.deformer.bones.parents)
         twists: TwistInputs = ()
         if settings.twist_spread.enabled and all(frame is None for frame in frames):
             # The stage follows the bones of the first that takes part.
@@ -87,7 +87,7 @@ def read(
         turns = None
         if follows_hierarchy(own, mix, values):
             turns = armature_io.read_turns(armature, stage.deformer.bones)
-        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values, back, twists, turns))
+        frames.append(SkinStageFrame(own, pose, space, own_rule, mix, values, back, twists, turns))
     return frames
 
 

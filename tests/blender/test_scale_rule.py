@@ -21,7 +21,7 @@ from sinew_addon.deform import session
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import reference
 
-RIGID_METHODS = [m for m in properties.METHODS if m != "lbs"]
+RIGID_METHODS = [method.name for method in sinew.methods() if method.name != "lbs"]
 
 
 def posed_arm(scaled: bool) -> bpy.types.Object:
