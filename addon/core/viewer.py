@@ -33,16 +33,18 @@ _RAMP_STOPS = 64
 _TEXTS = {"distance": "The distance of each vertex from where Blender's Armature modifier takes it."}
 
 
-def bone_buffer(posed: np.ndarray, rest: np.ndarray) -> np.ndarray:
+def bone_buffer(posed: np.ndarray, rest: np.ndarray, rest_inverses: np.ndarray) -> np.ndarray:
     """What the shaders read of bones, float32 [bones, 4, 4]: the rows of the 3x4 matrix of each motion, then
     its rotation as a quaternion x, y, z, w: see docs/engines.md.
 
-    posed, rest  float [bones, 4, 4], from the bone's own axes to armature space, Y along the bone
+    posed, rest    float [bones, 4, 4], from the bone's own axes to armature space, Y along the bone
+    rest_inverses  float64 [bones, 4, 4], of `rest`
     """
     posed, rest = posed.astype(np.float64), rest.astype(np.float64)
     buffer = np.empty((len(posed), 4, 4), dtype=np.float32)
-    buffer[:, :3] = (posed @ np.linalg.inv(rest))[:, :3]
-    q = rotations_of(_perpendicular(posed) @ _perpendicular(rest).swapaxes(1, 2))
+    # Not with numpy's products: see vectors.transformed().
+    buffer[:, :3] = np.einsum("bij,bjk->bik", posed[:, :3], rest_inverses)
+    q = rotations_of(np.einsum("bij,bkj->bik", _perpendicular(posed), _perpendicular(rest)))
     # With w >= 0, as Blender has them.
     buffer[:, 3] = np.roll(np.where(q[0] < 0.0, -q, q), -1, axis=0).T
     return buffer
@@ -107,7 +109,7 @@ class Part:
     def add_frame(self, posed: np.ndarray, world: np.ndarray) -> None:
         """posed: float32 [all bones, 4, 4], in armature space; world: [4, 4], from armature space."""
         self._posed = np.ascontiguousarray(posed[self._used])
-        self._palettes.append(bone_buffer(self._posed, self.rest_bones))
+        self._palettes.append(bone_buffer(self._posed, self.rest_bones, self._rest_inverses))
         self._worlds.append(np.asarray(world, dtype=np.float64))
 
     def world_points(self, method: str) -> np.ndarray:

@@ -124,6 +124,8 @@ def test_what_hangs_on_bones_goes_with_them(tmp_path):
 def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     obj = make_character()
     scenes.key_shape(obj)
+    scenes.add_sinew(obj, "dq")
+    obj.sinew.dq.signs = "hierarchy"
     second, _armature = scenes.make_arm(name="Masked</script>")
     scenes.modifiers(second)[0].vertex_group = "bone.1"
     path = save(tmp_path)
@@ -137,6 +139,7 @@ def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     assert "Quaternion-Vector" in notes
     assert "Masked</script>: left out: " in notes
     assert "Arm: shape keys" in notes
+    assert "Arm: rotations go the shorter way" in notes
     for measure in header["measures"]:
         assert measure["low"] < measure["high"]
         assert len(measure["ticks"]) == 5
@@ -189,7 +192,7 @@ def test_bones_are_as_the_shaders_read_them():
     posed, rest = (np.tile(np.eye(4), (200, 1, 1)) for _ in range(2))
     rest[:, :3] = rng.normal(size=(200, 3, 4))
     posed[:, :3] = rng.normal(size=(200, 3, 4))
-    mine, its = viewer.bone_buffer(posed, rest), bone_buffer(posed, rest)
+    mine, its = viewer.bone_buffer(posed, rest, np.linalg.inv(rest)), bone_buffer(posed, rest)
     np.testing.assert_allclose(mine[:, :3], its[:, :3], rtol=1e-6, atol=1e-6)
     same = (mine[:, 3] * its[:, 3]).sum(axis=1)
     np.testing.assert_allclose(np.abs(same), 1.0, atol=1e-6)

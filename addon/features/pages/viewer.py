@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, upstream_proxy
+from ...attach import attach, properties, stage_settings, upstream_proxy
 from ...core.errors import SinewError
 from ...core.influences import Influences
 from ...core.scale_rule import BLENDER_4
@@ -110,6 +110,7 @@ def page(
     characters.set_frame(scene, frames[0])
     skinned: list[_Skinned] = []
     notes = [*NOTES, *left_out]
+    of_shaders = [name for name in shown if name in METHODS]
     for obj, others in meshes.items():
         try:
             skinned.append(_read(obj, [obj, *others], shown))
@@ -134,6 +135,11 @@ def page(
             each.add_frame(depsgraph)
         viewer.add_frame(frame)
         yield (number + 1) / len(frames)
+    viewer.notes += [
+        f"{each.part.name}: rotations go the shorter way here, not along the chain as in Blender."
+        for each in skinned
+        if not stage_settings.has_defaults(properties.of(each.obj), of_shaders)
+    ]
     moved = [each.part.name for each in found if each.has_moved]
     viewer.notes += [
         f"{name}: shape keys and modifiers before the Armature modifier stay as at frame {frames[0]}."
