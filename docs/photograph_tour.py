@@ -32,7 +32,7 @@ STAGES, MESHES = (790, 184), (790, 211)
 # Panels' headers while all are closed.
 HEADERS = {
     name: (850, 97 + 28 * number)
-    for number, name in enumerate(("Sinew", "Suggest", "Heat Map", "Diagnostics"))
+    for number, name in enumerate(("Sinew", "Suggest", "Flex", "Heat Map", "Diagnostics"))
 }
 
 

@@ -30,8 +30,8 @@ VIEW = (400, 500)
 # Positions in the sidebar.
 ADD, METHOD, SWITCH = (880, 125), (930, 128), (812, 151)
 # Headers of panels while all are closed; what Diagnostics has below its own.
-HEADER, DIAGNOSTICS = (850, 97), (850, 181)
-CHECK, MEND = (830, 238), (835, 389)
+HEADER, DIAGNOSTICS = (850, 97), (850, 209)
+CHECK, MEND = (830, 266), (835, 417)
 SUGGEST_BUTTON = (970, 151)
 # The header of Suggest, and the recommended method.
 SUGGEST, BEST = (850, 125), (880, 156)

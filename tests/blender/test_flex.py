@@ -179,6 +179,7 @@ def test_a_file_is_judged_by_its_own_method(tmp_path):
     assert values["lbs"]["radius"]["value"] < 0.5
 
 
+@pytest.mark.once
 def test_wrong_use(tmp_path):
     path = tmp_path / "table.toml"
     path.write_text("[limits]\nlength = 3\n")
