@@ -41,9 +41,9 @@ SMALL = (
     "pictures --only wrist --out {0}/pictures; report --quick --out {0}/report; "
     "bench --quick --kernels --name=small"
 )
-# Debian's packages, by the programs that tests of pages need.
-BROWSERS = {"chromium": "chromium", "chromedriver": "chromium-driver", "firefox-esr": "firefox-esr"}
-BROWSERS |= {"Xvfb": "xvfb"}
+# Debian's packages, with the programs that tests of pages need; of each row any.
+BROWSERS = {"chromium": "chromium chromium-browser google-chrome", "chromium-driver": "chromedriver"}
+BROWSERS |= {"firefox-esr": "firefox-esr firefox", "xvfb": "Xvfb"}
 PROCESSORS = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 LOGS = ROOT / "build/test-logs"
 # A Blender that hangs must not prevent the others' results from being shown.
@@ -314,13 +314,13 @@ for _bpy in BLENDERS:
 @job("browser")
 def browser(session: nox.Session) -> None:
     """All: the page that turns, in real browsers, which the system's package manager brings where it can."""
-    missing = [package for program, package in BROWSERS.items() if not shutil.which(program)]
+    missing = [name for name, programs in BROWSERS.items() if not any(map(shutil.which, programs.split()))]
     if missing and shutil.which("apt-get") and (os.geteuid() == 0 or shutil.which("sudo")):
         start = ["sudo"] * (os.geteuid() != 0)
         start += ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq", "-o", "DPkg::Lock::Timeout=900"]
-        for words in (["update"], ["install", "-y", "--no-install-recommends", *missing]):
+        for words in ("update", *(f"install -y --no-install-recommends {name}" for name in missing)):
             # Where that fails, the tests say what is missing.
-            session.run(*start, *words, silent=True, success_codes=range(256))
+            session.run(*start, *words.split(), silent=True, success_codes=range(256))
     pytest(session, "browsers", "tests/browsers")
 
 
