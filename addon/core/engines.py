@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from .parameters import Value
 
 
+ENGINE_GROUP = "As in Engines"
+
+
 @dataclass(frozen=True)
 class Number:
     """A whole number that a method takes, with the facts of a sinew.Parameter."""
@@ -50,7 +53,7 @@ class Engine:
     levels: int = 0
     parameters: tuple[Number, ...] = ()
     source: str = "docs/engines.md"
-    group: str = "As in Engines"
+    group: str = ENGINE_GROUP
     needs: tuple[str, ...] = ()
     vertex_floats: int = 0
     rows_by_bone: bool = False

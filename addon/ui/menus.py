@@ -13,7 +13,7 @@ import rna_keymap_ui
 
 from ..attach import properties
 from ..attach.feature import Feature
-from ..core.engines import ENGINES
+from ..core.engines import ENGINE_GROUP
 from . import character, operators
 from .stepped import OVER
 
@@ -65,12 +65,16 @@ class SINEW_PT_methods(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         row = self.layout.split(factor=0.2)
         pictures = row.column()
-        _draw_methods(context, row.column(), pictures)
+        _draw_methods(context, row.column(), pictures, self.layout.column())
 
 
 def _draw_methods(
-    context: bpy.types.Context, names: bpy.types.UILayout, pictures: bpy.types.UILayout | None = None
+    context: bpy.types.Context,
+    names: bpy.types.UILayout,
+    pictures: bpy.types.UILayout | None = None,
+    below: bpy.types.UILayout | None = None,
 ) -> None:
+    """below: for what engines show, which has no pictures"""
     lead = character.lead(context)
     operator = "sinew.add" if lead is None else "sinew.use_method"
     if pictures is not None:
@@ -83,14 +87,17 @@ def _draw_methods(
         row.operator_context = "INVOKE_DEFAULT"
         row.operator("sinew.recommend", icon="SOLO_ON")
     for group, methods in groupby(properties.METHODS.values(), lambda method: method.group):
-        names.label(text=group)
-        if pictures is not None:
+        has_pictures = pictures is not None and group != ENGINE_GROUP
+        column = names if below is None or has_pictures else below
+        column.label(text=group)
+        if has_pictures:
             pictures.label()
+        elif column is below:
+            column = column.grid_flow(row_major=True, columns=2, even_columns=True)
         for method in methods:
-            row = names.row()
-            if pictures is not None:
-                picture = "lbs" if method.name in ENGINES else method.name
-                pictures.template_icon(_pictures[0][picture].icon_id, scale=PICTURE_HEIGHT)
+            row = column.row()
+            if has_pictures:
+                pictures.template_icon(_pictures[0][method.name].icon_id, scale=PICTURE_HEIGHT)
                 row.scale_y = PICTURE_HEIGHT
             is_used = lead is not None and properties.of(lead).method == method.name
             row.operator(operator, text=method.label, depress=is_used).method = method.name
