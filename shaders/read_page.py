@@ -45,6 +45,8 @@ def points(about, arrays, method, frame):
     weights[still, 0] = 1.0
     first, second = about["mix"] if method == "mix" else (method, method)
     rest, palette = arrays["rest"].astype(np.float64), arrays["palettes"][frame]
+    if "moving" in arrays:
+        rest[arrays["moving"]] = arrays["moved"][frame]
     common = rest, arrays.get("centres"), bones, weights, palette
     found = skinned(first, *common)
     if second != first:

@@ -64,7 +64,7 @@ def _perpendicular(matrices: np.ndarray) -> np.ndarray:
 class Part:
     """A mesh of the character and its motion, in armature space.
 
-    rest        float32 [vertices, 3]
+    rest        float32 [vertices, 3], of the first frame
     rest_bones  float32 [bones, 4, 4], from each bone's own axes
     blender     the method of its Armature modifier, one of METHODS
     centres     float32 [vertices, 3], for `cor`; None without it
@@ -83,6 +83,7 @@ class Part:
     mix: tuple[str, str, np.ndarray] | None = None
     _palettes: list[np.ndarray] = field(default_factory=list)
     _worlds: list[np.ndarray] = field(default_factory=list)
+    _rests: list[np.ndarray] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         # Only bones that move a vertex are in the page.
@@ -106,8 +107,12 @@ class Part:
         wanted = {MIX: self.mix, "cor": self.centres}
         return wanted.get(method, self.rest) is not None
 
-    def add_frame(self, posed: np.ndarray, world: np.ndarray) -> None:
-        """posed: float32 [all bones, 4, 4], in armature space; world: [4, 4], from armature space."""
+    def add_frame(self, posed: np.ndarray, world: np.ndarray, rest: np.ndarray | None = None) -> None:
+        """posed: float32 [all bones, 4, 4], in armature space; world: [4, 4], from armature space; rest: as
+        that of the first frame, which it is where it is None."""
+        self._rests.append(self.rest if rest is None else rest)
+        for deformer in self._deformers.values():
+            deformer.set_rest_points(self._rests[-1])
         self._posed = np.ascontiguousarray(posed[self._used])
         self._palettes.append(bone_buffer(self._posed, self.rest_bones, self._rest_inverses))
         self._worlds.append(np.asarray(world, dtype=np.float64))
@@ -123,13 +128,14 @@ class Part:
                 deformer = sinew.Deformer(self._binding, first, mix=(second, shares))
             else:
                 deformer = sinew.Deformer(self._binding, method)
+            deformer.set_rest_points(self._rests[-1])
             self._deformers[method] = deformer
         points = self._deformers[method].deform(self._posed, rest_inverses=self._rest_inverses)
         return transformed(points, self._worlds[-1])
 
     def world_rest(self) -> np.ndarray:
         """float64 [vertices, 3], where the frame that was added last has the mesh without its bones."""
-        return transformed(self.rest, self._worlds[-1])
+        return transformed(self._rests[-1], self._worlds[-1])
 
     def arrays(self) -> dict[str, np.ndarray]:
         """What the page has of it."""
@@ -147,6 +153,13 @@ class Part:
             found["centres"] = self.centres
         if self.mix is not None:
             found["shares"] = self.mix[2]
+        has_moved = np.zeros(len(self.rest), dtype=bool)
+        for rest in self._rests:
+            if rest is not self.rest:
+                has_moved |= (rest != self.rest).any(axis=1)
+        if has_moved.any():
+            found["moving"] = np.flatnonzero(has_moved).astype(np.uint32)
+            found["moved"] = np.array([rest[has_moved] for rest in self._rests])
         return found
 
 

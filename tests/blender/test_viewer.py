@@ -101,6 +101,28 @@ def test_a_modifier_in_front_gives_the_mesh(tmp_path):
     assert_has_points(write_page(path, "--methods", "dq", "--frames", "1,6,11"), expected, "dq", obj)
 
 
+def test_shape_keys_move_it(tmp_path):
+    """Those that move some vertices, and only these are in the page for each frame."""
+    obj = make_character()
+    scenes.key_shape(obj)
+    keys = obj.data.shape_keys.key_blocks
+    for vertex in range(100):
+        keys["Key"].data[vertex].co = keys["Basis"].data[vertex].co
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "lbs,dq,cor", "--frames", "1,6,11")
+    _header, (arrays,) = read_page.read(page)
+    assert arrays["moving"].tolist() == list(range(100, len(arrays["rest"])))
+    for method in ("lbs", "dq", "cor"):
+        assert_has_points(page, points_of(path, method), method, obj)
+
+
+def test_a_mesh_that_moves_against_its_armature_is_said(tmp_path):
+    obj = make_character()
+    scenes.key(obj, "location", [(1, (0.1, 0.0, 0.05)), (11, (0.1, 0.5, 0.05))])
+    page = write_page(save(tmp_path), "--methods", "dq", "--frames", "1,6,11")
+    assert any("moves against its armature" in note for note in read_page.read(page)[0]["notes"])
+
+
 def test_what_hangs_on_bones_goes_with_them(tmp_path):
     obj = make_character()
     bpy.ops.mesh.primitive_cube_add(size=0.2)
@@ -123,7 +145,6 @@ def test_what_hangs_on_bones_goes_with_them(tmp_path):
 
 def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     obj = make_character()
-    scenes.key_shape(obj)
     scenes.add_sinew(obj, "dq")
     obj.sinew.dq.signs = "hierarchy"
     second, _armature = scenes.make_arm(name="Masked</script>")
@@ -138,7 +159,6 @@ def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     notes = "\n".join(header["notes"])
     assert "Quaternion-Vector" in notes
     assert "Masked</script>: left out: " in notes
-    assert "Arm: shape keys" in notes
     assert "Arm: rotations go the shorter way" in notes
     for measure in header["measures"]:
         assert measure["low"] < measure["high"]

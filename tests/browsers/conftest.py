@@ -13,6 +13,23 @@ import pytest
 REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPOSITORY / "shaders"))
 SINEW = REPOSITORY / ".venv" / "bin" / "sinew"
+# The wrist with a shape key that swells a part of it.
+ADD_KEY = """
+import os, sys
+import bpy
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+wrist = bpy.data.objects["Wrist"]
+wrist.shape_key_add(name="Basis")
+key = wrist.shape_key_add(name="Swollen")
+for point in key.data[1000:3000]:
+    point.co.y *= 1.5
+for frame, value in ((1, 0.0), (24, 1.0)):
+    key.value = value
+    key.keyframe_insert("value", frame=frame)
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+sys.stdout.flush()
+os._exit(0)
+"""
 
 
 @pytest.fixture(scope="module", params=browsers.ALL, ids=lambda kind: kind.__name__.lower())
@@ -52,10 +69,13 @@ def made(tmp_path_factory):
     """By name: files whose meshes are in armature space, so that it is the space of `sinew points`."""
     folder, files = tmp_path_factory.mktemp("pages"), REPOSITORY / "blend_files"
     methods = ["blender", "lbs", "dq", "cor"]
+    words = [SINEW.with_name("python"), "-c", ADD_KEY, files / "wrist.blend", folder / "keyed.blend"]
+    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     mix = "--set", "mix.method=cor", "--set", "mix.group=Hand"
     found = {
         "wrist": Made(folder, files / "wrist.blend", [1, 12, 24], methods),
         "mix": Made(folder, files / "wrist.blend", [12, 24], ["dq"], mix),
+        "keyed": Made(folder, folder / "keyed.blend", [1, 12, 24], methods),
         "shoulder": Made(folder, files / "shoulder.blend", [1, 12, 24], methods),
     }
     rigs = Path(os.environ.get("SINEW_RIGS", "/none"), "human.blend")

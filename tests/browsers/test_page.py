@@ -34,7 +34,7 @@ def points(browser, *arguments):
     return browser.floats(f"window.sinew.points({', '.join(map(str, arguments))})").reshape(-1, 4)[:, :3]
 
 
-@pytest.mark.parametrize("name", ["wrist", "mix", "shoulder", "human"])
+@pytest.mark.parametrize("name", ["wrist", "mix", "keyed", "shoulder", "human"])
 def test_points_are_those_of_sinew(browser, made, name):
     if name not in made:
         pytest.skip("human.blend is in no folder SINEW_RIGS")

@@ -37,23 +37,40 @@ class _Skinned:
     obj       the object that Sinew deforms, the mesh itself or a copy
     armature  of its Armature modifier
     rest      float32 [vertices, 3], object space, of the first frame
+    space     from its object space to that of the armature, of the first frame
     """
 
     obj: bpy.types.Object
     armature: bpy.types.Object
     bound: Bound
     rest: np.ndarray
+    space: np.ndarray
     part: Part
     has_moved: bool = False
+    has_shifted: bool = False
 
     def add_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
         armature = self.armature.evaluated_get(depsgraph)
         pose = armature_io.read_pose(armature, self.bound.first_deformer.bones)
         if not np.isfinite(pose).all():
             raise SinewError(f"{self.part.name}: the pose of a bone is not finite")
-        self.part.add_frame(pose, np.array(armature.matrix_world))
-        rest = source.rest_points(self.obj, self.bound.source, depsgraph)
-        self.has_moved |= not np.array_equal(rest, self.rest)
+        points = source.rest_points(self.obj, self.bound.source, depsgraph)
+        rest = None
+        if not np.array_equal(points, self.rest):
+            self.has_moved, rest = True, transformed(points, self.space).astype(np.float32)
+        space = spaces.bones_from_model_in(depsgraph, self.obj, self.armature)
+        self.has_shifted |= space is None or not np.allclose(space, self.space, atol=1e-5)
+        self.part.add_frame(pose, np.array(armature.matrix_world), rest)
+
+    @property
+    def notes(self) -> list[str]:
+        """What the page has of it otherwise than Blender."""
+        name, found = self.part.name, []
+        if self.has_moved and self.bound.first_deformer.weighting.depends_on_points:
+            found.append(f"{name}: weights of envelopes and bendy bones stay as in the first frame.")
+        if self.has_shifted:
+            found.append(f"{name}: it moves against its armature, and stays as in the first frame here.")
+        return found
 
 
 @dataclass
@@ -62,7 +79,6 @@ class _Attached:
 
     obj: bpy.types.Object
     part: Part
-    has_moved: bool = False
 
     def add_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
         world = np.array(self.obj.evaluated_get(depsgraph).matrix_world)
@@ -140,11 +156,7 @@ def page(
         for each in skinned
         if not stage_settings.has_defaults(properties.of(each.obj), of_shaders)
     ]
-    moved = [each.part.name for each in found if each.has_moved]
-    viewer.notes += [
-        f"{name}: shape keys and modifiers before the Armature modifier stay as at frame {frames[0]}."
-        for name in moved
-    ]
+    viewer.notes += [note for each in skinned for note in each.notes]
     yield viewer.page()
 
 
@@ -192,7 +204,7 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         centres,
         mix,
     )
-    return _Skinned(obj_of_state, armature, bound, rest.copy(), part)
+    return _Skinned(obj_of_state, armature, bound, rest.copy(), space, part)
 
 
 def _read_attached(obj: bpy.types.Object) -> _Attached:

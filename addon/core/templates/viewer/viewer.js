@@ -152,15 +152,16 @@ class Mesh {
     this.most = 1;
     for (let v = 0; v < this.count; ++v) this.most = Math.max(this.most, arrays.offsets[v + 1] - arrays.offsets[v]);
     const wide = (points, last) => {
-      const found = new Float32Array(4 * this.count);
+      const found = new Float32Array(4 * WIDTH * Math.max(Math.ceil(this.count / WIDTH), 1));
       for (let v = 0; v < this.count; ++v) {
         for (let i = 0; i < 3; ++i) found[4 * v + i] = points[3 * v + i];
         found[4 * v + 3] = last ? last[v] : 0;
       }
-      return texture("rgba", found, this.count);
+      return found;
     };
-    this.rest = wide(arrays.rest, arrays.shares);
-    this.centres = wide(arrays.centres || arrays.rest);
+    this.restRows = wide(arrays.rest, arrays.shares);
+    this.rest = texture("rgba", this.restRows, this.count);
+    this.centres = texture("rgba", wide(arrays.centres || arrays.rest), this.count);
     this.palette = texture("rgba", arrays.palettes.subarray(0, 16 * this.bones), 4 * this.bones, 4);
     this.drawAround(arrays.triangles, arrays.edges);
     const target = () => texture("rgba", null, this.count);
@@ -214,8 +215,17 @@ class Mesh {
     gl.bindTexture(gl.TEXTURE_2D, this.palette.texture);
     const values = this.arrays.palettes.subarray(index * size, (index + 1) * size);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 4, this.bones, gl.RGBA, gl.FLOAT, values);
+    if (this.arrays.moving) this.moveRest(index);
     this.world = transposed(this.arrays.worlds.subarray(16 * index, 16 * index + 16));
     this.turn = [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => this.world[i]);
+  }
+
+  // By shape keys, or modifiers in front of the skinning.
+  moveRest(index) {
+    const { moving, moved } = this.arrays, first = 3 * moving.length * index;
+    moving.forEach((vertex, k) => this.restRows.set(moved.subarray(first + 3 * k, first + 3 * k + 3), 4 * vertex));
+    gl.bindTexture(gl.TEXTURE_2D, this.rest.texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, this.rest.width, this.rest.height, gl.RGBA, gl.FLOAT, this.restRows);
   }
 
   skin(method, most, target) {
