@@ -17,6 +17,8 @@ from .influences import Influences
 WIDTH, SLOPE, SHARPNESS = 0.222, 3.0, 7.0
 # Of an interval, until it is as short as float32 tells.
 _HALVINGS = 30
+# A share that counts as none; and how far beyond it float32 tells none, too, of the bone's length.
+_NOTHING, _BEYOND = 1e-7, 0.02
 
 
 def spread_over_joints(
@@ -90,7 +92,7 @@ def points_of_joints(joints: np.ndarray, rest: np.ndarray, length: float, is_cur
     centres = joints[:, :3, 3]
     size = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
     ends = joints[[0, -1], :3, 1] / np.linalg.norm(joints[[0, -1], :3, 1], axis=1, keepdims=True)
-    # Far beyond its ends, where smoothing moves nothing, and between joints on the curve.
+    # Beyond its ends, as near as smoothing moves nothing, and between joints on the curve.
     line = np.vstack([centres[0] - size * ends[0], centres, centres[-1] + size * ends[1]])
     positions = np.array([-1.0, *numbers, 2.0])
 
@@ -98,13 +100,14 @@ def points_of_joints(joints: np.ndarray, rest: np.ndarray, length: float, is_cur
         return np.stack([np.interp(at, positions, axis) for axis in line.T], axis=1)
 
     low, high = np.append(-1.0, numbers[:-1]), np.append(numbers[1:], 2.0)
+    wanted = np.clip(numbers, _NOTHING, 1.0 - _NOTHING)
     for _step in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        is_before = share_along_curve(on_line(middle), joints) < numbers
+        is_before = share_along_curve(on_line(middle), joints) < wanted
         low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
-    found = high
-    found[0], found[-1] = -1.0, 2.0
-    return on_line(found)
+    found = np.append(low[0] - _BEYOND, high[1:])
+    found[-1] += _BEYOND
+    return on_line(np.clip(found, -1.0, 2.0))
 
 
 def share_along_curve(points: np.ndarray, joints: np.ndarray) -> np.ndarray:

@@ -63,10 +63,12 @@ class SegmentErrors:
     influences  of bones and joints, constant
     bendy       int [n], the bendy bones whose joints move vertices
     joints      int [n], the joints of these
+    most        influences of a vertex that are kept; 0 for all
     """
 
     def __init__(self, bones: Bones, influences: Influences, most: int) -> None:
-        self.influences, self._cut, self._most = influences, influences.heaviest(most), most
+        self._most = most or int(influences.counts.max(initial=0))
+        self.influences, self._cut = influences, influences.heaviest(self._most)
         used = influences.bones[influences.bones >= len(bones.names)]
         self.bendy = np.unique(bones.owners[used])
         self.joints = len(bones.names) + np.flatnonzero(np.isin(bones.owners[len(bones.names) :], self.bendy))

@@ -173,7 +173,7 @@ def test_what_is_not_exact_is_reported(bendy, tmp_path, cause):
         options["influences"] = 2
     (expected,) = world_shapes([obj], FRAMES)
     scenes.add_sinew(obj, options["method"])
-    (report,), kept = bake_bones.replace_bendy_bones([obj], FRAMES, options["influences"])
+    (report,), _names, kept = bake_bones.replace_bendy_bones([obj], FRAMES, options["influences"])
     assert kept == []
     obj.sinew.enabled = False
     if cause == "method":

@@ -87,6 +87,8 @@ class _Rig:
         # For each mesh, the stack that deforms it in other poses; for each frame, the shapes of all meshes.
         self._stacks: list[SkinStack] = []
         self._shapes: list[list[Shape]] = []
+        # Names of the plain bones for joints.
+        self.segments: dict[int, str] = {}
 
     def take(self) -> None:
         """Records the evaluated frame."""
@@ -264,6 +266,7 @@ class _Rig:
         with nullcontext() if self.rig.visible_get() else characters.shown([self.rig]):
             helper_bones_io.use_copy_of_armature(self.rig)
             names = helper_bones_io.add_segments(self.rig, self._bones, self._segments.bendy)
+        self.segments = names
         movers, (slots, weights) = self._bones.names_with(names), self._segments.influences.padded()
         for obj, rows in self._rows():
             if obj.data.users > 1:
@@ -334,12 +337,13 @@ def _has_one_size(poses: np.ndarray) -> bool:
 
 def replace_bendy_bones(
     meshes: Sequence[bpy.types.Object], frames: Sequence[float], influences: int
-) -> tuple[list[SegmentReport], list[str]]:
+) -> tuple[list[SegmentReport], dict[str, dict[int, str]], list[str]]:
     """Puts plain bones in place of bendy ones, for an exporter. They follow the joints by constraints, so
-    that all actions move them. Returns, for each armature, what that leaves of the shapes at the frames; and
-    a sentence for each mesh that keeps its bendy bones.
+    that all actions move them. Returns, for each armature, what that leaves of the shapes at the frames; the
+    plain bones' names for each mesh, by the index of the joint; and a sentence for each mesh that keeps its
+    bendy bones.
 
-    influences  of a vertex, at most, that will be exported
+    influences  of a vertex, at most, that will be exported; 0 for all
     """
     found: dict[bpy.types.Object, list[bpy.types.Object]] = {}
     kept: list[str] = []
@@ -359,4 +363,4 @@ def replace_bendy_bones(
     for rig in rigs:
         reports += rig.replace_bendy_bones()
     session.refresh(bpy.context)
-    return reports, kept
+    return reports, {obj.name: rig.segments for rig in rigs for obj in rig.meshes}, kept

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far an exported file plays from what was seen, and why: each cause is put alone into the shape that the
+skin has in Blender, and what all of them together do not explain is the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .influences import Influences
+from .played import Played, blended, padded
+
+# Of the diagonal: a smaller distance is rounding.
+EXPLAINED = 1e-5
+
+# The sine of an angle.
+_NEAR_LIMIT = 0.99
+
+CAUSES: dict[str, str] = {
+    "modifiers": "modifiers behind the armature, which the file leaves out",
+    "method": "method and stages, where engines blend linearly",
+    "bendy": "bendy bones",
+    "influences": "influences that were cut",
+    "shape_keys": "shape keys",
+    "shear_scale": "bones whose shear, scale or rotation the file can not store exactly",
+    "transforms": "transforms of objects that move apart",
+    "sampling": "between frames, straight lines from key to key",
+    "rest": "no cause that is known",
+}
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A mesh at one frame, in Blender. Bones are followed by joints of bendy bones and by one that moves
+    vertices without influences.
+
+    seen     float64 [vertices, 3], world: the final mesh
+    shown    the same, before the modifiers behind the Armature modifier
+    rest     float [vertices, 3], object space, with shape keys
+    motions  float64 [bones, 4, 4], from object space at rest to the world
+    bound    the same, by the object's place at the export
+    damaged  bool [bones], whether location, rotation and scale of it or of a bone above do not give its pose
+    influences  of this frame
+    """
+
+    frame: float
+    seen: np.ndarray
+    shown: np.ndarray
+    rest: np.ndarray
+    motions: np.ndarray
+    bound: np.ndarray
+    damaged: np.ndarray
+    influences: Influences
+
+
+@dataclass
+class Seen:
+    """A mesh over frames, in Blender.
+
+    bones        the names in the file of bones and joints
+    constant     the influences that the file should have
+    influences   the largest number of a vertex that was exported; 0 for all
+    has_keys     it has shape keys
+    """
+
+    name: str
+    bones: list[str]
+    constant: Influences
+    influences: int
+    has_keys: bool
+    frames: list[Moment] = field(default_factory=list)
+    between: list[Moment] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Over vertices and frames, in scene units."""
+
+    largest: float
+    mean: float
+
+    @classmethod
+    def of(cls, pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> Distance:
+        found = [np.linalg.norm(a - b, axis=1) for a, b in pairs]
+        together = np.concatenate(found) if found else np.zeros(0)
+        return cls(float(together.max(initial=0.0)), float(together.mean()) if len(together) else 0.0)
+
+
+@dataclass(frozen=True)
+class Check:
+    """What an engine plays, compared with what was seen.
+
+    rounding  a distance that is not larger is that of the numbers in the file
+    total     between the file and what was seen
+    causes    of each of CAUSES alone
+    """
+
+    mesh: str
+    diagonal: float
+    rounding: float
+    total: Distance
+    causes: dict[str, Distance]
+
+    @property
+    def is_explained(self) -> bool:
+        return self.causes["rest"].largest <= self.rounding
+
+    def sentences(self, unit: str) -> list[str]:
+        """unit: the name of a scene unit."""
+        share, total = 100.0 * self.total.largest / (self.diagonal or 1.0), self._said(self.total, unit)
+        return [
+            f"{self.mesh}: the file plays {total} from what was seen ({share:.2g}% of the diagonal)",
+            *(
+                f"{self.mesh}: {self._said(distance, unit)}: {CAUSES[name]}"
+                for name, distance in self.causes.items()
+                if distance.largest > self.rounding
+            ),
+        ]
+
+    @staticmethod
+    def _said(distance: Distance, unit: str) -> str:
+        return f"{distance.largest:.2g} {unit} at most, {distance.mean:.2g} on average"
+
+
+def plain(name: str) -> str:
+    """A bone's name as all formats can have it: USD has letters, digits and underscores."""
+    return "".join(each if each.isalnum() and each.isascii() else "_" for each in name)
+
+
+class Comparison:
+    """A mesh of a file beside the same in Blender.
+
+    object_from_file  float64 [4, 4], from the space of the file's rest points
+    vertices          int [file's vertices]: which of Blender's vertices each is
+    """
+
+    def __init__(
+        self, seen: Seen, played: Played, object_from_file: np.ndarray, vertices: np.ndarray
+    ) -> None:
+        self._seen, self._played, self._vertices = seen, played, vertices
+        self._object_from_file = object_from_file
+        self._file_from_object = np.linalg.inv(object_from_file)
+        numbers = {plain(name): number for number, name in enumerate(seen.bones) if name}
+        self._none = len(seen.bones)
+        # What exporters add for vertices without weights is none of the armature's bones.
+        self._bone_of = np.array([numbers.get(plain(name), self._none) for name in played.joints], dtype=int)
+        self._own = self._bone_of[played.slots], played.weights
+        self._constant = self._rows(seen.constant)
+
+    def _rows(self, influences: Influences) -> tuple[np.ndarray, np.ndarray]:
+        slots, weights = padded(influences, self._none)
+        return slots[self._vertices], weights[self._vertices]
+
+    def _motions(self, moment: Moment) -> np.ndarray:
+        """The file's, by the numbers of Blender's bones, from object space."""
+        motions = moment.bound.copy()
+        motions[self._bone_of] = self._played.motions(moment.frame) @ self._file_from_object
+        motions[self._none] = moment.bound[self._none]
+        return motions
+
+    def _rest(self, moment: Moment) -> np.ndarray:
+        """The file's rest points, in object space."""
+        points, matrix = self._played.rest_at(moment.frame), self._object_from_file
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+    @property
+    def _cut(self) -> tuple[np.ndarray, np.ndarray]:
+        """The constant influences; those of the file where they are more than it was to have."""
+        (slots, weights), most = self._constant, self._seen.influences
+        if not most:
+            return slots, weights
+        own_slots, own_weights = self._own
+        width = max(slots.shape[1], own_slots.shape[1])
+        is_cut = (weights > 0.0).sum(axis=1) > most
+        chosen = []
+        for mine, theirs in ((slots, own_slots), (weights, own_weights)):
+            wide, narrow = np.zeros((2, len(mine), width), mine.dtype)
+            wide[:, : mine.shape[1]], narrow[:, : theirs.shape[1]] = mine, theirs
+            chosen.append(np.where(is_cut[:, None], narrow, wide))
+        return chosen[0], chosen[1]
+
+    def played(self, moment: Moment) -> np.ndarray:
+        """float64 [file's vertices, 3], world: what an engine plays."""
+        return blended(
+            self._played.slots,
+            self._played.weights,
+            self._played.motions(moment.frame),
+            self._played.rest_at(moment.frame),
+        )
+
+    def check(self) -> Check:
+        seen, at = self._seen, self._vertices
+        pairs: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {name: [] for name in (*CAUSES, "total")}
+        cut = self._cut
+        for moment in seen.frames:
+            own, rest = self._rows(moment.influences), moment.rest[at]
+            linear = blended(*own, moment.motions, rest)
+            motions = self._motions(moment)
+            points = self._rest(moment) if seen.has_keys else rest
+            damaged = moment.damaged[:, None, None]
+            constant = blended(*self._constant, moment.motions, rest)
+            played = self.played(moment)
+            pairs["total"].append((played, moment.seen[at]))
+            pairs["modifiers"].append((moment.seen[at], moment.shown[at]))
+            pairs["method"].append((moment.shown[at], linear))
+            pairs["bendy"].append((constant, linear))
+            pairs["influences"].append((blended(*cut, moment.motions, rest), constant))
+            pairs["shape_keys"].append((blended(*own, moment.motions, points), linear))
+            of_damaged = np.where(damaged, motions, moment.motions)
+            pairs["shear_scale"].append((blended(*own, of_damaged, rest), linear))
+            pairs["transforms"].append((blended(*own, moment.bound, rest), linear))
+            pairs["rest"].append((blended(*cut, np.where(damaged, motions, moment.bound), points), played))
+        for moment in seen.between:
+            own, rest = self._rows(moment.influences), moment.rest[at]
+            motions = np.where(moment.damaged[:, None, None], moment.bound, self._motions(moment))
+            pairs["sampling"].append((blended(*own, motions, rest), blended(*own, moment.bound, rest)))
+        found = {name: Distance.of(own) for name, own in pairs.items()}
+        points = seen.frames[0].seen
+        diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+        rounding = EXPLAINED * max(diagonal, 0.1 * float(np.abs(points).max(initial=0.0)))
+        return Check(seen.name, diagonal, rounding, found.pop("total"), found)
+
+
+def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarray:
+    """bool [bones]: those that location, rotation and scale relative to their parents, as a file stores them,
+    do not pose exactly, and all below them.
+
+    poses    float64 [bones, 4, 4]
+    parents  int [bones], -1 for none
+    kind     the ending of the file
+    """
+    above = np.where(parents[:, None, None] >= 0, poses[parents], np.identity(4))
+    axes = (np.linalg.pinv(above) @ poses)[:, :3, :3]
+    products = axes.transpose(0, 2, 1) @ axes
+    sizes = np.sqrt(np.einsum("nii->ni", products))
+    scale = np.maximum(sizes[:, :, None] * sizes[:, None], 1e-30)
+    damaged = (np.abs(products / scale * (1.0 - np.identity(3))) > 1e-5).any(axis=(1, 2))
+    damaged |= (sizes < 1e-6).any(axis=1)
+    if kind == ".usdc":
+        # Scales are half floats.
+        damaged |= (np.abs(sizes - sizes.astype(np.float16)) > 2e-6).any(axis=1)
+    elif kind == ".fbx":
+        # Angles about X and Z are not exact where that about Y is near 90 degrees.
+        damaged |= np.abs(axes[:, 2, 0]) > _NEAR_LIMIT * sizes[:, 0]
+    for _level in range(len(parents)):
+        below = damaged | (damaged[parents] & (parents >= 0))
+        if (below == damaged).all():
+            break
+        damaged = below
+    return damaged
+
+
+def spread_frames(first: int, last: int, most: int) -> tuple[list[float], list[float]]:
+    """Returns at most so many of the frames, evenly, and the middles between frames beside them."""
+    count = min(most, last - first + 1)
+    frames = np.unique(np.round(np.linspace(first, last, count))).tolist()
+    return frames, [frame + 0.5 for frame in frames[:-1]]

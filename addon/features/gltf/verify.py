@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compares what an exported file plays with what Blender showed: core/export_check.py has the arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils.kdtree import KDTree
+
+from ...attach import properties, upstream_proxy
+from ...core import played as readers
+from ...core import read_fbx
+from ...core.errors import SinewError
+from ...core.export_check import EXPLAINED, Check, Comparison, Moment, Seen, damaged_bones, plain
+from ...core.influences import Influences
+from ...core.played import Played
+from ...core.vectors import transformed
+from ...deform import characters, session
+from ...deform.skinned_object import SkinnedObject
+from ...io import mesh_io, read_usd
+
+
+class Recording:
+    """What Blender shows of meshes, before an export changes anything.
+
+    frames, between  whole frames, and times between them
+    influences       of a vertex, at most, that the file will have; 0 for all
+    kind             the file's ending
+    left_out         a sentence for each mesh that can not be verified
+    """
+
+    def __init__(
+        self,
+        meshes: Sequence[bpy.types.Object],
+        frames: Sequence[float],
+        between: Sequence[float],
+        influences: int,
+        kind: str,
+    ) -> None:
+        self.left_out: list[str] = []
+        self._kind, self._influences, self._times = kind, influences, [*frames, *between]
+        self._meshes: dict[str, _Mesh] = {}
+        scene = bpy.context.scene
+        self._rate = scene.render.fps / scene.render.fps_base
+        self._played = {obj.name: _animations_of(obj) for obj in meshes}
+        for frame in (*frames, *between):
+            characters.set_frame(scene, frame)
+            states = session.states_of(meshes, bpy.context.evaluated_depsgraph_get())
+            for obj, state in states:
+                if frame == frames[0] and (reason := _reason(obj, state)):
+                    self.left_out.append(f"{obj.name}: not verified: {reason}")
+                elif frame == frames[0]:
+                    self._meshes[obj.name] = _Mesh(obj, state)
+                if obj.name in self._meshes:
+                    moment = self._meshes[obj.name].moment(obj, state, frame, kind)
+                    recorded = self._meshes[obj.name]
+                    (recorded.frames if frame in frames else recorded.between).append(moment)
+        # Exporters take the places of objects at the current frame.
+        characters.set_frame(scene, frames[0])
+
+    def verify(self, path: Path, segments: Mapping[str, Mapping[int, str]]) -> list[Check]:
+        """Reads the file, and compares; adds to `left_out`.
+
+        segments  names of the plain bones for joints, by the names of objects
+        """
+        if self._kind == ".glb":
+            played = {name for own in self._played.values() for name in own}
+            read = readers.read_gltf(path, played, self._rate)
+        elif self._kind == ".fbx":
+            read = read_fbx.read_fbx(path, self._played, self._rate, self._times)
+        else:
+            read = read_usd.read_usd(path)
+        checks = []
+        for name, mesh in self._meshes.items():
+            found = [each for each in read if plain(each.name) == plain(name)]
+            if len(found) != 1:
+                self.left_out.append(f"{name}: not verified: the file has {len(found)} skinned meshes of it")
+                continue
+            try:
+                seen = mesh.seen(name, segments.get(name, {}), self._influences)
+                checks.append(mesh.compared(seen, found[0], self._kind).check())
+            except SinewError as error:
+                self.left_out.append(f"{name}: not verified: {error}")
+        return checks
+
+
+class _Mesh:
+    """A mesh over frames. What is read of it once is at the first."""
+
+    def __init__(self, obj: bpy.types.Object, state: SkinnedObject) -> None:
+        deformer = state.bound.first_deformer
+        self.bones, self._weighting = deformer.bones, deformer.weighting
+        self._from_rest = np.linalg.inv(self.bones.rest.astype(np.float64))
+        self._basis = mesh_io.read_points(obj.data).astype(np.float64)
+        self._has_keys = obj.data.shape_keys is not None
+        self._world = np.array(obj.matrix_world, dtype=np.float64)
+        self._bones_from_model = state.shown.frames[0].bones_from_model.astype(np.float64)
+        self._influences: Influences | None = None
+        self.frames: list[Moment] = []
+        self.between: list[Moment] = []
+
+    def moment(self, obj: bpy.types.Object, state: SkinnedObject, frame: float, kind: str) -> Moment:
+        bones, given = self.bones, state.shown.frames[0]
+        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        rig = properties.of(obj).armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        world, armature = (np.array(each.matrix_world, dtype=np.float64) for each in (evaluated, rig))
+        shown, final = transformed(state.points, world), characters.final_points(obj)
+        rest = state.shown.rest_points.astype(np.float64)
+        if self._influences is None or self._weighting.depends_on_points:
+            in_armature = transformed(rest, given.bones_from_model)
+            self._influences = self._weighting.influences_over_joints(in_armature)
+        motions = given.pose.astype(np.float64) @ self._from_rest
+        axes = bones.rest_axes.astype(np.float64)
+        flat = np.full(len(bones.rest) - len(bones.names), -1)
+        damaged = damaged_bones(motions @ axes, np.append(bones.parents, flat), kind)
+        return Moment(
+            frame,
+            transformed(final, world) if len(final) == len(shown) else shown,
+            shown,
+            rest,
+            np.concatenate([armature @ motions @ given.bones_from_model, world[None]]),
+            np.concatenate([armature @ motions @ self._bones_from_model, self._world[None]]),
+            np.append(damaged, False),
+            self._influences,
+        )
+
+    def seen(self, name: str, segments: Mapping[int, str], influences: int) -> Seen:
+        """segments: names of the plain bones for joints, if there are some"""
+        constant = self.frames[0].influences
+        if self.bones.bend and not segments:
+            in_armature = transformed(self.frames[0].rest, self._bones_from_model)
+            constant = self._weighting.influences(in_armature)
+        names = self.bones.names_with(segments)
+        return Seen(name, names, constant, influences, self._has_keys, self.frames, self.between)
+
+    def compared(self, seen: Seen, found: Played, kind: str) -> Comparison:
+        """Raises SinewError where the file has other rest points."""
+        # glTF has the rest points of skins in world space.
+        place = np.linalg.pinv(self._world) @ readers.Z_UP if kind == ".glb" else np.identity(4)
+        rest = transformed(found.rest, place)
+        size = float(np.linalg.norm(np.ptp(self._basis, axis=0)))
+        if len(rest) == len(self._basis) and np.abs(rest - self._basis).max(initial=0.0) <= EXPLAINED * size:
+            return Comparison(seen, found, place, np.arange(len(rest)))
+        near = _near(rest, self._basis, EXPLAINED * size)
+        if not all(near):
+            raise SinewError("the file has other rest points")
+        # Of vertices at one place, each of the file's is taken for the one that moves like it.
+        vertices = np.array([own[0] for own in near])
+        comparison = Comparison(seen, found, place, vertices)
+        several = [row for row, own in enumerate(near) if len(own) > 1]
+        if not several:
+            return comparison
+        moments = [self.frames[0], self.frames[len(self.frames) // 2], self.frames[-1]]
+        shapes = [comparison.played(moment) for moment in moments]
+        for row in several:
+            apart = [
+                max(np.linalg.norm(m.seen[v] - s[row]) for m, s in zip(moments, shapes, strict=True))
+                for v in near[row]
+            ]
+            vertices[row] = near[row][int(np.argmin(apart))]
+        return Comparison(seen, found, place, vertices)
+
+
+def _near(points: np.ndarray, others: np.ndarray, distance: float) -> list[list[int]]:
+    """For each of the points, the others within this distance, the nearest first."""
+    tree = KDTree(len(others))
+    for number, point in enumerate(others):
+        tree.insert(point, number)
+    tree.balance()
+    found = []
+    for point in points:
+        own = tree.find_range(point, distance)
+        found.append([number for _point, number, _apart in sorted(own, key=lambda each: each[2])])
+        if not own:
+            break
+    return found
+
+
+def _reason(obj: bpy.types.Object, state: SkinnedObject) -> str:
+    """Why it can not be compared; empty where it can."""
+    if len(properties.of(obj).replaced_modifiers) != 1 or state.shown.frames[0] is None:
+        return "several Armature modifiers deform it"
+    try:
+        upstream_proxy.check_not_needed(obj, "which the file leaves out")
+    except SinewError as error:
+        return str(error)
+    return ""
+
+
+def _animations_of(obj: bpy.types.Object) -> dict[str, float]:
+    """Names of the actions and of the NLA's tracks that move a mesh, with their first frames: exporters name
+    animations by the ones or the others. The armature's are first."""
+    found: dict[str, float] = {}
+    owners = [properties.of(obj).armature, obj.data.shape_keys, obj]
+    for animation in (owner.animation_data for owner in owners if owner is not None):
+        if animation is None:
+            continue
+        action = animation.action
+        tracks = [
+            track
+            for track in animation.nla_tracks
+            if (not track.mute if action is None else action in [s.action for s in track.strips])
+        ]
+        strips = [strip.action for track in tracks for strip in track.strips]
+        for each in filter(None, strips if action is None else [action]):
+            found.setdefault(each.name, float(each.frame_range[0]))
+        for track in tracks:
+            found.setdefault(track.name, 0.0)
+    return found

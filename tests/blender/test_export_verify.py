@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew export --verify`: each cause that is planted alone is found, with its distance; a file that was
+changed afterwards has a difference without a cause."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import bpy
+import numpy as np
+import other_gltf
+import pytest
+import scenes
+from program import run_sinew
+from scipy.spatial import cKDTree
+from sinew_addon.core import played
+from sinew_addon.core.export_check import CAUSES, EXPLAINED
+from sinew_addon.features.gltf import verify
+from test_segment_bones import make_bendy, world_rest
+
+FRAMES = list(range(1, 12))
+
+
+@pytest.fixture
+def scene(empty_file, tmp_path):
+    """An arm of three bones, and its armature: bends, moved and rotated, as a whole."""
+    obj, rig = scenes.make_arm(bones=3)
+    obj.parent = rig
+    rig.location, rig.rotation_euler, rig.scale = (0.3, -0.4, 0.2), (0.5, 0.2, -0.3), (1.3, 1.3, 1.3)
+    bpy.context.view_layer.update()
+    return obj, rig
+
+
+def exported(tmp_path, *options, method="lbs", ending=".glb", status=0):
+    """What is said of the only mesh."""
+    file, out = tmp_path / "arm.blend", tmp_path / f"arm{ending}"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    given = ("--method", method, "--verify", "--json", "--out", out, *options)
+    said = json.loads(run_sinew("export", file, *given, status=status).stdout)
+    assert said["errors"] == []
+    (mesh,) = said["meshes"]
+    return mesh
+
+
+def found_causes(mesh):
+    """Those of whole frames."""
+    found = {name for name, each in mesh["causes"].items() if each["largest"] > EXPLAINED * mesh["diagonal"]}
+    return found - {"sampling"}
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
+def test_a_file_without_faults(scene, tmp_path, ending):
+    skip_without_reader(ending)
+    mesh = exported(tmp_path, ending=ending)
+    assert found_causes(mesh) == set()
+    assert mesh["total"]["largest"] <= 1e-6 * mesh["diagonal"]
+    assert mesh["explained"]
+
+
+def skip_without_reader(ending):
+    if ending == ".usdc" and bpy.app.version < (4, 4, 0):
+        pytest.skip("pxr is not for others' scripts")
+    if ending == ".fbx":
+        pytest.importorskip("ufbx")
+
+
+def plant(cause, obj, rig):
+    """Returns options of the command."""
+    if cause == "method":
+        return {"method": "dq"}
+    if cause == "influences":
+        return {"options": ("--influences", "1")}
+    if cause == "modifiers":
+        modifier = obj.modifiers.new("Smooth", "SMOOTH")
+        modifier.iterations = 5
+    elif cause == "shear_scale":
+        rig.data.bones[1].inherit_scale = "NONE"
+        scenes.key(rig.pose.bones[0], "scale", ((1, (1, 1, 1)), (11, (1.1, 1.5, 0.7))))
+    elif cause == "transforms":
+        scenes.key(obj, "location", ((1, (0, 0, 0)), (11, (0.1, 0.2, 0.0))))
+    elif cause == "shape_keys":
+        # Exporters write all of a key, whatever group limits it to.
+        obj.shape_key_add(name="Basis")
+        key = obj.shape_key_add(name="Wide")
+        for point in key.points:
+            point.co.z *= 1.5
+        scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
+        key.vertex_group = "bone.1"
+    return {}
+
+
+@pytest.mark.parametrize("cause", [c for c in CAUSES if c not in ("bendy", "sampling", "rest")])
+def test_each_cause_alone(scene, tmp_path, cause):
+    planted = plant(cause, *scene)
+    mesh = exported(tmp_path, *planted.get("options", ()), method=planted.get("method", "lbs"))
+    assert found_causes(mesh) == {cause}
+    distance = mesh["causes"][cause]["largest"]
+    assert distance > 1e-3 * mesh["diagonal"]
+    assert np.isclose(distance, mesh["total"]["largest"], rtol=1e-3)
+    assert np.isclose(mesh["causes"][cause]["mean"], mesh["total"]["mean"], rtol=1e-3)
+
+
+def test_shape_keys_along_bendy_bones(empty_file, tmp_path):
+    obj = make_bendy(unequal=False)
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Along")
+    for point in key.points:
+        point.co.x *= 0.9
+    scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
+    mesh = exported(tmp_path)
+    assert found_causes(mesh) == {"bendy"}
+    assert np.isclose(mesh["causes"]["bendy"]["largest"], mesh["total"]["largest"], rtol=1e-3)
+
+
+def test_half_floats_of_usd(empty_file, tmp_path):
+    skip_without_reader(".usdc")
+    make_bendy()
+    mesh = exported(tmp_path, ending=".usdc")
+    assert found_causes(mesh) == {"shear_scale"}
+    assert mesh["explained"]
+
+
+def test_between_frames(scene, tmp_path):
+    """The distance in the middle between frames is that of Blender's shape from the file's."""
+    obj, rig = scene
+    mesh = exported(tmp_path)
+    sampled = mesh["causes"]["sampling"]["largest"]
+    middles = [frame + 0.5 for frame in FRAMES[:-1]]
+    name = rig.animation_data.action.name
+    rate = bpy.context.scene.render.fps
+    world = np.array(obj.matrix_world, dtype=np.float64)
+    expected = scenes.shapes(obj, middles).astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+    rest, shapes = other_gltf.points_at(tmp_path / "arm.glb", np.array(middles) / rate, name)
+    distances, vertices = cKDTree(world_rest(obj)).query(rest)
+    assert distances.max() <= 1e-6
+    assert np.isclose(np.linalg.norm(shapes - expected[:, vertices], axis=2).max(), sampled, rtol=1e-4)
+
+
+def test_the_limit_of_the_user(scene, tmp_path):
+    exported(tmp_path, "--at-most", "50", method="dq")
+    exported(tmp_path, "--at-most", "0.1", method="dq", status=1)
+
+
+def test_sentences(scene, tmp_path):
+    file, out = tmp_path / "arm.blend", tmp_path / "a.glb"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    command = ("export", file, "--method", "dq", "--out", out, "--frames", "1,6,11")
+    first, second, *others = run_sinew(*command, "--verify").stdout.splitlines()
+    assert first.startswith("Arm: the file plays 0.")
+    assert second.endswith(CAUSES["method"])
+    assert others == [str(out)]
+    assert "--frames and --at-most go with --verify" in run_sinew(*command, status=2).stderr
+
+
+def test_a_changed_file_has_a_difference_without_a_cause(scene, tmp_path):
+    obj, _rig = scene
+    scenes.add_sinew(obj, "lbs")
+    recording = verify.Recording([obj], [1, 6, 11], [], 4, ".glb")
+    path = tmp_path / "a.glb"
+    bpy.ops.export_scene.gltf(filepath=str(path), export_influence_nb=4)
+    (check,) = recording.verify(path, {})
+    assert check.is_explained
+    file = played.GltfFile(path)
+    number = file.header["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"]
+    view = file.header["bufferViews"][file.header["accessors"][number]["bufferView"]]
+    data = bytearray(path.read_bytes())
+    start = 28 + struct.unpack("<I", data[12:16])[0] + view.get("byteOffset", 0)
+    assert np.frombuffer(data, "<f4", 4, start).sum() == 1.0
+    # The first vertex, of the first bone, is given half to another joint.
+    data[start : start + 16] = struct.pack("<4f", 0.5, 0.5, 0.0, 0.0)
+    joints = file.header["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"]
+    view = file.header["bufferViews"][file.header["accessors"][joints]["bufferView"]]
+    at = 28 + struct.unpack("<I", data[12:16])[0] + view.get("byteOffset", 0)
+    assert file.header["accessors"][joints]["componentType"] == 5121
+    data[at : at + 4] = bytes([0, 2, 0, 0])
+    path.write_bytes(data)
+    (check,) = recording.verify(path, {})
+    assert not check.is_explained
+    assert check.causes["rest"].largest == check.total.largest > 1e-2 * check.diagonal
+
+
+def test_the_reader_plays_as_others_do(scene, tmp_path):
+    """With shape keys, between frames."""
+    obj, rig = scene
+    scenes.key_shape(obj)
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "a.glb"))
+    names = {rig.animation_data.action.name}
+    rate = bpy.context.scene.render.fps
+    (mesh,) = played.read_gltf(tmp_path / "a.glb", names, rate)
+    times = np.array([1.0, 3.3, 7.5, 11.0])
+    _rest, expected = other_gltf.points_at(tmp_path / "a.glb", times / rate, *names)
+    for time, shape in zip(times, expected, strict=True):
+        found = played.blended(mesh.slots, mesh.weights, mesh.motions(time), mesh.rest)
+        assert scenes.worst(found, shape) < 1e-6
+    assert mesh.targets.shape[0] == 1
