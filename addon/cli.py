@@ -38,7 +38,7 @@ COMMANDS = (
     *("compare", "flex", "render"),
 )
 # Batches start Blenders of their own, or prepare this one later.
-WITHOUT_BLENDER = ("methods", "check", "reskin", "restore")
+WITHOUT_BLENDER = ("methods", "check", "flex", "reskin", "restore")
 
 _commands: list[object] = []
 

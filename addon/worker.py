@@ -22,13 +22,14 @@ Report = Callable[..., None]
 def run(task: dict, report: Report) -> dict:
     """Performs one task in this process; returns its outcome with the hash of the file that was read."""
     from .features.bake import bake_apart
-    from .jobs.tasks import preflight, reskin
+    from .jobs.tasks import flex, preflight, reskin
 
     actions = {
         "reskin": reskin.reskin,
         "restore": reskin.restore,
         "export": bake_apart.export,
         "check": preflight.check,
+        "flex": flex.flex,
     }
     try:
         # Hashed first, so that a later change of the file is noticed.

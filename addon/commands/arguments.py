@@ -78,6 +78,22 @@ def one_of(names: Collection[str]) -> Callable[[str], str]:
     return read
 
 
+def methods(text: str) -> list[str]:
+    """The type of an argument that names methods of `sinew methods`, or the Armature modifier."""
+    read = one_of([*(method.name for method in sinew.methods()), "blender"])
+    return [read(name.strip()) for name in text.split(",")]
+
+
+def add_timeout(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--timeout",
+        type=seconds,
+        default=300.0,
+        metavar="SECONDS",
+        help="how long a file may take (default: %(default)g; 0: any time)",
+    )
+
+
 def add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help=FILES)
 

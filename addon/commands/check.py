@@ -3,14 +3,14 @@
 
 import argparse
 import json
-from collections.abc import Generator
 from contextlib import closing
 from pathlib import Path
 
-from ..blender_process import BlenderLost, BlenderProcess, Limits
+from ..blender_process import Limits
 from ..core.errors import WrongUse
 from ..jobs.inputs import blend_files_below
-from .arguments import add_json, seconds
+from ..jobs.workers import run_one_by_one
+from .arguments import add_json, add_timeout
 from .console import Console
 
 SUMMARY = "check that files can be rendered with Sinew, before they are sent to a farm"
@@ -27,20 +27,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files", nargs="+", type=Path, metavar="FILE_OR_FOLDER", help=".blend; a folder: all below it"
     )
     add_json(parser)
-    parser.add_argument(
-        "--timeout",
-        type=seconds,
-        default=300.0,
-        metavar="SECONDS",
-        help="how long a file may take (default: %(default)g; 0: any time)",
-    )
+    add_timeout(parser)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
     paths = [path for given in args.files for path in _files_of(given)]
     reports = []
-    with closing(_checked(paths, Limits(timeout=args.timeout, verbose=console.verbose))) as outcomes:
-        for path, outcome in outcomes:
+    tasks = [{"command": "check", "source": str(path.absolute())} for path in paths]
+    limits = Limits(timeout=args.timeout, verbose=console.verbose)
+    with closing(run_one_by_one(tasks, limits)) as outcomes:
+        for path, outcome in zip(paths, outcomes, strict=True):
             reports.append(_report(path, outcome))
             if not args.json:
                 console.say(line_of(reports[-1]))
@@ -56,23 +52,6 @@ def _files_of(given: Path) -> list[Path]:
     if not found:
         raise WrongUse(f"{given}: no .blend files in this folder")
     return found
-
-
-def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], None, None]:
-    """Yields each file and its outcome, from a Blender process that is restarted if it crashes or is ended.
-    Raises SinewError where none can be started."""
-    blender = None
-    try:
-        for path in paths:
-            blender = blender or BlenderProcess(limits)
-            try:
-                yield path, blender.run({"command": "check", "source": str(path.absolute())}, limits)
-            except BlenderLost as lost:
-                blender = None
-                yield path, {"error": f"{lost}"}
-    finally:
-        if blender is not None:
-            blender.end()
 
 
 def _report(path: Path, outcome: dict) -> dict:

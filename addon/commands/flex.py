@@ -5,16 +5,18 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from ..core import interrupt
+from ..blender_process import Limits
 from ..core.errors import SinewError
 from ..core.flex.limits import Table, read_table
-from ..core.flex.report import FileReport, junit, lines, markdown
+from ..core.flex.report import junit, lines, markdown, of_file
 from ..core.output import file_to_write, write_text
-from .arguments import add_files, add_json, add_object
+from ..jobs.workers import run_one_by_one
+from .arguments import add_files, add_json, add_object, add_timeout, methods
 from .console import Console
 
 SUMMARY = "bend each joint of characters, and say which deform well"
@@ -29,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
     parser.add_argument(
         "--methods",
-        type=lambda text: [name.strip() for name in text.split(",")],
+        type=methods,
         default=[],
         metavar="METHODS",
         help="others to try, of `sinew methods`, such as dq,cor: they are named where they mend a joint; the "
@@ -41,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--thresholds", type=Path, metavar="TABLE.toml", help="limits of measures, in [limits]"
     )
     add_json(parser)
+    add_timeout(parser)
     for option, ending, text in (
         ("--junit", ".xml", "for the test pages of build servers"),
         ("--markdown", ".md", "for a pull request"),
@@ -50,57 +53,55 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..deform import characters
-
-    characters.check_methods(args.methods)
     table = Table()
-    for path in (args.poses, args.thresholds):
-        table = table if path is None else read_table(path, table)
+    tables = [path for path in (args.poses, args.thresholds) if path is not None]
+    for path in tables:
+        table = read_table(path, table)
+    tasks = [
+        {
+            "command": "flex",
+            "source": str(path.absolute()),
+            "methods": args.methods,
+            "object": args.object,
+            "tables": [str(table.absolute()) for table in tables],
+        }
+        for path in args.files
+    ]
     reports = []
-    for path in args.files:
-        try:
-            reports.append(_report(path, table, args, console))
-        except SinewError as error:
-            reports.append(FileReport(str(path), error=str(error).removeprefix(f"{path}: ")))
-        if not args.json:
-            for line in lines(reports[-1]):
-                console.say(line)
+    with closing(_outcomes(tasks, args, console)) as outcomes:
+        for path, outcome in zip(args.files, outcomes, strict=True):
+            if "error" in outcome:
+                outcome["error"] = outcome["error"].removeprefix(f"{path.absolute()}: ")
+            console.note_on(path, outcome.get("notes", []))
+            reports.append(of_file(str(path), outcome))
+            if not args.json:
+                for line in lines(reports[-1]):
+                    console.say(line)
     if args.json:
-        content: list[dict[str, Any]] = [report.to_dict() for report in reports]
-        console.say(json.dumps(content, indent=2, ensure_ascii=False))
+        console.say(json.dumps(reports, indent=2, ensure_ascii=False))
     for target, text in ((args.junit, junit), (args.markdown, markdown)):
         if target is not None:
             write_text(target, text(reports))
             console.note(str(target))
-    return 0 if all(report.is_good for report in reports) else 1
+    return 0 if all(report["passed"] for report in reports) else 1
 
 
-def _report(path: Path, table: Table, args: argparse.Namespace, console: Console) -> FileReport:
-    import bpy
+def _outcomes(
+    tasks: Sequence[dict], args: argparse.Namespace, console: Console
+) -> Generator[dict, None, None]:
+    """Several files are bent in a Blender that they may crash; one is in this one, with its progress."""
+    if len(tasks) > 1:
+        outcomes = run_one_by_one(tasks, Limits(timeout=args.timeout, verbose=console.verbose))
+        yield from console.progress(outcomes, len(tasks), "Bending joints")
+        return
+    from ..jobs.tasks import flex
+    from ..prepare import prepare_blender
 
-    from ..attach import properties
-    from ..deform import characters
-    from ..features.flex import flex
-    from ..io import files
-
-    console.note_on(path, files.open_file(path))
-    scene = bpy.context.scene
-    settings = {
-        obj: properties.of(obj).method
-        for obj in scene.objects
-        if properties.has_sinew(obj) and properties.of(obj).enabled
-    }
-    meshes, left_out = characters.deformable_meshes(scene, path, ["dq", *args.methods], args.object)
-    own: dict[bpy.types.Object, str | None] = {}
-    for obj in meshes:
-        # Linear blending may be left to the Armature modifier, where nothing could be bent.
-        characters.use_method(obj, settings.get(obj, "dq"))
-        own[obj] = settings.get(obj, properties.BLENDER)
-    steps = flex.flex(meshes, args.methods, table, own)
-    with console.bar(f"Bending {path.name}", 1) as show:
-        while True:
+    prepare_blender()
+    for task in tasks:
+        with console.bar(f"Bending {Path(task['source']).name}", 1) as show:
             try:
-                show(next(steps))
-            except StopIteration as end:
-                return FileReport(str(path), end.value.verdict, tuple(left_out))
-            interrupt.check()
+                outcome = flex.flex(task, lambda _doing: None, show)
+            except SinewError as error:
+                outcome = {"error": str(error)}
+        yield outcome

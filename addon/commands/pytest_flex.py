@@ -42,7 +42,9 @@ def sinew_flex() -> Callable[..., dict[str, Any]]:
         reasons = [report["error"]] if "error" in report else report["left_out"]
         for joint in report.get("joints", []):
             if joint["joint"] not in known:
-                reasons += [f"{joint['joint']}: {finding['text']}" for finding in joint["findings"]]
+                reasons += [
+                    f"{joint['joint']}: {finding['text']} {finding['place']}" for finding in joint["findings"]
+                ]
         if reasons:
             pytest.fail("\n".join([f"{path}:", *reasons]), pytrace=False)
         return report

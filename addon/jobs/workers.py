@@ -9,7 +9,7 @@ import contextlib
 import importlib.metadata
 import uuid
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TypeAlias
@@ -157,6 +157,23 @@ def run_here(
 
     for task in tasks:
         yield task, _last(_steps(task, Limits(), at_once, versions))
+
+
+def run_one_by_one(tasks: Iterable[dict], limits: Limits) -> Generator[dict, None, None]:
+    """Yields the outcome of each task, which writes nothing, from a Blender process that is restarted if it
+    crashes or is ended. Raises SinewError where none can be started."""
+    blender = None
+    try:
+        for task in tasks:
+            blender = blender or BlenderProcess(limits)
+            try:
+                yield blender.run(task, limits)
+            except BlenderLost as lost:
+                blender = None
+                yield {"error": f"{lost}"}
+    finally:
+        if blender is not None:
+            blender.end()
 
 
 class _Running:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -84,8 +85,10 @@ class Finding:
     def to_dict(self) -> dict[str, Any]:
         return {
             "name": self.limit.name,
-            "text": f"{self.text} at {self.place}" if self.place else self.text,
-            "value": self.value,
+            "label": self.limit.label,
+            "text": self.text,
+            "place": self.place,
+            "value": _of_json(self.value),
             "limit": self.limit.value,
             "pose": self.pose,
             "mesh": self.mesh,
@@ -96,6 +99,11 @@ class Finding:
             "advice": self.limit.advice,
             "mends": list(self.mends),
         }
+
+
+def _of_json(value: float) -> float | None:
+    """JSON has no infinity, which the edges of a shape that is not finite have."""
+    return value if math.isfinite(value) else None
 
 
 @dataclass
@@ -124,7 +132,9 @@ class Joint:
             "passed": self.is_good,
             "poses": self.poses,
             "values": {
-                method: {name: {"value": value, "pose": pose} for name, (value, pose) in values.items()}
+                method: {
+                    name: {"value": _of_json(value), "pose": pose} for name, (value, pose) in values.items()
+                }
                 for method, values in self.values.items()
             },
             "findings": [finding.to_dict() for finding in self.findings],
@@ -140,6 +150,9 @@ class Verdict:
     @property
     def is_good(self) -> bool:
         return all(joint.is_good for joint in self.joints)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"joints": [joint.to_dict() for joint in self.joints]}
 
     @property
     def findings(self) -> list[Finding]:

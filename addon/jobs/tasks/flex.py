@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bends every joint of the characters of a file: for `sinew flex`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+
+from ...attach import properties
+from ...core import interrupt
+from ...core.flex.limits import Table, read_table
+from ...deform import characters
+from ...features.flex import flex as bending
+from ...io import files
+
+
+def flex(
+    task: dict, report: Callable[..., None], show: Callable[[float], None] = lambda _share: None
+) -> dict:
+    """Judges the file "source" of a task by the "tables", with "methods" to try, and only the mesh "object"
+    where one is named.
+
+    "joints": as from Verdict.to_dict(); "left_out": a sentence for each mesh that could not be judged;
+    "notes": remarks on the file. Raises SinewError where it cannot be judged.
+
+    show  called with the progress
+    """
+    path, table = Path(task["source"]), Table()
+    for each in task["tables"]:
+        table = read_table(Path(each), table)
+    report("opening it")
+    notes = files.open_file(path)
+    scene, methods = bpy.context.scene, task["methods"]
+    settings = {
+        obj: properties.of(obj).method
+        for obj in scene.objects
+        if properties.has_sinew(obj) and properties.of(obj).enabled
+    }
+    meshes, left_out = characters.deformable_meshes(scene, path, ["dq", *methods], task["object"])
+    own: dict[bpy.types.Object, str | None] = {}
+    for obj in meshes:
+        # Linear blending may be left to the Armature modifier, where nothing could be bent.
+        characters.use_method(obj, settings.get(obj, "dq"))
+        own[obj] = None if obj in settings else properties.BLENDER
+    report("bending it")
+    steps = bending.flex(meshes, methods, table, own)
+    while True:
+        try:
+            show(next(steps))
+        except StopIteration as end:
+            return {**end.value.verdict.to_dict(), "left_out": left_out, "notes": notes}
+        interrupt.check()
