@@ -47,6 +47,8 @@ def points(about, arrays, method, frame):
     rest, palette = arrays["rest"].astype(np.float64), arrays["palettes"][frame]
     if "moving" in arrays:
         rest[arrays["moving"]] = arrays["moved"][frame]
+    if not len(arrays["bones"]):
+        return rest
     common = rest, arrays.get("centres"), bones, weights, palette
     found = skinned(first, *common)
     if second != first:

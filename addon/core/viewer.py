@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import sinew
 
+from .errors import SinewError
 from .heat import HeatScale
 from .influences import Influences
 from .metrics import METRICS
@@ -40,24 +41,14 @@ def bone_buffer(posed: np.ndarray, rest: np.ndarray, rest_inverses: np.ndarray) 
     posed, rest    float [bones, 4, 4], from the bone's own axes to armature space, Y along the bone
     rest_inverses  float64 [bones, 4, 4], of `rest`
     """
-    posed, rest = posed.astype(np.float64), rest.astype(np.float64)
+    # Not with numpy's product: see vectors.transformed().
+    motions = np.einsum("bij,bjk->bik", posed.astype(np.float64), rest_inverses)
+    q = rotations_of(sinew.affine.split_scale(motions, rest.astype(np.float64)).rigid[:, :3, :3])
     buffer = np.empty((len(posed), 4, 4), dtype=np.float32)
-    # Not with numpy's products: see vectors.transformed().
-    buffer[:, :3] = np.einsum("bij,bjk->bik", posed[:, :3], rest_inverses)
-    q = rotations_of(np.einsum("bij,bkj->bik", _perpendicular(posed), _perpendicular(rest)))
+    buffer[:, :3] = motions[:, :3]
     # With w >= 0, as Blender has them.
     buffer[:, 3] = np.roll(np.where(q[0] < 0.0, -q, q), -1, axis=0).T
     return buffer
-
-
-def _perpendicular(matrices: np.ndarray) -> np.ndarray:
-    """Axes of unit length in columns, right-handed: Y as it is, X as near as it can be."""
-    y = matrices[:, :3, 1]
-    x = matrices[:, :3, 0]
-    y = y / np.maximum(np.linalg.norm(y, axis=1, keepdims=True), 1e-30)
-    x = x - y * (x * y).sum(axis=1, keepdims=True)
-    x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-30)
-    return np.stack([x, y, np.cross(x, y)], axis=2)
 
 
 @dataclass
@@ -211,6 +202,8 @@ class Viewer:
         for method in self.methods:
             for part, at_rest, reference in zip(self.parts, rest, references, strict=True):
                 points = part.world_points(method)
+                if not np.isfinite(points).all():
+                    raise SinewError(f"{part.name}: its shape under {method} is not finite at frame {frame}")
                 distances = np.linalg.norm(points - reference, axis=1)
                 self._distance.add(distances)
                 worst = max(worst, float(distances.max(initial=0.0)))
