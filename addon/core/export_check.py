@@ -22,7 +22,7 @@ CAUSES: dict[str, str] = {
     "modifiers": "modifiers behind the armature, which the file leaves out",
     "method": "method and stages, where engines blend linearly",
     "bendy": "bendy bones",
-    "influences": "influences that were cut",
+    "influences": "influences that were cut, or are of envelopes",
     "shape_keys": "shape keys",
     "shear_scale": "bones whose shear, scale or rotation the file can not store exactly",
     "transforms": "transforms of objects that move apart",
@@ -62,13 +62,15 @@ class Seen:
     bones        the names in the file of bones and joints
     constant     the influences that the file should have
     influences   the largest number of a vertex that was exported; 0 for all
-    has_keys     it has shape keys
+    has_envelopes  bones' envelopes have a part in the influences; files do not
+    has_keys       it has shape keys
     """
 
     name: str
     bones: list[str]
     constant: Influences
     influences: int
+    has_envelopes: bool
     has_keys: bool
     frames: list[Moment] = field(default_factory=list)
     between: list[Moment] = field(default_factory=list)
@@ -167,8 +169,11 @@ class Comparison:
 
     @property
     def _cut(self) -> tuple[np.ndarray, np.ndarray]:
-        """The constant influences; those of the file where they are more than it was to have."""
+        """The constant influences; those of the file where they are more than it was to have, or have
+        envelopes."""
         (slots, weights), most = self._constant, self._seen.influences
+        if self._seen.has_envelopes:
+            return self._own
         if not most:
             return slots, weights
         own_slots, own_weights = self._own

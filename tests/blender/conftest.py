@@ -29,8 +29,9 @@ BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
 OLDEST_AND_NEWEST = {
     *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_blend", "test_check"),
     "test_cluster",
-    *("test_command_line", "test_compare", "test_comparison", "test_export", "test_flamenco", "test_hostile"),
-    *("test_output", "test_read_only", "test_restore", "test_stages_in_features"),
+    *("test_command_line", "test_compare", "test_comparison", "test_export", "test_export_verify"),
+    *("test_flamenco", "test_hostile", "test_output", "test_read_only", "test_restore", "test_segment_bones"),
+    "test_stages_in_features",
 }
 # Tests of what Sinew computes from a character, and of its panels: they only run in long-term releases. The
 # others run how Blender evaluates, stores, edits and renders.

@@ -108,11 +108,26 @@ def test_shape_keys_along_bendy_bones(empty_file, tmp_path):
     for point in key.points:
         point.co.x *= 0.9
     scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
-    mesh = exported(tmp_path)
+    # The weights are those of the scene's first frame, whatever is compared.
+    mesh = exported(tmp_path, "--frames", "6,11")
     assert found_causes(mesh) == {"bendy"}
     assert np.isclose(mesh["causes"]["bendy"]["largest"], mesh["total"]["largest"], rtol=1e-3)
 
 
+def test_envelopes(scene, tmp_path):
+    """Files have the weights of groups alone."""
+    obj, rig = scene
+    obj.modifiers["Armature"].use_bone_envelopes = True
+    for group in list(obj.vertex_groups)[1:]:
+        group.remove([vertex.index for vertex in obj.data.vertices if vertex.co.x > 2.2])
+    for bone in rig.data.bones:
+        bone.envelope_distance = 0.6
+    mesh = exported(tmp_path)
+    assert found_causes(mesh) == {"influences"}
+    assert mesh["causes"]["influences"]["largest"] > 1e-2 * mesh["diagonal"]
+
+
+@pytest.mark.slow
 def test_half_floats_of_usd(empty_file, tmp_path):
     skip_without_reader(".usdc")
     make_bendy()
@@ -137,6 +152,7 @@ def test_between_frames(scene, tmp_path):
     assert np.isclose(np.linalg.norm(shapes - expected[:, vertices], axis=2).max(), sampled, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_limit_of_the_user(scene, tmp_path):
     exported(tmp_path, "--at-most", "50", method="dq")
     exported(tmp_path, "--at-most", "0.1", method="dq", status=1)

@@ -4,7 +4,6 @@ modifier with the bendy bones, and what is not exact is reported."""
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 
 import bpy
@@ -92,7 +91,18 @@ def played_gltf(path, frames=FRAMES, action=None):
     return other_gltf.points_at(path, np.array(frames) / bpy.context.scene.render.fps, name)
 
 
-@pytest.mark.parametrize(("curved", "motion"), list(itertools.product((False, True), ("keys", "pose"))))
+SLOW = {"marks": pytest.mark.slow}
+
+
+@pytest.mark.parametrize(
+    ("curved", "motion"),
+    [
+        (False, "keys"),
+        (True, "pose"),
+        pytest.param(False, "pose", **SLOW),
+        pytest.param(True, "keys", **SLOW),
+    ],
+)
 def test_gltf_has_the_armature_modifiers_shape(bendy, tmp_path, curved, motion):
     obj = bendy(curved)
     (expected,), rest = world_shapes([obj], FRAMES), world_rest(obj)
@@ -208,7 +218,7 @@ def test_bakes_of_what_is_not_exact_come_nearer(bendy):
     assert report.segments.method > report.after.worst
 
 
-@pytest.mark.parametrize("method", ["lbs", "dq", "cor"])
+@pytest.mark.parametrize("method", ["lbs", pytest.param("dq", **SLOW), pytest.param("cor", **SLOW)])
 def test_the_command_exports_plain_bones(bendy, tmp_path, capfd, method):
     obj = bendy(curved=True)
     file, glb = tmp_path / "arm.blend", tmp_path / "arm.glb"

@@ -46,20 +46,22 @@ class Recording:
         scene = bpy.context.scene
         self._rate = scene.render.fps / scene.render.fps_base
         self._played = {obj.name: _animations_of(obj) for obj in meshes}
-        for frame in (*frames, *between):
-            characters.set_frame(scene, frame)
-            states = session.states_of(meshes, bpy.context.evaluated_depsgraph_get())
-            for obj, state in states:
-                if frame == frames[0] and (reason := _reason(obj, state)):
-                    self.left_out.append(f"{obj.name}: not verified: {reason}")
-                elif frame == frames[0]:
-                    self._meshes[obj.name] = _Mesh(obj, state)
-                if obj.name in self._meshes:
-                    moment = self._meshes[obj.name].moment(obj, state, frame, kind)
-                    recorded = self._meshes[obj.name]
-                    (recorded.frames if frame in frames else recorded.between).append(moment)
-        # Exporters take the places of objects at the current frame.
-        characters.set_frame(scene, frames[0])
+        for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+            if reason := _reason(obj, state):
+                self.left_out.append(f"{obj.name}: not verified: {reason}")
+            else:
+                self._meshes[obj.name] = _Mesh(obj, state)
+        with characters.kept_frame(scene):
+            for frame in (scene.frame_start, *frames, *between):
+                characters.set_frame(scene, frame)
+                depsgraph = bpy.context.evaluated_depsgraph_get()
+                for obj, state in session.states_of(meshes, depsgraph):
+                    if obj.name in self._meshes:
+                        moment = self._meshes[obj.name].moment(obj, state, frame, kind)
+                        self._meshes[obj.name].moments.append(moment)
+        for mesh in self._meshes.values():
+            mesh.between = mesh.moments[1 + len(frames) :]
+            mesh.frames = mesh.moments[1 : 1 + len(frames)]
 
     def verify(self, path: Path, segments: Mapping[str, Mapping[int, str]]) -> list[Check]:
         """Reads the file, and compares; adds to `left_out`.
@@ -88,7 +90,10 @@ class Recording:
 
 
 class _Mesh:
-    """A mesh over frames. What is read of it once is at the first."""
+    """A mesh over frames. What is read of it once is at the current frame, as exporters do.
+
+    moments  the scene's first frame, where plain bones get their weights, and those to compare
+    """
 
     def __init__(self, obj: bpy.types.Object, state: SkinnedObject) -> None:
         deformer = state.bound.first_deformer
@@ -99,6 +104,7 @@ class _Mesh:
         self._world = np.array(obj.matrix_world, dtype=np.float64)
         self._bones_from_model = state.shown.frames[0].bones_from_model.astype(np.float64)
         self._influences: Influences | None = None
+        self.moments: list[Moment] = []
         self.frames: list[Moment] = []
         self.between: list[Moment] = []
 
@@ -129,12 +135,18 @@ class _Mesh:
 
     def seen(self, name: str, segments: Mapping[int, str], influences: int) -> Seen:
         """segments: names of the plain bones for joints, if there are some"""
-        constant = self.frames[0].influences
+        constant = self.moments[0].influences
         if self.bones.bend and not segments:
-            in_armature = transformed(self.frames[0].rest, self._bones_from_model)
+            in_armature = transformed(self.moments[0].rest, self._bones_from_model)
             constant = self._weighting.influences(in_armature)
+        has_envelopes = not segments and (
+            self._weighting.use_envelopes
+            or bool(self.bones.envelopes.multiply[self._weighting.entries.bones].any())
+        )
         names = self.bones.names_with(segments)
-        return Seen(name, names, constant, influences, self._has_keys, self.frames, self.between)
+        return Seen(
+            name, names, constant, influences, has_envelopes, self._has_keys, self.frames, self.between
+        )
 
     def compared(self, seen: Seen, found: Played, kind: str) -> Comparison:
         """Raises SinewError where the file has other rest points."""
