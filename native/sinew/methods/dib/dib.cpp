@@ -75,8 +75,8 @@ HWY_INLINE Vec<D> sine_of(D d, const Vec<D>* q) {
 ///
 /// These functions return points, not structures of them, which GCC would copy in parts of vectors. Such parts can
 /// not be loaded as a whole vector at once.
-template <class D>
-HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q, bool keeps_signs) {
+template <bool kKeepsSigns, class D>
+HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q) {
     // angle / sin(angle / 2) as a polynomial in 1 - w of the quaternion with w >= 0, to 4e-8.
     static constexpr float kAngle[] = {2.0f,
                                        0.6666707396507263f,
@@ -90,7 +90,7 @@ HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q, bool keeps_signs) {
                                        0.022325647994875908f};
     const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
     Vec<D> by = hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]);
-    if (keeps_signs) {
+    if constexpr (kKeepsSigns) {
         const Vec<D> round = hn::Div(hn::Set(d, 2.0f * std::numbers::pi_v<float>), sine_of(d, q));
         by = hn::IfThenElse(hn::Lt(q[0], hn::Zero(d)), hn::Add(round, by), by);
     }
@@ -98,16 +98,16 @@ HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q, bool keeps_signs) {
 }
 
 /// The linear part, for the motion that rotates by `q`, then adds `translation`.
-template <class D>
-HWY_INLINE Points<D> linear_part(D d, const Vec<D>* q, const Points<D>& angular, const Points<D>& translation,
-                                 bool keeps_signs) {
+template <bool kKeepsSigns, class D>
+HWY_INLINE Points<D> linear_part(D d, const Vec<D>* q, const Points<D>& angular,
+                                 const Points<D>& translation) {
     // (1 - (angle / 2) cot(angle / 2)) / angle^2, in the same way.
     static constexpr float kThird[] = {0.083333320915699f,     0.011112410575151443f,   0.003941489849239588f,
                                        0.001828863169066608f,  -5.928325481363572e-05f, 0.001786231528967619f,
                                        -0.001323370961472392f, 0.0007015004521235824f};
     const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
     Vec<D> third = polynomial(d, u, kThird);
-    if (keeps_signs) {
+    if constexpr (kKeepsSigns) {
         const Vec<D> squared = dot<D>(angular, angular);
         const Vec<D> cotangent = hn::Div(q[0], sine_of(d, q));
         const Vec<D> longer =
@@ -212,10 +212,9 @@ private:
 };
 
 /// The blend of dual quaternions, which take the vertex as their origin.
-template <class D, class BonesOf, class WeightOf>
+template <bool kKeepsSigns, class D, class BonesOf, class WeightOf>
 HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, std::size_t count,
-                                       const WeightOf& weight_of, const Points<D>& rest, bool keeps_signs,
-                                       Image<D>& blend) {
+                                       const WeightOf& weight_of, const Points<D>& rest, Image<D>& blend) {
     const Vec<D> zero = hn::Zero(d);
     Vec<D> real[4] = {zero, zero, zero, zero};
     // Twice the dual part, (0, translation) times the real part.
@@ -228,7 +227,7 @@ HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, st
         const Vec<D> along = hn::Add(hn::Add(hn::Mul(q[0], real[0]), hn::Mul(q[2], real[2])),
                                      hn::Add(hn::Mul(q[1], real[1]), hn::Mul(q[3], real[3])));
         const Vec<D> weight = weight_of(k);
-        const auto is_away = hn::Lt(keeps_signs ? zero : along, zero);
+        const auto is_away = hn::Lt(kKeepsSigns ? zero : along, zero);
         const Vec<D> by = hn::IfThenElse(is_away, hn::Neg(weight), weight);
         for (std::size_t i = 0; i < 4; ++i) real[i] = hn::MulAdd(by, q[i], real[i]);
         const Points<D> translation = times<D>(by, subtract<D>(m.point, rest));
@@ -265,16 +264,16 @@ HWY_INLINE hn::Mask<D> has_more_to_do(D d, const Points<D>& angular, const Point
 /// on other lanes.
 ///
 /// first_weight  of the first influence; those of the others are at `weights`, kLanes apart
-template <class D, class BonesOf>
+template <bool kKeepsSigns, class D, class BonesOf>
 HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t count,
-                                       const float* first_weight, const float* weights, const Points<D>& rest,
-                                       bool keeps_signs) {
+                                       const float* first_weight, const float* weights,
+                                       const Points<D>& rest) {
     const auto weight_of = [&](std::size_t k) HWY_ATTR {
         return hn::Load(d, k == 0 ? first_weight : weights + kLanes * (k - 1));
     };
     const Images<D, BonesOf> images(d, bones, count, rest);
     Image<D> blend;
-    blend_dual_quaternions(d, images, count, weight_of, rest, keeps_signs, blend);
+    blend_dual_quaternions<kKeepsSigns>(d, images, count, weight_of, rest, blend);
     hn::Mask<D> active = hn::Eq(rest.x, rest.x);
     Image<D> space;
     for (int step = 0; step < IterativeDq::kSteps && !hn::AllFalse(d, active); ++step) {
@@ -287,9 +286,9 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
             const Image<D>& image = images.at(d, k, space);
             Vec<D> rotation[4];
             multiply_by_conjugate<D>(image.rotation, blend.rotation, rotation);
-            const Points<D> own_angular = angular_part(d, rotation, keeps_signs);
+            const Points<D> own_angular = angular_part<kKeepsSigns>(d, rotation);
             const Points<D> own_linear =
-                linear_part(d, rotation, own_angular, subtract<D>(image.point, blend.point), keeps_signs);
+                linear_part<kKeepsSigns>(d, rotation, own_angular, subtract<D>(image.point, blend.point));
             const Vec<D> weight = weight_of(k);
             angular = add_scaled<D>(angular, weight, own_angular);
             linear = add_scaled<D>(linear, weight, own_linear);
@@ -302,64 +301,70 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
     return blend.point;
 }
 
-/// keeps_signs  Palette::keeps_signs
-template <class D, class BonesOf>
+template <bool kKeepsSigns, class D, class BonesOf>
 HWY_INLINE void deform_lanes(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
                              std::size_t lane, const BonesOf& bones, std::size_t count,
-                             const float* first_weight, const float* weights, bool keeps_signs) {
+                             const float* first_weight, const float* weights) {
     const Points<D> rest = load_rest(d, pointers, spaces, b, lane);
     store_in_model(d, pointers, spaces, b, lane,
-                   blend_iteratively(d, bones, count, first_weight, weights, rest, keeps_signs));
+                   blend_iteratively<kKeepsSigns>(d, bones, count, first_weight, weights, rest));
 }
 
 /// Deforms blocks [begin, end) with the same bones.
+template <bool kKeepsSigns>
 void deform_shared(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = frame.spaces;
-    const bool keeps_signs = frame.palette->keeps_signs;
     const std::size_t influences = pointers.blocks[begin].influences;
     const SharedBones<Full> bones{*frame.palette, frame.bones + pointers.blocks[begin].first_bone};
     for (std::size_t b = begin; b < end; ++b) {
         const float* const weights = weights_of(pointers, b);
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            deform_lanes(d, pointers, spaces, b, lane, bones, influences, first_weights_of(frame, b) + lane,
-                         weights + lane, keeps_signs);
+            deform_lanes<kKeepsSigns>(d, pointers, spaces, b, lane, bones, influences,
+                                      first_weights_of(frame, b) + lane, weights + lane);
         }
     }
 }
 
 /// Deforms a block whose vertices have own bones.
+template <bool kKeepsSigns>
 void deform_own(const Frame& frame, std::size_t b) {
     const Full d;
     const One one;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = frame.spaces;
-    const bool keeps_signs = frame.palette->keeps_signs;
     const Block& block = pointers.blocks[b];
     const float* const weights = weights_of(pointers, b);
     const std::int32_t* const bones = frame.bones + block.first_bone;
     if (frame.palette->any_scale) {
         for (std::size_t lane = 0; lane < block.vertices; ++lane) {
             const SharedBones<One> of_vertex{*frame.palette, bones + block.influences * lane};
-            deform_lanes(one, pointers, spaces, b, lane, of_vertex, block.influences, weights + lane,
-                         weights + kLanes + lane, keeps_signs);
+            deform_lanes<kKeepsSigns>(one, pointers, spaces, b, lane, of_vertex, block.influences,
+                                      weights + lane, weights + kLanes + lane);
         }
         return;
     }
     const std::size_t lanes = lanes_end(d, block);
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const OwnBones<Full> of_lanes{*frame.palette, bones + block.influences * lane, block.influences};
-        deform_lanes(d, pointers, spaces, b, lane, of_lanes, block.influences, weights + lane,
-                     weights + kLanes + lane, keeps_signs);
+        deform_lanes<kKeepsSigns>(d, pointers, spaces, b, lane, of_lanes, block.influences, weights + lane,
+                                  weights + kLanes + lane);
     }
 }
 
-void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+template <bool kKeepsSigns>
+void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
     for_each_set(
-        frame, begin, end, [&](std::size_t b, std::size_t after) HWY_ATTR { deform_shared(frame, b, after); },
-        [&](std::size_t b) HWY_ATTR { deform_own(frame, b); });
+        frame, begin, end,
+        [&](std::size_t b, std::size_t after) HWY_ATTR { deform_shared<kKeepsSigns>(frame, b, after); },
+        [&](std::size_t b) HWY_ATTR { deform_own<kKeepsSigns>(frame, b); });
+}
+
+void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+    const auto of_blocks = frame.palette->keeps_signs ? &deform_blocks<true> : &deform_blocks<false>;
+    of_blocks(frame, begin, end);
 }
 
 void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<CentreRows>(bones, palette); }
