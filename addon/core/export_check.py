@@ -15,6 +15,8 @@ from .played import Played, blended, padded
 # Of the diagonal: a smaller distance is rounding.
 EXPLAINED = 1e-5
 
+# In degrees; and a cosine.
+_SMALL_ANGLE, _SAME_NORMAL = 0.1, 0.9999
 # The sine of an angle.
 _NEAR_LIMIT = 0.99
 
@@ -43,6 +45,7 @@ class Moment:
     bound    the same, by the object's place at the export
     damaged  bool [bones], whether location, rotation and scale of it or of a bone above do not give its pose
     influences  of this frame
+    normals  float32 [corners, 3], world, of the final mesh; None where it has other corners
     """
 
     frame: float
@@ -53,6 +56,7 @@ class Moment:
     bound: np.ndarray
     damaged: np.ndarray
     influences: Influences
+    normals: np.ndarray | None = None
 
 
 @dataclass
@@ -64,6 +68,8 @@ class Seen:
     influences   the largest number of a vertex that was exported; 0 for all
     has_envelopes  bones' envelopes have a part in the influences; files do not
     has_keys       it has shape keys
+    corners        int [corners], the vertex of each corner of its faces
+    normals        float32 [corners, 3], at rest, object space
     """
 
     name: str
@@ -72,6 +78,8 @@ class Seen:
     influences: int
     has_envelopes: bool
     has_keys: bool
+    corners: np.ndarray
+    normals: np.ndarray
     frames: list[Moment] = field(default_factory=list)
     between: list[Moment] = field(default_factory=list)
 
@@ -97,6 +105,7 @@ class Check:
     rounding  a distance that is not larger is that of the numbers in the file
     total     between the file and what was seen
     causes    of each of CAUSES alone
+    normals   between skinned normals and those seen, in degrees; None where they were not compared
     """
 
     mesh: str
@@ -104,6 +113,7 @@ class Check:
     rounding: float
     total: Distance
     causes: dict[str, Distance]
+    normals: Distance | None = None
 
     @property
     def is_explained(self) -> bool:
@@ -112,7 +122,7 @@ class Check:
     def sentences(self, unit: str) -> list[str]:
         """unit: the name of a scene unit."""
         share, total = 100.0 * self.total.largest / (self.diagonal or 1.0), self._said(self.total, unit)
-        return [
+        said = [
             f"{self.mesh}: the file plays {total} from what was seen ({share:.2g}% of the diagonal)",
             *(
                 f"{self.mesh}: {self._said(distance, unit)}: {CAUSES[name]}"
@@ -120,6 +130,10 @@ class Check:
                 if distance.largest > self.rounding
             ),
         ]
+        if self.normals is not None and self.normals.largest > _SMALL_ANGLE:
+            angles = self._said(self.normals, "degrees")
+            said.append(f"{self.mesh}: {angles}: normals, which engines skin as they were at rest")
+        return said
 
     @staticmethod
     def _said(distance: Distance, unit: str) -> str:
@@ -225,7 +239,47 @@ class Comparison:
         points = seen.frames[0].seen
         diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
         rounding = EXPLAINED * max(diagonal, 0.1 * float(np.abs(points).max(initial=0.0)))
-        return Check(seen.name, diagonal, rounding, found.pop("total"), found)
+        return Check(seen.name, diagonal, rounding, found.pop("total"), found, self._angles())
+
+    def _angles(self) -> Distance | None:
+        """Between the normals that an engine skins, without the inverse of scale, and those seen."""
+        seen, normals = self._seen, self._played.normals
+        moments = [moment for moment in seen.frames if moment.normals is not None]
+        if normals is None or not moments or not len(seen.corners):
+            return None
+        corners = self._corners(normals)
+        rows, found = corners >= 0, []
+        for moment in moments:
+            assert moment.normals is not None
+            motions = self._played.motions(moment.frame).copy()
+            motions[:, :3, 3] = 0.0
+            skinned = _unit(blended(self._played.slots, self._played.weights, motions, normals)[rows])
+            shown = _unit(moment.normals[corners[rows]].astype(np.float64))
+            sines = np.linalg.norm(np.cross(skinned, shown), axis=1)
+            found.append(np.degrees(np.arctan2(sines, (skinned * shown).sum(axis=1))))
+        angles = np.concatenate(found)
+        return Distance(float(angles.max(initial=0.0)), float(angles.mean())) if len(angles) else None
+
+    def _corners(self, normals: np.ndarray) -> np.ndarray:
+        """int [file's vertices]: the corner that each was split from, by its normal; -1 for none."""
+        seen = self._seen
+        order = np.argsort(seen.corners, kind="stable")
+        counts = np.bincount(seen.corners, minlength=int(self._vertices.max(initial=0)) + 1)
+        starts = np.cumsum(counts) - counts
+        own = _unit(normals @ np.linalg.inv(self._object_from_file[:3, :3]))
+        best, found = np.full(len(own), -np.inf), np.full(len(own), -1)
+        for slot in range(int(counts.max(initial=0))):
+            rows = np.flatnonzero(counts[self._vertices] > slot)
+            corners = order[starts[self._vertices[rows]] + slot]
+            likeness = (own[rows] * seen.normals[corners]).sum(axis=1)
+            better = likeness > best[rows]
+            best[rows[better]], found[rows[better]] = likeness[better], corners[better]
+        # Of vertices at one place that move alike, another may have been taken.
+        return np.where(best > _SAME_NORMAL, found, -1)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-30)
 
 
 def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarray:

@@ -33,6 +33,7 @@ class Played:
     slots, weights  int and float64 [vertices, n], joints and weights of sum 1; 0 for unused ones
     motions  for a frame float64 [joints, 4, 4], from the space of `rest` to the world, Z up, in metres
     shapes   for a frame float64 [targets], how much of each
+    normals  float64 [vertices, 3] at rest; None where the reader leaves them out
     """
 
     name: str
@@ -43,6 +44,7 @@ class Played:
     weights: np.ndarray
     motions: Callable[[float], np.ndarray]
     shapes: Callable[[float], np.ndarray]
+    normals: np.ndarray | None = None
 
     def rest_at(self, frame: float) -> np.ndarray:
         """float64 [vertices, 3], with its shapes."""
@@ -246,4 +248,7 @@ def _gltf_mesh(scene: _GltfScene, number: int, node: dict[str, Any]) -> Played:
         of_sum_one(stacked("WEIGHTS").astype(np.float64)),
         lambda frame: Z_UP @ scene.world(frame, joints) @ inverses,
         lambda frame: np.asarray(scene.at(frame)[number].get("weights", plain), dtype=np.float64),
+        np.vstack([file.array(part["NORMAL"]) for part in parts]).astype(np.float64)
+        if all("NORMAL" in part for part in parts)
+        else None,
     )

@@ -127,6 +127,19 @@ def test_envelopes(scene, tmp_path):
     assert mesh["causes"]["influences"]["largest"] > 1e-2 * mesh["diagonal"]
 
 
+def test_normals(empty_file, tmp_path):
+    """A tube along a bone that is scaled across: its faces' normals are at odd multiples of 15 degrees."""
+    _obj, rig = scenes.make_arm(bones=1)
+    scenes.key(rig.pose.bones[0], "scale", ((1, (1.0, 1.0, 1.0)), (11, (2.0, 1.0, 1.0))))
+    mesh = exported(tmp_path)
+    across = np.radians(np.arange(15, 360, 30))
+    skinned, shown = (np.arctan2(np.sin(across), s * np.cos(across)) for s in (2.0, 0.5))
+    angles = np.degrees(np.abs(np.angle(np.exp(1j * (skinned - shown)))))
+    assert np.isclose(mesh["normals"]["largest"], angles.max(), rtol=1e-3)
+    mesh = exported(tmp_path, "--frames", "1")
+    assert mesh["normals"]["largest"] < 0.05
+
+
 @pytest.mark.slow
 def test_half_floats_of_usd(empty_file, tmp_path):
     skip_without_reader(".usdc")
@@ -165,7 +178,8 @@ def test_sentences(scene, tmp_path):
     first, second, *others = run_sinew(*command, "--verify").stdout.splitlines()
     assert first.startswith("Arm: the file plays 0.")
     assert second.endswith(CAUSES["method"])
-    assert others == [str(out)]
+    assert others[0].endswith("normals, which engines skin as they were at rest")
+    assert others[1:] == [str(out)]
     assert "--frames and --at-most go with --verify" in run_sinew(*command, status=2).stderr
 
 
