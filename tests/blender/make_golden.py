@@ -25,7 +25,6 @@ import scenes
 import sinew
 import sinew_addon
 from mathutils import Euler, Quaternion
-from sinew_addon.attach.properties import METHODS
 from sinew_addon.core.parameters import Value
 from sinew_addon.core.sdef import KEYS
 from sinew_addon.deform import characters, session
@@ -149,7 +148,7 @@ def results() -> list[Result]:
         *(Result(array, "Blender", method) for method, array in BLENDERS.items()),
         *(
             Result(array, "Sinew", method.name, METHOD_VALUES.get(method.name, {}) | chosen)
-            for method in METHODS.values()
+            for method in sinew.methods()
             for array, chosen in choices(method)
             if array not in BLENDERS
         ),
