@@ -1,5 +1,5 @@
 #version 300 es
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,5 +1,5 @@
 #version 300 es
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // A grid on the ground, in lines that fade out.
 precision highp float;
 

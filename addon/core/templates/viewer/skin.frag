@@ -1,5 +1,5 @@
 #version 300 es
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // The point of each vertex, in armature space: a texel each.
 precision highp float;
 precision highp int;

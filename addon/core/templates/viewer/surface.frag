@@ -1,5 +1,5 @@
 #version 300 es
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // The normal of each vertex in the world, and the value of a measure (docs/metrics.md): a texel each.
 precision highp float;
 precision highp int;

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: MIT
 // A character that the browser skins and draws: core/viewer.py writes the page, docs/viewer.md describes it.
 "use strict";
 
