@@ -42,7 +42,7 @@ def read_fbx(
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "read.npz")
         asked = json.dumps([str(path), str(out), played, rate, list(frames)])
-        paths = os.pathsep.join(filter(None, sys.path))
+        paths = os.pathsep.join(dict.fromkeys(_folder_of(name) for name in ("ufbx", "numpy")))
         done = subprocess.run(
             [sys.executable, __file__, asked],
             env={**os.environ, "PYTHONPATH": paths},
@@ -56,6 +56,15 @@ def read_fbx(
         with np.load(out) as arrays:
             read = dict(arrays)
     return [_played(read, number, list(frames)) for number in range(int(read["count"]))]
+
+
+def _folder_of(name: str) -> str:
+    """Returns the folder that a module is imported from."""
+    found = find_spec(name)
+    assert found is not None
+    assert found.origin is not None
+    file = Path(found.origin)
+    return str(file.parent.parent if found.submodule_search_locations else file.parent)
 
 
 def _played(read: dict[str, np.ndarray], number: int, frames: list[float]) -> Played:
