@@ -168,9 +168,9 @@ def _export(args: argparse.Namespace, skinned: list[bpy.types.Object], console: 
         left_out += recording.left_out
     if is_gltf:
         left_out += export.left_out()
-        for name, extras in export.written().items():
-            mixed = f", mixed with {extras['mix']}" if "mix" in extras else ""
-            console.note(f"{name}: {extras['method']}{mixed}")
+        for name, content in export.written().items():
+            mixed = f", mixed with {content['mix']}" if "mix" in content else ""
+            console.note(f"{name}: {content['method']}{mixed}")
     return _Written(bendy, checks, left_out)
 
 
@@ -198,6 +198,8 @@ def _gltf(path: str, influences: int) -> None:
 def _usd(path: str, _influences: int) -> None:
     import bpy
 
+    from ..features.bake.bake_export import TEXTURES_STAY
+
     bpy.ops.wm.usd_export(
         filepath=path,
         check_existing=False,
@@ -205,7 +207,7 @@ def _usd(path: str, _influences: int) -> None:
         export_armatures=True,
         only_deform_bones=False,
         export_shapekeys=True,
-        **({"export_textures_mode": "KEEP"} if bpy.app.version >= (4, 4) else {"export_textures": False}),
+        **TEXTURES_STAY,
     )
 
 

@@ -99,6 +99,4 @@ def imported(influences: Influences, engine: Engine, most: int) -> Influences:
         weights[:, 0] += np.where(kept[:, 0], engine.levels - weights.sum(axis=1), 0.0)
         weights /= engine.levels
         kept &= weights > 0.0
-    offsets = np.zeros(len(bones) + 1, np.int32)
-    np.cumsum(kept.sum(axis=1), out=offsets[1:])
-    return Influences(offsets, bones[kept].astype(np.int32), weights[kept].astype(np.float32))
+    return Influences.of_padded(bones, weights, kept)

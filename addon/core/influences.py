@@ -114,12 +114,14 @@ class Influences:
     def heaviest(self, most: int) -> Influences:
         """Without those of each vertex that `most` of its others exceed."""
         bones, weights = self.padded()
-        kept = bones[:, :most] >= 0
+        return Influences.of_padded(bones[:, :most], weights[:, :most], bones[:, :most] >= 0)
+
+    @classmethod
+    def of_padded(cls, bones: np.ndarray, weights: np.ndarray, kept: np.ndarray) -> Influences:
+        """Of bones and weights [vertices, slots] those that are `kept`, bool, in their order."""
         offsets = np.zeros(len(bones) + 1, dtype=np.int32)
         np.cumsum(kept.sum(axis=1), out=offsets[1:])
-        return Influences(
-            offsets, bones[:, :most][kept].astype(np.int32), weights[:, :most][kept].astype(np.float32)
-        )
+        return cls(offsets, bones[kept].astype(np.int32), weights[kept].astype(np.float32))
 
     def blended(self, motions: np.ndarray, points: np.ndarray) -> np.ndarray:
         """float64 [vertices, 3]: linear blend skinning. Vertices without influences stay.

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import sinew
@@ -171,16 +172,12 @@ class SkinDeformer:
                 packed, rest_normals, vertices=vertices, method=deformer.method, mix=mix
             )
             self._skinned = (made, deformer, rest_normals)
-        same_space = is_same_space(frame.bones_from_model)
         self._skinned[0].deform_normals(
             frame.pose,
             points,
             out=out,
-            bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=self._rest_from_armature,
-            parameters=None if frame.method in ENGINES else frame.parameters or None,
-            parents=self._parents_of(frame),
-            turns=frame.turns,
+            **self._arguments_of(frame),
         )
         return True
 
@@ -243,21 +240,18 @@ class SkinDeformer:
         if bound.rest_points is not rest_points:
             bound.deformer.set_rest_points(rest_points)
             bound.rest_points = rest_points
-        same_space = is_same_space(frame.bones_from_model)
-        bound.deformer.deform(
-            bones,
-            out=out,
-            bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
-            rest_inverses=rest_inverses,
-            parameters=None if frame.method in ENGINES else frame.parameters or None,
-            parents=self._parents_of(frame),
-            turns=frame.turns,
-        )
+        bound.deformer.deform(bones, out=out, rest_inverses=rest_inverses, **self._arguments_of(frame))
 
-    def _parents_of(self, frame: Frame) -> np.ndarray | None:
-        """Returns each bone's parent where signs come from the hierarchy."""
-        follows = follows_hierarchy(frame.method, frame.mix, frame.parameters)
-        return self.bones.twists.parents if follows else None
+    def _arguments_of(self, frame: Frame) -> dict[str, Any]:
+        """Returns those that the library takes for points and for normals alike."""
+        same_space = is_same_space(frame.bones_from_model)
+        along = follows_hierarchy(frame.method, frame.mix, frame.parameters)
+        return {
+            "bones_from_model": None if same_space else frame.bones_from_model.astype(np.float32),
+            "parameters": None if frame.method in ENGINES else frame.parameters or None,
+            "parents": self.bones.twists.parents if along else None,
+            "turns": frame.turns,
+        }
 
     def _take_new_data(self, frame: Frame) -> bool:
         """Whether the methods' vertex data has changed; meshes are then packed again."""

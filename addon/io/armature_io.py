@@ -167,7 +167,7 @@ def decomposed(pose: np.ndarray, parents: np.ndarray) -> np.ndarray:
     engines store it: what shears a bone against its parent is lost.
 
     pose     float32 [bones + joints, 4, 4], armature space
-    parents  int32 [bones]
+    parents  int32 [bones], each of which precedes its children
     """
     count = len(parents)
     above = np.where((parents >= 0)[:, None, None], pose[parents], np.identity(4)).astype(np.float64)
@@ -186,21 +186,12 @@ def decomposed(pose: np.ndarray, parents: np.ndarray) -> np.ndarray:
         # As Blender's exporters do it.
         local[bone] = Matrix.LocRotScale(*Matrix(local[bone].tolist()).decompose())
     result = pose.astype(np.float64)
-    order = sorted(range(count), key=lambda bone: _depth(parents, bone))
-    for bone in order:
-        parent = int(parents[bone])
+    for bone, parent in enumerate(parents):
         if parent >= 0 and not is_flat[bone]:
             result[bone] = result[parent] @ local[bone]
         elif is_sheared[bone]:
             result[bone] = local[bone]
     return result.astype(np.float32)
-
-
-def _depth(parents: np.ndarray, bone: int) -> int:
-    depth = 0
-    while parents[bone] >= 0:
-        bone, depth = int(parents[bone]), depth + 1
-    return depth
 
 
 def read_limits(armature: bpy.types.Object) -> dict[str, np.ndarray]:

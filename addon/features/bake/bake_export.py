@@ -33,6 +33,11 @@ def _alembic(path: str, first: int, last: int) -> None:
     )
 
 
+# Options of the USD exporter. Copied into one folder `textures`, those of several exports could have the same
+# name.
+TEXTURES_STAY = {"export_textures_mode": "KEEP"} if bpy.app.version >= (4, 4) else {"export_textures": False}
+
+
 def _usd(path: str, _first: int, _last: int) -> None:
     # Exports the final points instead of the armature and the shape keys, which do not include Sinew's
     # deformation.
@@ -47,8 +52,7 @@ def _usd(path: str, _first: int, _last: int) -> None:
         export_shapekeys=False,
         export_hair=False,
         export_subdivision="TESSELLATE",
-        # Copied into one folder `textures`, those of several exports could have the same name.
-        **({"export_textures_mode": "KEEP"} if bpy.app.version >= (4, 4) else {"export_textures": False}),
+        **TEXTURES_STAY,
     )
 
 

@@ -127,11 +127,7 @@ def _character(now: live.Moment, rigs: Sequence[_Rig]) -> Character:
     columns = []
     for part in now.subject.parts:
         rig = next(each for each in rigs if each.armature == properties.of(part.obj).armature)
-        owner = np.arange(len(rig.bones.rest))
-        for bone, segments in rig.bones.bending:
-            first = rig.bones.first_joints[bone]
-            owner[first : first + segments + 1] = bone
-        columns.append(owner + rig.first)
+        columns.append(rig.bones.owners + rig.first)
     surface, rest = now.subject.gauge.surface, now.pose.rest
     return Character(
         surface,
