@@ -20,7 +20,7 @@ import nox
 from filelock import FileLock
 
 sys.path.append(str(Path(__file__).parent / "tools"))
-from blenders import BLENDERS, NEWEST, OLDEST, SHORT_TERM
+from blenders import BLENDERS, NEWEST, NUMPY_1, OLDEST, SHORT_TERM
 from lock import tell_uv_of_the_registry
 from platforms import PLATFORMS
 
@@ -127,9 +127,9 @@ def is_current(wheel: Path | None) -> bool:
     return wheel is not None and wheel.stat().st_mtime > changed
 
 
-def sync(session: nox.Session, lock: str, *here: str) -> None:
-    """Has an environment contain what a lock has, and this of the checkout, and nothing else."""
-    words = [f"requirements/{lock}.txt", *(() if here else ("--require-hashes",))]
+def sync(session: nox.Session, locks: str, *here: str) -> None:
+    """Has an environment contain what locks have, and this of the checkout, and nothing else."""
+    words = [f"requirements/{lock}.txt" for lock in locks.split()] + ["--require-hashes"] * (not here)
     if here:
         words.append(str(Path(session.virtualenv.location, "here.txt")))
         Path(words[-1]).write_text("\n".join(here) + "\n", encoding="utf-8")
@@ -157,20 +157,22 @@ for _version in ("3.11", "3.12", "3.13", "3.14"):
 
 
 OTHERS = ("browsers", "cross", "lint", "shaders")
-# Name, lock, Python, whether it has the library, whether the extension. bpy contains Blender's program for
+# The locks of a Blender: its own wheel, and what that needs with the tests.
+LOCKS = {bpy: f"{'tests-numpy-1' if bpy in NUMPY_1 else 'tests'} bpy-{bpy}" for bpy in BLENDERS}
+# Name, locks, Python, whether it has the library, whether the extension. bpy contains Blender's program for
 # zips; what makes the site and the stub imports the library.
-ENVIRONMENTS = [(f"bpy-{bpy}", f"bpy-{bpy}", python, True, True) for bpy, python in BLENDERS.items()]
-ENVIRONMENTS += [("bundle", f"bpy-{EVERYDAY}", EVERYDAY_PYTHON, False, False)]
+ENVIRONMENTS = [(f"bpy-{bpy}", LOCKS[bpy], python, True, True) for bpy, python in BLENDERS.items()]
+ENVIRONMENTS += [("bundle", LOCKS[EVERYDAY], EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [("site", "site", EVERYDAY_PYTHON, True, False)]
 ENVIRONMENTS += [(name, name, EVERYDAY_PYTHON, False, False) for name in OTHERS]
-for _name, _lock, _version, _library, _addon in ENVIRONMENTS:
+for _name, _locks, _version, _library, _addon in ENVIRONMENTS:
     _wheel = [f"wheel-{_version}"] * _library
 
     @nox.session(name=_name, python=python_of(_version) or _version, requires=_wheel)
-    def environment(session: nox.Session, its: tuple = (_name, _lock, _version, _library, _addon)) -> None:
-        """What a lock has, and of the checkout what belongs to it."""
-        name, lock, version, library, addon = its
-        sync(session, lock, *[f"./{wheel_of(version)}"] * library, *["-e ./addon"] * addon)
+    def environment(session: nox.Session, its: tuple = (_name, _locks, _version, _library, _addon)) -> None:
+        """What locks have, and of the checkout what belongs to it."""
+        name, locks, version, library, addon = its
+        sync(session, locks, *[f"./{wheel_of(version)}"] * library, *["-e ./addon"] * addon)
         # So documents call them.
         for link in (Path(".venvs", name), *[Path(".venv")] * (name == f"bpy-{EVERYDAY}")):
             if link != environment_of(name) and not link.is_symlink():
@@ -190,11 +192,12 @@ def bench_environment(session: nox.Session) -> None:
 @nox.session(python=False)
 def fetch(session: nox.Session) -> None:
     """Has uv keep what environments to make will have, while the first wheel is built."""
-    for name, lock, version, library, _addon in ENVIRONMENTS:
+    for name, locks, version, library, _addon in ENVIRONMENTS:
         if library and name in session.posargs and not environment_of(name).exists():
             words = f"uv pip install --quiet --require-hashes --python {python_of(version)} --target".split()
             with tempfile.TemporaryDirectory(dir="build") as place:
-                session.run(*words, place, "-r", f"requirements/{lock}.txt")
+                needed = [word for lock in locks.split() for word in ("-r", f"requirements/{lock}.txt")]
+                session.run(*words, place, *needed)
 
 
 @nox.session(python=False, requires=[f"wheel-{version}" for version in FOUND])

@@ -45,10 +45,11 @@ def main() -> None:
     for name in options.names or known:
         print(f"dev: {options.out}/{name}.txt", file=sys.stderr, flush=True)
         # For all Pythons from the oldest that takes it. Without addresses of a registry: users may have
-        # another one.
+        # another one. What bpy's wheels need is in tests.in.
         python = BLENDERS.get(name.removeprefix("bpy-"), "3.11")
         line = f"uv pip compile --quiet --upgrade --universal --python-version {python} --generate-hashes"
-        line += " --no-emit-index-url --no-emit-find-links --no-header --output-file"
+        line += " --no-emit-index-url --no-emit-find-links --no-header"
+        line += f"{' --no-deps' * name.startswith('bpy-')} --output-file"
         words = [*line.split(), options.out / f"{name}.txt", f"requirements/{name}.in"]
         subprocess.run(words, cwd=FOLDER.parent, check=True)
 
