@@ -97,6 +97,13 @@ METRICS = {
 BENT = 0.9968
 # Limbs of less volume count as having this share of all.
 LEAST_LIMB = 1e-3
+# Rings of a joint: parts of equal width of the way from one bone to the other, the first and the last of which
+# are no rings; the least weights of both bones together; the fewest vertices.
+RINGS = 5
+OF_TWO = 0.7
+LEAST_IN_RING = 6
+# A ring that is a little narrower is hardly seen.
+NARROW = 0.8
 
 
 @dataclass(frozen=True)
@@ -265,6 +272,44 @@ class Skin:
         """int64 [triangles]: that of two of their corners, or of one where all differ."""
         return np.sort(self.limb_of_vertices[self.surface.triangles], axis=1)[:, 1]
 
+    @cached_property
+    def rings(self) -> tuple[np.ndarray, np.ndarray]:
+        """The rings of vertices around joints that two bones share alike.
+
+        int64 [vertices], the ring of each, -1 for none; int64 [rings, 2], the bones of each.
+        """
+        count = self.surface.vertex_count
+        of_vertices = np.full(count, -1)
+        owners = np.repeat(np.arange(count), self.influences.counts)
+        order = np.lexsort((-self.influences.weights, owners))
+        first = self.starts[self.influences.counts[self.weighted] > 1]
+        two = order[first[:, None] + np.arange(2)]
+        bones, weights = self.influences.bones[two], self.influences.weights[two]
+        both = weights.sum(axis=1)
+        is_first = bones[:, 0] < bones[:, 1]
+        share = np.where(is_first, weights[:, 0], weights[:, 1]) / np.maximum(both, 1e-30)
+        step = np.floor(share * RINGS).astype(np.int64)
+        keys, ring, members = np.unique(
+            np.column_stack([np.sort(bones, axis=1), step]), axis=0, return_inverse=True, return_counts=True
+        )
+        ring = ring.ravel()
+        taken = (both > OF_TWO) & (step > 0) & (step < RINGS - 1) & (members >= LEAST_IN_RING)[ring]
+        of_vertices[owners[first[taken]]] = ring[taken]
+        return of_vertices, keys[:, :2]
+
+    def ring_widths(self, points: np.ndarray) -> np.ndarray:
+        """float64 [rings]: how wide each is where it is narrow: the standard deviation of its points, of all
+        [3, vertices], along the second of the principal axes."""
+        of_vertices, bones = self.rings
+        members = np.flatnonzero(of_vertices >= 0)
+        ring, count = of_vertices[members], len(bones)
+        own, sizes = points[:, members], np.maximum(np.bincount(ring, minlength=count), 1)
+        means = np.array([np.bincount(ring, each, count) for each in own]) / sizes
+        offsets = own - means[:, ring]
+        products = np.einsum("im,jm->mij", offsets, offsets).reshape(-1, 9)
+        sums = np.column_stack([np.bincount(ring, each, count) for each in products.T])
+        return np.sqrt(np.linalg.eigvalsh((sums / sizes[:, None]).reshape(-1, 3, 3))[:, 1].clip(min=0.0))
+
     def blended(self, rotations: np.ndarray) -> np.ndarray:
         """float32 [4, vertices]: the weighted sums of the bones' rotations, shorter where these differ.
 
@@ -326,6 +371,11 @@ class Pose:
     def rotated_normals(self) -> np.ndarray:
         """float32 [3, triangles]: rest normals rotated by the bones."""
         return self.skin.rotated_normals(self.rest.normals, self.frame.rotations)
+
+    @cached_property
+    def rest_ring_widths(self) -> np.ndarray:
+        """float64 [rings]"""
+        return self.skin.ring_widths(self.rest.points)
 
     @cached_property
     def rest_limbs(self) -> np.ndarray:
@@ -509,6 +559,7 @@ class Measured:
         volume   that the limb gains or loses, as a part of its own
         folded   the share of area that is folded against a neighbour, and is not at rest
         bulge    above zero, RMS
+        pinch    by how much the narrowest ring of its joints is narrower than NARROW of its width at rest
         """
         pose, rest, surface = self._pose, self.rest, self.shape.surface
         count, bones = pose.bone_count, pose.skin.limb_of_vertices
@@ -529,7 +580,13 @@ class Measured:
         volume[numbers] = np.divide(
             changes, np.abs(pose.rest_limbs), out=np.zeros_like(changes), where=pose.rest_limbs != 0.0
         )
+        (_of_vertices, owners), pinch = pose.skin.rings, np.zeros(count)
+        before, widths = pose.rest_ring_widths, pose.skin.ring_widths(self.shape.points)
+        ratios = np.divide(widths, before, out=np.ones_like(before), where=before > 0.0)
+        for bones_of_rings in owners.T:
+            np.maximum.at(pinch, bones_of_rings, NARROW - ratios)
         found = {
+            "pinch": pinch,
             "stretch": np.sqrt(np.divide(sums, wholes, out=np.zeros(count), where=wholes > 0.0)),
             "volume": volume,
             "folded": np.divide(folds, of_all, out=np.zeros(count), where=of_all > 0.0),

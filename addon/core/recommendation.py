@@ -76,6 +76,7 @@ MEASURES = {
     "volume": Measure(2.0, 0.03),
     "folded": Measure(1.0, 0.02),
     "bulge": Measure(2.0, 0.005),
+    "pinch": Measure(2.0, 0.1),
     "crossings": Measure(1.0, 20.0),
 }
 """Of a limb: those of metrics.Measured.by_limb(), and how many of its triangles cross others."""

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
 from sinew_addon.core import battery
@@ -73,6 +74,14 @@ def test_an_elbow_that_would_bulge_does_not():
     assert "twist_spread" not in stages_on(obj)
     assert of_limbs("bulge") < 0.5 * swollen
     assert of_limbs("volume") < 0.5 * lost
+
+
+def test_a_shoulder_that_linear_blending_collapses_does_not():
+    bpy.ops.wm.open_mainfile(filepath=str(REPOSITORY / "blend_files/shoulder.blend"))
+    (obj,) = (each for each in bpy.data.objects if each.type == "MESH")
+    scenes.add_sinew(obj, "lbs")
+    assert bpy.ops.sinew.recommend() == {"FINISHED"}
+    assert properties.of(obj).method != "lbs"
 
 
 def test_crude_weights_get_delta_mush_and_painted_ones_do_not():

@@ -246,6 +246,16 @@ def test_what_one_limb_gains_does_not_make_up_for_another(tube):
     assert measured.entry("limb_change") == pytest.approx(0.2, rel=0.03)
 
 
+def test_a_ring_of_a_joint_that_collapses_is_pinched(tube):
+    """At weight w the cross-section of a half twist is scaled by |1 - 2 w|; the middle ring has w from .4 to .6."""
+    by_limb = tube.measure("lbs", about([1, 0, 0], 180)).by_limb()
+    np.testing.assert_allclose(by_limb["pinch"], 0.8 - 0.2 / np.sqrt(3), atol=0.02)
+    np.testing.assert_array_equal(tube.measure("dq", about([1, 0, 0], 179)).by_limb()["pinch"], 0.0)
+    # A bend is narrow across the plane in which it bends.
+    bent = tube.measure("lbs", about([0, 0, 1], 120)).by_limb()["pinch"]
+    np.testing.assert_allclose(bent, 0.8 - 0.5, atol=0.05)
+
+
 def test_several_meshes_are_measured_as_one():
     a, b = MESHES["ball"], MESHES["box"]
     both = joined([surface_of(a), surface_of(b)])
