@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keys and drivers of Sinew's own settings."""
 
+from collections.abc import Iterable
+
 import bpy
 
 from ..io import actions
@@ -27,6 +29,19 @@ def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
             animation.action = None
             if not action.users:
                 bpy.data.actions.remove(action)
+
+
+def keyed(obj: bpy.types.Object, names: Iterable[str]) -> str:
+    """Returns the first of the settings that the object's animation has keys of, or none."""
+    animation = obj.animation_data
+    paths = {
+        curve.data_path
+        for player in (players(animation) if animation is not None else ())
+        if player.action is not None
+        for curves in actions.curve_lists(player.action, actions.slot_of(player))
+        for curve in curves
+    }
+    return next((name for name in names if f"sinew.{name}" in paths), "")
 
 
 def _others_need(obj: bpy.types.Object, player: bpy.types.AnimData | bpy.types.NlaStrip) -> bool:

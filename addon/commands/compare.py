@@ -14,7 +14,8 @@ from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
-from ..core.page import page, require_jinja
+from ..core.page import Sheet, page, require_jinja
+from ..core.parameters import PRESETS
 from ..core.viewer import METHODS as SHADER_METHODS
 from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
@@ -36,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
     parser.add_argument(
         "--methods",
-        help="of `sinew methods`, and blender for the Armature modifier (default: "
+        help="of `sinew methods`, recommended, and blender for the Armature modifier (default: "
         f"{','.join(USUAL_METHODS)}; for --viewer alone {','.join(SHADER_METHODS)})",
     )
     parser.add_argument(
@@ -83,7 +84,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     usual = USUAL_METHODS if args.out is not None else SHADER_METHODS
     named = usual if args.methods is None else args.methods.split(",")
     methods = list(dict.fromkeys(name.strip() for name in named))
-    characters.check_methods([*methods, args.reference])
+    characters.check_methods([*methods, args.reference], PRESETS)
     characters.set_parameters(args.set)
     if args.out is None and args.viewer is None:
         raise WrongUse("expected --out, --viewer or both")
@@ -160,7 +161,7 @@ def _compare(
     import bpy
 
     from ..deform import characters
-    from ..features.pages import illustrate, measure, render
+    from ..features.pages import measure
     from ..io import files
 
     console.note_on(path, files.open_file(path))
@@ -172,22 +173,41 @@ def _compare(
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     subject = measure.gather(scene, meshes)
+    with characters.kept_presets(meshes, played):
+        for sentence in characters.sentences():
+            console.note(f"{path}: {sentence}")
+        comparison, sheets = _illustrated(path, subject, methods, frames, engine, args, console)
+    target = args.out / f"{path.stem}.html"
+    write_text(target, page(comparison, sheets, "; ".join(f"Left out: {reason}" for reason in left_out)))
+    console.say(str(target))
+    return not left_out
+
+
+def _illustrated(
+    path: Path,
+    subject: Subject,
+    methods: list[str],
+    frames: list[float],
+    engine: str | None,
+    args: argparse.Namespace,
+    console: Console,
+) -> tuple[Comparison, list[Sheet]]:
+    """Measures, and draws pictures; writes both."""
+    from ..features.pages import illustrate, render
+
     comparison = _measure(path, subject, methods, frames, args, console)
     folder = args.out / as_file_name(path.stem)
     write_text(folder / "metrics.json", comparison.to_json())
     sheets = []
     if engine is not None:
-        studio = render.Studio(scene, subject.meshes, engine, args.size)
+        studio = render.Studio(subject.scene, subject.meshes, engine, args.size)
         illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
         illustrator.plan(args.pictures)
         count = illustrator.picture_count
         for _ in console.progress(illustrator.draw(), count, f"Drawing {path.name}"):
             pass
         sheets = illustrator.sheets
-    target = args.out / f"{path.stem}.html"
-    write_text(target, page(comparison, sheets, "; ".join(f"Left out: {reason}" for reason in left_out)))
-    console.say(str(target))
-    return not left_out
+    return comparison, sheets
 
 
 def _measure(
@@ -212,7 +232,7 @@ def _measure(
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],
-        {method: properties.method_label(method) for method in methods},
+        {name: name.title() if name in PRESETS else properties.method_label(name) for name in methods},
         args.reference,
         characters.length_unit(subject.scene),
         rest,

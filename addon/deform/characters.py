@@ -25,10 +25,12 @@ def method_names() -> list[str]:
     return [*properties.METHODS, BLENDER]
 
 
-def check_methods(names: Iterable[str]) -> None:
+def check_methods(names: Iterable[str], more: Iterable[str] = ()) -> None:
+    """more: names beside those of method_names()."""
+    known = [*method_names(), *more]
     for name in names:
-        if name not in method_names():
-            raise WrongUse(f"method: expected one of {', '.join(method_names())}, got {name!r}")
+        if name not in known:
+            raise WrongUse(f"method: expected one of {', '.join(known)}, got {name!r}")
 
 
 def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy.types.Object]:
@@ -129,6 +131,35 @@ choosers: dict[str, Callable[[Sequence[bpy.types.Object]], Chosen]] = {}
 """For each of parameters.PRESETS, which may stand in the place of a method: chooses for the meshes of a
 character, which are deformed by Sinew already."""
 
+_kept: dict[str, dict[bpy.types.Object, tuple[str, Mapping[str, Value]]]] = {}
+_own: dict[bpy.types.Object, dict[str, Value]] = {}
+
+
+@contextmanager
+def kept_presets(meshes: Sequence[bpy.types.Object], names: Iterable[str]) -> Iterator[None]:
+    """Context in which each preset among the names stands for what it chooses for the meshes at the beginning,
+    and with every other method they have their own settings.
+
+    Raises SinewError where it can not choose, or where a setting that it sets is keyed.
+    """
+    try:
+        for name in names:
+            if name in choosers:
+                found, values, failed = _with_presets([(obj, name) for obj in meshes], {})
+                for error in failed.values():
+                    raise error
+                for obj in meshes:
+                    keyed = setting_animation.keyed(obj, values[obj])
+                    if keyed:
+                        raise SinewError(f"{obj.name}: {keyed} is keyed; {name} can not be compared with it")
+                    _own[obj] = {each: _stored(obj, each) for each in values[obj]}
+                _kept[name] = {obj: (method, values[obj]) for obj, method in found}
+        yield
+    finally:
+        _kept.clear()
+        _own.clear()
+
+
 # The method of meshes while a preset is being chosen.
 _FIRST = "dq"
 _sentences: list[str] = []
@@ -150,6 +181,10 @@ def _with_presets(
 ]:
     """Returns the same with methods and values in the place of presets, and the errors of meshes that none
     can be chosen for."""
+    if _own:
+        kept = {obj: _kept.get(method, {}).get(obj, (method, _own[obj])) for obj, method in wanted}
+        own = {obj: {**kept[obj][1], **values.get(obj, _values_of_all)} for obj, _method in wanted}
+        return [(obj, kept[obj][0]) for obj, _method in wanted], own, {}
     named = {obj: method for obj, method in wanted if method in choosers}
     if not named:
         return wanted, values, {}
@@ -219,12 +254,23 @@ def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> 
     setting_animation.remove_keys(obj, "sinew.method")
     properties.of(obj).method = method
     for name, value in values.items():
-        owner, _dot, own_name = name.partition(".")
+        owner, own_name = _place(obj, name)
         setting_animation.remove_keys(obj, f"sinew.{name}")
         stored = stage_settings.OFF if value == parameters.OFF else value
-        setattr(getattr(properties.of(obj), owner), own_name, stored)
+        setattr(owner, own_name, stored)
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
+
+
+def _place(obj: bpy.types.Object, name: str) -> tuple[bpy.types.PropertyGroup, str]:
+    """The settings that have a parameter, and its name there."""
+    owner, _dot, own = name.partition(".")
+    return getattr(properties.of(obj), owner), own
+
+
+def _stored(obj: bpy.types.Object, name: str) -> Value:
+    stored: Value = getattr(*_place(obj, name))
+    return parameters.OFF if stored == stage_settings.OFF else stored
 
 
 def _check_groups(values: Mapping[str, Value]) -> None:

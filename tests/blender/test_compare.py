@@ -14,6 +14,7 @@ import scenes
 import trimesh
 from conftest import REPOSITORY
 from program import run_sinew
+from sinew_addon.attach import properties
 
 # Pictures take a third of a second each, and are almost the same in all versions.
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="drawn with the newest Blender only")
@@ -22,6 +23,35 @@ newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="drawn with th
 def save(path):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
+
+
+def test_recommended_is_one_of_the_methods(tmp_path):
+    """Its numbers are those of what it chooses, and every other method has the file's own stages."""
+    obj, armature = scenes.make_arm(sides=16, rings=41)
+    armature.animation_data_clear()
+    bone = armature.pose.bones[1]
+    bone.rotation_mode = "XYZ"
+    scenes.key(bone, "rotation_euler", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 2.6, 0.0))))
+    scenes.add_sinew(obj, "lbs")
+    properties.of(obj).delta_mush.enabled = True
+    path, options = save(tmp_path / "arm.blend"), ("--frames", "11", "--pictures", 0, "--out", tmp_path)
+
+    def summaries(methods, *words):
+        done = run_sinew("compare", path, "--methods", methods, *options, *words)
+        found = json.loads((tmp_path / "arm" / "metrics.json").read_text(encoding="utf-8"))
+        return found["summaries"], done
+
+    found, done = summaries("recommended,lbs,blender")
+    assert "with Twist Spread" in done.stdout + done.stderr
+    method = "dq" if "Dual Quaternion" in done.stdout + done.stderr else "lbs"
+    own, _done = summaries("lbs,blender")
+    assert (found["lbs"], found["blender"]) == (own["lbs"], own["blender"])
+    alone, _done = summaries(method, "--set", "twist_spread=on", "--set", "delta_mush=off")
+    assert found["recommended"] == alone[method]
+    scenes.key(properties.of(obj).delta_mush, "factor", ((1, 0.0), (11, 1.0)))
+    save(path)
+    done = run_sinew("compare", path, "--methods", "recommended", *options, status=1)
+    assert "delta_mush.factor is keyed" in done.stderr
 
 
 def test_numbers_are_those_of_the_shapes(tmp_path):
