@@ -16,7 +16,6 @@ from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import Sheet, page, require_jinja
 from ..core.parameters import PRESETS
-from ..core.viewer import METHODS as SHADER_METHODS
 from .arguments import add_engine, add_files, add_object, add_set, count, pixels
 from .console import Console
 
@@ -38,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--methods",
         help="of `sinew methods`, recommended, and blender for the Armature modifier (default: "
-        f"{','.join(USUAL_METHODS)}; for --viewer alone {','.join(SHADER_METHODS)})",
+        f"{','.join(USUAL_METHODS)})",
     )
     parser.add_argument(
         "--reference",
@@ -81,8 +80,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..deform import characters
     from ..features.pages import render
 
-    usual = USUAL_METHODS if args.out is not None else SHADER_METHODS
-    named = usual if args.methods is None else args.methods.split(",")
+    named = USUAL_METHODS if args.methods is None else args.methods.split(",")
     methods = list(dict.fromkeys(name.strip() for name in named))
     characters.check_methods([*methods, args.reference], PRESETS)
     characters.set_parameters(args.set)

@@ -11,7 +11,7 @@ from .diagnostics import Finding
 from .metrics import METRICS, Gauge, Summary
 
 # Compared unless the user names others.
-USUAL_METHODS = ("lbs", "qv", "dq")
+USUAL_METHODS = ("lbs", "dq", "cor")
 # Differences below this share of the diagonal, or of the value at rest, are rounding errors.
 ROUNDING = 1e-5
 LENGTHS = {"distance_max", "distance_rms", "bulge_min", "bulge_max", "bulge_worst"}
