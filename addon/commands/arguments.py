@@ -3,13 +3,14 @@
 
 import argparse
 from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from pathlib import Path
 
 import sinew
 
 from ..core import parameters
 from ..core.errors import WrongUse
-from ..core.output import folder_to_write
+from ..core.output import file_to_write, folder_to_write
 
 FILES = ".blend, .glb, .gltf or .fbx"
 
@@ -104,6 +105,16 @@ def add_files(parser: argparse.ArgumentParser) -> None:
 
 def add_object(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--object", metavar="NAME", help="only this mesh")
+
+
+def add_viewer(parser: argparse.ArgumentParser, text: str) -> None:
+    page = partial(file_to_write, endings=(".html",))
+    parser.add_argument("--viewer", type=page, metavar="PAGE.html", help=text)
+
+
+def check_viewer(args: argparse.Namespace) -> None:
+    if args.viewer is not None and len(args.files) > 1:
+        raise WrongUse(f"{args.viewer}: --viewer writes the page of a single file")
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

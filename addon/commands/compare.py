@@ -13,10 +13,10 @@ from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
-from ..core.output import file_to_write, folder_to_write, write_text
+from ..core.output import folder_to_write, write_text
 from ..core.page import Sheet, page, require_jinja
 from ..core.parameters import PRESETS
-from .arguments import add_engine, add_files, add_object, add_set, count, pixels
+from .arguments import add_engine, add_files, add_object, add_set, add_viewer, check_viewer, count, pixels
 from .console import Console
 
 if TYPE_CHECKING:
@@ -66,12 +66,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_engine(parser)
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="folder for the pages")
-    parser.add_argument(
-        "--viewer",
-        type=partial(file_to_write, endings=(".html",)),
-        metavar="PAGE.html",
-        help="write a page in which the character of the file moves and turns in the browser; without --out "
-        "it alone",
+    add_viewer(
+        parser,
+        "write a page in which the character of the file moves and turns in the browser; without --out it "
+        "alone",
     )
     add_set(parser)
 
@@ -86,8 +84,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     characters.set_parameters(args.set)
     if args.out is None and args.viewer is None:
         raise WrongUse("expected --out, --viewer or both")
-    if args.viewer is not None and len(args.files) > 1:
-        raise WrongUse(f"{args.viewer}: --viewer writes the page of a single file")
+    check_viewer(args)
     if args.out is not None:
         require_jinja()
     frames = parse_frames(args.frames) if args.frames is not None else None

@@ -16,7 +16,7 @@ from ..core.flex.limits import Table, read_table
 from ..core.flex.report import junit, lines, markdown, of_file
 from ..core.output import file_to_write, write_text
 from ..jobs.workers import run_one_by_one
-from .arguments import add_files, add_json, add_object, add_timeout, methods
+from .arguments import add_files, add_json, add_object, add_timeout, add_viewer, check_viewer, methods
 from .console import Console
 
 SUMMARY = "bend each joint of characters, and say which deform well"
@@ -50,9 +50,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         file = partial(file_to_write, endings=(ending,))
         parser.add_argument(option, type=file, metavar=f"FILE{ending}", help=f"also write a report {text}")
+    add_viewer(parser, "also write a page in which the character of the file turns, bent to each pose, with the "
+        "faults as a list")
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
+    check_viewer(args)
     table = Table()
     tables = [path for path in (args.poses, args.thresholds) if path is not None]
     for path in tables:
@@ -64,6 +67,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             "methods": args.methods,
             "object": args.object,
             "tables": [str(table.absolute()) for table in tables],
+            "viewer": args.viewer and str(args.viewer.absolute()),
         }
         for path in args.files
     ]

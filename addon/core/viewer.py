@@ -9,8 +9,8 @@ import base64
 import json
 import re
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -165,6 +165,18 @@ class _Range:
         self.most = max(self.most, float(values.max(initial=self.most)))
 
 
+@dataclass(frozen=True)
+class Found:
+    """What the page lists of Flex.
+
+    verdict   one sentence
+    findings  each as the page has it: docs/viewer.md
+    """
+
+    verdict: str
+    findings: Sequence[Mapping[str, Any]]
+
+
 class Viewer:
     """The parts and frames of a page.
 
@@ -172,6 +184,7 @@ class Viewer:
     rate     frames a second
     unit     of lengths: "m", or "units"
     notes    sentences on what the page leaves out
+    found    where frames are poses of Flex
     """
 
     def __init__(
@@ -182,17 +195,18 @@ class Viewer:
         rate: float,
         unit: str,
         notes: Sequence[str] = (),
+        found: Found | None = None,
     ) -> None:
         self.title, self.parts, self.methods, self.rate, self.unit = title, parts, methods, rate, unit
-        self.notes = list(notes)
-        self.frames: list[float] = []
+        self.notes, self.found = list(notes), found
+        self.frames: list[float | str] = []
         self._distance, self._stretch = _Range(0.0), _Range(1.0)
         self._worst, self._start = -1.0, 0
         self._boxes: list[np.ndarray] = []
         self._diagonal = 0.0
 
-    def add_frame(self, frame: float) -> None:
-        """Call it when all parts have it."""
+    def add_frame(self, frame: float | str) -> None:
+        """Call it when all parts have it. frame: its number, or the name of a pose"""
         rest = [part.world_rest() for part in self.parts]
         self._diagonal = self._diagonal or float(np.linalg.norm(np.ptp(np.concatenate(rest), axis=0)))
         references = [part.world_points(BLENDER) for part in self.parts]
@@ -250,11 +264,13 @@ class Viewer:
             "title": self.title,
             "methods": self.methods,
             "frames": self.frames,
-            "start": self._start,
+            # Flex begins at rest.
+            "start": 0 if self.found else self._start,
             "rate": self.rate,
             "low": boxes[:, 0].tolist(),
             "high": boxes[:, 1].tolist(),
             "notes": self.notes,
+            "flex": asdict(self.found) if self.found else None,
             "measures": [self._measure(scale) for scale in scales],
             "parts": [
                 {

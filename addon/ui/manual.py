@@ -30,6 +30,7 @@ _SECTIONS = {
     "bpy.ops.sinew.worst_frames*": "heat-map",
     "bpy.ops.sinew.go_to_frame*": "heat-map",
     "bpy.ops.sinew.flex*": "flex",
+    "bpy.ops.sinew.save_flex*": "flex",
     "bpy.ops.sinew.check*": "diagnostics",
     "bpy.ops.sinew.*finding*": "diagnostics",
     "bpy.ops.sinew.mend*": "diagnostics",

@@ -147,6 +147,7 @@ class SINEW_MT_compare(_Submenu, bpy.types.Menu):
         Entry("sinew.recommend", icon="SOLO_ON"),
         *_over("sinew.suggest", "Suggest a Method"),
         Entry("sinew.flex", "Flex: Bend Every Joint"),
+        Entry("sinew.save_flex", "Save Flex as Page\u2026", icon="URL"),
     )
 
 

@@ -48,6 +48,10 @@ class Limit:
     def text(self, value: float) -> str:
         return f"{self.number(value)} {self.unit}"
 
+    @property
+    def bound(self) -> str:
+        return f"at {'least' if self.least else 'most'} {self.text(self.value)}"
+
 
 LIMITS: dict[str, Limit] = {
     limit.name: limit

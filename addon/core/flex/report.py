@@ -24,7 +24,7 @@ def of_file(file: str, outcome: Report) -> Report:
 
 
 def lines(report: Report) -> Iterator[str]:
-    yield f"{report['file']}: {'ok' if report['passed'] else 'FAILED'}: {_headline(report)}"
+    yield f"{report['file']}: {'ok' if report['passed'] else 'FAILED'}: {headline(report)}"
     for reason in report["left_out"]:
         yield f"  left out: {reason}"
     findings = list(_findings(report))
@@ -71,7 +71,7 @@ def markdown(reports: Sequence[Report]) -> str:
     parts = []
     for report in reports:
         mark = "pass" if report["passed"] else "**fail**"
-        parts.append(f"### {_cell(report['file'])}: {mark}\n\n{_cell(_headline(report))}\n")
+        parts.append(f"### {_cell(report['file'])}: {mark}\n\n{_cell(headline(report))}\n")
         parts += [f"- left out: {_cell(reason)}\n" for reason in report["left_out"]]
         rows = [
             f"| {' | '.join(map(_cell, (joint, each['text'], each['place'], each['advice'])))} |"
@@ -89,7 +89,7 @@ def _findings(report: Report) -> Iterator[tuple[str, Report]]:
             yield joint["joint"], finding
 
 
-def _headline(report: Report) -> str:
+def headline(report: Report) -> str:
     if "error" in report:
         return str(report["error"])
     joints = report["joints"]

@@ -68,8 +68,7 @@ class Finding:
         limit = self.limit
         if limit.name == "inert":
             return limit.label
-        word = "at least" if limit.least else "at most"
-        text = f"{limit.label}: {limit.text(self.value)}, {word} {limit.text(limit.value)}"
+        text = f"{limit.label}: {limit.text(self.value)}, {limit.bound}"
         return f"{text} ({self.pose})" if self.pose else text
 
     @property

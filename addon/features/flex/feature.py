@@ -21,7 +21,8 @@ from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from ..diagnose import diagnose
 from ..heat.worst_frames import check_measurable
-from . import flex
+from ..pages.save import SavesPage
+from . import flex, page
 
 # What is tried beside a character's own method.
 OTHERS = ("lbs", "dq", "cor")
@@ -123,6 +124,28 @@ class SINEW_OT_flex_pose(_OnFinding, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SINEW_OT_save_flex(SavesPage, bpy.types.Operator):
+    bl_label = "Save as Page"
+    bl_description = (
+        "Save one HTML file in which the character turns in any browser, bent as it was here; a click on a "
+        "fault goes to its place"
+    )
+    bl_options = {"REGISTER"}
+    saying = "Sinew bends every joint"
+    usual_name = "flex"
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        return "" if context.scene.session_uid in results else "Bend every joint first"
+
+    def page(self, context: bpy.types.Context, title: str) -> Iterator[float | str]:
+        result, found = results[context.scene.session_uid], context.scene.objects
+        objects = [found[name] for name in result.own if name in found]
+        if len(objects) < len(result.own) or not all(map(properties.has_sinew, objects)):
+            raise SinewError("A mesh that was bent is gone; press Flex again")
+        return page.page(context.scene, title, objects, result)
+
+
 class SINEW_PT_flex(Sidebar, bpy.types.Panel):
     bl_label = "Flex"
     bl_options = {"DEFAULT_CLOSED"}
@@ -143,6 +166,8 @@ class SINEW_PT_flex(Sidebar, bpy.types.Panel):
             return
         is_good = result.verdict.is_good
         draw_text(layout, context, _headline(result), icon="CHECKMARK" if is_good else "ERROR")
+        if not stepped.draw_progress(layout, SINEW_OT_save_flex.bl_idname):
+            layout.operator("sinew.save_flex", icon="URL")
         bad = [(number, joint) for number, joint in enumerate(result.verdict.joints) if not joint.is_good]
         told: set[str] = set()
         for number, joint in bad[:JOINTS_SHOWN]:
@@ -188,7 +213,7 @@ def _draw_joint(
 
 
 FEATURE = Feature(
-    (SINEW_OT_flex, SINEW_OT_flex_place, SINEW_OT_flex_pose, SINEW_PT_flex),
+    (SINEW_OT_flex, SINEW_OT_flex_place, SINEW_OT_flex_pose, SINEW_OT_save_flex, SINEW_PT_flex),
     subscriptions=((subscribers.loading, results.clear),),
     end=results.clear,
 )

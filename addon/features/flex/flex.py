@@ -53,11 +53,13 @@ class Result:
     """
     poses    by armature, joint and name: rotations of bones, as of battery.Pose, by the bones' names
     methods  those that were tried beside the objects' own
+    own      the methods that the verdict is on, by the names of the objects
     """
 
     verdict: Verdict
     poses: Mapping[tuple[str, str, str], Mapping[str, np.ndarray]]
     methods: Sequence[str]
+    own: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,11 @@ def flex(
         rotations |= {(rig.armature.name, names[bone], pose.name): of_names for bone in bones}
     tried = [OWN, *methods]
     verdict = yield from judge(_character(now, rigs), poses, tried, table.limits, crossing_triangles)
-    return Result(verdict, rotations, methods)
+    of_objects = {
+        part.obj.name: method or properties.of(part.obj).method
+        for part, method in zip(subject.parts, own_methods, strict=True)
+    }
+    return Result(verdict, rotations, methods, of_objects)
 
 
 def _rigs(now: live.Moment) -> list[_Rig]:

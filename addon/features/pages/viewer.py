@@ -5,29 +5,51 @@ Meshes are those of Sinew's objects: of the mesh itself or, where Sinew is off t
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
 from ...attach import attach, properties, stage_settings, upstream_proxy
+from ...core import battery
 from ...core.errors import SinewError
 from ...core.influences import Influences
+from ...core.rig import Bones
 from ...core.scale_rule import BLENDER_4
 from ...core.vectors import transformed
 from ...core.vertex_data import VertexData
-from ...core.viewer import BLENDER, METHODS, MIX, Part, Viewer
+from ...core.viewer import BLENDER, METHODS, MIX, Found, Part, Viewer
 from ...deform import characters, session, source
 from ...deform.bound import Bound
 from ...io import armature_io, mesh_io, spaces
 
 # The method of meshes that have none of their own; any of Sinew's would do.
 PLAYED = "dq"
+POSES_A_SECOND = 1.0
 NOTES = (
     "The browser skins the meshes by the shaders that Sinew has for engines: Linear Blend, Dual Quaternion, "
     "Centres of Rotation and the painted mix of two. For other methods and for stages, compare in Blender.",
     "Shapes are those right after the skinning, without the modifiers behind it.",
 )
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A frame of the page that no frame of the scene has: bones of an armature are rotated, others at rest.
+
+    armature   its name
+    rotations  as of battery.Pose, by the bones' names
+    """
+
+    name: str
+    armature: str = ""
+    rotations: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def of(self, armature: bpy.types.Object, bones: Bones) -> np.ndarray:
+        """float32 [bones + joints, 4, 4], armature space"""
+        own = self.rotations if armature.name == self.armature else {}
+        by_bone = {bones.names.index(name): rotation for name, rotation in own.items()}
+        return battery.posed(bones, battery.Pose(self.name, by_bone))
 
 
 @dataclass
@@ -49,9 +71,9 @@ class _Skinned:
     has_moved: bool = False
     has_shifted: bool = False
 
-    def add_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
-        armature = self.armature.evaluated_get(depsgraph)
-        pose = armature_io.read_pose(armature, self.bound.first_deformer.bones)
+    def add_frame(self, depsgraph: bpy.types.Depsgraph, chosen: Pose | None) -> None:
+        armature, bones = self.armature.evaluated_get(depsgraph), self.bound.first_deformer.bones
+        pose = chosen.of(self.armature, bones) if chosen else armature_io.read_pose(armature, bones)
         if not np.isfinite(pose).all():
             raise SinewError(f"{self.part.name}: the pose of a bone is not finite")
         points = source.rest_points(self.obj, self.bound.source, depsgraph)
@@ -80,8 +102,17 @@ class _Attached:
     obj: bpy.types.Object
     part: Part
 
-    def add_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def add_frame(self, depsgraph: bpy.types.Depsgraph, chosen: Pose | None) -> None:
         world = np.array(self.obj.evaluated_get(depsgraph).matrix_world)
+        carrier = self.obj
+        while carrier is not None and carrier.parent_type != "BONE":
+            carrier = carrier.parent
+        if chosen is not None and carrier is not None:
+            armature = carrier.parent.evaluated_get(depsgraph)
+            bones, place = armature_io.read_bones(armature), np.array(armature.matrix_world)
+            bone = bones.names.index(carrier.parent_bone)
+            posed, now = chosen.of(armature, bones)[bone], armature_io.read_pose(armature, bones)[bone]
+            world = place @ posed @ np.linalg.pinv(place @ now) @ world
         self.part.add_frame(_STILL, world)
 
 
@@ -108,22 +139,26 @@ def page(
     meshes: Mapping[bpy.types.Object, Sequence[bpy.types.Object]],
     attached: Sequence[bpy.types.Object],
     methods: Sequence[str],
-    frames: Sequence[float],
+    frames: Sequence[float] | Sequence[Pose],
     left_out: Sequence[str] = (),
+    found: Found | None = None,
 ) -> Iterator[float | str]:
     """Yields the progress, at the end the text of the page. Sets frames; restoring is the caller's.
 
     meshes    each with the objects that Sinew may deform in its place
     attached  meshes that bones move as they are
     methods   those to choose from; the shaders lack some, which the page says
+    frames    of the scene, or poses beside the one that it has
     left_out  sentences on other meshes
+    found     what Flex found in these poses
 
     Raises SinewError where no mesh or method can be shown.
     """
     shown = [name for name in methods if name in (*METHODS, BLENDER)]
     if not shown:
         raise SinewError(f"the page has {', '.join(METHODS)} and blender: choose one of them")
-    characters.set_frame(scene, frames[0])
+    if not isinstance(frames[0], Pose):
+        characters.set_frame(scene, frames[0])
     skinned: list[_Skinned] = []
     notes = [*NOTES, *left_out]
     of_shaders = [name for name in shown if name in METHODS]
@@ -136,20 +171,22 @@ def page(
         raise SinewError("; ".join(notes[len(NOTES) :]))
     labels = {name: properties.method_label(name) for name in shown}
     if any(each.part.mix is not None for each in skinned):
-        labels[MIX] = "Painted Mix"
+        labels = {MIX: "Painted Mix", **labels} if found else {**labels, MIX: "Painted Mix"}
     missing = [properties.method_label(name) for name in methods if name not in shown]
     if missing:
         notes.append(f"Not in this page: {', '.join(missing)}.")
-    found = [*skinned, *(_read_attached(obj) for obj in attached)]
-    rate = scene.render.fps / scene.render.fps_base
-    parts = [each.part for each in found]
-    viewer = Viewer(title, parts, labels, rate, characters.length_unit(scene), notes)
+    shown_meshes = [*skinned, *(_read_attached(obj) for obj in attached)]
+    rate = POSES_A_SECOND if found else scene.render.fps / scene.render.fps_base
+    parts = [each.part for each in shown_meshes]
+    viewer = Viewer(title, parts, labels, rate, characters.length_unit(scene), notes, found)
     for number, frame in enumerate(frames):
-        characters.set_frame(scene, frame)
+        pose = frame if isinstance(frame, Pose) else None
+        if pose is None:
+            characters.set_frame(scene, frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for each in found:
-            each.add_frame(depsgraph)
-        viewer.add_frame(frame)
+        for each in shown_meshes:
+            each.add_frame(depsgraph, pose)
+        viewer.add_frame(frame if pose is None else pose.name)
         yield (number + 1) / len(frames)
     viewer.notes += [
         f"{each.part.name}: rotations go the shorter way here, not along the chain as in Blender."

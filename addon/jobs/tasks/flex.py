@@ -11,8 +11,10 @@ import bpy
 from ...attach import properties
 from ...core import interrupt
 from ...core.flex.limits import Table, read_table
+from ...core.output import write_text
 from ...deform import characters
 from ...features.flex import flex as bending
+from ...features.flex import page as flex_page
 from ...io import files
 
 
@@ -23,11 +25,12 @@ def flex(
     where one is named.
 
     "joints": as from Verdict.to_dict(); "left_out": a sentence for each mesh that could not be judged;
-    "notes": remarks on the file. Raises SinewError where it cannot be judged.
+    "notes": remarks on the file. Writes the page "viewer" where one is named. Raises SinewError where it
+    cannot be judged.
 
     show  called with the progress
     """
-    path, table = Path(task["source"]), Table()
+    path, table, page = Path(task["source"]), Table(), task["viewer"]
     for each in task["tables"]:
         table = read_table(Path(each), table)
     report("opening it")
@@ -45,10 +48,21 @@ def flex(
         characters.use_method(obj, settings.get(obj, "dq"))
         own[obj] = None if obj in settings else properties.BLENDER
     report("bending it")
+    of_bending = 0.5 if page else 1.0
     steps = bending.flex(meshes, methods, table, own)
     while True:
         try:
-            show(next(steps))
+            show(of_bending * next(steps))
         except StopIteration as end:
-            return {**end.value.verdict.to_dict(), "left_out": left_out, "notes": notes}
+            result = end.value
+            break
         interrupt.check()
+    if page:
+        report("reading it for the page")
+        for step in flex_page.page(scene, path.stem, meshes, result, left_out):
+            if isinstance(step, str):
+                write_text(Path(page), step)
+            else:
+                show(of_bending * (1.0 + step))
+            interrupt.check()
+    return {**result.verdict.to_dict(), "left_out": left_out, "notes": notes}

@@ -260,15 +260,18 @@ function product(a, b) {
   });
 }
 
+const moved = (m, v) => [0, 1, 2, 3].map((row) => [0, 1, 2, 3].reduce((sum, k) => sum + m[4 * k + row] * v[k], 0));
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
+const cross = (a, b) => [1, 2, 0].map((i) => a[i] * b[(i + 1) % 3] - a[(i + 1) % 3] * b[i]);
 const plus = (a, b, factor = 1) => a.map((x, i) => x + factor * b[i]);
 
 // --- The state
 
 const names = Object.keys(header.methods), last = header.frames.length - 1;
+const { findings = [], verdict = "" } = header.flex ?? {};
 const state = {
-  frame: header.start, playing: false, panes: names.length > 1 && innerWidth > 560 ? 2 : 1, methods: [names[0], names[names.length - 1]],
-  measure: 0, most: Infinity, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
+  frame: header.start, playing: false, panes: !header.flex && names.length > 1 && innerWidth > 560 ? 2 : 1, methods: [names[0], names[names.length - 1]],
+  measure: 0, most: Infinity, finding: -1, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
 };
 
 // Where the character is at a frame. One that walks away is followed; others stay where they are.
@@ -287,11 +290,13 @@ const radius = Math.hypot(wide, deep, tall) || 1;
 const power = 10 ** Math.floor(Math.log10(radius / 1.5));
 const spacing = [1, 2, 5].map((step) => step * power).findLast((step) => step <= radius / 1.5) ?? power;
 
+const backOf = ({ yaw, pitch }) => [Math.sin(yaw) * Math.cos(pitch), -Math.cos(yaw) * Math.cos(pitch), Math.sin(pitch)];
+
 function camera(aspect) {
   const box = isTravelling ? boxOver([state.frame]) : whole;
   const middle = plus(box[0], box[1]).map((x) => x / 2);
   const [cy, sy, cp, sp] = [Math.cos(state.yaw), Math.sin(state.yaw), Math.cos(state.pitch), Math.sin(state.pitch)];
-  const back = [sy * cp, -cy * cp, sp], right = [cy, sy, 0], up = [-sy * sp, cy * sp, cp];
+  const back = backOf(state), right = [cy, sy, 0], up = [-sy * sp, cy * sp, cp];
   // The character fits however it is turned about the vertical.
   const half = Math.tan(Math.PI / 12), around = Math.hypot(wide, deep) || radius;
   const distance = Math.max(1.04 * tall / half + 0.3 * around, 1.06 * around / (half * aspect) + 0.7 * around) / state.zoom;
@@ -326,9 +331,11 @@ const ramps = header.measures.map(({ ramp }) => {
 
 // What the points on the graphics card were made for: a camera that moves needs no others.
 let skinnedFor = "";
+// Of each pane, where the vertex of the chosen finding is in the world, and its normal.
+let marks = [];
 
 function skinAll() {
-  const wanted = [state.frame, state.panes, ...state.methods, state.measure, state.most].join();
+  const wanted = [state.frame, state.panes, ...state.methods, state.measure, state.most, state.finding].join();
   if (wanted === skinnedFor) return;
   skinnedFor = wanted;
   for (const mesh of meshes) {
@@ -338,6 +345,30 @@ function skinAll() {
       mesh.skin(state.methods[i], state.most, pane.points);
       mesh.measure(pane, state.measure);
     });
+  }
+  marks = [0, 1].slice(0, state.panes).map(markOf);
+}
+
+function markOf(pane) {
+  const { mesh: name, vertex } = findings[state.finding] ?? {}, mesh = meshes.find(({ about }) => about.name === name);
+  if (!mesh || vertex >= mesh.count) return null;
+  const [point, normal] = [mesh.panes[pane].points, mesh.panes[pane].surface].map((target) => {
+    const found = new Float32Array(4);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+    gl.readPixels(vertex & (WIDTH - 1), vertex >> SHIFT, 1, 1, gl.RGBA, gl.FLOAT, found);
+    return found;
+  });
+  return { point: moved(mesh.world, point).slice(0, 3), normal: Array.from(normal.slice(0, 3)) };
+}
+
+function showMarks() {
+  const { clip_from_world } = camera(canvas.clientWidth / state.panes / canvas.clientHeight);
+  for (const i of [0, 1]) {
+    const mark = find(`mark-${i}`), place = marks[i] && moved(clip_from_world, [...marks[i].point, 1]);
+    const [x, y] = place ? [place[0] / place[3], place[1] / place[3]] : [2, 2];
+    mark.hidden = !(Math.abs(x) < 1 && Math.abs(y) < 1 && place[3] > 0);
+    mark.style.left = `${50 * (1 + x + 2 * i) / state.panes}%`;
+    mark.style.top = `${50 * (1 - y)}%`;
   }
 }
 
@@ -395,6 +426,7 @@ function draw(isSmooth = false) {
   gl.enable(gl.DEPTH_TEST);
   gl.enable(gl.SCISSOR_TEST);
   for (let i = 0; i < state.panes; ++i) drawPane(i, Math.floor(width / state.panes), height);
+  showMarks();
   if (!isSmooth) return;
   gl.disable(gl.SCISSOR_TEST);
   gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
@@ -433,7 +465,8 @@ function values(part, method, frame, measure) {
 // --- The page
 
 const SLOW_MILLISECONDS = 20, STILL_MILLISECONDS = 150;
-let isWaiting = false, playedFrom = null, isFast = null, whenStill = 0;
+const FLIGHT_MILLISECONDS = 700, prefersStill = matchMedia("(prefers-reduced-motion: reduce)");
+let isWaiting = false, playedFrom = null, isFast = null, whenStill = 0, flight = null;
 
 // Whether a smooth frame is drawn fast enough to draw none but smooth ones.
 function measureSpeed() {
@@ -456,10 +489,11 @@ function changed() {
       state.frame = (playedFrom.frame + passed) % (last + 1);
       showFrame();
     }
+    if (flight) flyOn();
     isFast ??= measureSpeed();
     draw(isFast);
     clearTimeout(whenStill);
-    if (state.playing) changed();
+    if (state.playing || flight) changed();
     else if (!isFast) whenStill = setTimeout(() => draw(true), STILL_MILLISECONDS);
   });
 }
@@ -472,10 +506,12 @@ function say(text) {
 
 function showFrame() {
   find("frame").value = state.frame;
-  find("frame").setAttribute("aria-valuetext", `frame ${header.frames[state.frame]}`);
+  find("frame").setAttribute("aria-valuetext", `${step} ${header.frames[state.frame]}`);
   find("frame-shown").textContent = header.frames[state.frame];
 }
 
+// What a frame is called.
+const step = header.flex ? "pose" : "frame";
 // The stops of the slider.
 const stops = [1, 2, 3, 4, 8].filter((n) => n < most).concat(Infinity);
 
@@ -484,6 +520,11 @@ function show() {
   document.body.classList.toggle("playing", state.playing);
   find("play").setAttribute("aria-label", state.playing ? "Pause" : "Play");
   for (const input of document.querySelectorAll("[name=panes]")) input.checked = Number(input.value) === state.panes;
+  findings.forEach((_, i) => {
+    const [button, more] = find("findings").children[i].children;
+    button.setAttribute("aria-pressed", i === state.finding);
+    more.hidden = i !== state.finding;
+  });
   for (const input of document.querySelectorAll("[name=measure]")) input.checked = Number(input.value) === state.measure;
   state.methods.forEach((name, i) => {
     find(`method-${i}`).value = name;
@@ -519,6 +560,7 @@ function show() {
 function set(values) {
   Object.assign(state, values);
   if ("frame" in values || "playing" in values) playedFrom = null;
+  if ("yaw" in values || "zoom" in values || "offset" in values) flight = null;
   show();
 }
 
@@ -527,7 +569,94 @@ function flip() {
   say(`Now ${state.methods.slice(0, state.panes).map(methodLabel).join(" and ")}`);
 }
 
+// --- Flex
+
+const HOME = { yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0] };
+
+function choose(index) {
+  const { joint, measure, value, limit, size, frame } = findings[index];
+  set({ finding: index, frame, playing: false });
+  skinAll();
+  fly(marks[0] ? viewOf(marks[0], size) : HOME);
+  const button = find("findings").children[index].firstChild;
+  button.scrollIntoView({ block: "nearest" });
+  say([`${joint}: ${measure}`, value, limit, header.frames[frame]].filter(Boolean).join(", "));
+}
+
+// Along the normal, or as near to that as nothing is in between; some lengths of the bone around the place.
+function viewOf({ point, normal }, size) {
+  const its = camera(canvas.clientWidth / state.panes / canvas.clientHeight);
+  const reach = Math.min(Math.max(1.6 * size, radius / 12), radius / 2);
+  const [yaw, pitch] = [Math.atan2(normal[0], -normal[1]), Math.min(Math.max(Math.asin(normal[2]), -1), 1)];
+  const views = [{ yaw, pitch }];
+  for (let k = 0; k < 12; ++k) for (const other of [-0.5, 0, 0.5, 1]) views.push({ yaw: yaw + k * Math.PI / 6, pitch: other });
+  const closeness = new Map(views.map((view) => [view, dot(backOf(view), normal)]));
+  views.sort((a, b) => closeness.get(b) - closeness.get(a));
+  const corners = meshes.flatMap((mesh) => trianglesNear(mesh, point, reach / its.half));
+  const best = views.find((view) => !isHidden(point, backOf(view), 0.03 * reach, reach / its.half, corners)) ?? views[0];
+  return { ...best, zoom: state.zoom * its.distance * its.half / reach, offset: plus(point, its.middle, -1) };
+}
+
+// Of the left pane, in the world: the corners of triangles of which one is within a distance.
+function trianglesNear(mesh, point, distance) {
+  const shape = read(mesh.panes[0].points, mesh), { triangles } = mesh.arrays, found = [];
+  const world = Array.from({ length: mesh.count }, (_, v) => moved(mesh.world, shape.subarray(4 * v, 4 * v + 4)));
+  const isNear = world.map((p) => Math.hypot(p[0] - point[0], p[1] - point[1], p[2] - point[2]) < distance);
+  for (let k = 0; k < triangles.length; k += 3) {
+    const own = triangles.subarray(k, k + 3);
+    if (own.some((v) => isNear[v])) found.push(Array.from(own, (v) => world[v].slice(0, 3)));
+  }
+  return found;
+}
+
+// Whether a ray goes through one of the triangles between two distances.
+function isHidden(from, direction, least, most, triangles) {
+  return triangles.some(([a, b, c]) => {
+    const first = plus(b, a, -1), second = plus(c, a, -1), across = cross(direction, second), scale = dot(first, across);
+    const start = plus(from, a, -1), u = dot(start, across) / scale, other = cross(start, first);
+    const v = dot(direction, other) / scale, along = dot(second, other) / scale;
+    return u >= 0 && v >= 0 && u + v <= 1 && along > least && along < most;
+  });
+}
+
+function fly(to) {
+  const { yaw, pitch, zoom, offset } = state, turn = to.yaw - yaw;
+  const from = { yaw: yaw + Math.round(turn / (2 * Math.PI)) * 2 * Math.PI, pitch, zoom, offset };
+  if (prefersStill.matches) set(to);
+  else flight = { from, to, started: performance.now() };
+  changed();
+}
+
+function flyOn() {
+  const { from, to, started } = flight, passed = Math.min((performance.now() - started) / FLIGHT_MILLISECONDS, 1);
+  const share = passed * passed * (3 - 2 * passed), between = (a, b) => a + share * (b - a);
+  Object.assign(state, {
+    yaw: between(from.yaw, to.yaw), pitch: between(from.pitch, to.pitch),
+    zoom: from.zoom * (to.zoom / from.zoom) ** share, offset: from.offset.map((x, i) => between(x, to.offset[i])),
+  });
+  if (passed === 1) flight = null;
+}
+
+function listFindings() {
+  for (const one of document.querySelectorAll(".of-flex")) one.hidden = !header.flex;
+  document.body.classList.toggle("has-poses", Boolean(header.flex));
+  const made = (name, text) => Object.assign(document.createElement(name), { textContent: text });
+  find("verdict").textContent = verdict;
+  find("findings").replaceChildren(...findings.map(({ joint, measure, value, limit, frame, meaning, advice }, i) => {
+    const item = made("li", ""), button = Object.assign(made("button", ""), { type: "button" });
+    button.append(made("b", joint), ` ${measure}`, made("span", [value, limit].filter(Boolean).join(", ")));
+    button.append(made("span", header.frames[frame]));
+    button.addEventListener("click", () => choose(i));
+    item.append(button, made("p", `${meaning} ${advice}`));
+    return item;
+  }));
+}
+
 const actions = {
+  ...(findings.length && {
+    n: () => choose((state.finding + 1) % findings.length),
+    p: () => choose((Math.max(state.finding, 0) + findings.length - 1) % findings.length),
+  }),
   " ": () => set({ playing: !state.playing }),
   ",": () => set({ playing: false, frame: (state.frame + last) % (last + 1) }),
   ".": () => set({ playing: false, frame: (state.frame + 1) % (last + 1) }),
@@ -539,7 +668,7 @@ const actions = {
   "+": () => zoomBy(1.15),
   "=": () => zoomBy(1.15),
   "-": () => zoomBy(1 / 1.15),
-  Home: () => set({ yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0] }),
+  Home: () => set(HOME),
 };
 
 function zoomBy(factor) {
@@ -576,6 +705,7 @@ function connect() {
   find("flip").addEventListener("click", flip);
   find("play").addEventListener("click", actions[" "]);
   find("frame").max = last;
+  find("frame").setAttribute("aria-label", header.flex ? "Pose" : "Frame");
   find("frame").addEventListener("input", ({ target }) => set({ playing: false, frame: Number(target.value) }));
   find("time").hidden = last === 0;
   find("influences").max = stops.length - 1;
@@ -587,7 +717,7 @@ function connect() {
     return item;
   }));
   const vertices = meshes.reduce((sum, mesh) => sum + mesh.count, 0);
-  const frames = last ? `${last + 1} frames` : `frame ${header.frames[0]}`;
+  const frames = last ? `${last + 1} ${step}s` : `${step} ${header.frames[0]}`;
   find("facts").textContent = `${vertices.toLocaleString("en")} vertices, ${frames}`;
 }
 
@@ -639,6 +769,7 @@ function connectPointers() {
 }
 
 connect();
+listFindings();
 connectKeys();
 connectPointers();
 new ResizeObserver(changed).observe(canvas);
