@@ -148,6 +148,19 @@ def photograph_viewer(target: Path) -> None:
         photograph(page, target, 1180, 640)
 
 
+def photograph_flex(target: Path) -> None:
+    """The page of a character that was bent, at a fault of a finger."""
+    with tempfile.TemporaryDirectory() as place:
+        page = Path(place, "human.html")
+        words = [SINEW, "flex", find("human.blend"), "--viewer", page]
+        # Its fingers have faults, so the command fails.
+        assert subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode == 1
+        click = 'choose(findings.findIndex(({ measure }) => measure === "Flipped faces"));\nwindow.sinew = {'
+        text = page.read_text(encoding="utf-8").replace("window.sinew = {", click)
+        page.write_text(text, encoding="utf-8")
+        photograph(page, target, 1180, 640)
+
+
 def photograph_heat_map(target: Path) -> None:
     """Of a page, the section on the stretch of edges."""
     with tempfile.TemporaryDirectory() as place:
@@ -169,6 +182,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "batch-report.png": photograph_report,
     "page.png": photograph_page,
     "viewer.png": photograph_viewer,
+    "viewer-flex.png": photograph_flex,
     "heat.png": photograph_heat_map,
     "elbows": draw_elbows,
 }

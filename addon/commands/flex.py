@@ -50,8 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         file = partial(file_to_write, endings=(ending,))
         parser.add_argument(option, type=file, metavar=f"FILE{ending}", help=f"also write a report {text}")
-    add_viewer(parser, "also write a page in which the character of the file turns, bent to each pose, with the "
-        "faults as a list")
+    add_viewer(
+        parser,
+        "also write a page in which the character of the file turns, bent to each pose, with the "
+        "faults as a list",
+    )
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 import planted
 import pytest
+import read_page
 import scenes
 from planted import HUMAN, PLANTS, Plant, Rig
 from program import run_sinew
@@ -150,6 +151,14 @@ def test_the_command_says_what_is_wrong_where_and_what_mends_it(tmp_path):
     assert "; not under dq" in result.stdout
     run_sinew("flex", good, "--poses", table, "--thresholds", limits)
     before = good.read_bytes()
+    page = tmp_path / "bent.html"
+    run_sinew("flex", good, "--poses", table, "--methods", "dq", "--viewer", page, status=1)
+    header, _meshes = read_page.read(page)
+    bent = [f"{bone.name}: twist 170" for bone in bpy.data.armatures[0].bones[1:]]
+    assert header["frames"] == ["At rest", *bent]
+    assert list(header["methods"]) == ["blender", "dq"]
+    assert header["flex"]["verdict"] == "1 of 2 joints pass"
+    assert {each["measure"] for each in header["flex"]["findings"]} >= {"Radius"}
     xml, text = tmp_path / "flex.xml", tmp_path / "flex.md"
     arguments = ("--json", "--junit", xml, "--markdown", text, "--poses", table)
     result = run_sinew("flex", good, tmp_path / "none.blend", *arguments, status=1)
@@ -187,6 +196,7 @@ def test_wrong_use(tmp_path):
         (("--methods", "mush"), "expected one of"),
         (("--poses", path), "limits.length"),
         (("--junit", tmp_path / "a.txt"), ".xml"),
+        (("b.blend", "--viewer", tmp_path / "page.html"), "a single file"),
     ):
         assert said in run_sinew("flex", "a.blend", *arguments, status=2).stderr
 

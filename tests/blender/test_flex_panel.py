@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+import read_page
 import scenes
 from sinew_addon.core.flex.verdict import Finding
 from sinew_addon.features.flex import feature
@@ -24,6 +25,10 @@ def arm_with_a_bare_patch():
     scenes.add_sinew(obj, "dq")
     yield obj, armature, bare
     feature.results.clear()
+
+
+# Methods of the skin, and of what a bone carries.
+MOVING = "dq", "lbs"
 
 
 def findings() -> dict[str, tuple[int, int, Finding]]:
@@ -81,6 +86,50 @@ def test_a_click_poses_the_bone_as_it_was_bent(arm_with_a_bare_patch):
     rest = scenes.rest_points(obj)
     before, after = (np.linalg.norm(p[edges[:, 0]] - p[edges[:, 1]], axis=1) for p in (rest, points))
     assert finding.vertex in edges[np.argsort(before - after)[:80]]
+
+
+def test_the_poses_are_saved_as_a_page(arm_with_a_bare_patch, tmp_path):
+    """Its shapes are those that Blender makes of the same poses, also of an eye; nothing is changed."""
+    obj, armature, _bare = arm_with_a_bare_patch
+    bpy.ops.mesh.primitive_cube_add(size=0.2)
+    eye = bpy.context.object
+    eye.parent, eye.parent_type, eye.parent_bone = armature, "BONE", armature.data.bones[-1].name
+    armature.location, armature.scale = (0.3, -0.4, 0.2), (1.3, 1.3, 1.3)
+    scenes.bend(armature, 50.0)
+    assert not bpy.ops.sinew.save_flex.poll()
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.sinew.flex()
+    before, path = content(), tmp_path / "bent.html"
+    assert bpy.ops.sinew.save_flex(filepath=str(path)) == {"FINISHED"}
+    assert_same(before)
+    header, meshes = read_page.read(path)
+    assert list(header["methods"]) == ["dq", "lbs", "cor"]
+    assert [part["name"] for part in header["parts"]] == [obj.name, eye.name]
+    result = feature.results[bpy.context.scene.session_uid]
+    assert len(header["frames"]) == len({id(rotations) for rotations in result.poses.values()}) + 1
+    known = findings()
+    assert len(header["flex"]["findings"]) == len(result.verdict.findings)
+    for entry in header["flex"]["findings"]:
+        (name,) = [each for each, (*_n, finding) in known.items() if finding.limit.label == entry["measure"]]
+        joint, place, finding = known[name]
+        for bone in armature.pose.bones:
+            bone.matrix_basis.identity()
+        if finding.pose:
+            bpy.ops.sinew.flex_pose(joint=joint, finding=place)
+            assert header["frames"][entry["frame"]] == f"{entry['joint']}: {finding.pose}"
+        else:
+            assert header["frames"][entry["frame"]] == "At rest"
+        bpy.context.view_layer.update()
+        assert (entry["mesh"], entry["vertex"]) == (obj.name, finding.vertex)
+        for part, arrays, mesh, method in zip(header["parts"], meshes, (obj, eye), MOVING, strict=True):
+            world = arrays["worlds"][entry["frame"]].astype(np.float64)
+            found = read_page.points(part, arrays, method, entry["frame"]) @ world[:3, :3].T + world[:3, 3]
+            place_in_world = np.array(mesh.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+            wanted = scenes.final_points(mesh) @ place_in_world[:3, :3].T + place_in_world[:3, 3]
+            np.testing.assert_allclose(found, wanted, atol=2e-5)
+    armature.data.bones[-1].name = "Renamed"
+    with pytest.raises(RuntimeError, match="other bones"):
+        bpy.ops.sinew.save_flex(filepath=str(path))
 
 
 def test_what_is_gone_is_said(arm_with_a_bare_patch):

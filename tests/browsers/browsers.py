@@ -62,10 +62,13 @@ class Browser:
             time.sleep(0.05)
         raise AssertionError(f"not within {SECONDS} s: {condition}")
 
-    def show(self, page, width=1280, height=800, is_dark=False):
-        """Opens a page, and waits until it has drawn the character."""
+    def show(self, page, width=1280, height=800, is_dark=False, is_still=False):
+        """Opens a page, and waits until it has drawn the character.
+
+        is_still  as if somebody had the system show as little motion as it can
+        """
         self.resize(width, height)
-        self.set_dark(is_dark)
+        self.prefer(is_dark, is_still)
         self.open(page.as_uri())
         said = self.wait("window.sinew ? 'drawn' : document.getElementById('message').textContent")
         assert said == "drawn", said
@@ -96,9 +99,13 @@ class Chromium(Browser):
         values = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self._driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", values)
 
-    def set_dark(self, is_dark):
-        feature = {"name": "prefers-color-scheme", "value": "dark" if is_dark else "light"}
-        self._driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [feature]})
+    def prefer(self, is_dark, is_still):
+        values = {
+            "prefers-color-scheme": "dark" if is_dark else "light",
+            "prefers-reduced-motion": "reduce" if is_still else "no-preference",
+        }
+        features = [{"name": name, "value": value} for name, value in values.items()]
+        self._driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
     def open(self, address):
         self._driver.get(address)
@@ -178,8 +185,9 @@ class Firefox(Browser):
         extra = self.run("return [outerWidth - innerWidth, outerHeight - innerHeight]")
         self._driver.set_window_rect(width=width + extra[0], height=height + extra[1])
 
-    def set_dark(self, is_dark):
+    def prefer(self, is_dark, is_still):
         self._driver.set_pref("layout.css.prefers-color-scheme.content-override", 0 if is_dark else 1)
+        self._driver.set_pref("ui.prefersReducedMotion", int(is_still))
 
     def open(self, address):
         self._driver.navigate(address)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pages made by the command of the everyday environment, and what reads them: imported by name."""
 
+import json
 import os
 import subprocess
 import sys
@@ -43,9 +44,10 @@ def browser(request):
         yield opened
 
 
-def sinew(*words):
+def sinew(*words, status=0):
     done = subprocess.run([SINEW, *map(str, words)], capture_output=True, text=True, check=False, timeout=300)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == status, done.stdout + done.stderr
+    return done.stdout
 
 
 class Made:
@@ -62,6 +64,16 @@ class Made:
             arrays = np.load(out)
             (name,) = set(arrays.files) - {"frames"}
             self.points["mix" if options else method] = arrays[name]
+
+
+@pytest.fixture(scope="session")
+def bent(tmp_path_factory):
+    """A page of Flex, with faults by limits that a good rig passes, and the report."""
+    folder, source = tmp_path_factory.mktemp("flex"), REPOSITORY / "blend_files/elbow.blend"
+    page, limits = folder / "bent.html", folder / "limits.toml"
+    limits.write_text("[limits]\nstretch = 1.05\npivot = 0.01\n", encoding="utf-8")
+    text = sinew("flex", source, "--thresholds", limits, "--json", "--viewer", page, status=1)
+    return page, json.loads(text)[0]
 
 
 @pytest.fixture(scope="session")

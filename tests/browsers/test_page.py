@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page that turns, in browsers: its points are those of `sinew points`, its heat maps those of
-docs/metrics.md; keys and controls do what they say; it fits on small screens.
+docs/metrics.md; keys and controls do what they say; it fits on small screens; faults of Flex are found.
 
 SINEW_PICTURES  a folder for pictures, to look at
 """
@@ -28,6 +28,14 @@ for (let k = 3; k < found.length; k += 4) {
 }
 return counts.map((count) => count / width / height * state.panes)
 """
+
+# The middle of the mark of what is chosen, from that of the view, in pixels.
+MARKED = """
+const boxes = ["mark-0", "view"].map((id) => document.getElementById(id).getBoundingClientRect());
+const [mark, view] = boxes.map((box) => [box.x + box.width / 2, box.y + box.height / 2]);
+return [mark[0] - view[0], mark[1] - view[1]]
+"""
+VIEW = "const { yaw, pitch, zoom, offset } = window.sinew.state; return [yaw, pitch, zoom, ...offset]"
 
 
 def points(browser, *arguments):
@@ -132,12 +140,66 @@ def test_keys_and_controls(browser, made):
     assert browser.run("return window.sinew.gl.getError()") == 0
 
 
+def test_a_fault_is_shown_at_its_place(browser, bent):
+    page, report = bent
+    browser.show(page, is_still=True)
+    faults = [(joint["joint"], each) for joint in report["joints"] for each in joint["findings"]]
+    texts = browser.run(
+        "return [...document.querySelectorAll('#findings button')].map((each) => each.textContent)"
+    )
+    assert len(texts) == len(faults) > 1
+    header, meshes = read_page.read(page)
+    assert (browser.run("return window.sinew.state.frame"), header["frames"][0]) == (0, "At rest")
+    places = set()
+    for number, (joint, fault) in enumerate(faults):
+        assert joint in texts[number]
+        assert fault["label"] in texts[number]
+        browser.press("n")
+        assert browser.run("return window.sinew.state.finding") == number
+        frame = browser.run("return window.sinew.state.frame")
+        shown = browser.run("return document.getElementById('frame-shown').textContent")
+        pose = f"{joint}: {fault['pose']}" if fault["pose"] else "At rest"
+        assert shown == header["frames"][frame] == pose
+        # The view is at the vertex at once, and nothing moves afterwards.
+        view = browser.run(VIEW)
+        browser.run("window.sinew.draw()")
+        assert np.abs(browser.run(MARKED)).max() < 2.0
+        assert browser.run(VIEW) == view
+        own = read_page.points(header["parts"][0], meshes[0], header["parts"][0]["blender"], frame)
+        world = meshes[0]["worlds"][frame].astype(np.float64)
+        place = world[:3, :3] @ own[fault["vertex"]] + world[:3, 3]
+        low, high = np.min(header["low"], axis=0), np.max(header["high"], axis=0)
+        np.testing.assert_allclose(view[3:] + (low + high) / 2, place, atol=1e-4)
+        places.add(tuple(np.round(place, 4)))
+    assert len(places) > 1
+
+
+def test_the_way_to_a_fault_is_flown(browser, bent):
+    page, _report = bent
+    browser.show(page)
+    before = browser.run(VIEW)
+    browser.run("document.querySelector('#findings button').focus()")
+    # Enter.
+    browser.press("\ue007")
+    browser.wait(f"window.sinew.state.zoom !== {before[2]}")
+    browser.wait(f"(() => {{{MARKED}}})().every((x) => Math.abs(x) < 2)")
+    pressed = "document.querySelector('#findings button').getAttribute('aria-pressed')"
+    assert browser.run(f"return {pressed}") == "true"
+    assert "Pivot outside" in browser.run("return document.getElementById('said').textContent")
+    assert browser.run(KEYS_ARE_NAMED) == 0
+    browser.press("\ue011")
+    assert browser.run(VIEW) == before
+
+
 @pytest.mark.parametrize("is_dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 400])
-def test_it_fits_and_is_drawn(browser, made, width, is_dark):
-    page = made.get("human") or made["wrist"]
-    browser.show(page.page, width, 800, is_dark)
-    panes = 2 if width > 720 else 1
+@pytest.mark.parametrize("kind", ["compared", "bent"])
+def test_it_fits_and_is_drawn(browser, made, bent, width, is_dark, kind):
+    page = bent[0] if kind == "bent" else (made.get("human") or made["wrist"]).page
+    browser.show(page, width, 800, is_dark)
+    if kind == "bent":
+        browser.press("n")
+    panes = 2 if width > 720 and kind == "compared" else 1
     shares = browser.run(DRAWN)
     assert len(shares) == panes
     for share in shares:
@@ -147,5 +209,5 @@ def test_it_fits_and_is_drawn(browser, made, width, is_dark):
     assert browser.run("return document.documentElement.scrollWidth") <= inner
     folder = os.environ.get("SINEW_PICTURES")
     if folder:
-        name = f"{type(browser).__name__.lower()}-{width}-{'dark' if is_dark else 'light'}.png"
+        name = f"{type(browser).__name__.lower()}-{kind}-{width}-{'dark' if is_dark else 'light'}.png"
         Path(folder, name).write_bytes(browser.picture())
