@@ -1,45 +1,157 @@
 # SPDX-License-Identifier: MIT
-"""What the shaders read of bones, made of their poses: for an engine to write in its own language."""
+"""What the shaders read of bones, made of their poses: for an engine to write in its own language.
+
+Matrices are by rows, [bones, 4, 4], quaternions x, y, z, w. A twist is (bone, base, tip, is_from_parent): the
+twist of `tip` against `base` is spread along `bone`.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 
+Twist = Sequence[int]
 
-def bone_buffer(posed, rest):
-    """float32 [bones, 4, 4]: for each bone the rows of its motion, then the rotation in it as a quaternion
-    x, y, z, w.
 
-    posed, rest  float [bones, 4, 4], by rows, from the bone's own axes to one space, that of the armature; Y
-                 is along the bone. At rest they are the inverses of glTF's inverse bind matrices.
+def bone_buffer(
+    posed: np.ndarray,
+    rest: np.ndarray,
+    parents: Sequence[int] | None = None,
+    lengths: np.ndarray | None = None,
+    twists: Sequence[Twist] = (),
+    amounts: Sequence[float] = (),
+    curves: Sequence[float] = (),
+) -> np.ndarray:
+    """float32 [bones, 7, 4]: see docs/engines.md.
 
-    Bones that are not scaled are rotated by the 3x3 part of their motion. Those that are, by Blender's rule:
-    by what takes the rest axes to the posed ones, made perpendicular with Y kept.
+    posed, rest      float [bones, 4, 4], from the bone's own axes to one space, that of the armature; Y is
+                     along the bone. At rest they are the inverses of glTF's inverse bind matrices.
+    parents          -1 for none: only signs by hierarchy need them
+    lengths          [bones], along the bone's own Y: only the stages need them
+    amounts, curves  [twists], 0 to 1 and -1 to 1
     """
-    posed, rest = np.asarray(posed, np.float64), np.asarray(rest, np.float64)
-    buffer = np.empty((len(posed), 4, 4), np.float32)
-    buffer[:, :3] = (posed @ np.linalg.inv(rest))[:, :3]
-    for bone, (now, before) in enumerate(zip(posed, rest, strict=True)):
-        buffer[bone, 3] = quaternion(perpendicular(now) @ perpendicular(before).T)
+    posed, rest = posed.astype(np.float64), rest.astype(np.float64)
+    motions = posed @ np.linalg.inv(rest)
+    rotations = quaternions(perpendicular(posed) @ perpendicular(rest).swapaxes(1, 2))
+    if parents is not None:
+        rotations = along_chain(rotations, parents, np.linalg.det(motions[:, :3, :3]) < 0)
+    buffer = of_motions(motions, rotations)
+    if lengths is not None:
+        heads = rest[:, :3, 3]
+        add_segments(buffer, heads, heads + np.asarray(lengths)[:, None] * rest[:, :3, 1])
+        add_twists(buffer, twists, amounts * twist_angles(motions, rest, twists), curves)
     return buffer
 
 
-def perpendicular(matrix):
-    """Axes of unit length in columns, right-handed: Y as it is, X as near as it can be."""
-    y = matrix[:3, 1] / np.linalg.norm(matrix[:3, 1])
-    x = matrix[:3, 0] - y * (matrix[:3, 0] @ y)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, y, np.cross(x, y)])
+def of_motions(motions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """The buffer for methods alone. Bones that are not scaled are rotated by the 3x3 part of their motion.
+    Those that are, by Blender's rule: by what takes the rest axes to the posed ones, made perpendicular with Y
+    kept."""
+    buffer = np.zeros((len(motions), 7, 4), np.float32)
+    buffer[:, :3], buffer[:, 3] = motions[:, :3], rotations
+    return buffer
 
 
-def quaternion(r):
-    """x, y, z, w of a 3x3 rotation, from its largest component on (Shepperd 1978)."""
-    squares = np.array([r[0, 0], r[1, 1], r[2, 2], np.trace(r)])
-    largest = int(squares.argmax())
-    if largest == 3:
-        q = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + squares[3]])
-    else:
-        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
-        q = np.empty(4)
-        q[i] = 1 + r[i, i] - r[j, j] - r[k, k]
-        q[j], q[k], q[3] = r[i, j] + r[j, i], r[i, k] + r[k, i], r[k, j] - r[j, k]
-    # With w >= 0, as Blender has them: the sign decides where bones are more than 180 degrees apart.
-    return q / np.linalg.norm(q) * (-1 if q[3] < 0 else 1)
+def perpendicular(matrices: np.ndarray) -> np.ndarray:
+    """Axes of unit length in columns, right-handed: Y as it is, X as near as it can be; [bones, 3, 3]."""
+    x, y = matrices[:, :3, 0], matrices[:, :3, 1]
+    y = y / np.linalg.norm(y, axis=1, keepdims=True)
+    x = x - y * (x * y).sum(axis=1, keepdims=True)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=2)
+
+
+def quaternions(r: np.ndarray) -> np.ndarray:
+    """Of rotations [n, 3, 3], with w >= 0, as Blender has them."""
+    x, y, z = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    squares = 1 + np.array([x - y - z, y - x - z, z - x - y, x + y + z])
+    yz, xz, xy = r[:, 2, 1] + r[:, 1, 2], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 0] + r[:, 0, 1]
+    xw, yw, zw = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    # Each row is q times four of its components: the largest is the most exact.
+    rows = np.array(
+        [
+            [squares[0], xy, xz, xw],
+            [xy, squares[1], yz, yw],
+            [xz, yz, squares[2], zw],
+            [xw, yw, zw, squares[3]],
+        ]
+    )
+    q = rows[squares.argmax(axis=0), :, np.arange(len(r))]
+    return q / np.linalg.norm(q, axis=1, keepdims=True) * np.where(q[:, 3:] < 0, -1, 1)
+
+
+# --- Signs by hierarchy
+
+
+def along_chain(rotations: np.ndarray, parents: Sequence[int], mirrors: np.ndarray) -> np.ndarray:
+    """The same quaternions, each with the sign that brings it nearest to its parent's; a bone that mirrors counts
+    as its parent for those that it carries."""
+    found = rotations.copy()
+    nearby: dict[int, np.ndarray] = {-1: np.array([0.0, 0.0, 0.0, 1.0])}
+
+    def visit(bone: int) -> np.ndarray:
+        if bone not in nearby:
+            before = visit(int(parents[bone]))
+            found[bone] *= -1 if found[bone] @ before < 0 else 1
+            nearby[bone] = before if mirrors[bone] else found[bone]
+        return nearby[bone]
+
+    for bone in range(len(found)):
+        visit(bone)
+    return found
+
+
+# --- The stages
+
+
+def add_segments(buffer: np.ndarray, heads: np.ndarray, tails: np.ndarray) -> None:
+    """Each bone from its head to its tail at rest, and how much longer its motion makes what is across it, seen
+    along its image, at most."""
+    along, linear = tails - heads, buffer[:, :3, :3].astype(np.float64)
+    image = np.einsum("bij,bj->bi", linear, along)
+    across, unaffected = (np.eye(3) - projection(vectors) for vectors in (along, image))
+    stretches = np.linalg.norm(unaffected @ linear @ across, 2, axis=(1, 2))
+    points = np.linalg.norm(linear, axis=(1, 2)) / np.sqrt(3)
+    buffer[:, 4, :3], buffer[:, 5, :3] = heads, along
+    buffer[:, 4, 3] = np.where(along.any(axis=1), stretches, points)
+
+
+def projection(vectors: np.ndarray) -> np.ndarray:
+    """Onto each of vectors [n, 3], float [n, 3, 3]; 0 for a vector without length."""
+    squares = (vectors * vectors).sum(axis=1)[:, None, None]
+    return vectors[:, :, None] * vectors[:, None, :] / np.where(squares > 0, squares, 1)
+
+
+def add_twists(
+    buffer: np.ndarray, twists: Sequence[Twist], angles: np.ndarray, curves: Sequence[float]
+) -> None:
+    """angles: radians, with their amounts."""
+    for number, ((bone, _base, _tip, is_from_parent), angle, curve) in enumerate(
+        zip(twists, angles, curves, strict=True), 1
+    ):
+        if angle != 0.0:
+            buffer[bone, 5, 3] = curve
+            buffer[bone, 6, :3] = (-angle, 0, number) if is_from_parent else (0, angle, number)
+
+
+def twist_angles(motions: np.ndarray, rest: np.ndarray, twists: Sequence[Twist]) -> np.ndarray:
+    """Radians [twists]: the rotation of the tip against the base about the bone's Y axis at rest, which fades where
+    a matrix does not tell which way round the tip went."""
+    if not len(twists):
+        return np.empty(0)
+    bones, bases, tips, _from_parent = np.array(twists).T
+    axes = perpendicular(rest)
+    # A base without volume: its scale is not known.
+    is_flat = np.linalg.det(motions[bases, :3, :3]) == 0
+    of_bases = np.where(is_flat[:, None, None], np.eye(3), motions[bases, :3, :3])
+    relative = np.linalg.inv(of_bases) @ motions[tips, :3, :3] @ rest[tips, :3, :3]
+    q = quaternions(perpendicular(relative) @ axes[tips].swapaxes(1, 2))
+    along = (q[:, :3] * axes[bones, :, 1]).sum(axis=1)
+    angles = 2 * np.arctan2(along, q[:, 3])
+    swings = 2 * np.arccos(np.minimum(np.hypot(along, q[:, 3]), 1))
+    return angles * fade(np.abs(angles)) * fade(swings)
+
+
+def fade(angles: np.ndarray) -> np.ndarray:
+    """From 1 at 150 degrees to 0 at 180."""
+    t = np.clip((np.degrees(angles) - 150) / 30, 0, 1)
+    return 1 - t * t * (3 - 2 * t)

@@ -2,14 +2,16 @@
 // A compute shader; bones and vertices are in buffers. [[vk::binding(n)]] is for Vulkan: leave it out for Direct3D 11.
 #define SINEW_BONES_DECLARED
 [[vk::binding(0)]] StructuredBuffer<float4> bones_of_frame : register(t0);
-#define SINEW_BONE(bone, k) bones_of_frame[4 * (bone) + (k)]
+#define SINEW_BONE(bone, k) bones_of_frame[7 * (bone) + (k)]
 #include "sinew.hlsl"
 
 struct Vertex {
     float3 position;
     float share;
     float3 centre;
-    float padding;
+    float twist;  // how much Twist Spread moves the vertex
+    float bulge;  // the same for Limit Bulge
+    float padding[3];
     uint bones[SINEW_INFLUENCES];
     float weights[SINEW_INFLUENCES];
 };
@@ -22,7 +24,7 @@ struct Skinned {
 [[vk::binding(1)]] StructuredBuffer<Vertex> vertices : register(t1);
 [[vk::binding(2)]] StructuredBuffer<float4> normals : register(t2);
 [[vk::binding(3)]] RWStructuredBuffer<Skinned> skinned : register(u0);
-[[vk::binding(4)]] cbuffer Methods : register(b0) { int method; int second_method; uint count; uint unused; };
+[[vk::binding(4)]] cbuffer Methods : register(b0) { int method; int second_method; uint count; int bulge_form; };
 
 [numthreads(64, 1, 1)]
 void skin(uint3 id : SV_DispatchThreadID) {
@@ -34,7 +36,11 @@ void skin(uint3 id : SV_DispatchThreadID) {
         bones[i] = int(v.bones[i]);
         weights[i] = v.weights[i];
     }
-    float3 position = sinew_mix(method, second_method, v.share, v.position, v.centre, bones, weights);
-    skinned[id.x].position = float4(position, 1.0);
-    skinned[id.x].normal = float4(sinew_normal(normals[id.x].xyz, bones, weights), 0.0);
+    float3 moved = sinew_mix(method, second_method, v.share, v.position, v.centre, bones, weights);
+    float linear_share = sinew_linear_share(method, second_method, v.share);
+    moved = sinew_twist_spread(moved, linear_share, v.twist, v.position, bones, weights);
+    moved = sinew_bulge_limit(moved, bulge_form, v.bulge, v.position, bones, weights);
+    skinned[id.x].position = float4(moved, 1.0);
+    float3 normal = sinew_normal(method, normals[id.x].xyz, bones, weights);
+    skinned[id.x].normal = float4(sinew_twist_normal(normal, v.twist, v.position, bones, weights), 0.0);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Linear blending, dual quaternions, centres of rotation and the painted mix of two, as Sinew computes them in Blender.
+// Linear blending, dual quaternions, centres of rotation, the painted mix of two, and the stages Twist Spread and Limit
+// Bulge, as Sinew computes them in Blender.
 // For HLSL of shader model 5 and later; include this file before your entry points. docs/engines.md has the layout.
 //
 // Points, centres and bones are in one space, that of the armature.
@@ -9,24 +10,30 @@
 #define SINEW_INFLUENCES 4
 #endif
 
-// The bones: four vectors each. 0 to 2 are the rows of the 3x4 matrix that takes the bone's rest pose to its pose; 3 is the
-// rotation in it as a unit quaternion x, y, z, w. Here a buffer, one bone after the other; define SINEW_BONE(bone, k) and
-// SINEW_BONES_DECLARED to read them from elsewhere.
+// The bones: seven vectors each. 0 to 2 are the rows of the 3x4 matrix that takes a bone's rest pose to its pose, 3 is
+// the rotation in it as a unit quaternion x, y, z, w; 4 to 6 are for the stages. Here a buffer, one bone after the
+// other; define SINEW_BONE(bone, k) and SINEW_BONES_DECLARED to read them from elsewhere.
 #ifndef SINEW_BONES_DECLARED
 StructuredBuffer<float4> sinew_bones;
-#define SINEW_BONE(bone, k) sinew_bones[4 * (bone) + (k)]
+#define SINEW_BONE(bone, k) sinew_bones[7 * (bone) + (k)]
 #endif
 
 static const int SINEW_LBS = 0;
 static const int SINEW_DQ = 1;
 static const int SINEW_COR = 2;
+// Added to SINEW_DQ or SINEW_COR: quaternions keep the signs that the buffer has, those of the hierarchy.
+static const int SINEW_HIERARCHY = 4;
 
 // A vertex whose weights have no larger sum stays where it is.
 static const float SINEW_LEAST_WEIGHT = 1e-4;
 
-float3 sinew_moved(int bone, float3 x) {
-    float4 p = float4(x, 1.0);
+// A point by the motion of a bone, where p.w is 1; a vector, where it is 0.
+float3 sinew_by_bone(int bone, float4 p) {
     return float3(dot(SINEW_BONE(bone, 0), p), dot(SINEW_BONE(bone, 1), p), dot(SINEW_BONE(bone, 2), p));
+}
+
+float3 sinew_moved(int bone, float3 x) {
+    return sinew_by_bone(bone, float4(x, 1.0));
 }
 
 float3 sinew_rotate(float4 q, float3 v) {
@@ -39,13 +46,17 @@ float sinew_sum(float weights[SINEW_INFLUENCES]) {
     return sum;
 }
 
-// The rotation of the blend, a unit quaternion: each bone's in the hemisphere of the sum of those before it. That sum never
-// vanishes where a weight is above 0.
-float4 sinew_rotation(int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
+// The weight of a quaternion in a sum: negative where that brings it nearer to the sum so far, unless signs are kept.
+float sinew_signed(float weight, float4 q, float4 sum, bool keeps_signs) {
+    return !keeps_signs && dot(q, sum) < 0.0 ? -weight : weight;
+}
+
+// The rotation of the blend, a unit quaternion.
+float4 sinew_rotation(bool keeps_signs, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
     float4 sum = 0.0;
     for (int i = 0; i < SINEW_INFLUENCES; ++i) {
         float4 q = SINEW_BONE(bones[i], 3);
-        sum += (dot(q, sum) < 0.0 ? -weights[i] : weights[i]) * q;
+        sum += sinew_signed(weights[i], q, sum, keeps_signs) * q;
     }
     return normalize(sum);
 }
@@ -60,14 +71,14 @@ float3 sinew_lbs(float3 x, int bones[SINEW_INFLUENCES], float weights[SINEW_INFL
 }
 
 // Dual quaternions; each bone has the translation that takes x where the whole bone takes it, scale included.
-float3 sinew_dq(float3 x, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
+float3 sinew_dq(bool keeps_signs, float3 x, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
     if (!(sinew_sum(weights) > SINEW_LEAST_WEIGHT)) return x;
     float4 real = 0.0;
     float4 dual = 0.0;
     for (int i = 0; i < SINEW_INFLUENCES; ++i) {
         float4 q = SINEW_BONE(bones[i], 3);
         float3 t = sinew_moved(bones[i], x) - sinew_rotate(q, x);
-        float weight = dot(q, real) < 0.0 ? -weights[i] : weights[i];
+        float weight = sinew_signed(weights[i], q, real, keeps_signs);
         real += weight * q;
         dual += 0.5 * weight * float4(q.w * t + cross(t, q.xyz), -dot(t, q.xyz));
     }
@@ -79,7 +90,8 @@ float3 sinew_dq(float3 x, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLU
 }
 
 // Rotated by the blend about a centre of the vertex's own, which linear blending moves.
-float3 sinew_cor(float3 x, float3 centre, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
+float3 sinew_cor(bool keeps_signs, float3 x, float3 centre, int bones[SINEW_INFLUENCES],
+                 float weights[SINEW_INFLUENCES]) {
     float total = sinew_sum(weights);
     if (!(total > SINEW_LEAST_WEIGHT)) return x;
     float3 from_centre = x - centre;
@@ -88,13 +100,15 @@ float3 sinew_cor(float3 x, float3 centre, int bones[SINEW_INFLUENCES], float wei
         float4 q = SINEW_BONE(bones[i], 3);
         sum += weights[i] * (sinew_moved(bones[i], x) - sinew_rotate(q, from_centre));
     }
-    return sum / total + sinew_rotate(sinew_rotation(bones, weights), from_centre);
+    return sum / total + sinew_rotate(sinew_rotation(keeps_signs, bones, weights), from_centre);
 }
 
 // By a method of these three; lbs and dq do not read the centre.
 float3 sinew_skin(int method, float3 x, float3 centre, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
-    if (method == SINEW_DQ) return sinew_dq(x, bones, weights);
-    if (method == SINEW_COR) return sinew_cor(x, centre, bones, weights);
+    bool keeps_signs = method >= SINEW_HIERARCHY;
+    int blend = keeps_signs ? method - SINEW_HIERARCHY : method;
+    if (blend == SINEW_DQ) return sinew_dq(keeps_signs, x, bones, weights);
+    if (blend == SINEW_COR) return sinew_cor(keeps_signs, x, centre, bones, weights);
     return sinew_lbs(x, bones, weights);
 }
 
@@ -107,7 +121,139 @@ float3 sinew_mix(int first, int second, float share, float3 x, float3 centre, in
 }
 
 // A normal or a tangent, moved by the rotation of the blend: what dq and cor do to it where bones are not scaled.
-float3 sinew_normal(float3 normal, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
+float3 sinew_normal(int method, float3 normal, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
     if (!(sinew_sum(weights) > SINEW_LEAST_WEIGHT)) return normal;
-    return sinew_rotate(sinew_rotation(bones, weights), normal);
+    return sinew_rotate(sinew_rotation(method >= SINEW_HIERARCHY, bones, weights), normal);
+}
+
+// --- Twist Spread, the first stage after the blend: spreads the twist of a bone against the next along the bone.
+// Vector 6 of such a bone has the angle at its head, that at its tail, and a number above those of the bones that carry
+// it; it is 0 for other bones. Vector 5 has the curve between the angles in w.
+
+// How much of a blend is linear.
+float sinew_linear_share(int first, int second, float share) {
+    return lerp(first == SINEW_LBS ? 1.0 : 0.0, second == SINEW_LBS ? 1.0 : 0.0, clamp(share, 0.0, 1.0));
+}
+
+// The place among the influences of the twisted bone with the largest number below `before`; -1 for none.
+int sinew_twisted(float before, int bones[SINEW_INFLUENCES], float weights[SINEW_INFLUENCES]) {
+    int found = -1;
+    float number = 0.0;
+    for (int i = 0; i < SINEW_INFLUENCES; ++i) {
+        float own = SINEW_BONE(bones[i], 6).z;
+        if (weights[i] > 0.0 && own > number && own < before) {
+            found = i;
+            number = own;
+        }
+    }
+    return found;
+}
+
+// The twist of a bone at a rest point.
+float sinew_twist(int bone, float3 x) {
+    float4 along = SINEW_BONE(bone, 5);
+    float2 angles = SINEW_BONE(bone, 6).xy;
+    float share = clamp(dot(x - SINEW_BONE(bone, 4).xyz, along.xyz) / dot(along.xyz, along.xyz), 0.0, 1.0);
+    return lerp(angles.x, angles.y, share + along.w * share * (1.0 - share));
+}
+
+// The direction of a posed bone, about which it twists; 0 where it has none.
+float3 sinew_posed_axis(int bone) {
+    float3 axis = sinew_by_bone(bone, float4(SINEW_BONE(bone, 5).xyz, 0.0));
+    float volume = dot(SINEW_BONE(bone, 0).xyz, cross(SINEW_BONE(bone, 1).xyz, SINEW_BONE(bone, 2).xyz));
+    float size = length(axis) * (volume < 0.0 ? -1.0 : 1.0);
+    return size == 0.0 ? axis : axis / size;
+}
+
+// What a rotation about an axis adds to a vector.
+float3 sinew_spun(float3 axis, float angle, float3 v) {
+    float3 across = cross(axis, v);
+    return sin(angle) * across + (1.0 - cos(angle)) * cross(axis, across);
+}
+
+// moved         by the blend
+// linear_share  of sinew_linear_share()
+// amount        of the vertex, 0 to 1
+// x             at rest
+float3 sinew_twist_spread(float3 moved, float linear_share, float amount, float3 x, int bones[SINEW_INFLUENCES],
+                          float weights[SINEW_INFLUENCES]) {
+    float total = sinew_sum(weights);
+    if (!(amount > 0.0 && total > SINEW_LEAST_WEIGHT)) return moved;
+    int i = sinew_twisted(1e9, bones, weights);
+    while (i >= 0) {
+        int bone = bones[i];
+        float weight = weights[i] / total;
+        float angle = amount * sinew_twist(bone, x);
+        float3 head = SINEW_BONE(bone, 4).xyz;
+        float3 axis = sinew_posed_axis(bone);
+        // Linear: by the bone's matrix after a rotation at rest. Other blends are rotated about the posed bone; where
+        // it is scaled, they keep its scaled shape.
+        float3 own = sinew_by_bone(bone, float4(sinew_spun(normalize(SINEW_BONE(bone, 5).xyz), angle, x - head), 0.0));
+        float3 by = sinew_spun(axis, weight * angle, moved - sinew_moved(bone, head));
+        by += weight * (own - sinew_spun(axis, angle, sinew_by_bone(bone, float4(x - head, 0.0))));
+        moved += lerp(dot(axis, axis) > 0.0 ? by : float3(0.0, 0.0, 0.0), weight * own, linear_share);
+        i = sinew_twisted(SINEW_BONE(bone, 6).z, bones, weights);
+    }
+    return moved;
+}
+
+// The same rotations for a normal or a tangent, after sinew_normal().
+float3 sinew_twist_normal(float3 normal, float amount, float3 x, int bones[SINEW_INFLUENCES],
+                          float weights[SINEW_INFLUENCES]) {
+    float total = sinew_sum(weights);
+    if (!(amount > 0.0 && total > SINEW_LEAST_WEIGHT)) return normal;
+    int i = sinew_twisted(1e9, bones, weights);
+    while (i >= 0) {
+        float angle = amount * sinew_twist(bones[i], x);
+        normal += sinew_spun(sinew_posed_axis(bones[i]), weights[i] / total * angle, normal);
+        i = sinew_twisted(SINEW_BONE(bones[i], 6).z, bones, weights);
+    }
+    return normal;
+}
+
+// --- Limit Bulge, the next stage: moves a vertex of several bones back where it is farther from them than at rest.
+// Vector 4 of a bone is its head at rest, vector 5 goes from there to its tail; 4 has in w how much the motion of the
+// bone stretches what is across it.
+
+static const int SINEW_CONTINUOUS = 0;
+static const int SINEW_KIM_HAN = 1;
+
+// From a point to the nearest of a segment.
+float3 sinew_to_segment(float3 head, float3 along, float3 p) {
+    float squared = dot(along, along);
+    float share = squared > 0.0 ? clamp(dot(p - head, along) / squared, 0.0, 1.0) : 0.0;
+    return head + share * along - p;
+}
+
+// moved   by what came before
+// form    SINEW_CONTINUOUS, or SINEW_KIM_HAN for the distance to the heaviest bone alone
+// amount  strength times that of the vertex, 0 to 1
+// x       at rest
+float3 sinew_bulge_limit(float3 moved, int form, float amount, float3 x, int bones[SINEW_INFLUENCES],
+                         float weights[SINEW_INFLUENCES]) {
+    float total = sinew_sum(weights);
+    if (!(amount > 0.0 && total > SINEW_LEAST_WEIGHT)) return moved;
+    int heaviest = 0;
+    int count = 0;
+    for (int i = 0; i < SINEW_INFLUENCES; ++i) {
+        if (weights[i] > weights[heaviest]) heaviest = i;
+        if (weights[i] > 0.0) ++count;
+    }
+    if (count < 2) return moved;
+    float3 to_bones = 0.0;
+    float at_rest = 0.0;
+    float stretch = 0.0;
+    for (int i = 0; i < SINEW_INFLUENCES; ++i) {
+        float weight = form == SINEW_KIM_HAN ? (i == heaviest ? 1.0 : 0.0) : weights[i] / total;
+        float4 head = SINEW_BONE(bones[i], 4);
+        float3 along = SINEW_BONE(bones[i], 5).xyz;
+        float3 posed = sinew_by_bone(bones[i], float4(along, 0.0));
+        to_bones += weight * sinew_to_segment(sinew_moved(bones[i], head.xyz), posed, moved);
+        at_rest += weight * length(sinew_to_segment(head.xyz, along, x));
+        stretch += weight * head.w;
+    }
+    // Rounding leaves the rest pose as it is.
+    float allowed = 1.000001 * at_rest * stretch;
+    float now = length(to_bones);
+    return now > allowed ? moved + amount * (1.0 - allowed / now) * to_bones : moved;
 }

@@ -13,11 +13,14 @@ import methods as reader_methods
 import numpy as np
 import pytest
 import skin as reader
-from bone_buffer import bone_buffer
+import stages as reader_stages
+from bone_buffer import add_segments, add_twists, bone_buffer, twist_angles
 from conftest import REPOSITORY
 
 GOLDEN, SHADERS = REPOSITORY / "tests" / "golden", REPOSITORY / "shaders"
-METHODS = {"lbs": 0, "dq": 1, "cor": 2}
+METHODS = {"lbs": 0, "dq": 1, "cor": 2, "hierarchy": 4}
+FORMS = ["continuous", "kim_han"]
+STAGES = ["mix", "twist_spread", "bulge_limit"]
 TOLERANCE = 1e-5
 MOST = 8
 
@@ -31,26 +34,58 @@ class Mesh:
         to = self.case["armature_from_mesh"]
         self.points = reader.moved_by(to, self.case["points"])
         self.centres = reader.moved_by(to, self.case["data_cor"])
-        self.shares = self.case["painted"]
+        self.painted = self.case["painted"]
         self.bones = np.zeros((len(self.points), MOST), np.uint32)
         self.weights = np.zeros((len(self.points), MOST), np.float32)
         for vertex, point in enumerate(self.points):
             of, weights = stored_influences(self.case, vertex, point)
             self.bones[vertex, : len(of)], self.weights[vertex, : len(of)] = of, weights
-        self.palette = bone_buffer(self.case["posed"], self.case["rest"])
         normals = np.random.default_rng(1).normal(size=self.points.shape)
         self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         self.tolerance = TOLERANCE * np.linalg.norm(np.ptp(self.case["points"], axis=0))
 
-    def expected_normals(self):
-        pose = reader.bones(self.case)
-        result = self.normals.copy()
+    def palette(self, result):
+        """The buffer of bones; a joint of a bendy bone has the segments beside it."""
+        rest, parents = self.case["rest"], self.case["parents"]
+        buffer = bone_buffer(self.case["posed"], rest, parents)
+        add_segments(buffer, *reader_stages.segments(self.case))
+        # The chain's last bone has nothing to share; bendy bones spread their roll themselves.
+        twists = [(bone, bone, bone + 1, False) for bone in np.flatnonzero(self.case["segments"][:-1] == 1)]
+        angles = twist_angles(self.case["posed"] @ np.linalg.inv(rest), rest, twists)
+        amount = result["stages"].get("twist_spread", {}).get("amount", 0.0)
+        add_twists(buffer, twists, amount * angles, [0.0] * len(twists))
+        return buffer
+
+    def amounts(self, result):
+        """Of each vertex: the share of the second method, of Twist Spread, of Limit Bulge."""
+        strengths = [result["stages"].get(name, {}).get("strength", 1.0) for name in STAGES]
+        return [
+            self.painted * strength if name in result["stages"] else 0.0 * self.painted
+            for name, strength in zip(STAGES, strengths, strict=True)
+        ]
+
+    def expected_normals(self, result):
+        """By the rotation of the blend, then by the twists about the posed bones."""
+        pose, rest = reader.bones(self.case), self.case["rest"]
+        found = self.normals.copy()
+        buffer, twist = self.palette(result), self.amounts(result)[1]
+        signs = result["parameters"].get("signs", "blender")
         for vertex, point in enumerate(self.points):
             of, weights = reader.influences(self.case, vertex, point)
-            if len(of):
-                q = reader_methods.blended(pose.quaternion[of], weights)
-                result[vertex] = reader_methods.rotation_of(q) @ self.normals[vertex]
-        return result
+            if not len(of):
+                continue
+            q = weights @ reader_methods.signed(of, weights, pose, signs)
+            found[vertex] = reader_methods.rotation_of(q) @ found[vertex]
+            for bone in sorted(of, key=lambda bone: -buffer[bone, 6, 2]):
+                at_head, at_tail, number, _unused = buffer[bone, 6]
+                if number:
+                    head, along = rest[bone][:3, 3], buffer[bone, 5, :3].astype(np.float64)
+                    share = np.clip((point - head) @ along / (along @ along), 0.0, 1.0)
+                    axis = pose.motion[bone][:3, :3] @ along
+                    axis *= np.sign(np.linalg.det(pose.motion[bone][:3, :3])) / np.linalg.norm(axis)
+                    angle = weights[of == bone].sum() * twist[vertex] * (at_head + share * (at_tail - at_head))
+                    found[vertex] = reader_stages.turned(axis, angle, found[vertex])
+        return found
 
     def assert_is(self, result, armature_points):
         points = reader.moved_by(np.linalg.inv(self.case["armature_from_mesh"]), armature_points)
@@ -69,16 +104,16 @@ def stored_influences(case, vertex, point):
 
 
 def is_for_shaders(result):
-    if result["parameters"].get("signs", "blender") != "blender":
-        return False
-    mixed = [values["method"] for values in result["stages"].values() if "method" in values]
-    return {result["method"], *mixed} <= set(METHODS) and set(result["stages"]) <= {"mix"}
+    return {result["method"], *mixed_methods(result)} <= set(METHODS) and {*result["stages"]} <= {*STAGES}
 
 
 def numbers(result):
-    """The method and the second one."""
+    """The method, the second one, and the form of Limit Bulge."""
     first = METHODS[result["method"]]
-    return first, METHODS[result["stages"]["mix"]["method"]] if result["stages"] else first
+    if result["parameters"].get("signs") == "hierarchy":
+        first += METHODS["hierarchy"]
+    second = [METHODS[name] for name in mixed_methods(result)] or [first]
+    return first, *second, FORMS.index(result["stages"].get("bulge_limit", {}).get("form", FORMS[0]))
 
 
 def glsl(name):
@@ -128,7 +163,6 @@ def test_glsl_vertex_shader(gl, mesh):
         "position": (mesh.points, "3f"),
         "normal": (mesh.normals, "3f"),
         "centre": (mesh.centres, "3f"),
-        "share": (mesh.shares, "1f"),
         "joints": (mesh.bones[:, :4], "4u"),
         "weights": (mesh.weights[:, :4], "4f"),
     }
@@ -136,39 +170,42 @@ def test_glsl_vertex_shader(gl, mesh):
         (gl.buffer(np.ascontiguousarray(values, np.uint32 if kind == "4u" else np.float32)), kind, name)
         for name, (values, kind) in attributes.items()
     ]
-    vertices = gl.vertex_array(program, content)
-    bones = gl.texture((4, len(mesh.palette)), 4, mesh.palette.tobytes(), dtype="f4")
+    amounts = gl.buffer(reserve=12 * len(mesh.points))
+    vertices = gl.vertex_array(program, [*content, (amounts, "1f 2f", "share", "stages")])
+    bones = gl.texture((7, len(mesh.case["rest"])), 4, dtype="f4")
     bones.use(0)
     program["sinew_bones"] = 0
     program["clip_from_armature"].write(np.eye(4, dtype=np.float32).tobytes())
     out = gl.buffer(reserve=24 * len(mesh.points))
     for result in mesh.results:
-        program["method"], program["second_method"] = numbers(result)
+        program["method"], program["second_method"], program["bulge_form"] = numbers(result)
+        amounts.write(np.column_stack(mesh.amounts(result)).astype(np.float32).tobytes())
+        bones.write(mesh.palette(result).tobytes())
         vertices.transform(out, mode=gl.POINTS)
         points, normals = np.frombuffer(out.read(), np.float32).reshape(-1, 2, 3).swapaxes(0, 1)
         mesh.assert_is(result, points)
-        assert np.abs(normals - mesh.expected_normals()).max() < 1e-5
+        assert np.abs(normals - mesh.expected_normals(result)).max() < 1e-5
 
 
-def packed(mesh, influences):
-    """float32 words of the struct Vertex of the compute shaders, [vertices, 8 + 2 * influences]."""
-    words = np.zeros((len(mesh.points), 8 + 2 * influences), np.float32)
-    words[:, :3], words[:, 3], words[:, 4:7] = mesh.points, mesh.shares, mesh.centres
-    words[:, 8 : 8 + influences] = mesh.bones[:, :influences].view(np.float32)
-    words[:, 8 + influences :] = mesh.weights[:, :influences]
+def packed(mesh, influences, result):
+    """float32 words of the struct Vertex of the compute shaders, [vertices, 12 + 2 * influences]."""
+    words = np.zeros((len(mesh.points), 12 + 2 * influences), np.float32)
+    words[:, :3], words[:, 4:7] = mesh.points, mesh.centres
+    words[:, 3], words[:, 7], words[:, 8] = mesh.amounts(result)
+    words[:, 12 : 12 + influences] = mesh.bones[:, :influences].view(np.float32)
+    words[:, 12 + influences :] = mesh.weights[:, :influences]
     return words
 
 
 def test_glsl_compute_shader(gl, mesh):
     shader = gl.compute_shader(glsl("example.comp"))
-    vertices = packed(mesh, MOST)
-    out = gl.buffer(reserve=16 * len(vertices))
-    gl.buffer(mesh.palette).bind_to_storage_buffer(0)
-    gl.buffer(vertices).bind_to_storage_buffer(1)
+    out = gl.buffer(reserve=16 * len(mesh.points))
     out.bind_to_storage_buffer(2)
     for result in mesh.results:
-        shader["method"], shader["second_method"] = numbers(result)
-        shader.run(group_x=-(-len(vertices) // 64))
+        gl.buffer(mesh.palette(result)).bind_to_storage_buffer(0)
+        gl.buffer(packed(mesh, MOST, result)).bind_to_storage_buffer(1)
+        shader["method"], shader["second_method"], shader["bulge_form"] = numbers(result)
+        shader.run(group_x=-(-len(mesh.points) // 64))
         mesh.assert_is(result, np.frombuffer(out.read(), np.float32).reshape(-1, 4)[:, :3])
 
 
@@ -182,10 +219,11 @@ def skinned(gpu, module, mesh, influences):
     normals = np.column_stack([mesh.normals, np.zeros(count)]).astype(np.float32)
     out = gpu.create_buffer(size=32 * count, usage=storage | wgpu.BufferUsage.COPY_SRC)
     for result in mesh.results:
-        chosen = np.array([*numbers(result), count, 0], np.uint32)
+        first, second, form = numbers(result)
+        chosen = np.array([first, second, count, form], np.uint32)
         buffers = [
-            gpu.create_buffer_with_data(data=mesh.palette, usage=storage),
-            gpu.create_buffer_with_data(data=packed(mesh, influences), usage=storage),
+            gpu.create_buffer_with_data(data=mesh.palette(result), usage=storage),
+            gpu.create_buffer_with_data(data=packed(mesh, influences, result), usage=storage),
             gpu.create_buffer_with_data(data=normals, usage=storage),
             out,
             gpu.create_buffer_with_data(data=chosen, usage=wgpu.BufferUsage.UNIFORM),
@@ -233,25 +271,26 @@ def hlsl(gpu, influences):
 def test_compute_shader(gpu, mesh, made, influences):
     for result, (points, normals) in skinned(gpu, made(gpu, influences), mesh, influences):
         mesh.assert_is(result, points)
-        assert np.abs(normals - mesh.expected_normals()).max() < 1e-5
+        assert np.abs(normals - mesh.expected_normals(result)).max() < 1e-5
 
 
 def test_each_method_is_tested(mesh):
     used = {name for result in mesh.results for name in (result["method"], *mixed_methods(result))}
-    assert used == set(METHODS)
-    assert any(result["stages"] for result in mesh.results)
+    used |= {signs for result in mesh.results for signs in result["parameters"].values()}
+    assert used == {*METHODS, "blender"}
+    assert {name for result in mesh.results for name in result["stages"]} == {*STAGES}
 
 
 def mixed_methods(result):
-    return [values["method"] for values in result["stages"].values()]
+    return [values["method"] for values in result["stages"].values() if "method" in values]
 
 
 @pytest.mark.parametrize(
     ("name", "pattern"),
     [
-        ("sinew.glsl", r"const int SINEW_(LBS|DQ|COR) = (\d);"),
-        ("sinew.hlsl", r"const int SINEW_(LBS|DQ|COR) = (\d);"),
-        ("sinew.wgsl", r"const SINEW_(LBS|DQ|COR): u32 = (\d)u;"),
+        ("sinew.glsl", r"const int SINEW_(LBS|DQ|COR|HIERARCHY) = (\d);"),
+        ("sinew.hlsl", r"const int SINEW_(LBS|DQ|COR|HIERARCHY) = (\d);"),
+        ("sinew.wgsl", r"const SINEW_(LBS|DQ|COR|HIERARCHY): u32 = (\d)u;"),
     ],
 )
 def test_methods_have_the_same_numbers_everywhere(name, pattern):
