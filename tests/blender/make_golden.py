@@ -42,7 +42,7 @@ METHOD_VALUES: dict[str, dict[str, Value]] = {"ddm": {"radius": 0.3}}
 # For each stage: the methods before it, and its parameters except choices.
 STAGE_VALUES: dict[str, list[tuple[str, dict[str, Value]]]] = {
     "mix": [(a, {"method": b, "group": GROUP}) for a, b in (("lbs", "dq"), ("dq", "cor"), ("cor", "lbs"))],
-    "twist_spread": [("lbs", {"amount": 0.9, "group": GROUP})],
+    "twist_spread": [(method, {"amount": 0.9, "group": GROUP}) for method in ("lbs", "dq")],
     "bulge_limit": [("dq", {"strength": 0.8, "group": GROUP})],
     "delta_mush": [("lbs", {"iterations": 4, "factor": 0.6, "scale": 0.9, "group": GROUP})],
 }

@@ -137,7 +137,8 @@ def result_of(case, result):
 
     points = skin(case, result["method"], result["parameters"])
     for stage, values in result["stages"].items():
-        points = getattr(stages, stage)(case, points, **values)
+        after = {"is_linear": result["method"] == "lbs"} if stage == "twist_spread" else {}
+        points = getattr(stages, stage)(case, points, **values, **after)
     return points
 
 

@@ -37,19 +37,27 @@ def turned(axis, angle, arm):
     return arm + np.sin(angle) * across + (1 - np.cos(angle)) * np.cross(axis, across)
 
 
-def twist_spread(case, points, amount, group):  # after linear blending
-    to, motion, result = case["armature_from_mesh"], skin.bones(case).motion, points.copy()
-    for bone in np.flatnonzero(case["segments"][:-1] == 1):
-        rest, length = case["rest"][bone], case["lengths"][bone]
+def twist_spread(case, points, amount, group, is_linear):  # is_linear: after linear blending
+    to, motion = case["armature_from_mesh"], skin.bones(case).motion
+    result, at_rest = skin.moved_by(to, points), skin.moved_by(to, case["points"])
+    for bone in np.flatnonzero(case["segments"][:-1] == 1)[::-1]:  # those that others carry first
+        rest, length, linear = case["rest"][bone], case["lengths"][bone], motion[bone][:3, :3]
         head, axis = rest[:3, 3], rest[:3, 1] / np.linalg.norm(rest[:3, 1])
-        angle = twist_of(motion[bone], motion[bone + 1], case["rest"][bone + 1], axis)
-        for v, x in enumerate(skin.moved_by(to, case["points"])):
+        posed_head = skin.moved_by(motion[bone], head)
+        posed_axis = unit(np.sign(np.linalg.det(linear)) * linear @ axis)
+        twist = twist_of(motion[bone], motion[bone + 1], case["rest"][bone + 1], axis)
+        for v, x in enumerate(at_rest):
             of, w = skin.influences(case, v, x)
-            share = np.clip((x - head) @ axis / length, 0, 1) * amount * np.clip(case[group][v], 0, 1)
-            change = turned(axis, share * angle, x - head) - (x - head)
-            by = w[of == bone].sum() * motion[bone][:3, :3] @ change
-            result[v] += np.linalg.inv(to[:3, :3]) @ by
-    return result
+            weight, arm = w[of == bone].sum(), x - head
+            share = np.clip(arm @ axis / length, 0, 1) * amount * np.clip(case[group][v], 0, 1)
+            alone = linear @ turned(axis, share * twist, arm)  # a vertex of this bone alone
+            if is_linear:
+                result[v] += weight * (alone - linear @ arm)
+                continue
+            scaled = alone - turned(posed_axis, share * twist, linear @ arm)  # 0 where the bone is not
+            from_head = result[v] - posed_head
+            result[v] = posed_head + turned(posed_axis, weight * share * twist, from_head) + weight * scaled
+    return skin.moved_by(np.linalg.inv(to), result)
 
 
 # --- Limit Bulge
