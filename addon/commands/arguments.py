@@ -112,9 +112,9 @@ def add_viewer(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--viewer", type=page, metavar="PAGE.html", help=text)
 
 
-def check_viewer(args: argparse.Namespace) -> None:
-    if args.viewer is not None and len(args.files) > 1:
-        raise WrongUse(f"{args.viewer}: --viewer writes the page of a single file")
+def check_viewer(page: Path | None, files: int) -> None:
+    if page is not None and files > 1:
+        raise WrongUse(f"{page}: --viewer writes the page of a single file")
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The common part of `sinew reskin` and `sinew restore`: inputs, workers, journal, progress, report."""
+"""The common part of `sinew reskin`, `restore` and `flex`: inputs, workers, journal, progress, report."""
 
 import argparse
 import hashlib
@@ -8,10 +8,14 @@ import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Collection, Generator
+from collections.abc import Callable, Collection, Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import TypeAlias
+
+import sinew
 
 from ..blender_process import Limits
 from ..core.errors import SinewError, WrongUse
@@ -20,9 +24,13 @@ from ..jobs.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..jobs.job_file import JobFile, Settings, read_job_file
 from ..jobs.journal import Journal, is_complete
 from ..jobs.report import PICTURES, write_report
-from ..jobs.workers import run_here, run_on_this_machine
+from ..jobs.workers import run_here, run_on_this_machine, versions
 from .arguments import count, seconds
 from .console import BatchProgress, Console
+
+
+# Seconds for a file, with its pictures.
+TIMEOUT = 1800
 
 
 @dataclass(frozen=True)
@@ -44,13 +52,7 @@ class Action:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "inputs",
-        nargs="*",
-        metavar="INPUT",
-        help="a file, a folder (all .blend files below it), a pattern such as 'chars/**/*.blend', or - for a "
-        "list of paths on standard input",
-    )
+    add_inputs(parser, "*")
     parser.add_argument(
         "--out", type=folder_to_write, metavar="DIR", help="folder for copies, journal and report"
     )
@@ -61,15 +63,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="only objects, or collections, of this name or pattern",
     )
     parser.add_argument("--exclude", action="append", metavar="NAME", help="but not these")
-    parser.add_argument("--resume", action="store_true", help="do only what is missing or has changed")
     parser.add_argument("--overwrite", action="store_true", help="replace copies that are there already")
+    add_workers(parser, TIMEOUT)
+
+
+def add_inputs(parser: argparse.ArgumentParser, number: str) -> None:
+    parser.add_argument(
+        "inputs",
+        nargs=number,
+        metavar="INPUT",
+        help="a file, a folder (all .blend files below it), a pattern such as 'chars/**/*.blend', or - for a "
+        "list of paths on standard input",
+    )
+
+
+def listed(inputs: Collection[str]) -> Iterable[str]:
+    """The paths in standard input, which need not be valid text, where the inputs name it."""
+    return map(os.fsdecode, sys.stdin.buffer) if STANDARD_INPUT in inputs else ()
+
+
+def add_workers(parser: argparse.ArgumentParser, timeout: int) -> None:
+    parser.add_argument("--resume", action="store_true", help="do only what is missing or has changed")
     parser.add_argument("--jobs", type=count, metavar="N", help="Blenders at a time (default: one a core)")
     parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="work on this dask cluster instead")
     parser.add_argument(
         "--timeout",
         type=seconds,
         metavar="SECONDS",
-        help="how long one file may take (default: 1800; 0: any time)",
+        help=f"how long one file may take (default: {timeout}; 0: any time)",
     )
     parser.add_argument(
         "--memory",
@@ -88,9 +109,7 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     if out is None:
         raise WrongUse("no --out: name a folder for the copies")
     out = Path(os.path.abspath(out))
-    # Paths in standard input need not be valid text.
-    lines = map(os.fsdecode, sys.stdin.buffer) if STANDARD_INPUT in inputs else ()
-    jobs = plan_jobs(inputs, out, lines)
+    jobs = plan_jobs(inputs, out, listed(inputs))
     given = Settings(
         include=tuple(args.include) if args.include else None,
         exclude=tuple(args.exclude) if args.exclude else None,
@@ -102,78 +121,124 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     for rule in job_file.files:
         if not any(rule.matches(job.source) for job in jobs):
             console.note(f"{action.job}:{rule.line}: no file matches {', '.join(rule.match)}")
-    workers = _Workers(args, len(jobs), console)
+    workers = Workers(args, len(jobs), console, TIMEOUT)
 
     started = time.monotonic()
+    results: dict[str, dict] = {}
     with Journal(out) as journal:
-        journal.recover()
-        journal.remove_unfinished(job.target for job in jobs)
-        tasks, results = [], {}
-        for job, wanted in zip(jobs, settings, strict=True):
-            task = _task(args, action, job, wanted, journal)
-            try:
-                task["known"] = _known(args, task, job, journal)
-                tasks.append(task)
-            except SinewError as error:
-                results[job.target] = {"error": str(error)}
-                console.complain(error)
-        try:
-            with (
-                console.batch(f"{action.command} {len(jobs)} files", len(jobs)) as progress,
-                closing(workers.run(tasks)) as outcomes,
-            ):
-                progress.done = len(results)
-                progress.failed = len(results)
-                for task, outcome in outcomes:
-                    result = _keep(journal, task, outcome)
-                    results[Path(task["target"])] = result
-                    _show_result(console, progress, task, result)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(
-                f"{len(results)} of {len(jobs)} files are done; --resume does the others"
-            ) from None
-        finally:
-            journal.remove_unfinished(job.target for job in jobs)
+        tasks = [
+            _task(args, action, job, wanted, journal) for job, wanted in zip(jobs, settings, strict=True)
+        ]
+        showing = Showing(partial(_show_result, console))
+        do_all(args, console, journal, tasks, workers.run, showing, results)
         seconds = time.monotonic() - started
-        rows = [_row(job, journal.name_of(job.target), results[job.target]) for job in jobs]
+        rows = [_row(job, journal.name_of(job.target), results[str(job.target)]) for job in jobs]
         summary = _summary(action, rows, seconds)
         report = write_report(out, summary, rows)
     return _conclude(console, action, rows, summary, report)
 
 
-class _Workers:
-    """The workers of a batch; the constructor checks the options before any work starts."""
+Outcomes: TypeAlias = Generator[tuple[dict, dict], None, None]
+"""Tasks with their outcomes, in the order in which they end."""
 
-    def __init__(self, args: argparse.Namespace, files: int, console: Console) -> None:
+
+@dataclass(frozen=True)
+class Showing:
+    """What a command shows of a batch.
+
+    show         called with each task and its record
+    is_complete  whether a record has all that is reported
+    counted      what show() counts
+    rest         is said of the other files where the user interrupts it
+    """
+
+    show: Callable[[BatchProgress, dict, dict], None]
+    is_complete: Callable[[dict], bool] = is_complete
+    counted: str = "meshes"
+    rest: str = "; --resume does the others"
+
+
+def do_all(
+    args: argparse.Namespace,
+    console: Console,
+    journal: Journal,
+    tasks: Sequence[dict],
+    run: Callable[[list[dict], BatchProgress], Outcomes],
+    showing: Showing,
+    results: dict[str, dict],
+) -> None:
+    """Does those of the tasks that are not done yet.
+
+    tasks    all of one command, as of jobs.workers without "known"
+    results  gets the record of each task by its target, also where the user interrupts it
+    """
+    targets = [Path(task["target"]) for task in tasks]
+    journal.recover()
+    journal.remove_unfinished(targets)
+    left = []
+    for task, target in zip(tasks, targets, strict=True):
+        try:
+            left.append({**task, "known": _known(args, task, target, journal, showing.is_complete)})
+        except SinewError as error:
+            results[task["target"]] = {"error": str(error)}
+            console.complain(error)
+    command, count = tasks[0]["command"], len(tasks)
+    try:
+        with (
+            console.batch(f"{command} {count} file{'s' * (count > 1)}", count, showing.counted) as progress,
+            closing(run(left, progress)) as outcomes,
+        ):
+            progress.done = len(results)
+            progress.failed = len(results)
+            for task, outcome in outcomes:
+                result = _keep(journal, task, outcome)
+                results[task["target"]] = result
+                showing.show(progress, task, result)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{len(results)} of {count} files are done{showing.rest}") from None
+    finally:
+        journal.remove_unfinished(targets)
+
+
+class Workers:
+    """The workers of a batch; the constructor checks the options before any work starts.
+
+    timeout  seconds for each file, where the user gives none
+    apart    within Blender, too, files are opened in a Blender of their own, and in several for --jobs
+    """
+
+    def __init__(
+        self, args: argparse.Namespace, files: int, console: Console, timeout: int, apart: bool = False
+    ) -> None:
         self._args, self._console = args, console
         bpy = sys.modules.get("bpy")
         self._inside_blender = bpy is not None and bool(bpy.app.binary_path)
+        self._apart = apart
         if self._inside_blender:
-            for option in ("scheduler", "timeout", "memory"):
+            for option in ("scheduler", "memory", *(["timeout"] * (not apart))):
                 if getattr(args, option) is not None:
                     raise WrongUse(_needs_python(f"--{option}"))
-            if args.jobs is not None and args.jobs > 1:
+            if args.jobs is not None and args.jobs > 1 and not apart:
                 raise WrongUse(_needs_python("--jobs"))
-            return
         if args.scheduler is not None and args.jobs is not None:
             raise WrongUse("--jobs and --scheduler: the cluster's workers decide how many Blenders it runs")
-        self._jobs = min(args.jobs or os.cpu_count() or 1, files)
+        self._jobs = min(args.jobs or (not self._inside_blender and os.cpu_count()) or 1, files)
         self._limits = Limits(
-            timeout=1800.0 if args.timeout is None else args.timeout,
+            timeout=timeout if args.timeout is None else args.timeout,
             memory=self._memory(args.memory),
             # More threads would only wait for each other.
             threads=0 if args.scheduler is not None else max(1, _processors() // self._jobs),
             verbose=console.verbose,
         )
 
-    def run(self, tasks: list[dict]) -> Generator[tuple[dict, dict], None, None]:
-        if not tasks or self._inside_blender:
+    def run(self, tasks: list[dict], _progress: BatchProgress) -> Outcomes:
+        if not tasks or (self._inside_blender and not self._apart):
             from .. import worker
             from ..prepare import prepare_blender
 
             if tasks:
                 prepare_blender()
-            return run_here(tasks, lambda task: worker.run(task, lambda _doing: None), _versions)
+            return run_here(tasks, lambda task: worker.run(task, lambda _doing: None), self.versions)
         if self._args.scheduler is not None:
             try:
                 from ..jobs.dask_cluster import run_in_dask
@@ -181,11 +246,19 @@ class _Workers:
                 raise SinewError("--scheduler needs dask: pip install 'sinew-blender[cluster]'") from None
 
             return run_in_dask(tasks, self._limits, self._args.scheduler, self._console.complain)
-        return run_on_this_machine(tasks, self._limits, self._jobs)
+        return run_on_this_machine(tasks, self._limits, self._jobs, self.versions)
+
+    def versions(self) -> dict[str, str]:
+        """Of this Python, or of this Blender."""
+        if not self._inside_blender:
+            return versions()
+        import bpy
+
+        return {"sinew": sinew.__version__, "blender": bpy.app.version_string}
 
     def _memory(self, text: str | None) -> int:
         if text is None:
-            if self._args.scheduler is not None:
+            if self._args.scheduler is not None or self._inside_blender:
                 return 0
             import psutil
 
@@ -209,19 +282,13 @@ def _needs_python(option: str) -> str:
     )
 
 
-def _versions() -> dict[str, str]:
-    import bpy
-    import sinew
-
-    return {"sinew": sinew.__version__, "blender": bpy.app.version_string}
-
-
 def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings, journal: Journal) -> dict:
     name = hashlib.blake2b(os.fsencode(journal.name_of(job.target)), digest_size=8).hexdigest()
     return {
         "command": action.command,
         "source": str(job.source),
         "target": str(job.target),
+        "writes": True,
         "settings": settings.as_task(),
         "frames": args.frames,
         "pictures": str(journal.out / PICTURES / name) if args.pictures else None,
@@ -229,17 +296,21 @@ def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings
     }
 
 
-def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> dict | None:
+def _known(
+    args: argparse.Namespace,
+    task: dict,
+    target: Path,
+    journal: Journal,
+    is_complete: Callable[[dict], bool],
+) -> dict | None:
     """Returns the hash and the versions with which the copy is up to date; None where it has to be written.
     Raises SinewError where it must not be replaced."""
-    record = journal.latest.get(journal.name_of(job.target))
-    may_react = journal.matches(job.target, record)
-    if job.target.exists() and not args.overwrite and not (args.resume and may_react):
+    record = journal.latest.get(journal.name_of(target))
+    may_react = journal.matches(target, record)
+    if task["writes"] and target.exists() and not args.overwrite and not (args.resume and may_react):
         if args.resume and record is not None:
-            raise SinewError(f"{job.target}: was changed since it was written; use --overwrite to replace it")
-        raise SinewError(
-            f"{job.target}: is there already; use --overwrite to replace it, or --resume to go on"
-        )
+            raise SinewError(f"{target}: was changed since it was written; use --overwrite to replace it")
+        raise SinewError(f"{target}: is there already; use --overwrite to replace it, or --resume to go on")
     same = ("command", "source", "settings")
     if record is None or not args.resume or not may_react or "error" in record:
         return None
@@ -259,6 +330,8 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
         _record_failure(journal, target, record, before)
         return record
     journal.record(target, record)
+    if not task["writes"]:
+        return record
     try:
         with writing(target):
             journal.finish(target, record)

@@ -84,7 +84,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     characters.set_parameters(args.set)
     if args.out is None and args.viewer is None:
         raise WrongUse("expected --out, --viewer or both")
-    check_viewer(args)
+    check_viewer(args.viewer, len(args.files))
     if args.out is not None:
         require_jinja()
     frames = parse_frames(args.frames) if args.frames is not None else None

@@ -110,10 +110,13 @@ class Console:
             raise SinewError(f"standard output: can not be written: {error.strerror or error}") from None
 
     @contextmanager
-    def batch(self, what: str, total: int) -> Iterator[BatchProgress]:
+    def batch(self, what: str, total: int, counted: str) -> Iterator[BatchProgress]:
         """Shows the progress of a batch of `total` files: a bar on a terminal, a line for each file
-        elsewhere."""
-        with self._live(what, _columns_of_batch, total=total, meshes=0, failed=0) as update:
+        elsewhere.
+
+        counted  what is counted beside files, such as "meshes"
+        """
+        with self._live(what, partial(_columns_of_batch, counted), total=total, number=0, failed=0) as update:
             yield BatchProgress(self, total, update)
 
     @contextmanager
@@ -134,7 +137,7 @@ class Console:
                 self._has_bar = False
 
 
-def _columns_of_batch() -> tuple:
+def _columns_of_batch(counted: str) -> tuple:
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     return (
@@ -142,7 +145,7 @@ def _columns_of_batch() -> tuple:
         # Leaves space for a terminal's ^C in 80 columns: if that wraps, the bar is drawn twice.
         BarColumn(bar_width=20),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[meshes]} meshes, {task.fields[failed]} failed"),
+        TextColumn(f"{{task.fields[number]}} {counted}, {{task.fields[failed]}} failed"),
         TimeRemainingColumn(),
     )
 
@@ -157,16 +160,22 @@ class BatchProgress:
     """Counts of a running batch."""
 
     def __init__(self, console: Console, total: int, update: Callable[..., None] | None = None) -> None:
-        self.done = self.meshes = self.failed = 0
+        self.done = self.number = self.failed = 0
         self._console, self._total, self._update = console, total, update
 
-    def step(self, line: str | None, meshes: int, failed: bool) -> None:
-        """Counts one more file; `line` describes it, None if it was printed already."""
+    def show_share(self, share: float) -> None:
+        """Shows how far the file is that is at work, 0 to 1."""
+        if self._update is not None:
+            self._update(completed=self.done + share)
+
+    def step(self, line: str | None, number: int, failed: bool) -> None:
+        """Counts one more file, with `number` of what is counted; `line` describes it, None if it was printed
+        already."""
         self.done += 1
-        self.meshes += meshes
+        self.number += number
         self.failed += failed
         if self._update is not None:
-            self._update(completed=self.done, meshes=self.meshes, failed=self.failed)
+            self._update(completed=self.done, number=self.number, failed=self.failed)
         elif line is not None:
             self._console.note(f"[{self.done}/{self._total}] {line}")
 

@@ -5,19 +5,24 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Generator, Sequence
-from contextlib import closing
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from ..blender_process import Limits
-from ..core.errors import SinewError
+from ..core.errors import WrongUse
 from ..core.flex.limits import Table, read_table
-from ..core.flex.report import junit, lines, markdown, of_file
-from ..core.output import file_to_write, write_text
-from ..jobs.workers import run_one_by_one
-from .arguments import add_files, add_json, add_object, add_timeout, add_viewer, check_viewer, methods
-from .console import Console
+from ..core.flex.report import Report, junit, lines, markdown, of_file
+from ..core.output import file_to_write, folder_to_write, write_text
+from ..core.scratch import scratch_folder
+from ..jobs.inputs import files_of
+from ..jobs.journal import Journal, content_hash
+from ..jobs.workers import run_here
+from . import batch
+from .arguments import add_json, add_object, add_viewer, check_viewer, methods
+from .console import BatchProgress, Console
 
 SUMMARY = "bend each joint of characters, and say which deform well"
 HELP = """\
@@ -25,10 +30,11 @@ Bends every joint of every character by itself, and figures as people move, meas
 surface, and looks at weights and bones. Files are only read; actions, controls and drivers take no part.
 
 Exit status 0: all joints pass; 1: one does not, or a file can not be judged; 2: wrong use."""
+TIMEOUT = 300
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_files(parser)
+    batch.add_inputs(parser, "+")
     parser.add_argument(
         "--methods",
         type=methods,
@@ -43,7 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--thresholds", type=Path, metavar="TABLE.toml", help="limits of measures, in [limits]"
     )
     add_json(parser)
-    add_timeout(parser)
     for option, ending, text in (
         ("--junit", ".xml", "for the test pages of build servers"),
         ("--markdown", ".md", "for a pull request"),
@@ -52,40 +57,65 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(option, type=file, metavar=f"FILE{ending}", help=f"also write a report {text}")
     add_viewer(
         parser,
-        "also write a page in which the character of the file turns, bent to each pose, with the "
-        "faults as a list",
+        "also write a page in which the character of the file turns, bent to each pose, with the faults as a "
+        "list",
     )
+    parser.add_argument(
+        "--out", type=folder_to_write, metavar="DIR", help="folder for the journal and report.json"
+    )
+    batch.add_workers(parser, TIMEOUT)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    check_viewer(args)
+    tables = [path.absolute() for path in (args.poses, args.thresholds) if path is not None]
     table = Table()
-    tables = [path for path in (args.poses, args.thresholds) if path is not None]
     for path in tables:
         table = read_table(path, table)
+    if args.resume and args.out is None:
+        raise WrongUse("--resume: name the folder of the journal by --out")
+    with scratch_folder() if args.out is None else nullcontext(args.out.absolute()) as out:
+        return _run(args, console, tables, out)
+
+
+def _run(args: argparse.Namespace, console: Console, tables: Sequence[Path], out: Path) -> int:
+    """out: folder of the journal"""
+    names = _names(args.inputs, out)
+    check_viewer(args.viewer, len(names))
+    settings = {
+        "methods": args.methods,
+        "object": args.object,
+        # With what is in them, so that --resume knows them again.
+        "tables": [[str(path), content_hash(path)] for path in tables],
+        "viewer": args.viewer and str(args.viewer.absolute()),
+    }
+    # Nothing is written to a target: it is the name of the file in the journal.
+    targets = {path: str(out / path.relative_to(path.anchor)) for path in names}
     tasks = [
-        {
-            "command": "flex",
-            "source": str(path.absolute()),
-            "methods": args.methods,
-            "object": args.object,
-            "tables": [str(table.absolute()) for table in tables],
-            "viewer": args.viewer and str(args.viewer.absolute()),
-        }
-        for path in args.files
+        {"command": "flex", "source": str(path), "target": target, "writes": False, "settings": settings}
+        for path, target in targets.items()
     ]
-    reports = []
-    with closing(_outcomes(tasks, args, console)) as outcomes:
-        for path, outcome in zip(args.files, outcomes, strict=True):
-            if "error" in outcome:
-                outcome["error"] = outcome["error"].removeprefix(f"{path.absolute()}: ")
-            console.note_on(path, outcome.get("notes", []))
-            reports.append(of_file(str(path), outcome))
-            if not args.json:
-                for line in lines(reports[-1]):
-                    console.say(line)
-    if args.json:
-        console.say(json.dumps(reports, indent=2, ensure_ascii=False))
+    workers = batch.Workers(args, len(tasks), console, TIMEOUT, apart=True)
+    limits = args.jobs, args.scheduler, args.timeout, args.memory
+    is_here = len(tasks) == 1 and all(limit is None for limit in limits)
+    run = partial(_run_here, workers.versions) if is_here else workers.run
+    text_of = partial(json.dumps, indent=2, ensure_ascii=False)
+    results: dict[str, dict] = {}
+    showing = batch.Showing(partial(_show, console, names), partial(_is_complete, args.viewer), "joints")
+    if args.out is None:
+        showing = replace(showing, rest="")
+    try:
+        with Journal(out) as journal:
+            batch.do_all(args, console, journal, tasks, run, showing, results)
+    finally:
+        done = {path: results[target] for path, target in targets.items() if target in results}
+        reports = [_report(names[path], path, outcome) for path, outcome in done.items()]
+        if args.json:
+            console.say(text_of(reports))
+        else:
+            for report in reports:
+                console.say("\n".join(lines(report)))
+    if args.out is not None:
+        write_text(out / "report.json", text_of(reports))
     for target, text in ((args.junit, junit), (args.markdown, markdown)):
         if target is not None:
             write_text(target, text(reports))
@@ -93,22 +123,53 @@ def run(args: argparse.Namespace, console: Console) -> int:
     return 0 if all(report["passed"] for report in reports) else 1
 
 
-def _outcomes(
-    tasks: Sequence[dict], args: argparse.Namespace, console: Console
-) -> Generator[dict, None, None]:
-    """Several files are bent in a Blender that they may crash; one is in this one, with its progress."""
-    if len(tasks) > 1:
-        outcomes = run_one_by_one(tasks, Limits(timeout=args.timeout, verbose=console.verbose))
-        yield from console.progress(outcomes, len(tasks), "Bending joints")
-        return
-    from ..jobs.tasks import flex
+def _names(inputs: Sequence[str], out: Path) -> dict[Path, str]:
+    """Returns the absolute paths of the files, with what they are called in reports. Raises WrongUse."""
+    names: dict[Path, str] = {}
+    for given in inputs:
+        _root, paths = files_of(given, out, batch.listed(inputs))
+        for path in paths:
+            name = str(path) if os.path.isabs(given) else os.path.relpath(path)
+            names.setdefault(path, given if path == Path(given).absolute() else name)
+    return names
+
+
+def _run_here(
+    versions: Callable[[], dict[str, str]], tasks: list[dict], progress: BatchProgress
+) -> batch.Outcomes:
+    """In this process, which a crash ends."""
+    from .. import worker
     from ..prepare import prepare_blender
 
+    def report(_doing: str, share: float = 0.0) -> None:
+        progress.show_share(share)
+
     prepare_blender()
-    for task in tasks:
-        with console.bar(f"Bending {Path(task['source']).name}", 1) as show:
-            try:
-                outcome = flex.flex(task, lambda _doing: None, show)
-            except SinewError as error:
-                outcome = {"error": str(error)}
-        yield outcome
+    return run_here(tasks, lambda task: worker.run(task, report), versions)
+
+
+def _show(
+    console: Console, names: Mapping[Path, str], progress: BatchProgress, task: dict, result: dict
+) -> None:
+    path = Path(task["source"])
+    report = _report(names[path], path, result)
+    console.note_on(Path(names[path]), result.get("notes", []))
+    line = f"{next(lines(report))}{', unchanged' if 'unchanged' in result else ''}"
+    joints = len(report.get("joints", []))
+    progress.step(line if len(names) > 1 else None, joints, not report["passed"])
+
+
+def _report(name: str, path: Path, outcome: dict) -> Report:
+    if "error" in outcome:
+        outcome = {**outcome, "error": outcome["error"].removeprefix(f"{path}: ")}
+    return of_file(name, outcome)
+
+
+def _is_complete(page: Path | None, record: dict) -> bool:
+    """Whether a record can be reported, and the page is there."""
+    with suppress(AttributeError, KeyError, TypeError):
+        report = of_file("", record)
+        return bool(junit([report]) and markdown([report]) and list(lines(report))) and (
+            page is None or page.exists()
+        )
+    return False

@@ -36,7 +36,7 @@ def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> l
     out = Path(os.path.abspath(out))
     jobs: dict[Path, Job] = {}
     for given in inputs:
-        root, paths = _files_of(given, out, listed)
+        root, paths = files_of(given, out, listed)
         for path in paths:
             target = (out / path.relative_to(root)).with_suffix(".blend")
             jobs.setdefault(path, Job(path, target))
@@ -44,8 +44,9 @@ def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> l
     return list(jobs.values())
 
 
-def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[Path]]:
-    """Returns the absolute paths of one input, and the folder below which the tree is kept."""
+def files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[Path]]:
+    """Returns the absolute paths of one input, and the folder below which the tree is kept. Raises
+    WrongUse."""
     # Made absolute without following links, so that a linked folder keeps its name.
     path = Path(os.path.abspath(given))
     if given == STANDARD_INPUT:

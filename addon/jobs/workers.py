@@ -50,7 +50,7 @@ class _Blenders:
     def run(self, task: dict, limits: Limits) -> Steps:
         blender = self._take(limits)
         try:
-            if task["pictures"] is not None:
+            if task.get("pictures") is not None:
                 # Found once for all of them, while the first one starts.
                 task = {**task, "engine": _engine()}
             blender.send(task, limits)
@@ -117,8 +117,8 @@ def _steps(
           that need not be processed again, or None
     run   performs the task, in another process or in this one
 
-    The copy is written in the folder of its target under the name "unfinished"; the journal's writer renames
-    it.
+    A copy, where the task "writes" one, is written in the folder of its target under the name "unfinished";
+    the journal's writer renames it.
     """
     source, target = Path(task["source"]), Path(task["target"])
     facts: dict[str, object] = {"versions": versions()}
@@ -139,7 +139,7 @@ def _steps(
         except SinewError as error:
             outcome = {"error": str(error)}
         break
-    if "error" in outcome:
+    if "error" in outcome or not task["writes"]:
         return {**outcome, **facts}
     return {**outcome, **facts, "unfinished": unfinished.name, "written": stamp(unfinished)}
 
@@ -179,10 +179,10 @@ def run_one_by_one(tasks: Iterable[dict], limits: Limits) -> Generator[dict, Non
 class _Running:
     """A task that a Blender does. `blender` is to be waited for; `outcome` is None until it is done."""
 
-    def __init__(self, task: dict, limits: Limits) -> None:
+    def __init__(self, task: dict, limits: Limits, versions: Callable[[], dict[str, str]]) -> None:
         self.task = task
         self.outcome: dict | None = None
-        self._steps = _steps(task, limits)
+        self._steps = _steps(task, limits, versions=versions)
         self.go_on()
 
     def go_on(self) -> None:
@@ -197,7 +197,7 @@ class _Running:
 
 
 def run_on_this_machine(
-    tasks: Sequence[dict], limits: Limits, jobs: int
+    tasks: Sequence[dict], limits: Limits, jobs: int, versions: Callable[[], dict[str, str]] = versions
 ) -> Generator[tuple[dict, dict], None, None]:
     """Yields each task and its outcome, in the order in which `jobs` Blenders finish them.
 
@@ -216,7 +216,7 @@ def run_on_this_machine(
             running = [each for each in running if each.outcome is None]
             # A Blender gets its next file before the outcome of its last one is handled.
             while waiting and len(running) < jobs:
-                running.append(_Running(waiting.popleft(), limits))
+                running.append(_Running(waiting.popleft(), limits, versions))
             yield from done
             busy = [each.blender for each in running if each.outcome is None]
             if len(busy) == len(running):

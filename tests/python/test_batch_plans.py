@@ -23,9 +23,9 @@ def test_without_dask_a_scheduler_is_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "sinew_addon.jobs.dask_cluster", raising=False)
     args = argparse.Namespace(scheduler="tcp://127.0.0.1:1", jobs=None, timeout=None, memory=None)
-    workers = batch._Workers(args, 1, SimpleNamespace(verbose=False))
+    workers = batch.Workers(args, 1, SimpleNamespace(verbose=False), 0)
     with pytest.raises(SinewError, match=r"pip install 'sinew-blender\[cluster\]'"):
-        workers.run([{}])
+        workers.run([{}], None)
 
 
 @pytest.fixture

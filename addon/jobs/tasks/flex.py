@@ -18,51 +18,44 @@ from ...features.flex import page as flex_page
 from ...io import files
 
 
-def flex(
-    task: dict, report: Callable[..., None], show: Callable[[float], None] = lambda _share: None
-) -> dict:
-    """Judges the file "source" of a task by the "tables", with "methods" to try, and only the mesh "object"
-    where one is named.
+def flex(task: dict, report: Callable[..., None]) -> dict:
+    """Judges the file "source" of a task by its "settings": "tables", each with a hash; "methods" to try;
+    "object", only that mesh, or None; "viewer", a page to write, or None.
 
     "joints": as from Verdict.to_dict(); "left_out": a sentence for each mesh that could not be judged;
-    "notes": remarks on the file. Writes the page "viewer" where one is named. Raises SinewError where it
-    cannot be judged.
-
-    show  called with the progress
+    "notes": remarks on the file. Raises SinewError where it cannot be judged.
     """
-    path, table, page = Path(task["source"]), Table(), task["viewer"]
-    for each in task["tables"]:
+    path, settings, table = Path(task["source"]), task["settings"], Table()
+    for each, _hash in settings["tables"]:
         table = read_table(Path(each), table)
     report("opening it")
     notes = files.open_file(path)
-    scene, methods = bpy.context.scene, task["methods"]
-    settings = {
+    scene, methods, page = bpy.context.scene, settings["methods"], settings["viewer"]
+    own_methods = {
         obj: properties.of(obj).method
         for obj in scene.objects
         if properties.has_sinew(obj) and properties.of(obj).enabled
     }
-    meshes, left_out = characters.deformable_meshes(scene, path, ["dq", *methods], task["object"])
+    meshes, left_out = characters.deformable_meshes(scene, path, ["dq", *methods], settings["object"])
     own: dict[bpy.types.Object, str | None] = {}
     for obj in meshes:
         # Linear blending may be left to the Armature modifier, where nothing could be bent.
-        characters.use_method(obj, settings.get(obj, "dq"))
-        own[obj] = None if obj in settings else properties.BLENDER
-    report("bending it")
+        characters.use_method(obj, own_methods.get(obj, "dq"))
+        own[obj] = None if obj in own_methods else properties.BLENDER
     of_bending = 0.5 if page else 1.0
     steps = bending.flex(meshes, methods, table, own)
     while True:
         try:
-            show(of_bending * next(steps))
+            report("bending it", share=of_bending * next(steps))
         except StopIteration as end:
             result = end.value
             break
         interrupt.check()
     if page:
-        report("reading it for the page")
         for step in flex_page.page(scene, path.stem, meshes, result, left_out):
             if isinstance(step, str):
                 write_text(Path(page), step)
             else:
-                show(of_bending * (1.0 + step))
+                report("reading it for the page", share=of_bending * (1.0 + step))
             interrupt.check()
     return {**result.verdict.to_dict(), "left_out": left_out, "notes": notes}
