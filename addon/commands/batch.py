@@ -28,7 +28,6 @@ from ..jobs.workers import run_here, run_on_this_machine, versions
 from .arguments import count, seconds
 from .console import BatchProgress, Console
 
-
 # Seconds for a file, with its pictures.
 TIMEOUT = 1800
 
