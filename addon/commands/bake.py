@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core import interrupt
-from ..core.bake import EXPORTS, KINDS
+from ..core.bake import FILES, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
+from ..core.vat import AXES, DEFAULT_VAT, TEXELS, VatOptions
 from ..jobs.inputs import Job, plan_jobs
 from .arguments import add_copies, add_method, add_set, count, percent
 from .console import Console
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from ..features.bake.bake_state import Started
 
-SUMMARY = "write what Sinew deforms as shape keys, point caches, Alembic, USD or helper bones"
+SUMMARY = "write what Sinew deforms as shape keys, point caches, Alembic, USD, helper bones or textures"
 HELP = """\
 Writes Sinew's deformation of every armature-deformed mesh as data that plays without it. Inputs are never
 written to. A folder stands for all .blend files below it.
@@ -39,6 +40,8 @@ bones       a .blend whose armatures have helper bones with keys, and meshes wit
             blending, as every engine and glTF and FBX files have it, comes as near as the errors say;
             with --motion pose they have constraints instead, and follow other animation, too; n + 1 plain
             bones replace a bendy bone of n segments
+vat         vertex animation textures of positions and normals, and a .glb of the meshes at rest, for shaders
+            of engines
 
 In a .blend the Armature modifiers stay, switched off (bones: on). Between frames that are not neighbours
 shapes move in straight lines."""
@@ -72,6 +75,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=KEYS,
         help="bones: helper bones have keys (default), or follow the pose by constraints",
     )
+    parser.add_argument(
+        "--axes",
+        choices=tuple(AXES),
+        default=DEFAULT_VAT.axes,
+        help="vat: axes and units of the textures (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--texels",
+        choices=TEXELS,
+        default=DEFAULT_VAT.texels,
+        help="vat: of the textures (default: %(default)s)",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON, with the errors of bones")
     add_set(parser)
 
@@ -100,7 +115,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             "--set goes with --method or --preset; without it meshes are baked as the file has them"
         )
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
-    suffix = EXPORTS.get(args.to, ".blend")
+    suffix = FILES.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
     outcomes = of_each(
         jobs, Baked, lambda outcome: _bake(outcome, args, frames, console), args.overwrite, console
@@ -148,7 +163,8 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
         try:
             helpers = HelperOptions(args.helpers or 0, args.error, args.influences, args.motion)
-            started = bake.start(taken, args.to, chosen, target, args.overwrite, helpers)
+            vat = VatOptions(args.axes, args.texels)
+            started = bake.start(taken, args.to, chosen, target, args.overwrite, helpers, vat)
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None
         # An exporter writes all frames in one call, which cannot be interrupted and can crash on a full disk:
@@ -168,7 +184,7 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
             show(1.0)
     with _whole_or_nothing(started, source):
         started.place()
-        if args.to in EXPORTS:
+        if args.to in FILES:
             started.publish()
         else:
             files.save_copy(source, target, started.publish)

@@ -13,10 +13,12 @@ import numpy as np
 from .errors import SinewError, WrongUse
 from .output import remove, writing
 
-# Bakes that a .blend plays, and bakes to files for other programs.
+# Bakes that a .blend plays; those of Blender's exporters, and all that other programs play.
 BONES = "bones"
 EXPORTS = {"alembic": ".abc", "usd": ".usdc"}
-KINDS = ("shape-keys", "mdd", "pc2", BONES, *EXPORTS)
+VAT = "vat"
+FILES = {**EXPORTS, VAT: ".glb"}
+KINDS = ("shape-keys", "mdd", "pc2", BONES, *FILES)
 
 
 def mdd_header(frames: Sequence[float], vertices: int, rate: float) -> bytes:

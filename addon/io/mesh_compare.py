@@ -107,9 +107,7 @@ def _arrays(mesh: bpy.types.Mesh) -> Iterator[np.ndarray]:
     for attribute in mesh.attributes:
         yield _values_of(attribute)
     if mesh.has_custom_normals and mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS) is None:
-        normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
-        mesh.corner_normals.foreach_get("vector", normals.ravel())
-        yield normals
+        yield mesh_io.corner_normals(mesh)
     for key in () if mesh.shape_keys is None else mesh.shape_keys.key_blocks:
         yield mesh_io.read_key_points(key)
 

@@ -44,6 +44,13 @@ def attribute_to_write(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute |
     return mesh.attributes.get(name)
 
 
+def corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
+    """float32 [corners, 3], object space."""
+    normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
+    mesh.corner_normals.foreach_get("vector", normals.ravel())
+    return normals
+
+
 def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
     """Returns vertex positions in object space, float32 [vertices, 3]; a copy."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)

@@ -83,7 +83,9 @@ class Mesh:
                     share = np.clip((point - head) @ along / (along @ along), 0.0, 1.0)
                     axis = pose.motion[bone][:3, :3] @ along
                     axis *= np.sign(np.linalg.det(pose.motion[bone][:3, :3])) / np.linalg.norm(axis)
-                    angle = weights[of == bone].sum() * twist[vertex] * (at_head + share * (at_tail - at_head))
+                    angle = (
+                        weights[of == bone].sum() * twist[vertex] * (at_head + share * (at_tail - at_head))
+                    )
                     found[vertex] = reader_stages.turned(axis, angle, found[vertex])
         return found
 

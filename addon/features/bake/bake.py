@@ -12,12 +12,14 @@ from ...core import bake
 from ...core.errors import SinewError
 from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...core.names import as_file_name
+from ...core.vat import DEFAULT_VAT, VatOptions
 from ...deform import characters
 from ...io import files
 from ...io.actions import curves_of
 from . import bake_export, bake_state, shape_animation
 from .bake_bones import BoneBake
 from .bake_state import Started, take_off
+from .bake_vat import VatBake
 
 SHAPE_KEYS = "shape-keys"
 
@@ -179,17 +181,22 @@ def start(
     target: Path,
     overwrite: bool,
     helpers: HelperOptions = DEFAULT_HELPERS,
+    vat: VatOptions = DEFAULT_VAT,
 ) -> Started:
-    """Returns a bake of skinned meshes. Caches are written to a folder beside `target`, exports to `target`.
+    """Returns a bake of skinned meshes. Caches are written to a folder beside `target`, exports to `target`,
+    textures beside it.
 
     frames     ascending
     overwrite  whether existing files may be replaced
     helpers    for a bake to bones
+    vat        for a bake to textures
 
     Raises SinewError where it is not possible.
     """
     if kind == bake.BONES:
         return BoneBake(meshes, frames, helpers)
+    if kind == bake.VAT:
+        return VatBake(meshes, frames, target, overwrite, vat)
     if kind in bake.EXPORTS:
         files.check_free(target, overwrite)
         return bake_export.SceneExport(meshes, kind, frames, target)

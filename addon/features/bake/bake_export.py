@@ -95,7 +95,7 @@ class SceneExport(Started):
     def sample(self) -> Generator[float, None, None]:
         first, last = int(self.frames[0]), int(self.frames[-1])
         with self.whole_or_nothing(), _frames_of_scene(first, last):
-            with _selected([*self.meshes, *self.carried]), self._reporting_frames():
+            with selected([*self.meshes, *self.carried]), self._reporting_frames():
                 self._export(first, last)
             for obj in self.meshes:
                 bake_state.check_on(obj)
@@ -177,7 +177,7 @@ def _frames_of_scene(first: float, last: float) -> Iterator[None]:
 
 
 @contextmanager
-def _selected(objects: list[bpy.types.Object]) -> Iterator[None]:
+def selected(objects: list[bpy.types.Object]) -> Iterator[None]:
     """Context in which only these objects are selected; afterwards the selection is as before."""
     layer = bpy.context.view_layer
     before, active = [o for o in layer.objects if o.select_get()], layer.objects.active

@@ -7,10 +7,11 @@ from pathlib import Path
 import bpy
 
 from ...attach.feature import Feature
-from ...core.bake import BONES, EXPORTS
+from ...core.bake import BONES, EXPORTS, FILES, VAT
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
 from ...core.helper_bones import KEYS, POSE, HelperOptions
+from ...core.vat import EXR, EXR_HALF, PNG, VatOptions
 from ...deform import characters
 from ...ui import stepped
 from ...ui.operators import OfSkinned, OnSinewObjects, sinew_targets
@@ -39,6 +40,12 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
             (BONES, "Bones", "Helper bones and weights, in this file: what engines play"),
             ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
             ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
+            (
+                VAT,
+                "Vertex Animation Textures",
+                "Positions and normals as textures, with the mesh at rest, for engines' shaders; this file "
+                "stays as it is",
+            ),
         ],
     )
     frames: bpy.props.StringProperty(
@@ -91,15 +98,34 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
         ],
     )
 
+    axes: bpy.props.EnumProperty(
+        name="Engine",
+        description="Whose axes and units the textures have",
+        items=[
+            ("unreal", "Unreal", "Z up, Y to the other side, centimetres"),
+            ("unity", "Unity", "Y up, X to the other side, metres"),
+            ("gltf", "Godot, three.js", "Y up, metres, as glTF has them"),
+        ],
+    )
+    texels: bpy.props.EnumProperty(
+        name="Texels",
+        description="How exact they are",
+        items=[
+            (EXR, "EXR, Float", "32 bits: exact"),
+            (EXR_HALF, "EXR, Half", "16 bits of floating point: half the size, to a part in 2,000"),
+            (PNG, "PNG, 16 Bits", "Whole numbers between the bounds: to a part in 130,000 of these"),
+        ],
+    )
+
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         of_kind = ("motion", "helpers", "error", "influences") if self.kind == BONES else ()
         if self.kind not in WITHOUT_FILES:
-            of_kind = ("folder", "overwrite")
+            of_kind = ("folder", "overwrite", *(("axes", "texels") if self.kind == VAT else ()))
         for name in ("kind", "frames", "step", *of_kind):
             layout.prop(self, name)
-        if self.kind not in EXPORTS:
+        if self.kind not in FILES:
             layout.label(text="Takes Sinew off: what is baked plays without it", icon="INFO")
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
@@ -125,11 +151,12 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
             raise SinewError("Save the file first, or choose a folder that is not beside it")
         frames = sorted(set(parse_frames(self.frames))) if self.frames.strip() else None
         frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
-        suffix = EXPORTS.get(self.kind, ".blend")
+        suffix = FILES.get(self.kind, ".blend")
         target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
         helpers = HelperOptions(self.helpers, self.error, self.influences, self.motion)
         meshes, frames = sinew_targets(context), frames[:: self.step]
-        return bake.start(meshes, self.kind, frames, target, self.overwrite, helpers)
+        vat = VatOptions(self.axes, self.texels)
+        return bake.start(meshes, self.kind, frames, target, self.overwrite, helpers, vat)
 
 
 class SINEW_PT_bake(Sidebar, OfSkinned, bpy.types.Panel):

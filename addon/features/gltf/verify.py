@@ -103,7 +103,7 @@ class _Mesh:
         self._has_keys = obj.data.shape_keys is not None
         self._corners = np.empty(len(obj.data.loops), dtype=np.int32)
         obj.data.loops.foreach_get("vertex_index", self._corners)
-        self._normals = _corner_normals(obj.data)
+        self._normals = mesh_io.corner_normals(obj.data)
         self._world = np.array(obj.matrix_world, dtype=np.float64)
         self._bones_from_model = state.shown.frames[0].bones_from_model.astype(np.float64)
         self._influences: Influences | None = None
@@ -140,7 +140,7 @@ class _Mesh:
     def _seen_normals(self, mesh: bpy.types.Mesh, world: np.ndarray) -> np.ndarray | None:
         if len(mesh.loops) != len(self._normals) or not np.linalg.det(world):
             return None
-        return (_corner_normals(mesh) @ np.linalg.inv(world[:3, :3])).astype(np.float32)
+        return (mesh_io.corner_normals(mesh) @ np.linalg.inv(world[:3, :3])).astype(np.float32)
 
     def seen(self, name: str, segments: Mapping[int, str], influences: int) -> Seen:
         """segments: names of the plain bones for joints, if there are some"""
@@ -192,13 +192,6 @@ class _Mesh:
             ]
             vertices[row] = near[row][int(np.argmin(apart))]
         return Comparison(seen, found, place, vertices)
-
-
-def _corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
-    """float32 [corners, 3], object space."""
-    normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
-    mesh.corner_normals.foreach_get("vector", normals.ravel())
-    return normals
 
 
 def _near(points: np.ndarray, others: np.ndarray, distance: float) -> list[list[int]]:
