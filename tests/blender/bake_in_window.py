@@ -25,7 +25,7 @@ FOLDER = HERE / "baked"
 USER = HERE / "user"
 FRAME = 16
 # Long enough to be stopped in between.
-LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "bones": 2000}
+LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "bones": 2000, "vat": 3000}
 # Some distributions' builds of Blender lack the other formats.
 KINDS = [kind for kind in LONG if kind not in ("alembic", "usd") or getattr(bpy.app, kind).supported]
 TICK = 0.1

@@ -230,17 +230,23 @@ def skinned(gpu, module, mesh, influences):
             out,
             gpu.create_buffer_with_data(data=chosen, usage=wgpu.BufferUsage.UNIFORM),
         ]
-        entries = [{"binding": k, "resource": {"buffer": buffer}} for k, buffer in enumerate(buffers)]
-        group = gpu.create_bind_group(layout=pipeline.get_bind_group_layout(0), entries=entries)
-        encoder = gpu.create_command_encoder()
-        run = encoder.begin_compute_pass()
-        run.set_pipeline(pipeline)
-        run.set_bind_group(0, group)
-        run.dispatch_workgroups(-(-count // 64))
-        run.end()
-        gpu.queue.submit([encoder.finish()])
-        read = np.frombuffer(gpu.queue.read_buffer(out), np.float32).reshape(-1, 2, 4)
+        resources = [{"buffer": buffer} for buffer in buffers]
+        read = dispatched(gpu, pipeline, resources, -(-count // 64), out).reshape(-1, 2, 4)
         yield result, read[:, :, :3].swapaxes(0, 1)
+
+
+def dispatched(gpu, pipeline, resources, groups, out):
+    """float32 [n] of the buffer `out`, after the pipeline has run with these resources."""
+    entries = [{"binding": k, "resource": resource} for k, resource in enumerate(resources)]
+    group = gpu.create_bind_group(layout=pipeline.get_bind_group_layout(0), entries=entries)
+    encoder = gpu.create_command_encoder()
+    run = encoder.begin_compute_pass()
+    run.set_pipeline(pipeline)
+    run.set_bind_group(0, group)
+    run.dispatch_workgroups(groups)
+    run.end()
+    gpu.queue.submit([encoder.finish()])
+    return np.frombuffer(gpu.queue.read_buffer(out), np.float32)
 
 
 def wgsl(gpu, influences):
@@ -251,15 +257,19 @@ def wgsl(gpu, influences):
 
 
 def hlsl(gpu, influences):
-    """By the reference compiler for shaders of Vulkan."""
+    options = "-e", "skin", f"-DSINEW_INFLUENCES={influences}"
+    return compiled(gpu, SHADERS / "example.hlsl", *options)
+
+
+def compiled(gpu, path, *options):
+    """A file of HLSL by the reference compiler for shaders of Vulkan."""
     compiler = shutil.which("glslangValidator")
     if compiler is None:
         pytest.skip("no glslangValidator: install glslang-tools to test the shaders of HLSL")
     with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "skin.spv"
-        options = ["-D", "-S", "comp", "-e", "skin", "-V", f"-DSINEW_INFLUENCES={influences}"]
+        target = Path(folder) / "made.spv"
         found = subprocess.run(
-            [compiler, *options, "-o", str(target), str(SHADERS / "example.hlsl")],
+            [compiler, "-D", "-S", "comp", "-V", *options, "-o", str(target), str(path)],
             capture_output=True,
             text=True,
             check=False,
@@ -298,3 +308,118 @@ def mixed_methods(result):
 def test_methods_have_the_same_numbers_everywhere(name, pattern):
     found = re.findall(pattern, (SHADERS / name).read_text())
     assert {method.lower(): int(number) for method, number in found} == METHODS
+
+
+# Of vertex animation textures, as docs/bake.md has them.
+FRAMES, ROWS, COLUMNS, VERTICES = 4, 3, 7, 19
+SCALE, BIAS = (0.5, 2.0, 1.0), (0.1, 0.0, -3.0)
+VAT_VERTEX = """#version 300 es
+precision highp float;
+precision highp int;
+#include "vat.glsl"
+uniform highp sampler2D animation;
+uniform float frame;
+uniform int rows;
+in vec2 place;
+out vec3 found;
+void main() {
+    found = sinew_vat(animation, place, frame, FRAMES, rows, vec3SCALE, vec3BIAS);
+    gl_Position = vec4(0.0);
+}
+"""
+VAT_COMPUTE = """#include "vat.hlsl"
+[[vk::binding(0)]] Texture2D positions;
+[[vk::binding(1)]] StructuredBuffer<float2> places;
+[[vk::binding(2)]] RWStructuredBuffer<float4> found;
+[[vk::binding(3)]] cbuffer Time { float time; int rows; };
+[[vk::binding(4)]] Texture2D normals;
+[numthreads(1, 1, 1)]
+void play(uint3 id : SV_DispatchThreadID) {
+    float2 uv = places[id.x];
+    int frames = FRAMES;
+    float rate = 2.0;
+    float3 rest = float3(1.0, 2.0, 3.0), scale = float3SCALE, bias = float3BIAS;
+    float3 normal_scale = float3(2.0, 2.0, 2.0), normal_bias = float3(-1.0, -1.0, -1.0);
+    DOCUMENTED
+    found[2 * id.x] = float4(position, 0.0);
+    found[2 * id.x + 1] = float4(normal, 0.0);
+}
+"""
+
+
+def vat_source(text, name):
+    text = text.replace(f'#include "{name}"', (SHADERS / name).read_text())
+    return text.replace("FRAMES", str(FRAMES)).replace("SCALE", str(SCALE)).replace("BIAS", str(BIAS))
+
+
+@pytest.fixture(params=[False, True], ids=["from the top", "from the bottom"])
+def animation(request):
+    """Texels, places, rows of a frame, and what is to be found, by frame."""
+    samples = np.random.default_rng(5).normal(size=(FRAMES, VERTICES, 3)).astype(np.float32)
+    texels = np.zeros((FRAMES, ROWS * COLUMNS, 4), np.float32)
+    texels[:, :VERTICES, :3] = samples
+    texels = texels.reshape(FRAMES * ROWS, COLUMNS, 4)
+    rows, columns = np.divmod(np.arange(VERTICES), COLUMNS)
+    places = np.stack([(columns + 0.5) / COLUMNS, (rows + 0.5) / (FRAMES * ROWS)], axis=1)
+    if request.param:
+        texels, places = texels[::-1].copy(), places * (1.0, -1.0) + (0.0, 1.0)
+    values = SCALE * samples + BIAS
+    expected = {
+        0.0: values[0],
+        1.25: 0.75 * values[1] + 0.25 * values[2],
+        3.5: 0.5 * values[3] + 0.5 * values[0],
+        6.0: values[2],
+    }
+    return texels, places.astype(np.float32), -ROWS if request.param else ROWS, expected
+
+
+def test_vertex_animation_in_glsl(gl, animation):
+    texels, places, rows, expected = animation
+    program = gl.program(vat_source(VAT_VERTEX, "vat.glsl"), varyings=["found"])
+    texture = gl.texture((COLUMNS, FRAMES * ROWS), 4, texels.tobytes(), dtype="f4")
+    texture.use(0)
+    program["animation"], program["rows"] = 0, rows
+    vertices = gl.vertex_array(program, [(gl.buffer(places), "2f", "place")])
+    out = gl.buffer(reserve=12 * VERTICES)
+    for frame, values in expected.items():
+        program["frame"] = frame
+        vertices.transform(out, mode=gl.POINTS)
+        found = np.frombuffer(out.read(), np.float32).reshape(-1, 3)
+        np.testing.assert_allclose(found, values, atol=1e-5)
+
+
+def test_vertex_animation_in_hlsl(gpu, animation, tmp_path):
+    """As docs/bake.md calls it."""
+    import wgpu
+
+    texels, places, rows, expected = animation
+    path, document = tmp_path / "play.hlsl", (SHADERS.parent / "docs/bake.md").read_text(encoding="utf-8")
+    (documented,) = re.findall(r"^```hlsl\n(.*?)^```$", document, re.MULTILINE | re.DOTALL)
+    path.write_text(vat_source(VAT_COMPUTE, "vat.hlsl").replace("DOCUMENTED", documented))
+    module = compiled(gpu, path, "-e", "play")
+    pipeline = gpu.create_compute_pipeline(layout="auto", compute={"module": module, "entry_point": "play"})
+    size = (COLUMNS, FRAMES * ROWS, 1)
+    usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+    texture = gpu.create_texture(size=size, format="rgba32float", usage=usage)
+    gpu.queue.write_texture(
+        {"texture": texture}, texels, {"bytes_per_row": 16 * COLUMNS, "rows_per_image": size[1]}, size
+    )
+    storage = wgpu.BufferUsage.STORAGE
+    out = gpu.create_buffer(size=32 * VERTICES, usage=storage | wgpu.BufferUsage.COPY_SRC)
+    for frame, values in expected.items():
+        # At two frames a second.
+        time = np.float32(frame / 2).tobytes() + np.int32(rows).tobytes() + bytes(8)
+        resources = [
+            texture.create_view(),
+            {"buffer": gpu.create_buffer_with_data(data=places, usage=storage)},
+            {"buffer": out},
+            {"buffer": gpu.create_buffer_with_data(data=time, usage=wgpu.BufferUsage.UNIFORM)},
+            texture.create_view(),
+        ]
+        found = dispatched(gpu, pipeline, resources, VERTICES, out).reshape(-1, 2, 4)[:, :, :3]
+        np.testing.assert_allclose(found[:, 0], values + np.array([1.0, 2.0, 3.0]), atol=1e-5)
+        # The texels again, as if they were normals of whole numbers.
+        normals = 2.0 * (values - BIAS) / SCALE - 1.0
+        np.testing.assert_allclose(
+            found[:, 1], normals / np.linalg.norm(normals, axis=1, keepdims=True), atol=1e-5
+        )
