@@ -68,11 +68,13 @@ class Made:
 
 @pytest.fixture(scope="session")
 def bent(tmp_path_factory):
-    """A page of Flex, with faults by limits that a good rig passes, and the report."""
+    """A page of Flex, with a twist that only dual quaternions stand, and a limit that no rig passes; and the
+    report."""
     folder, source = tmp_path_factory.mktemp("flex"), REPOSITORY / "blend_files/elbow.blend"
-    page, limits = folder / "bent.html", folder / "limits.toml"
-    limits.write_text("[limits]\nstretch = 1.05\npivot = 0.01\n", encoding="utf-8")
-    text = sinew("flex", source, "--thresholds", limits, "--json", "--viewer", page, status=1)
+    page, table = folder / "bent.html", folder / "table.toml"
+    table.write_text('[limits]\npivot = 0.01\n[joints]\nother = ["twist 170"]\n', encoding="utf-8")
+    words = "--poses", table, "--methods", "dq,lbs", "--json", "--viewer", page
+    text = sinew("flex", source, *words, status=1)
     return page, json.loads(text)[0]
 
 

@@ -150,12 +150,14 @@ def test_a_fault_is_shown_at_its_place(browser, bent):
     assert len(texts) == len(faults) > 1
     header, meshes = read_page.read(page)
     assert (browser.run("return window.sinew.state.frame"), header["frames"][0]) == (0, "At rest")
-    places = set()
+    places, second = set(), "lbs"
     for number, (joint, fault) in enumerate(faults):
         assert joint in texts[number]
         assert fault["label"] in texts[number]
         browser.press("n")
         assert browser.run("return window.sinew.state.finding") == number
+        second = next(iter(fault["mends"]), second)
+        assert browser.run("return window.sinew.state.methods") == ["blender", second]
         frame = browser.run("return window.sinew.state.frame")
         shown = browser.run("return document.getElementById('frame-shown').textContent")
         pose = f"{joint}: {fault['pose']}" if fault["pose"] else "At rest"
@@ -172,6 +174,7 @@ def test_a_fault_is_shown_at_its_place(browser, bent):
         np.testing.assert_allclose(view[3:] + (low + high) / 2, place, atol=1e-4)
         places.add(tuple(np.round(place, 4)))
     assert len(places) > 1
+    assert second == "dq"
 
 
 def test_the_way_to_a_fault_is_flown(browser, bent):

@@ -67,4 +67,5 @@ def _entry(scene: bpy.types.Scene, joint: Joint, finding: Finding, frame: int) -
         "size": max(armature.matrix_world.to_scale()) * armature.data.bones[joint.name].length,
         "meaning": limit.meaning,
         "advice": finding.advice,
+        "mends": finding.mends,
     }

@@ -574,8 +574,10 @@ function flip() {
 const HOME = { yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0] };
 
 function choose(index) {
-  const { joint, measure, value, limit, size, frame } = findings[index];
-  set({ finding: index, frame, playing: false });
+  const { joint, measure, value, limit, size, frame, mends } = findings[index];
+  // A method that mends it is a flip away.
+  const methods = [names[0], mends.find((name) => names.includes(name)) ?? state.methods[1]];
+  set({ finding: index, frame, playing: false, methods });
   skinAll();
   fly(marks[0] ? viewOf(marks[0], size) : HOME);
   const button = find("findings").children[index].firstChild;
