@@ -109,11 +109,10 @@ def _run(args: argparse.Namespace, console: Console, tables: Sequence[Path], out
     finally:
         done = {path: results[target] for path, target in targets.items() if target in results}
         reports = [_report(names[path], path, outcome) for path, outcome in done.items()]
-        if args.json:
-            console.say(text_of(reports))
-        else:
-            for report in reports:
-                console.say("\n".join(lines(report)))
+        for report in () if args.json else reports:
+            console.say("\n".join(lines(report)))
+    if args.json:
+        console.say(text_of(reports))
     if args.out is not None:
         write_text(out / "report.json", text_of(reports))
     for target, text in ((args.junit, junit), (args.markdown, markdown)):
