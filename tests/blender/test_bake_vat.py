@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 
+import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -168,6 +169,12 @@ def test_it_is_stopped_without_a_trace(character, tmp_path):
 
 def test_what_can_not_be_a_texture_is_said(character, tmp_path, monkeypatch):
     obj, _eye = character
+    addon_utils.disable("io_scene_gltf2")
+    try:
+        with pytest.raises(SinewError, match=r"Switch on the add-on glTF 2\.0 format"):
+            baked(character, tmp_path / "arm.glb")
+    finally:
+        addon_utils.enable("io_scene_gltf2")
     monkeypatch.setattr(vat, "MOST_ROWS", 3)
     with pytest.raises(SinewError, match="3 are the most; bake fewer frames"):
         baked(character, tmp_path / "arm.glb")

@@ -41,6 +41,8 @@ class VatBake(Started):
         overwrite: bool,
         options: vat.VatOptions,
     ) -> None:
+        if not hasattr(bpy.types, "EXPORT_SCENE_OT_gltf"):
+            raise SinewError("Switch on the add-on glTF 2.0 format in the preferences: it writes the mesh")
         for obj in meshes:
             bake_state.check_on(obj)
         self.meshes = [*meshes, *carried_by(list(meshes))]
