@@ -115,7 +115,7 @@ void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
 }
 
 bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                      std::span<Vec3<float>> points) const noexcept {
+                      Strided<Vec3<float>> points) const noexcept {
     const PackedBinding& packed = *state_->packed;
     if (points.size() != packed.vertex_count) return false;
     const PaletteStore::Reading reading(state_->palettes);
@@ -138,7 +138,7 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
                      &palette,
                      rows.spaces(),
                      parameters[k].data(),
-                     points.data()};
+                     points};
     }
     parallel_for_blocks(packed.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {
         if (state_->mix) {

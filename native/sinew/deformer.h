@@ -8,6 +8,7 @@
 
 #include "sinew/base/owned.h"
 #include "sinew/binding.h"
+#include "sinew/strided.h"
 
 namespace sinew {
 
@@ -66,11 +67,11 @@ public:
     /// Writes the deformed points, model space.
     ///
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
-    /// points           [vertices]
+    /// points           [vertices], in a vertex buffer, too
     ///
     /// A vertex without influences, or with only weights of 0, stays at rest.
     [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                              std::span<Vec3<float>> points) const noexcept;
+                              Strided<Vec3<float>> points) const noexcept;
 
 private:
     struct State;

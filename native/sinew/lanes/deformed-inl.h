@@ -17,13 +17,18 @@ namespace HWY_NAMESPACE {
 template <class D>
 HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b, std::size_t lane) {
     const Block& block = from.blocks[b];
+    const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
+    if (!is_contiguous(from.points)) {
+        return load_apart(d, [&](std::size_t i) -> auto& { return from.points[vertices[i]]; });
+    }
+    const Vec3<float>* const points = from.points.data();
     if constexpr (hn::MaxLanes(D()) > 1) {
-        if (block.consecutive) return load_consecutive(d, &from.points[block.output + lane].x);
+        if (block.consecutive) return load_consecutive(d, &points[block.output + lane].x);
 #if HWY_TARGET == HWY_AVX3
-        if (block.runs > 0) return load_runs(d, from.runs + block.output, block.runs, &from.points->x);
+        if (block.runs > 0) return load_runs(d, from.runs + block.output, block.runs, &points->x);
 #endif
     }
-    return points_of<true>(d, from.points, from.vertices[b].lane.data() + lane);
+    return points_of<true>(d, points, vertices);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -11,6 +11,7 @@
 #include "sinew/lanes/palette.h"
 #include "sinew/lanes/spaces.h"
 #include "sinew/mesh/packed_mesh.h"
+#include "sinew/strided.h"
 
 namespace sinew {
 
@@ -48,7 +49,7 @@ struct Frame {
     const Palette* palette;
     Spaces spaces;
     const double* parameters;  // [MethodInfo::parameters] valid_value() of each
-    Vec3<float>* points;
+    Strided<Vec3<float>> points;
 };
 
 /// How the library deforms whole meshes with one method: five functions. Registered in methods/NAME/NAME.cpp by

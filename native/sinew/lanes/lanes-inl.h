@@ -38,7 +38,7 @@ struct MeshPointers {
     const Lanes<float>* vertex_rows;  // PackedVertexData::rows; null if there is no vertex data
     const Lanes<std::int32_t>* vertices;
     const Run* runs;
-    Vec3<float>* points;
+    Strided<Vec3<float>> points;
 };
 
 HWY_INLINE MeshPointers pointers_of(const Frame& frame) {
@@ -351,6 +351,49 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>*
 
 #endif
 
+/// Whether nothing lies between points.
+HWY_INLINE bool is_contiguous(const Strided<Vec3<float>>& points) {
+    return HWY_LIKELY(points.stride() == sizeof(Vec3<float>));
+}
+
+/// Stores each point by itself.
+///
+/// to_point  returns where that of a lane is
+///
+/// Not inlined into store_points, whose stack frame would grow for every block.
+template <class D, class ToPoint>
+HWY_NOINLINE void store_apart(D d, Vec<D> x, Vec<D> y, Vec<D> z, const ToPoint& to_point) {
+    alignas(64) float rows[3][hn::MaxLanes(D())];
+    hn::Store(x, d, rows[0]);
+    hn::Store(y, d, rows[1]);
+    hn::Store(z, d, rows[2]);
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) to_point(i) = {rows[0][i], rows[1][i], rows[2][i]};
+}
+
+/// The inverse of store_apart().
+template <class D, class ToPoint>
+HWY_NOINLINE Points<D> load_apart(D d, const ToPoint& to_point) {
+    alignas(64) float rows[3][hn::MaxLanes(D())];
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+        const Vec3<float>& point = to_point(i);
+        rows[0][i] = point.x, rows[1][i] = point.y, rows[2][i] = point.z;
+    }
+    return {hn::Load(d, rows[0]), hn::Load(d, rows[1]), hn::Load(d, rows[2])};
+}
+
+/// Elements from `i` on.
+template <class D>
+HWY_INLINE Points<D> load_at(D d, const Strided<const Vec3<float>>& from, std::size_t i) {
+    if (from.stride() == sizeof(Vec3<float>)) return load_consecutive(d, &from[i].x);
+    return load_apart(d, [&](std::size_t k) -> auto& { return from[i + k]; });
+}
+
+template <class D>
+HWY_INLINE void store_at(D d, const Points<D>& p, const Strided<Vec3<float>>& to, std::size_t i) {
+    if (is_contiguous(to)) return store_consecutive(d, p, &to[i].x);
+    store_apart(d, p.x, p.y, p.z, [&](std::size_t k) -> auto& { return to[i + k]; });
+}
+
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it again.
 template <class D>
 HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::size_t lane,
@@ -360,11 +403,16 @@ HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::si
     if constexpr (hn::MaxLanes(D()) == 1) {
         store_consecutive(d, p, &to.points[*vertices].x);
     } else {
-        if (block.consecutive) return store_consecutive(d, p, &to.points[block.output + lane].x);
+        if (!is_contiguous(to.points)) {
+            return store_apart(d, p.x, p.y, p.z,
+                               [&](std::size_t i) -> auto& { return to.points[vertices[i]]; });
+        }
+        Vec3<float>* const points = to.points.data();
+        if (block.consecutive) return store_consecutive(d, p, &points[block.output + lane].x);
 #if HWY_TARGET == HWY_AVX3
-        if (block.runs > 0) return store_runs(d, to.runs + block.output, block.runs, p, &to.points->x);
+        if (block.runs > 0) return store_runs(d, to.runs + block.output, block.runs, p, &points->x);
 #endif
-        scatter_points(d, vertices, to.points, p.x, p.y, p.z);
+        scatter_points(d, vertices, points, p.x, p.y, p.z);
     }
 }
 

@@ -7,19 +7,20 @@
 
 #include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
+#include "sinew/strided.h"
 
 namespace sinew {
 
 /// The input and output of one frame.
 struct SkinnedNormalFrame {
-    const Vec3<float>* points;  // [vertices] deformed
+    Strided<const Vec3<float>> points;  // [vertices] deformed
     // [vertices] deformed, from rest points one step away along each axis
     std::array<const Vec3<float>*, 3> moved;
     float inverse_step;                // 1 over that step, which is the same for all three axes
     std::array<Float4*, 3> cofactors;  // [vertices] of each vertex's blend, for each axis
     const Vec3<float>* rest_normals;   // [normals]
     const std::int32_t* vertices;      // [normals] the vertex of each
-    Vec3<float>* normals;              // [normals]
+    Strided<Vec3<float>> normals;      // [normals]
 };
 
 /// Functions for elements [begin, end), compiled once for each instruction set. Results do not depend on how the

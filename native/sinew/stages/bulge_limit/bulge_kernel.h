@@ -27,7 +27,7 @@ struct BulgeFrame {
     float strength;
     bool is_stretched;  // some bone has a stretch other than 1
     Spaces spaces;
-    Vec3<float>* points;
+    Strided<Vec3<float>> points;
 };
 
 /// Functions for blocks [begin, end), compiled once for each instruction set.

@@ -43,7 +43,7 @@ struct BulgeLimit::State {
     State(const Binding& binding, const BulgeLimitData& data);
 
     void measure(std::vector<Vec3<float>> points, const Affine<float>& space);
-    [[nodiscard]] BulgeFrame frame(std::span<Vec3<float>> points) const;
+    [[nodiscard]] BulgeFrame frame(Strided<Vec3<float>> points) const;
 
     std::shared_ptr<const PackedBinding> packed;
     const PackedMesh& mesh = packed->mesh;
@@ -68,7 +68,7 @@ BulgeLimit::State::State(const Binding& binding, const BulgeLimitData& data) : p
     measure(unpack(mesh, mesh.rest_points, packed->vertex_count).rest_points, data.bones_from_model);
 }
 
-BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
+BulgeFrame BulgeLimit::State::frame(Strided<Vec3<float>> points) const {
     // measure() alone writes the distances, and no other call runs at the same time.
     return {&mesh,
             bones.data(),
@@ -78,7 +78,7 @@ BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
             1.0f,
             false,
             space_rows.spaces(),
-            points.data()};
+            points};
 }
 
 void BulgeLimit::State::measure(std::vector<Vec3<float>> points, const Affine<float>& space) {
@@ -106,7 +106,7 @@ void BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
 std::size_t BulgeLimit::vertex_count() const noexcept { return state_->packed->vertex_count; }
 std::size_t BulgeLimit::bone_count() const noexcept { return state_->packed->bone_count; }
 
-bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+bool BulgeLimit::apply(Strided<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                        const BulgeLimitOptions& options) const noexcept {
     const State& state = *state_;
     if (points.size() != vertex_count()) return false;

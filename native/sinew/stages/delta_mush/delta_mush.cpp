@@ -260,16 +260,15 @@ std::size_t DeltaMush::iterations() const noexcept {
     return state_->bound->iterations;
 }
 
-bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
+bool DeltaMush::apply(Strided<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
     const State& state = *state_;
     const MushMesh& mesh = state.mesh;
     if (points.size() != mesh.vertices.size()) return false;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
-    const auto gather = [&](std::size_t begin, std::size_t end) {
-        // Read once, because the compiler assumes that any stored number may change it.
+    // Read once, because the compiler assumes that any stored number may change it.
+    const auto gather = [&, from = points](std::size_t begin, std::size_t end) {
         const std::uint32_t* const of = mesh.vertices.data();
-        const Vec3<float>* const from = points.data();
         Float4* const to = state.smoothed[0].data();
         end = std::min(end * MushMesh::kChunk, mesh.vertices.size());
         for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
@@ -282,7 +281,7 @@ bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
                           .from = state.smoothed[state.smooth(*state.bound, threads)].data(),
                           .details = state.bound->details.data(),
                           .scale = scale,
-                          .points = points.data()};
+                          .points = points};
     const auto finish = [&](std::size_t begin, std::size_t end) {
         kMushKernel.finish[target_in_use()](frame, begin, end);
     };

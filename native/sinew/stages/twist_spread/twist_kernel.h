@@ -69,7 +69,7 @@ struct TwistFrame {
     bool is_linear = true;                      // all blends are
     bool goes_around = false;  // a bone is farther than the shorter way, and a method blends the shorter way
     Spaces spaces;
-    Vec3<float>* points;
+    Strided<Vec3<float>> points;
 };
 
 /// Functions for `blocks` [begin, end), compiled once for each instruction set.

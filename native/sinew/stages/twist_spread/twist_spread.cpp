@@ -88,7 +88,7 @@ struct TwistSpread::State {
 
     /// Measures the vertices' shares and arms in the space of the bones.
     void measure(const Affine<float>& space);
-    [[nodiscard]] TwistFrame frame(std::span<Vec3<float>> points) const noexcept;
+    [[nodiscard]] TwistFrame frame(Strided<Vec3<float>> points) const noexcept;
     [[nodiscard]] Affine<double> motion(std::span<const Affine<float>> posed,
                                         std::int32_t bone) const noexcept;
     [[nodiscard]] TwistSpreadStage::Reading<double> read(
@@ -175,7 +175,7 @@ void TwistSpread::State::list_blocks(std::span<const std::int32_t> parents) {
     }
 }
 
-TwistFrame TwistSpread::State::frame(std::span<Vec3<float>> points) const noexcept {
+TwistFrame TwistSpread::State::frame(Strided<Vec3<float>> points) const noexcept {
     return {.mesh = &mesh,
             .rest_points = own_rest_points.empty() ? mesh.rest_points.data() : own_rest_points.data(),
             .blocks = blocks.data(),
@@ -186,7 +186,7 @@ TwistFrame TwistSpread::State::frame(std::span<Vec3<float>> points) const noexce
             .weights = weights.empty() ? nullptr : weights.data(),
             .mix = mix.empty() ? nullptr : mix.data(),
             .spaces = space_rows.spaces(),
-            .points = points.data()};
+            .points = points};
 }
 
 void TwistSpread::State::measure(const Affine<float>& space) {
@@ -295,7 +295,7 @@ std::vector<float> TwistSpread::angles(std::span<const Affine<float>> posed_from
     return angles;
 }
 
-bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+bool TwistSpread::apply(Strided<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                         const TwistSpreadOptions& options) const noexcept {
     const State& state = *state_;
     const auto fits = [&](std::size_t size) { return size == 0 || size == state.twists.size(); };
