@@ -24,18 +24,18 @@ Blended between(const ArrayLike& a, const ArrayLike& b, const ArrayLike& t, cons
     });
 }
 
-// Calls f(std::integral_constant<Signs, ..>) for the choice with the name `signs`.
+// Calls f(std::integral_constant<BlendSigns, ..>) for the choice with the name `signs`.
 template <class F>
 py::object with_signs(const py::object& signs, F f) {
     constexpr std::array<std::string_view, 3> kNames{"heaviest", "running_sum", "as_given"};
     switch (checked_choice(signs, "signs", kNames)) {
-        case 0: return f(std::integral_constant<Signs, Signs::kToHeaviest>{});
-        case 1: return f(std::integral_constant<Signs, Signs::kRunningSum>{});
-        default: return f(std::integral_constant<Signs, Signs::kAsGiven>{});
+        case 0: return f(std::integral_constant<BlendSigns, BlendSigns::kToHeaviest>{});
+        case 1: return f(std::integral_constant<BlendSigns, BlendSigns::kRunningSum>{});
+        default: return f(std::integral_constant<BlendSigns, BlendSigns::kAsGiven>{});
     }
 }
 
-template <class Method, Signs signs, class T>
+template <class Method, BlendSigns signs, class T>
 py::object blend_items(const py::object& transforms, const py::object& weights) {
     using Transform = typename Method::template Transform<T>;
     std::array inputs{checked_input<T, Transform>(transforms, "transforms"),
@@ -63,7 +63,7 @@ Blended blend(const ArrayLike& any_transforms, const ArrayLike& any_weights, con
               const Typed<"sinew.interpolate.Signs">& signs) {
     const auto [transforms, weights] = promoted<2>({"transforms", "weights"}, {any_transforms, any_weights});
     return with_method(method, transforms, "transforms", [&]<class Method, class T>() {
-        return with_signs(signs, [&]<Signs choice>(std::integral_constant<Signs, choice>) {
+        return with_signs(signs, [&]<BlendSigns choice>(std::integral_constant<BlendSigns, choice>) {
             return blend_items<Method, choice, T>(transforms, weights);
         });
     });

@@ -19,18 +19,17 @@ public:
         : first_(first), count_(count), stride_(stride) {}
 
     template <class Range>
-        requires std::is_constructible_v<std::span<T>, Range>
+    requires std::is_constructible_v<std::span<T>, Range>
     // NOLINTNEXTLINE(google-explicit-constructor): as std::span
-    Strided(Range&& range) noexcept {
+    Strided(Range&& range)
+    noexcept {
         const std::span<T> elements(range);
         first_ = elements.data();
         count_ = elements.size();
     }
 
     // NOLINTNEXTLINE(google-explicit-constructor): as std::span
-    operator Strided<const T>() const noexcept
-        requires(!std::is_const_v<T>)
-    {
+    operator Strided<const T>() const noexcept requires(!std::is_const_v<T>) {
         return {first_, count_, stride_};
     }
 

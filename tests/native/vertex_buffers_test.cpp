@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Protects what engines call: vertex buffers that hold other data, too, packed influences, and a job system of the
-// host's.
+// Protects what engines call: vertex buffers that hold other data, too, packed influences, a job system of the
+// host's, and the header that has all.
 #include "sinew/vertex_buffers.h"
 
 #include <algorithm>
@@ -11,11 +11,7 @@
 
 #include "polygons.h"
 #include "scene.h"
-#include "sinew/base/thread_pool.h"
-#include "sinew/bulge_limit.h"
-#include "sinew/delta_mush.h"
-#include "sinew/skinned_normals.h"
-#include "sinew/twist_spread.h"
+#include "sinew/sinew.h"
 
 namespace sinew {
 namespace {
@@ -96,14 +92,14 @@ TEST_P(VertexBuffers, take_normals_and_tangents) {
         const SkinnedNormals skinned(Binding(scene.data()), Dq::info, {rest, scene.rest_points, vertices});
         EXPECT_TRUE(skinned.deform(scene.posed_from_rest, {}, points, normals, tangents));
         Buffer buffer(count);
-        EXPECT_TRUE(skinned.deform(scene.posed_from_rest, {}, buffer[&Vertex::point],
-                                   buffer[&Vertex::normal], buffer[&Vertex::tangent]));
+        EXPECT_TRUE(skinned.deform(scene.posed_from_rest, {}, buffer[&Vertex::point], buffer[&Vertex::normal],
+                                   buffer[&Vertex::tangent]));
         EXPECT_TRUE(same_bits(buffer.written(&Vertex::point), points));
         EXPECT_TRUE(same_bits(buffer.written(&Vertex::normal), normals));
         EXPECT_TRUE(same_bits(buffer.written(&Vertex::tangent), tangents));
         Buffer alone(points);
-        EXPECT_TRUE(skinned.deform_normals(scene.posed_from_rest, {}, alone[&Vertex::point],
-                                           alone[&Vertex::normal]));
+        EXPECT_TRUE(
+            skinned.deform_normals(scene.posed_from_rest, {}, alone[&Vertex::point], alone[&Vertex::normal]));
         EXPECT_TRUE(same_bits(alone.written(&Vertex::normal), normals));
     }
 }
@@ -148,8 +144,8 @@ TEST(InfluencesOf, are_those_of_the_buffers) {
     const std::vector<Skin> skins{{{1, 2, 0, 0}, {65535, 0, 0, 0}}, {{3, 255, 4, 0}, {13107, 26214, 0, 0}}};
     const std::vector<std::array<std::uint16_t, 2>> more_joints{{0, 0}, {300, 7}};
     const std::vector<std::array<float, 2>> more_weights{{0.0f, 0.0f}, {0.25f, 0.5f}};
-    const InfluenceBuffer<std::uint8_t, std::uint16_t, 4> first{
-        {&skins.front().joints, 2, sizeof(Skin)}, {&skins.front().weights, 2, sizeof(Skin)}};
+    const InfluenceBuffer<std::uint8_t, std::uint16_t, 4> first{{&skins.front().joints, 2, sizeof(Skin)},
+                                                                {&skins.front().weights, 2, sizeof(Skin)}};
     const InfluenceBuffer<std::uint16_t, float, 2> second{more_joints, more_weights};
     const BufferInfluences found = influences_of(first, second);
     EXPECT_EQ(found.offsets, (std::vector<std::int32_t>{0, 1, 5}));
@@ -185,7 +181,8 @@ TEST(JobSystem, does_the_work_of_the_threads) {
         EXPECT_TRUE(same_bits(deformed(deformer, scene, {.threads = 3}), alone));
         EXPECT_EQ(host.jobs, 3u);
         std::atomic<std::size_t> sum{0};
-        parallel_for(1000, 0, [&](std::size_t begin, std::size_t end) { sum += end - begin; }, 10);
+        parallel_for(
+            1000, 0, [&](std::size_t begin, std::size_t end) { sum += end - begin; }, 10);
         EXPECT_EQ(sum, 1000u);
         const auto fails = [](std::size_t begin, std::size_t) {
             if (begin == 500) throw std::runtime_error("as work may");

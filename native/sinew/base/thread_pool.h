@@ -42,7 +42,8 @@ void parallel_for(std::size_t count, std::size_t threads, const Work& work, std:
 struct JobSystem {
     /// Calls job(of_job, i) once for each i below `jobs`, on any threads, the caller's among them, and returns when
     /// all have returned. They throw nothing.
-    using Run = void (*)(void* host, std::size_t jobs, void (*job)(void* of_job, std::size_t i), void* of_job);
+    using Run = void (*)(void* host, std::size_t jobs, void (*job)(void* of_job, std::size_t i),
+                         void* of_job);
 
     Run run = nullptr;
     void* host = nullptr;     // passed to `run`

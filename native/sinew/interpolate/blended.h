@@ -22,7 +22,7 @@ struct Blended {
 };
 
 /// How a blend chooses the free signs of quaternions.
-enum class Signs {
+enum class BlendSigns {
     kToHeaviest,  ///< flips each to the hemisphere of the term with the largest weight: the shortest path
     /// flips each to the hemisphere of the sum of the terms before it: the rule of Blender and of Deformer
     kRunningSum,
@@ -203,9 +203,9 @@ template <class T>
 
 /// The componentwise weighted sum (of 12, 7 or 8 components), with weights times `scale`; not a rigid transform
 /// (Smith 2013, section 3.2.2). Not defined if a rotation of weight other than 0 does not have unit length; with
-/// Signs::kToHeaviest also if one is 180 degrees from the heaviest, or if order_decides(); with
-/// Signs::kRunningSum also if one is perpendicular to the sum before it.
-template <Signs signs, class Transform, class T>
+/// BlendSigns::kToHeaviest also if one is 180 degrees from the heaviest, or if order_decides(); with
+/// BlendSigns::kRunningSum also if one is perpendicular to the sum before it.
+template <BlendSigns signs, class Transform, class T>
 [[nodiscard]] Blended<Transform> weighted_sum(std::span<const Transform> transforms,
                                               std::span<const T> weights, const Shares<T>& share) noexcept {
     const Transform& pivot = transforms[share.heaviest];
@@ -215,10 +215,10 @@ template <Signs signs, class Transform, class T>
         if (weights[i] == T(0)) continue;
         const T weight = share.of(weights[i]);
         if (!has_unit_rotation(transforms[i])) total.is_defined = false;
-        if constexpr (signs == Signs::kToHeaviest) {
+        if constexpr (signs == BlendSigns::kToHeaviest) {
             if (is_half_turn_apart(transforms[i], pivot)) total.is_defined = false;
             total.transform = sum(total.transform, scaled(weight, aligned(transforms[i], pivot)));
-        } else if constexpr (signs == Signs::kRunningSum) {
+        } else if constexpr (signs == BlendSigns::kRunningSum) {
             if (has_terms && is_half_turn_apart(transforms[i], total.transform)) total.is_defined = false;
             has_terms = true;
             total.transform = sum(total.transform, scaled(weight, aligned(transforms[i], total.transform)));
@@ -226,7 +226,7 @@ template <Signs signs, class Transform, class T>
             total.transform = sum(total.transform, scaled(weight, transforms[i]));
         }
     }
-    if constexpr (signs == Signs::kToHeaviest && HasQuaternion<Transform>) {
+    if constexpr (signs == BlendSigns::kToHeaviest && HasQuaternion<Transform>) {
         if (order_decides(transforms, weights, share)) total.is_defined = false;
     }
     return total;

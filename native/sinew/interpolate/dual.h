@@ -30,7 +30,7 @@ struct Sclerp {
             T(1) - t < t ? b : a);
     }
 
-    template <Signs signs = Signs::kToHeaviest, class T>
+    template <BlendSigns signs = BlendSigns::kToHeaviest, class T>
     [[nodiscard]] static Blended<DualQuat<T>> blend(std::span<const DualQuat<T>> transforms,
                                                     std::span<const T> weights) noexcept {
         using std::hypot;

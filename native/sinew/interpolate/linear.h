@@ -34,7 +34,7 @@ struct Linear {
         return finite_or(Method::finished(total, heaviest), heaviest);
     }
 
-    template <Signs signs = Signs::kToHeaviest, class T>
+    template <BlendSigns signs = BlendSigns::kToHeaviest, class T>
     [[nodiscard]] static Blended<Of<T>> blend(std::span<const Of<T>> transforms,
                                               std::span<const T> weights) noexcept {
         const Shares<T> share = shares(weights);

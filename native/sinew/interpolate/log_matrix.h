@@ -25,10 +25,10 @@ struct MatrixLog {
     [[nodiscard]] static Blended<Affine<T>> between(const Affine<T>& a, const Affine<T>& b, T t) noexcept {
         const std::array<Affine<T>, 2> ends{a, b};
         const std::array<T, 2> weights{T(1) - t, t};
-        return blend<Signs::kAsGiven, T>(ends, weights);
+        return blend<BlendSigns::kAsGiven, T>(ends, weights);
     }
 
-    template <Signs signs = Signs::kToHeaviest, class T>
+    template <BlendSigns signs = BlendSigns::kToHeaviest, class T>
     [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
                                                   std::span<const T> weights) noexcept {
         const Shares<T> share = shares(weights);

@@ -54,7 +54,7 @@ struct QvSlerp {
                                      T(1) - t < t ? b : a);
     }
 
-    template <Signs signs = Signs::kToHeaviest, class T>
+    template <BlendSigns signs = BlendSigns::kToHeaviest, class T>
     [[nodiscard]] static Blended<QuatVec<T>> blend(std::span<const QuatVec<T>> transforms,
                                                    std::span<const T> weights) noexcept {
         const Shares<T> share = shares(weights);

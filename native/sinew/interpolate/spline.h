@@ -76,7 +76,7 @@ template <class Transform, class T>
     const auto chain = along_chain(span, keys);
     const std::span<const Transform> terms(chain.transform);
     const std::span<const T> weights(span.weights);
-    const Blended<Transform> sum = weighted_sum<Signs::kAsGiven>(terms, weights, {1, T(1), T(1), true});
+    const Blended<Transform> sum = weighted_sum<BlendSigns::kAsGiven>(terms, weights, {1, T(1), T(1), true});
     return finite_or<Transform>({sum.transform, chain.is_defined}, keys[1]);
 }
 
@@ -89,7 +89,8 @@ template <class Method, class Transform, class T>
 [[nodiscard]] Blended<Transform> spline_blend(const SplineSpan<T>& span,
                                               const std::array<Transform, 4>& keys) noexcept {
     const auto chain = along_chain(span, keys);
-    Blended<Transform> result = Method::template blend<Signs::kAsGiven, T>(chain.transform, span.weights);
+    Blended<Transform> result =
+        Method::template blend<BlendSigns::kAsGiven, T>(chain.transform, span.weights);
     if (!chain.is_defined) result.is_defined = false;
     return result;
 }

@@ -19,7 +19,8 @@ HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b,
     const Block& block = from.blocks[b];
     const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
     if (!is_contiguous(from.points)) {
-        return load_apart(d, [&](std::size_t i) -> auto& { return from.points[vertices[i]]; });
+        return load_apart(
+            d, [ vertices, points = from.points ](std::size_t i) -> auto& { return points[vertices[i]]; });
     }
     const Vec3<float>* const points = from.points.data();
     if constexpr (hn::MaxLanes(D()) > 1) {

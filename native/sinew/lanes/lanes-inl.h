@@ -385,13 +385,15 @@ HWY_NOINLINE Points<D> load_apart(D d, const ToPoint& to_point) {
 template <class D>
 HWY_INLINE Points<D> load_at(D d, const Strided<const Vec3<float>>& from, std::size_t i) {
     if (from.stride() == sizeof(Vec3<float>)) return load_consecutive(d, &from[i].x);
-    return load_apart(d, [&](std::size_t k) -> auto& { return from[i + k]; });
+    return load_apart(
+        d, [ from, i ](std::size_t k) -> auto& { return from[i + k]; });
 }
 
 template <class D>
 HWY_INLINE void store_at(D d, const Points<D>& p, const Strided<Vec3<float>>& to, std::size_t i) {
     if (is_contiguous(to)) return store_consecutive(d, p, &to[i].x);
-    store_apart(d, p.x, p.y, p.z, [&](std::size_t k) -> auto& { return to[i + k]; });
+    store_apart(
+        d, p.x, p.y, p.z, [ to, i ](std::size_t k) -> auto& { return to[i + k]; });
 }
 
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it again.
@@ -404,8 +406,10 @@ HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::si
         store_consecutive(d, p, &to.points[*vertices].x);
     } else {
         if (!is_contiguous(to.points)) {
-            return store_apart(d, p.x, p.y, p.z,
-                               [&](std::size_t i) -> auto& { return to.points[vertices[i]]; });
+            // A copy: of what a function refers to, the compiler would reload the members.
+            return store_apart(
+                d, p.x, p.y, p.z,
+                [ vertices, points = to.points ](std::size_t i) -> auto& { return points[vertices[i]]; });
         }
         Vec3<float>* const points = to.points.data();
         if (block.consecutive) return store_consecutive(d, p, &points[block.output + lane].x);

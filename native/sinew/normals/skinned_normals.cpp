@@ -94,11 +94,13 @@ struct SkinnedNormals::State {
 
     void move_normals(Strided<const Vec3<float>> points, Strided<Vec3<float>> to,
                       std::size_t threads) const noexcept {
-        const SkinnedNormalFrame frame{
-            points,         {moved[0].data(), moved[1].data(), moved[2].data()},
-            inverse_step,   {cofactors[0].data(), cofactors[1].data(), cofactors[2].data()},
-            normals.data(), vertices.data(),
-            to};
+        const SkinnedNormalFrame frame{points,
+                                       {moved[0].data(), moved[1].data(), moved[2].data()},
+                                       inverse_step,
+                                       {cofactors[0].data(), cofactors[1].data(), cofactors[2].data()},
+                                       normals.data(),
+                                       vertices.data(),
+                                       to};
         const auto compute = [&](const SkinnedNormalKernel::OfRange& function, std::size_t count) {
             const auto part = [&](std::size_t begin, std::size_t end) {
                 function[target_in_use()](frame, begin, end);

@@ -55,3 +55,13 @@ run(${CMAKE_COMMAND} --build "${folder}/build")
 foreach(program library calls_plain calls_aligned)
   run("${folder}/build/${program}")
 endforeach()
+
+# The engine of docs/engines.md, where there is OpenGL ES.
+find_path(egl EGL/egl.h)
+find_path(gles GLES3/gl3.h)
+if(egl AND gles AND NOT GLM)
+  run(${CMAKE_COMMAND} -S "${SOURCE}/native/example" -B "${folder}/example" -G Ninja
+    "-DCMAKE_PREFIX_PATH=${folder}/installed" "-DCMAKE_CXX_FLAGS=${FLAGS}")
+  run(${CMAKE_COMMAND} --build "${folder}/example")
+  run("${folder}/example/engine" "${folder}/engine.ppm")
+endif()

@@ -20,8 +20,8 @@ void mix_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Fr
     const auto for_each_vertex = [&](const auto& call) {
         for (std::size_t b = begin; b < end; ++b) {
             for (std::size_t lane = 0; lane < mesh.blocks[b].vertices; ++lane) {
-                call(points[static_cast<std::size_t>(mesh.vertices[b].lane[lane])], kLanes * (b - begin) + lane,
-                     mix.weights[b].lane[lane]);
+                call(points[static_cast<std::size_t>(mesh.vertices[b].lane[lane])],
+                     kLanes * (b - begin) + lane, mix.weights[b].lane[lane]);
             }
         }
     };
