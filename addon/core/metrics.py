@@ -97,8 +97,8 @@ METRICS = {
 BENT = 0.9968
 # Limbs of less volume count as having this share of all.
 LEAST_LIMB = 1e-3
-# Rings of a joint: parts of equal width of the way from one bone to the other, the first and the last of which
-# are no rings; the least weights of both bones together; the fewest vertices.
+# Rings of a joint: parts of equal width of the way from one bone to the other, the first and the last of
+# which are no rings; the least weights of both bones together; the fewest vertices.
 RINGS = 5
 OF_TWO = 0.7
 LEAST_IN_RING = 6

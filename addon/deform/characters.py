@@ -137,8 +137,8 @@ _own: dict[bpy.types.Object, dict[str, Value]] = {}
 
 @contextmanager
 def kept_presets(meshes: Sequence[bpy.types.Object], names: Iterable[str]) -> Iterator[None]:
-    """Context in which each preset among the names stands for what it chooses for the meshes at the beginning,
-    and with every other method they have their own settings.
+    """Context in which each preset among the names stands for what it chooses for the meshes at the
+    beginning, and with every other method they have their own settings.
 
     Raises SinewError where it can not choose, or where a setting that it sets is keyed.
     """

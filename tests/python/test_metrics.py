@@ -247,7 +247,8 @@ def test_what_one_limb_gains_does_not_make_up_for_another(tube):
 
 
 def test_a_ring_of_a_joint_that_collapses_is_pinched(tube):
-    """At weight w the cross-section of a half twist is scaled by |1 - 2 w|; the middle ring has w from .4 to .6."""
+    """At weight w the cross-section of a half twist is scaled by |1 - 2 w|; in the middle ring w is .4 to
+    .6."""
     by_limb = tube.measure("lbs", about([1, 0, 0], 180)).by_limb()
     np.testing.assert_allclose(by_limb["pinch"], 0.8 - 0.2 / np.sqrt(3), atol=0.02)
     np.testing.assert_array_equal(tube.measure("dq", about([1, 0, 0], 179)).by_limb()["pinch"], 0.0)
