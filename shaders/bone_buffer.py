@@ -82,22 +82,38 @@ def quaternions(r: np.ndarray) -> np.ndarray:
 # --- Signs by hierarchy
 
 
-def along_chain(rotations: np.ndarray, parents: Sequence[int], mirrors: np.ndarray) -> np.ndarray:
+def along_chain(
+    rotations: np.ndarray, parents: Sequence[int], mirrors: np.ndarray, turns: np.ndarray | None = None
+) -> np.ndarray:
     """The same quaternions, each with the sign that brings it nearest to its parent's; a bone that mirrors counts
-    as its parent for those that it carries."""
+    as its parent for those that it carries.
+
+    turns  of the first bones: w, x, y, z of the rotation of each against its parent as its own angles give it,
+           where w < 0 is more than half a turn; 0: unknown
+    """
     found = rotations.copy()
     nearby: dict[int, np.ndarray] = {-1: np.array([0.0, 0.0, 0.0, 1.0])}
 
     def visit(bone: int) -> np.ndarray:
         if bone not in nearby:
             before = visit(int(parents[bone]))
-            found[bone] *= -1 if found[bone] @ before < 0 else 1
+            along = found[bone] @ before
+            if turns is not None and bone < len(turns) and turns[bone].any():
+                told = found[bone] @ product(before, np.roll(turns[bone], -1))
+                # Otherwise something else turns the bone.
+                along = told if abs(told) > np.cos(np.radians(2.5)) else along
+            found[bone] *= -1 if along < 0 else 1
             nearby[bone] = before if mirrors[bone] else found[bone]
         return nearby[bone]
 
     for bone in range(len(found)):
         visit(bone)
     return found
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of two quaternions."""
+    return np.array([*(a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])), a[3] * b[3] - a[:3] @ b[:3]])
 
 
 # --- The stages

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from bone_buffer import bone_buffer
+from skinning import deformed
 
 COMPONENTS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -75,53 +76,6 @@ def influences(file, attributes):
         for name in ("JOINTS", "WEIGHTS")
     )
     return joints, weights.astype(np.float64)
-
-
-def rotated(quaternions, vectors):
-    """Vectors [n, 3] by quaternions [n, 4], x, y, z, w."""
-    axes, real = quaternions[:, :3], quaternions[:, 3:]
-    return vectors + 2.0 * np.cross(axes, np.cross(axes, vectors) + real * vectors)
-
-
-def moved(bones, points):
-    """Points [n, 3] by the matrices of bones [n, 4, 4] of the bone buffer."""
-    return np.einsum("nij,nj->ni", bones[:, :3, :3], points) + bones[:, :3, 3]
-
-
-def skinned(method, points, centres, joints, weights, bones):
-    """As the shaders: points [vertices, 3] by lbs, dq or cor.
-
-    bones  float [bones, 4, 4], of bone_buffer()
-    """
-    weights = weights / weights.sum(axis=1, keepdims=True)
-    slots = [(bones[joints[:, k]].astype(np.float64), weights[:, k, None]) for k in range(joints.shape[1])]
-    linear = sum(weight * moved(bone, points) for bone, weight in slots)
-    if method == "lbs":
-        return linear
-    real, dual = np.zeros((len(points), 4)), np.zeros((len(points), 4))
-    for bone, weight in slots:
-        q = bone[:, 3]
-        signed = np.where((q * real).sum(axis=1, keepdims=True) < 0.0, -weight, weight)
-        t = moved(bone, points) - rotated(q, points)
-        real += signed * q
-        dual += (
-            0.5
-            * signed
-            * np.column_stack([q[:, 3:] * t + np.cross(t, q[:, :3]), -(t * q[:, :3]).sum(axis=1)])
-        )
-    length = np.linalg.norm(real, axis=1, keepdims=True)
-    real, dual = real / length, dual / length
-    if method == "dq":
-        translation = (
-            real[:, 3:] * dual[:, :3] - dual[:, 3:] * real[:, :3] + np.cross(real[:, :3], dual[:, :3])
-        )
-        return rotated(real, points) + 2.0 * translation
-    if method == "cor":
-        arms = points - centres
-        return (
-            linear + rotated(real, arms) - sum(weight * rotated(bone[:, 3], arms) for bone, weight in slots)
-        )
-    raise SystemExit(f"{method}: these shaders have lbs, dq and cor alone")
 
 
 def points_at(path, times, animation_name=None):

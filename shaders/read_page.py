@@ -7,7 +7,7 @@ import re
 import zlib
 
 import numpy as np
-from read_glb import skinned
+from skinning import deformed
 
 
 def read(path):
@@ -33,7 +33,7 @@ def points(about, arrays, method, frame):
     """Points [vertices, 3] in armature space.
 
     about   the mesh's entry in the header
-    method  lbs, dq, cor or mix
+    method  lbs, dq, cor, mix, or blender for the Armature modifier
     frame   its place in the header's frames
     """
     counts = np.diff(arrays["offsets"])
@@ -44,14 +44,16 @@ def points(about, arrays, method, frame):
     still = weights.sum(axis=1) <= 1e-4
     weights[still, 0] = 1.0
     first, second = about["mix"] if method == "mix" else (method, method)
+    share = arrays["shares"] if method == "mix" else np.zeros(len(counts))
+    amounts, by_hierarchy = arrays.get("amounts"), about["hierarchy"]
+    if method == "blender":
+        first, second, amounts, by_hierarchy = about["blender"], about["blender"], None, ()
     rest, palette = arrays["rest"].astype(np.float64), arrays["palettes"][frame]
     if "moving" in arrays:
         rest[arrays["moving"]] = arrays["moved"][frame]
     if not len(arrays["bones"]):
         return rest
-    common = rest, arrays.get("centres"), bones, weights, palette
-    found = skinned(first, *common)
-    if second != first:
-        share = arrays["shares"].astype(np.float64)[:, None]
-        found += share * (skinned(second, *common) - found)
+    amounts = np.zeros((len(counts), 2)) if amounts is None else amounts
+    of_rest = rest, arrays.get("centres"), bones, weights, palette
+    found = deformed(first, second, share, amounts, about["form"], *of_rest, by_hierarchy)
     return np.where(still[:, None], rest, found)

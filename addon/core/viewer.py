@@ -13,20 +13,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import sinew
 
+from .bone_buffer import add_segments, add_twists, along_chain, of_motions
 from .errors import SinewError
 from .heat import HeatScale
 from .influences import Influences
 from .metrics import METRICS
 from .page import legend_texts
+from .twist_spread import TwistInputs, blend_of
+from .twists import Twists
 from .vectors import rotations_of, transformed
 
 # Methods that the shaders have, in the order of the page's lists.
 METHODS = ("lbs", "dq", "cor")
+Form: TypeAlias = Literal["continuous", "kim_han"]
 BLENDER, MIX = "blender", "mix"
 FOLDER = Path(__file__).parent / "templates/viewer"
 _SHADERS = (".glsl", ".vert", ".frag")
@@ -34,21 +38,22 @@ _RAMP_STOPS = 64
 _TEXTS = {"distance": "The distance of each vertex from where Blender's Armature modifier takes it."}
 
 
-def bone_buffer(posed: np.ndarray, rest: np.ndarray, rest_inverses: np.ndarray) -> np.ndarray:
-    """What the shaders read of bones, float32 [bones, 4, 4]: the rows of the 3x4 matrix of each motion, then
-    its rotation as a quaternion x, y, z, w: see docs/engines.md.
+@dataclass
+class Stages:
+    """The stages of a mesh after the blend that the shaders have.
 
-    posed, rest    float [bones, 4, 4], from the bone's own axes to armature space, Y along the bone
-    rest_inverses  float64 [bones, 4, 4], of `rest`
+    names     of those that are on
+    amounts   float32 [vertices, 2], how much each vertex gets of Twist Spread and of Limit Bulge, 0 to 1
+    form      of Limit Bulge
+    twists    of the bones
+    segments  float32 [bones, 3] each: heads and tails at rest, armature space
     """
-    # Not with numpy's product: see vectors.transformed().
-    motions = np.einsum("bij,bjk->bik", posed.astype(np.float64), rest_inverses)
-    q = rotations_of(sinew.affine.split_scale(motions, rest.astype(np.float64)).rigid[:, :3, :3])
-    buffer = np.empty((len(posed), 4, 4), dtype=np.float32)
-    buffer[:, :3] = motions[:, :3]
-    # With w >= 0, as Blender has them.
-    buffer[:, 3] = np.roll(np.where(q[0] < 0.0, -q, q), -1, axis=0).T
-    return buffer
+
+    names: list[str]
+    amounts: np.ndarray
+    form: Form
+    twists: Twists
+    segments: tuple[np.ndarray, np.ndarray]
 
 
 @dataclass
@@ -61,6 +66,10 @@ class Part:
     centres     float32 [vertices, 3], for `cor`; None without it
     mix         the two methods of the painted mix, and float32 [vertices], the share of the second; None
                 without it
+    by_hierarchy  the methods whose signs are from the hierarchy
+    parents       int32 [bones], -1 for none; given where there are such methods
+    stages        None without any
+    has_turned    a bone is twisted beyond half a turn in a frame, which the shaders do not follow
     """
 
     name: str
@@ -72,6 +81,10 @@ class Part:
     blender: str
     centres: np.ndarray | None = None
     mix: tuple[str, str, np.ndarray] | None = None
+    by_hierarchy: Sequence[str] = ()
+    parents: np.ndarray | None = None
+    stages: Stages | None = None
+    has_turned: bool = False
     _palettes: list[np.ndarray] = field(default_factory=list)
     _worlds: list[np.ndarray] = field(default_factory=list)
     _rests: list[np.ndarray] = field(default_factory=list)
@@ -79,9 +92,7 @@ class Part:
     def __post_init__(self) -> None:
         # Only bones that move a vertex are in the page.
         self._used, bones = np.unique(self.influences.bones, return_inverse=True)
-        inverse = bones.reshape(-1).astype(np.int32)
-        self.influences = Influences(self.influences.offsets, inverse, self.influences.weights)
-        self.rest_bones = self.rest_bones[self._used]
+        self._bones = bones.reshape(-1).astype(np.uint16)
         self._rest_inverses = np.linalg.inv(self.rest_bones.astype(np.float64))
         data = {} if self.centres is None else {"cor": self.centres}
         self._binding = sinew.Binding(
@@ -93,35 +104,98 @@ class Part:
             vertex_data=data,
         )
         self._deformers: dict[str, sinew.Deformer] = {}
+        self._twist: sinew.TwistSpread | None = None
+        self._bulge: sinew.BulgeLimit | None = None
+        if self.stages is not None:
+            twists, amounts = self.stages.twists, self.stages.amounts.T
+            self._twist = sinew.TwistSpread(
+                self._binding,
+                twists.rows,
+                twists.heads,
+                twists.tails,
+                self.rest_bones,
+                parents=twists.parents,
+                weights=amounts[0],
+                mix=None if self.mix is None else self.mix[2],
+            )
+            self._bulge = sinew.BulgeLimit(self._binding, *self.stages.segments, weights=amounts[1])
 
     def has(self, method: str) -> bool:
         wanted = {MIX: self.mix, "cor": self.centres}
         return wanted.get(method, self.rest) is not None
 
-    def add_frame(self, posed: np.ndarray, world: np.ndarray, rest: np.ndarray | None = None) -> None:
-        """posed: float32 [all bones, 4, 4], in armature space; world: [4, 4], from armature space; rest: as
-        that of the first frame, which it is where it is None."""
+    def add_frame(
+        self,
+        posed: np.ndarray,
+        world: np.ndarray,
+        rest: np.ndarray | None = None,
+        twists: TwistInputs = (),
+        turns: np.ndarray | None = None,
+    ) -> None:
+        """
+        posed   float32 [bones, 4, 4], in armature space
+        world   [4, 4], from armature space
+        rest    as that of the first frame, which it is where it is None
+        twists  of those of the bones
+        turns   as sinew.Deformer.deform takes them
+        """
         self._rests.append(self.rest if rest is None else rest)
-        for deformer in self._deformers.values():
-            deformer.set_rest_points(self._rests[-1])
-        self._posed = np.ascontiguousarray(posed[self._used])
-        self._palettes.append(bone_buffer(self._posed, self.rest_bones, self._rest_inverses))
+        for each in (*self._deformers.values(), self._twist, self._bulge):
+            if each is not None:
+                each.set_rest_points(self._rests[-1])
+        # Not with numpy's product: see vectors.transformed().
+        motions = np.einsum("bij,bjk->bik", posed.astype(np.float64), self._rest_inverses)
+        split = sinew.affine.split_scale(motions, self.rest_bones.astype(np.float64))
+        rotations = np.roll(rotations_of(split.rigid[:, :3, :3]), -1, axis=0).T
+        if self.parents is not None:
+            mirrors = np.linalg.det(motions[:, :3, :3]) < 0.0
+            rotations = along_chain(rotations, self.parents, mirrors, turns)
+        buffer = of_motions(motions, rotations)
+        if self.stages is not None:
+            add_segments(buffer, *self.stages.segments)
+            self._add_twists(buffer, motions.astype(np.float32), twists)
+        self._palettes.append(buffer[self._used])
+        self._posed, self._turns = posed, turns
         self._worlds.append(np.asarray(world, dtype=np.float64))
+
+    def _add_twists(self, buffer: np.ndarray, motions: np.ndarray, twists: TwistInputs) -> None:
+        assert self._twist is not None
+        assert self.stages is not None
+        inputs = np.array(twists, np.float32).reshape(self._twist.twist_count, -1)
+        amounts, curves, channels = inputs[:, 0], inputs[:, 1], inputs[:, 2:]
+        is_within = np.abs(self._twist.angles(motions, channels)) <= np.pi
+        self.has_turned |= not is_within.all()
+        channels = channels * is_within[:, None]
+        angles = amounts * self._twist.angles(motions, channels)
+        add_twists(buffer, self.stages.twists.rows, angles, curves)
+        self._inputs = motions, {"amounts": amounts, "curves": curves, "channels": channels}
 
     def world_points(self, method: str) -> np.ndarray:
         """float64 [vertices, 3], of the frame that was added last; those of Blender's method where it lacks
         what `method` needs."""
-        if method == BLENDER or not self.has(method):
-            method = self.blender
+        is_own = method != BLENDER and self.has(method)
+        first = second = method if is_own else self.blender
+        mix = None
+        if method == MIX and self.mix is not None:
+            first, second, shares = self.mix
+            mix = second, shares
         if method not in self._deformers:
-            if method == MIX and self.mix is not None:
-                first, second, shares = self.mix
-                deformer = sinew.Deformer(self._binding, first, mix=(second, shares))
-            else:
-                deformer = sinew.Deformer(self._binding, method)
-            deformer.set_rest_points(self._rests[-1])
-            self._deformers[method] = deformer
-        points = self._deformers[method].deform(self._posed, rest_inverses=self._rest_inverses)
+            self._deformers[method] = sinew.Deformer(self._binding, first, mix=mix)
+            self._deformers[method].set_rest_points(self._rests[-1])
+        points = self._deformers[method].deform(
+            self._posed,
+            rest_inverses=self._rest_inverses,
+            parameters={f"{name}.signs": "hierarchy" for name in self.by_hierarchy if name in (first, second)}
+            if is_own
+            else None,
+            parents=self.parents,
+            turns=self._turns,
+        )
+        if is_own and self._twist is not None and self._bulge is not None and self.stages is not None:
+            motions, inputs = self._inputs
+            blends = blend_of(first), blend_of(second)
+            self._twist.apply(points, motions, points, blend=blends[0], mix_blend=blends[1], **inputs)
+            self._bulge.apply(points, motions, points, form=self.stages.form)
         return transformed(points, self._worlds[-1])
 
     def world_rest(self) -> np.ndarray:
@@ -133,7 +207,7 @@ class Part:
         found = {
             "rest": self.rest,
             "offsets": self.influences.offsets,
-            "bones": self.influences.bones.astype(np.uint16),
+            "bones": self._bones,
             "weights": self.influences.weights,
             "triangles": self.triangles.astype(np.uint32),
             "edges": self.edges.astype(np.uint32),
@@ -144,6 +218,8 @@ class Part:
             found["centres"] = self.centres
         if self.mix is not None:
             found["shares"] = self.mix[2]
+        if self.stages is not None:
+            found["amounts"] = self.stages.amounts
         has_moved = np.zeros(len(self.rest), dtype=bool)
         for rest in self._rests:
             if rest is not self.rest:
@@ -277,6 +353,9 @@ class Viewer:
                     "name": part.name,
                     "blender": part.blender,
                     "mix": part.mix and part.mix[:2],
+                    "hierarchy": part.by_hierarchy,
+                    "stages": part.stages.names if part.stages else [],
+                    "form": part.stages.form if part.stages else "",
                     "arrays": arrays,
                 }
                 for part, arrays in zip(self.parts, places, strict=True)

@@ -16,14 +16,15 @@ from conftest import REPOSITORY
 from mathutils import Euler
 from program import run_sinew
 from sinew_addon.core import heat, viewer
+from sinew_addon.core.influences import Influences
 
 FRAMES = [1, 6, 11]
 GROUP = "Painted"
 
 
-def make_character(**options):
+def make_character(bones=3):
     """An arm, moved, rotated and scaled as one, with a scaled bone."""
-    obj, armature = scenes.make_arm(bones=3, **options)
+    obj, armature = scenes.make_arm(bones)
     armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), Euler((0.5, 0.2, -0.3))
     armature.scale = (1.3, 1.3, 1.3)
     obj.parent = armature
@@ -94,6 +95,71 @@ def test_the_painted_mix_is_that_of_the_file(tmp_path):
     assert_has_points(page, points_of(path, "dq"), "mix", obj)
 
 
+def make_limb(angle=150.0, mode="QUATERNION"):
+    """An arm that spreads twists from the hand and from the upper arm, twisted more from frame to frame, with a
+    scaled bone and a vertex group."""
+    obj = make_character(bones=4)
+    names = ["shoulder.L", "upper_arm.L", "forearm.L", "hand.L"]
+    for bone, name in zip(obj.parent.data.bones, names, strict=True):
+        bone.name = name
+    for name, share in (("upper_arm.L", 0.4), ("forearm.L", 0.0), ("hand.L", 1.0)):
+        bone = obj.parent.pose.bones[name]
+        bone.rotation_mode = mode
+        last = Euler((0.5, np.radians(share * angle), 0.7 - 0.7 * share))
+        if mode == "XYZ":
+            scenes.key(bone, "rotation_euler", [(1, (0.0, 0.0, 0.0)), (11, last)])
+        else:
+            scenes.key(bone, "rotation_quaternion", [(1, (1.0, 0.0, 0.0, 0.0)), (11, last.to_quaternion())])
+    obj.parent.pose.bones["forearm.L"].sinew_twist_curve = 0.5
+    obj.parent.pose.bones["upper_arm.L"].sinew_twist_amount = 0.7
+    group = obj.vertex_groups.new(name=GROUP)
+    for vertex in range(len(obj.data.vertices)):
+        group.add([vertex], vertex % 5 / 4, "REPLACE")
+    scenes.add_sinew(obj, "dq")
+    obj.sinew.mix.method, obj.sinew.mix.group = "lbs", GROUP
+    return obj
+
+
+@pytest.mark.parametrize("form", ["continuous", "kim_han"])
+def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
+    obj = make_limb(150.0)
+    settings = obj.sinew
+    settings.twist_spread.enabled = settings.bulge_limit.enabled = True
+    settings.twist_spread.amount, settings.bulge_limit.strength = 0.9, 0.8
+    settings.bulge_limit.group, settings.bulge_limit.form = GROUP, form
+    settings.dq.signs = "hierarchy"
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "blender,lbs,dq,cor", "--frames", "1,6,11")
+    header, (arrays,) = read_page.read(page)
+    assert header["parts"][0]["stages"] == ["Twist Spread", "Limit Bulge"]
+    assert header["parts"][0]["hierarchy"] == ["dq"]
+    assert len(np.unique(arrays["palettes"][2, :, 6, 2])) == 3
+    assert_has_points(page, points_of(path, "dq"), "mix", obj)
+    settings.mix.method = "OFF"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    for method in ("lbs", "dq", "cor"):
+        expected = points_of(path, method)
+        assert_has_points(page, expected, method, obj)
+        plain = read_page.points(header["parts"][0], {**arrays, "amounts": 0 * arrays["amounts"]}, method, 2)
+        assert np.abs(plain - read_page.points(header["parts"][0], arrays, method, 2)).max() > 0.05
+    assert_has_points(page, points_of(path, "blender"), "blender", obj)
+
+
+@pytest.mark.parametrize(("angle", "has_turned"), [(175.0, False), (300.0, True)])
+def test_turns_that_euler_angles_tell(tmp_path, angle, has_turned):
+    obj = make_limb(angle, "XYZ")
+    obj.sinew.mix.method, obj.sinew.twist_spread.enabled = "OFF", True
+    obj.sinew.cor.signs = "hierarchy"
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "dq,cor", "--frames", "1,6,11")
+    assert any("beyond half a turn" in note for note in read_page.read(page)[0]["notes"]) == has_turned
+    if has_turned:
+        obj.sinew.twist_spread.turns = False
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    for method in ("dq", "cor"):
+        assert_has_points(page, points_of(path, method), method, obj)
+
+
 def test_a_modifier_in_front_gives_the_mesh(tmp_path):
     obj = make_character()
     scenes.put_in_front(obj)
@@ -148,7 +214,7 @@ def test_what_hangs_on_bones_goes_with_them(tmp_path):
 def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     obj = make_character()
     scenes.add_sinew(obj, "dq")
-    obj.sinew.dq.signs = "hierarchy"
+    obj.sinew.delta_mush.enabled = True
     second, _armature = scenes.make_arm(name="Masked</script>")
     scenes.modifiers(second)[0].vertex_group = "bone.1"
     path = save(tmp_path)
@@ -161,7 +227,7 @@ def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     notes = "\n".join(header["notes"])
     assert "Quaternion-Vector" in notes
     assert "Masked</script>: left out: " in notes
-    assert "Arm: rotations go the shorter way" in notes
+    assert "Arm: shown without Delta Mush" in notes
     for measure in header["measures"]:
         assert measure["low"] < measure["high"]
         assert len(measure["ticks"]) == 5
@@ -218,7 +284,12 @@ def test_bones_are_as_the_shaders_read_them():
         bones[:, :3, 3] = rng.normal(size=(200, 3))
     posed[:, :3, :3] *= rng.uniform(0.5, 1.5, size=(200, 1, 3))
     posed[:, :3, :3] += rng.uniform(-0.1, 0.1, size=(200, 3, 3))
-    mine, its = viewer.bone_buffer(posed, rest, np.linalg.inv(rest)), bone_buffer(posed, rest)
+    nothing, none = np.empty((0, 3), np.float32), np.empty((0, 2), np.int32)
+    each = np.arange(201, dtype=np.int32)
+    influences = Influences(each, each[:-1], np.ones(200, np.float32))
+    part = viewer.Part("", np.zeros((200, 3), np.float32), influences, nothing, none, rest, "lbs")
+    part.add_frame(posed, np.eye(4))
+    mine, its = part.arrays()["palettes"][0], bone_buffer(posed, rest)
     np.testing.assert_allclose(mine[:, :3], its[:, :3], atol=1e-5)
     same = (mine[:, 3] * its[:, 3]).sum(axis=1)
     np.testing.assert_allclose(np.abs(same), 1.0, atol=1e-5)

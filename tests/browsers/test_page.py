@@ -86,7 +86,7 @@ def test_heat_maps_show_the_measures(browser, made):
     header, (arrays,) = read_page.read(page.page)
     part, frame = header["parts"][0], header["start"]
     world = arrays["worlds"][frame, :3, :3].astype(np.float64)
-    own, reference = (read_page.points(part, arrays, method, frame) for method in ("dq", part["blender"]))
+    own, reference = (read_page.points(part, arrays, method, frame) for method in ("dq", "blender"))
     distances, stretches = (
         browser.floats(f"window.sinew.values(0, 'dq', {frame}, {measure})").reshape(-1, 4)[:, 3]
         for measure in (1, 2)

@@ -12,15 +12,18 @@ import numpy as np
 
 from ...attach import attach, properties, stage_settings, upstream_proxy
 from ...core import battery
+from ...core.bulge_limit import segments
 from ...core.errors import SinewError
 from ...core.influences import Influences
 from ...core.rig import Bones
 from ...core.scale_rule import BLENDER_4
+from ...core.twist_spread import NOT_TOLD, TwistInputs
 from ...core.vectors import transformed
 from ...core.vertex_data import VertexData
-from ...core.viewer import BLENDER, METHODS, MIX, Found, Part, Viewer
+from ...core.viewer import BLENDER, METHODS, MIX, Found, Part, Stages, Viewer
 from ...deform import characters, session, source
 from ...deform.bound import Bound
+from ...deform.pose import stage_values
 from ...io import armature_io, mesh_io, spaces
 
 # The method of meshes that have none of their own; any of Sinew's would do.
@@ -28,7 +31,8 @@ PLAYED = "dq"
 POSES_A_SECOND = 1.0
 NOTES = (
     "The browser skins the meshes by the shaders that Sinew has for engines: Linear Blend, Dual Quaternion, "
-    "Centres of Rotation and the painted mix of two. For other methods and for stages, compare in Blender.",
+    "Centres of Rotation and the painted mix of two, Twist Spread and Limit Bulge. For other methods and for "
+    "Delta Mush, compare in Blender.",
     "Shapes are those right after the skinning, without the modifiers behind it.",
 )
 
@@ -60,6 +64,8 @@ class _Skinned:
     armature  of its Armature modifier
     rest      float32 [vertices, 3], object space, of the first frame
     space     from its object space to that of the armature, of the first frame
+
+    follows_turns  Twist Spread's setting
     """
 
     obj: bpy.types.Object
@@ -68,13 +74,14 @@ class _Skinned:
     rest: np.ndarray
     space: np.ndarray
     part: Part
+    follows_turns: bool
     has_moved: bool = False
     has_shifted: bool = False
 
     def add_frame(self, depsgraph: bpy.types.Depsgraph, chosen: Pose | None) -> None:
         armature, bones = self.armature.evaluated_get(depsgraph), self.bound.first_deformer.bones
-        pose = chosen.of(self.armature, bones) if chosen else armature_io.read_pose(armature, bones)
-        if not np.isfinite(pose).all():
+        posed = chosen.of(self.armature, bones) if chosen else armature_io.read_pose(armature, bones)
+        if not np.isfinite(posed).all():
             raise SinewError(f"{self.part.name}: the pose of a bone is not finite")
         points = source.rest_points(self.obj, self.bound.source, depsgraph)
         rest = None
@@ -82,7 +89,13 @@ class _Skinned:
             self.has_moved, rest = True, transformed(points, self.space).astype(np.float32)
         space = spaces.bones_from_model_in(depsgraph, self.obj, self.armature)
         self.has_shifted |= space is None or not np.allclose(space, self.space, atol=1e-5)
-        self.part.add_frame(pose, np.array(armature.matrix_world), rest)
+        twists: TwistInputs = ()
+        if self.part.stages is not None:
+            twists = armature_io.read_twists(armature, bones)
+            if chosen or not self.follows_turns:
+                twists = tuple((*own[:2], *NOT_TOLD) for own in twists)
+        turns = None if chosen or self.part.parents is None else armature_io.read_turns(armature, bones)
+        self.part.add_frame(posed, np.array(armature.matrix_world), rest, twists, turns)
 
     @property
     def notes(self) -> list[str]:
@@ -92,6 +105,10 @@ class _Skinned:
             found.append(f"{name}: weights of envelopes and bendy bones stay as in the first frame.")
         if self.has_shifted:
             found.append(f"{name}: it moves against its armature, and stays as in the first frame here.")
+        if self.part.has_turned:
+            found.append(f"{name}: twists fade beyond half a turn here, and go on in Blender.")
+        if stage_settings.is_on(properties.of(self.obj), "delta_mush"):
+            found.append(f"{name}: shown without Delta Mush.")
         return found
 
 
@@ -161,7 +178,6 @@ def page(
         characters.set_frame(scene, frames[0])
     skinned: list[_Skinned] = []
     notes = [*NOTES, *left_out]
-    of_shaders = [name for name in shown if name in METHODS]
     for obj, others in meshes.items():
         try:
             skinned.append(_read(obj, [obj, *others], shown))
@@ -188,11 +204,6 @@ def page(
             each.add_frame(depsgraph, pose)
         viewer.add_frame(frame if pose is None else pose.name)
         yield (number + 1) / len(frames)
-    viewer.notes += [
-        f"{each.part.name}: rotations go the shorter way here, not along the chain as in Blender."
-        for each in skinned
-        if not stage_settings.has_defaults(properties.of(each.obj), of_shaders)
-    ]
     viewer.notes += [note for each in skinned for note in each.notes]
     yield viewer.page()
 
@@ -230,6 +241,8 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         found_centres = data.of("cor", space)
         assert found_centres is not None
         centres = transformed(found_centres, space).astype(np.float32)
+    signs = stage_settings.method_values(settings, METHODS)
+    by_hierarchy = [name for name in METHODS if signs.get(f"{name}.signs") == "hierarchy"]
     part = Part(
         obj.name,
         points,
@@ -240,8 +253,31 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         attach.method_of(modifier),
         centres,
         mix,
+        by_hierarchy,
+        weighting.bones.twists.parents if by_hierarchy else None,
+        _stages_of(settings, bound, len(points)),
     )
-    return _Skinned(obj_of_state, armature, bound, rest.copy(), space, part)
+    return _Skinned(
+        obj_of_state, armature, bound, rest.copy(), space, part, follows_turns=settings.twist_spread.turns
+    )
+
+
+def _stages_of(settings: properties.SinewSettings, bound: Bound, vertices: int) -> Stages | None:
+    """Returns the stages that are on and that the shaders have."""
+    after = bound.skin_stack.stages_after
+    values = {} if after is None else stage_values(settings)
+    strengths = [("twist_spread", "amount"), ("bulge_limit", "strength")]
+    names = [name for name, _strength in strengths if name in values]
+    if after is None or not names:
+        return None
+    amounts = np.zeros((vertices, 2), np.float32)
+    for column, (name, strength) in enumerate(strengths):
+        if name in values:
+            amounts[:, column] = values[name][strength] * after.masks.get(name, 1.0)
+    form = values["bulge_limit"]["form"] if "bulge_limit" in values else "continuous"
+    bones = bound.first_deformer.weighting.bones
+    labels = [stage_settings.STAGES[name].label for name in names]
+    return Stages(labels, amounts.clip(0.0, 1.0), form, bones.twists, segments(bones))
 
 
 def _read_attached(obj: bpy.types.Object) -> _Attached:

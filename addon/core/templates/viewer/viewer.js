@@ -9,7 +9,7 @@ const sources = JSON.parse(find("shaders").textContent);
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 // Of textures with a texel for each vertex, corner or influence.
 const SHIFT = 10, WIDTH = 1 << SHIFT;
-const METHODS = { lbs: 0, dq: 1, cor: 2 };
+const METHODS = { lbs: 0, dq: 1, cor: 2 }, HIERARCHY = 4, BONE = 7, FORMS = { kim_han: 1 };
 // Of the grid: lines each way, each in pieces that fade out.
 const LINES = 31, PIECES = 12, GROUND_VERTICES = 2 * 2 * LINES * PIECES;
 
@@ -162,7 +162,8 @@ class Mesh {
     this.restRows = wide(arrays.rest, arrays.shares);
     this.rest = texture("rgba", this.restRows, this.count);
     this.centres = texture("rgba", wide(arrays.centres || arrays.rest), this.count);
-    this.palette = texture("rgba", arrays.palettes.subarray(0, 16 * this.bones), 4 * this.bones, 4);
+    this.amounts = texture("rg", arrays.amounts || new Float32Array(2 * this.count), this.count);
+    this.palette = texture("rgba", arrays.palettes.subarray(0, 4 * BONE * this.bones), BONE * this.bones, BONE);
     this.drawAround(arrays.triangles, arrays.edges);
     const target = () => texture("rgba", null, this.count);
     this.panes = [0, 1].map(() => ({ points: target(), surface: target() }));
@@ -211,10 +212,10 @@ class Mesh {
   }
 
   setFrame(index) {
-    const size = 16 * this.bones;
+    const size = 4 * BONE * this.bones;
     gl.bindTexture(gl.TEXTURE_2D, this.palette.texture);
     const values = this.arrays.palettes.subarray(index * size, (index + 1) * size);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 4, this.bones, gl.RGBA, gl.FLOAT, values);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, BONE, this.bones, gl.RGBA, gl.FLOAT, values);
     if (this.arrays.moving) this.moveRest(index);
     this.world = transposed(this.arrays.worlds.subarray(16 * index, 16 * index + 16));
     this.turn = [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => this.world[i]);
@@ -229,13 +230,15 @@ class Mesh {
   }
 
   skin(method, most, target) {
-    let [first, second] = [method, method];
-    if (method === "mix" && this.about.mix) [first, second] = this.about.mix;
-    else if (method === "cor" ? !this.arrays.centres : !(method in METHODS)) first = second = this.about.blender;
+    const { blender, mix, hierarchy, form } = this.about, has = method === "mix" ? mix : method in METHODS;
+    const isOwn = has && (method !== "cor" || this.arrays.centres);
+    const [first, second] = (method === "mix" && mix || Array(2).fill(isOwn ? method : blender))
+      .map((name) => METHODS[name] + (isOwn && hierarchy.includes(name) ? HIERARCHY : 0));
     const { number, influences } = this.influences(most);
     drawTo(target, program("screen.vert", "skin.frag", `#define SINEW_INFLUENCES ${number}`), {
-      sinew_bones: this.palette, rest: this.rest, centres: this.centres, influences,
-      method: { int: METHODS[first] }, second_method: { int: METHODS[second] },
+      sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts: this.amounts, influences,
+      method: { int: first }, second_method: { int: second }, bulge_form: { int: FORMS[form] ?? 0 },
+      stages: Number(isOwn && state.stages),
     });
   }
 
@@ -271,7 +274,7 @@ const names = Object.keys(header.methods), last = header.frames.length - 1;
 const { findings = [], verdict = "" } = header.flex ?? {};
 const state = {
   frame: header.start, playing: false, panes: !header.flex && names.length > 1 && innerWidth > 560 ? 2 : 1, methods: [names[0], names[names.length - 1]],
-  measure: 0, most: Infinity, finding: -1, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
+  measure: 0, most: Infinity, stages: true, finding: -1, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
 };
 
 // Where the character is at a frame. One that walks away is followed; others stay where they are.
@@ -335,15 +338,16 @@ let skinnedFor = "";
 let marks = [];
 
 function skinAll() {
-  const wanted = [state.frame, state.panes, ...state.methods, state.measure, state.most, state.finding].join();
+  const { frame, panes, methods, measure, most, stages, finding } = state;
+  const wanted = [frame, panes, ...methods, measure, most, stages, finding].join();
   if (wanted === skinnedFor) return;
   skinnedFor = wanted;
   for (const mesh of meshes) {
-    mesh.setFrame(state.frame);
-    if (state.measure === 1) mesh.skin(mesh.about.blender, Infinity, mesh.reference);
-    mesh.panes.slice(0, state.panes).forEach((pane, i) => {
-      mesh.skin(state.methods[i], state.most, pane.points);
-      mesh.measure(pane, state.measure);
+    mesh.setFrame(frame);
+    if (measure === 1) mesh.skin("blender", Infinity, mesh.reference);
+    mesh.panes.slice(0, panes).forEach((pane, i) => {
+      mesh.skin(methods[i], most, pane.points);
+      mesh.measure(pane, measure);
     });
   }
   marks = [0, 1].slice(0, state.panes).map(markOf);
@@ -456,7 +460,7 @@ function points(part, method, frame, influences = Infinity) {
 function values(part, method, frame, measure) {
   const mesh = meshes[part], pane = mesh.panes[0];
   mesh.setFrame(frame);
-  mesh.skin(mesh.about.blender, Infinity, mesh.reference);
+  mesh.skin("blender", Infinity, mesh.reference);
   mesh.skin(method, Infinity, pane.points);
   mesh.measure(pane, measure);
   return read(pane.surface, mesh);
@@ -512,6 +516,7 @@ function showFrame() {
 
 // What a frame is called.
 const step = header.flex ? "pose" : "frame";
+const staged = [...new Set(header.parts.flatMap((part) => part.stages))];
 // The stops of the slider.
 const stops = [1, 2, 3, 4, 8].filter((n) => n < most).concat(Infinity);
 
@@ -550,6 +555,7 @@ function show() {
       return tick;
     }));
   }
+  find("stages").checked = state.stages;
   find("influences").value = stops.indexOf(state.most);
   const bones = state.most === Infinity ? `all (${most})` : String(state.most);
   find("influences-shown").textContent = bones;
@@ -663,6 +669,12 @@ const actions = {
   ",": () => set({ playing: false, frame: (state.frame + last) % (last + 1) }),
   ".": () => set({ playing: false, frame: (state.frame + 1) % (last + 1) }),
   f: flip,
+  ...(staged.length && {
+    s: () => {
+      set({ stages: !state.stages });
+      say(`${staged.join(" and ")} ${state.stages ? "on" : "off"}`);
+    },
+  }),
   h: () => {
     set({ measure: (state.measure + 1) % (header.measures.length + 1) });
     say(state.measure ? header.measures[state.measure - 1].label : "No heat map");
@@ -710,6 +722,9 @@ function connect() {
   find("frame").setAttribute("aria-label", header.flex ? "Pose" : "Frame");
   find("frame").addEventListener("input", ({ target }) => set({ playing: false, frame: Number(target.value) }));
   find("time").hidden = last === 0;
+  find("stages-set").hidden = !staged.length;
+  find("stages-shown").textContent = staged.join(" and ");
+  find("stages").addEventListener("change", ({ target }) => set({ stages: target.checked }));
   find("influences").max = stops.length - 1;
   find("influences-set").hidden = stops.length === 1;
   find("influences").addEventListener("input", ({ target }) => set({ most: stops[Number(target.value)] }));
