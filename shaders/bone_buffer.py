@@ -21,7 +21,7 @@ def bone_buffer(
     amounts: Sequence[float] = (),
     curves: Sequence[float] = (),
 ) -> np.ndarray:
-    """float32 [bones, 7, 4]: see docs/engines.md.
+    """float32 [bones, 8, 4]: see docs/engines.md.
 
     posed, rest      float [bones, 4, 4], from the bone's own axes to one space, that of the armature; Y is
                      along the bone. At rest they are the inverses of glTF's inverse bind matrices.
@@ -38,7 +38,8 @@ def bone_buffer(
     if lengths is not None:
         heads = rest[:, :3, 3]
         add_segments(buffer, heads, heads + np.asarray(lengths)[:, None] * rest[:, :3, 1])
-        add_twists(buffer, twists, amounts * twist_angles(motions, rest, twists), curves)
+        angles, swings = twist_angles(motions, rest, twists)
+        add_twists(buffer, twists, amounts * angles * fade(np.abs(angles)) * fade(swings), curves)
     return buffer
 
 
@@ -46,7 +47,7 @@ def of_motions(motions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """The buffer for methods alone. Bones that are not scaled are rotated by the 3x3 part of their motion.
     Those that are, by Blender's rule: by what takes the rest axes to the posed ones, made perpendicular with Y
     kept."""
-    buffer = np.zeros((len(motions), 7, 4), np.float32)
+    buffer = np.zeros((len(motions), 8, 4), np.float32)
     buffer[:, :3], buffer[:, 3] = motions[:, :3], rotations
     return buffer
 
@@ -66,7 +67,7 @@ def quaternions(r: np.ndarray) -> np.ndarray:
     squares = 1 + np.array([x - y - z, y - x - z, z - x - y, x + y + z])
     yz, xz, xy = r[:, 2, 1] + r[:, 1, 2], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 0] + r[:, 0, 1]
     xw, yw, zw = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
-    # Each row is q times four of its components: the largest is the most exact.
+    # Each row is q times four of its components. Any that is large will do; this choice is Blender's.
     rows = np.array(
         [
             [squares[0], xy, xz, xw],
@@ -75,7 +76,8 @@ def quaternions(r: np.ndarray) -> np.ndarray:
             [xw, yw, zw, squares[3]],
         ]
     )
-    q = rows[squares.argmax(axis=0), :, np.arange(len(r))]
+    chosen = np.where(z < 0, np.where(x > y, 0, 1), np.where(x < -y, 2, 3))
+    q = rows[chosen, :, np.arange(len(r))]
     return q / np.linalg.norm(q, axis=1, keepdims=True) * np.where(q[:, 3:] < 0, -1, 1)
 
 
@@ -149,11 +151,39 @@ def add_twists(
             buffer[bone, 6, :3] = (-angle, 0, number) if is_from_parent else (0, angle, number)
 
 
-def twist_angles(motions: np.ndarray, rest: np.ndarray, twists: Sequence[Twist]) -> np.ndarray:
-    """Radians [twists]: the rotation of the tip against the base about the bone's Y axis at rest, which fades where
-    a matrix does not tell which way round the tip went."""
+def add_turns(
+    buffer: np.ndarray, twists: Sequence[Twist], around: np.ndarray, parts: np.ndarray, parents: Sequence[int]
+) -> None:
+    """Only where angles tell of more than half a turn.
+
+    around  whole turns beyond that, [twists]
+    parts   of each twist that is spread, 0 to 1
+    """
+    children: dict[int, list[int]] = {}
+    for bone, parent in enumerate(parents):
+        children.setdefault(int(parent), []).append(bone)
+    # Those that a bone carries follow it at once.
+    order, left, ends = [], children.get(-1, [])[::-1], {}
+    while left:
+        bone = left.pop()
+        if bone < 0:
+            ends[~bone] = len(order)
+            continue
+        order.append(bone)
+        left += [~bone, *children.get(bone, [])[::-1]]
+    buffer[order, 7, 0] = np.arange(len(order))
+    for (bone, _base, tip, _is_from_parent), turns, part in zip(twists, around, parts, strict=True):
+        buffer[bone, 7, 1:] = buffer[tip, 7, 0], ends[tip], turns
+        buffer[bone, 6, 3] = part
+
+
+def twist_angles(
+    motions: np.ndarray, rest: np.ndarray, twists: Sequence[Twist]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of the rotation of each tip against its base: its angle about the bone's Y axis at rest, and that of the rest
+    of it, radians [twists]. Both fade, as a matrix does not tell which way round the tip went."""
     if not len(twists):
-        return np.empty(0)
+        return np.empty(0), np.empty(0)
     bones, bases, tips, _from_parent = np.array(twists).T
     axes = perpendicular(rest)
     # A base without volume: its scale is not known.
@@ -164,7 +194,7 @@ def twist_angles(motions: np.ndarray, rest: np.ndarray, twists: Sequence[Twist])
     along = (q[:, :3] * axes[bones, :, 1]).sum(axis=1)
     angles = 2 * np.arctan2(along, q[:, 3])
     swings = 2 * np.arccos(np.minimum(np.hypot(along, q[:, 3]), 1))
-    return angles * fade(np.abs(angles)) * fade(swings)
+    return angles, swings
 
 
 def fade(angles: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ layout(std430, binding = 0) readonly buffer SinewBones { vec4 sinew_bones[]; };
 
 #define SINEW_INFLUENCES 8
 #define SINEW_BONES_DECLARED
-#define SINEW_BONE(bone, k) sinew_bones[7 * (bone) + (k)]
+#define SINEW_BONE(bone, k) sinew_bones[8 * (bone) + (k)]
 #include "sinew.glsl"
 
 struct Vertex {

@@ -2,7 +2,7 @@
 // A compute shader; bones and vertices are in buffers. [[vk::binding(n)]] is for Vulkan: leave it out for Direct3D 11.
 #define SINEW_BONES_DECLARED
 [[vk::binding(0)]] StructuredBuffer<float4> bones_of_frame : register(t0);
-#define SINEW_BONE(bone, k) bones_of_frame[7 * (bone) + (k)]
+#define SINEW_BONE(bone, k) bones_of_frame[8 * (bone) + (k)]
 #include "sinew.hlsl"
 
 struct Vertex {

@@ -10,8 +10,8 @@
 #define SINEW_INFLUENCES 4
 #endif
 
-// The bones: seven vectors each. 0 to 2 are the rows of the 3x4 matrix that takes a bone's rest pose to its pose, 3 is
-// the rotation in it as a unit quaternion x, y, z, w; 4 to 6 are for the stages. Here an RGBA32F texture, seven texels
+// The bones: eight vectors each. 0 to 2 are the rows of the 3x4 matrix that takes a bone's rest pose to its pose, 3 is
+// the rotation in it as a unit quaternion x, y, z, w; 4 to 7 are for the stages. Here an RGBA32F texture, eight texels
 // wide, one row a bone; define SINEW_BONE(bone, k) and SINEW_BONES_DECLARED to read them from elsewhere.
 #ifndef SINEW_BONES_DECLARED
 uniform highp sampler2D sinew_bones;
@@ -129,6 +129,10 @@ vec3 sinew_normal(int method, vec3 normal, int bones[SINEW_INFLUENCES], float we
 // --- Twist Spread, the first stage after the blend: spreads the twist of a bone against the next along the bone.
 // Vector 6 of such a bone has the angle at its head, that at its tail, and a number above those of the bones that carry
 // it; it is 0 for other bones. Vector 5 has the curve between the angles in w.
+//
+// Matrices do not tell of more than half a turn. Where something else does, vector 7 has its whole turns beyond that in
+// w, and vector 6 the part of the twist that is spread. Then each bone has a number in x of 7, and the bones from the
+// number y to before z are those beyond the twist.
 
 // How much of a blend is linear.
 float sinew_linear_share(int first, int second, float share) {
@@ -165,10 +169,30 @@ vec3 sinew_posed_axis(int bone) {
     return size == 0.0 ? axis : axis / size;
 }
 
+// Of an angle up to a quarter turn. The functions that drivers bring may be off by 1e-4.
+float sinew_sine(float x) {
+    float y = x * x;
+    return x * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0)))));
+}
+
 // What a rotation about an axis adds to a vector.
 vec3 sinew_spun(vec3 axis, float angle, vec3 v) {
-    vec3 across = cross(axis, v);
-    return sin(angle) * across + (1.0 - cos(angle)) * cross(axis, across);
+    float half_angle = 0.5 * angle - 3.14159265 * round(angle / 6.28318531);
+    vec3 q = sinew_sine(half_angle) * axis;
+    return 2.0 * cross(q, cross(q, v) + sinew_sine(1.57079633 - abs(half_angle)) * v);
+}
+
+// What a blend the shorter way leaves out where bones are whole turns farther apart.
+float sinew_left_out(int bone, float amount, float total, int bones[SINEW_INFLUENCES],
+                     float weights[SINEW_INFLUENCES]) {
+    vec4 turns = SINEW_BONE(bone, 7);
+    if (turns.w == 0.0 || !(amount * SINEW_BONE(bone, 6).w > 0.5)) return 0.0;
+    float beyond = 0.0;
+    for (int i = 0; i < SINEW_INFLUENCES; ++i) {
+        float number = SINEW_BONE(bones[i], 7).x;
+        if (number >= turns.y && number < turns.z) beyond += weights[i];
+    }
+    return beyond > 0.0 && beyond < total ? 4.0 * turns.w * atan(beyond, total - beyond) : 0.0;
 }
 
 // moved         by the blend
@@ -189,7 +213,8 @@ vec3 sinew_twist_spread(vec3 moved, float linear_share, float amount, vec3 x, in
         // Linear: by the bone's matrix after a rotation at rest. Other blends are rotated about the posed bone; where
         // it is scaled, they keep its scaled shape.
         vec3 own = sinew_by_bone(bone, vec4(sinew_spun(normalize(SINEW_BONE(bone, 5).xyz), angle, x - head), 0.0));
-        vec3 by = sinew_spun(axis, weight * angle, moved - sinew_moved(bone, head));
+        float left_out = sinew_left_out(bone, amount, total, bones, weights);
+        vec3 by = sinew_spun(axis, weight * angle + left_out, moved - sinew_moved(bone, head));
         by += weight * (own - sinew_spun(axis, angle, sinew_by_bone(bone, vec4(x - head, 0.0))));
         moved += mix(dot(axis, axis) > 0.0 ? by : vec3(0.0), weight * own, linear_share);
         i = sinew_twisted(SINEW_BONE(bone, 6).z, bones, weights);
@@ -204,8 +229,9 @@ vec3 sinew_twist_normal(vec3 normal, float amount, vec3 x, int bones[SINEW_INFLU
     if (!(amount > 0.0 && total > SINEW_LEAST_WEIGHT)) return normal;
     int i = sinew_twisted(1e9, bones, weights);
     while (i >= 0) {
-        float angle = amount * sinew_twist(bones[i], x);
-        normal += sinew_spun(sinew_posed_axis(bones[i]), weights[i] / total * angle, normal);
+        float angle = weights[i] / total * amount * sinew_twist(bones[i], x);
+        angle += sinew_left_out(bones[i], amount, total, bones, weights);
+        normal += sinew_spun(sinew_posed_axis(bones[i]), angle, normal);
         i = sinew_twisted(SINEW_BONE(bones[i], 6).z, bones, weights);
     }
     return normal;

@@ -9,7 +9,7 @@
 const SINEW_INFLUENCES: u32 = 4u;
 
 // row0 to row2: the 3x4 matrix that takes the bone's rest pose to its pose; rotation: that in it as a unit quaternion
-// x, y, z, w; the rest is for the stages. 112 bytes.
+// x, y, z, w; the rest is for the stages. 128 bytes.
 struct SinewBone {
     row0: vec4f,
     row1: vec4f,
@@ -18,6 +18,7 @@ struct SinewBone {
     head: vec4f,
     along: vec4f,
     twist: vec4f,
+    turns: vec4f,
 }
 @group(0) @binding(0) var<storage, read> sinew_bones: array<SinewBone>;
 
@@ -142,6 +143,10 @@ fn sinew_normal(method: u32, normal: vec3f, own: SinewInfluences) -> vec3f {
 // --- Twist Spread, the first stage after the blend: spreads the twist of a bone against the next along the bone. The
 // `twist` of such a bone has the angle at its head, that at its tail, and a number above those of the bones that carry
 // it; it is 0 for other bones. `along` has the curve between the angles in w.
+//
+// Matrices do not tell of more than half a turn. Where something else does, `turns` has its whole turns beyond that in
+// w, and `twist` the part of the twist that is spread. Then each bone has a number in x of `turns`, and the bones from
+// the number y to before z are those beyond the twist.
 
 // How much of a blend is linear.
 fn sinew_linear_share(first: u32, second: u32, share: f32) -> f32 {
@@ -179,10 +184,30 @@ fn sinew_posed_axis(bone: u32) -> vec3f {
     return select(axis / size, axis, size == 0.0);
 }
 
+// Of an angle up to a quarter turn. The functions that drivers bring may be off by 1e-4.
+fn sinew_sine(x: f32) -> f32 {
+    let y = x * x;
+    return x * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0)))));
+}
+
 // What a rotation about an axis adds to a vector.
 fn sinew_spun(axis: vec3f, angle: f32, v: vec3f) -> vec3f {
-    let across = cross(axis, v);
-    return sin(angle) * across + (1.0 - cos(angle)) * cross(axis, across);
+    let half_angle = 0.5 * angle - 3.14159265 * round(angle / 6.28318531);
+    let q = sinew_sine(half_angle) * axis;
+    return 2.0 * cross(q, cross(q, v) + sinew_sine(1.57079633 - abs(half_angle)) * v);
+}
+
+// What a blend the shorter way leaves out where bones are whole turns farther apart.
+fn sinew_left_out(bone: u32, amount: f32, total: f32, own: SinewInfluences) -> f32 {
+    var influences = own;
+    let turns = sinew_bones[bone].turns;
+    if turns.w == 0.0 || !(amount * sinew_bones[bone].twist.w > 0.5) { return 0.0; }
+    var beyond = 0.0;
+    for (var i = 0u; i < SINEW_INFLUENCES; i++) {
+        let number = sinew_bones[influences.bones[i]].turns.x;
+        if number >= turns.y && number < turns.z { beyond += influences.weights[i]; }
+    }
+    return select(0.0, 4.0 * turns.w * atan2(beyond, total - beyond), beyond > 0.0 && beyond < total);
 }
 
 // blended       the point by the blend
@@ -205,7 +230,8 @@ fn sinew_twist_spread(blended: vec3f, linear_share: f32, amount: f32, x: vec3f, 
         // it is scaled, they keep its scaled shape.
         let spun = sinew_spun(normalize(sinew_bones[bone].along.xyz), angle, x - head);
         let alone = sinew_by_bone(bone, vec4f(spun, 0.0));
-        var by = sinew_spun(axis, weight * angle, moved - sinew_moved(bone, head));
+        let left_out = sinew_left_out(bone, amount, total, own);
+        var by = sinew_spun(axis, weight * angle + left_out, moved - sinew_moved(bone, head));
         by += weight * (alone - sinew_spun(axis, angle, sinew_by_bone(bone, vec4f(x - head, 0.0))));
         moved += mix(select(vec3f(0.0), by, dot(axis, axis) > 0.0), weight * alone, linear_share);
         i = sinew_twisted(sinew_bones[bone].twist.z, own);
@@ -222,7 +248,8 @@ fn sinew_twist_normal(normal: vec3f, amount: f32, x: vec3f, own: SinewInfluences
     var i = sinew_twisted(1e9, own);
     while i >= 0 {
         let bone = influences.bones[i];
-        let angle = influences.weights[i] / total * amount * sinew_twist(bone, x);
+        let angle = influences.weights[i] / total * amount * sinew_twist(bone, x)
+            + sinew_left_out(bone, amount, total, own);
         rotated += sinew_spun(sinew_posed_axis(bone), angle, rotated);
         i = sinew_twisted(sinew_bones[bone].twist.z, own);
     }

@@ -66,7 +66,7 @@ def twist_spread(blended, linear_share, amounts, rest, joints, weights, bones):
     numbers = bones[:, 6, 2]
     # Those that other bones carry first.
     for bone in np.argsort(-numbers)[: np.count_nonzero(numbers)]:
-        rows, (head, curve_of, twist) = bones[bone, :3].astype(np.float64), bones[bone, 4:].astype(np.float64)
+        rows, (head, curve_of, twist) = bones[bone, :3].astype(np.float64), bones[bone, 4:7].astype(np.float64)
         matrix, head, along = rows[:, :3], head[:3], curve_of[:3]
         weight = (weights * (joints == bone)).sum(axis=1, keepdims=True)
         share = np.clip((rest - head) @ along / (along @ along), 0.0, 1.0)[:, None]
@@ -76,10 +76,22 @@ def twist_spread(blended, linear_share, amounts, rest, joints, weights, bones):
         length = np.linalg.norm(axis) * (-1.0 if np.linalg.det(matrix) < 0.0 else 1.0)
         axis = axis / length if length else axis
         own = spun(along / np.linalg.norm(along), angles, rest - head) @ matrix.T
-        by = spun(axis, weight * angles, points - (matrix @ head + rows[:, 3]))
+        angle = weight * angles + left_out(bone, amounts, joints, weights, bones)
+        by = spun(axis, angle, points - (matrix @ head + rows[:, 3]))
         by += weight * (own - spun(axis, angles, (rest - head) @ matrix.T))
         points += linear_share * weight * own + (1.0 - linear_share) * by * bool(length)
     return points
+
+
+def left_out(bone, amounts, joints, weights, bones):
+    """What a blend the shorter way leaves out where bones are whole turns farther apart. In Blender it is also added
+    to vertices that have bones on either side, but not the twisted one."""
+    _number, first, end, turns = bones[bone, 7]
+    numbers = bones[joints, 7, 0]
+    beyond = (weights * ((numbers >= first) & (numbers < end))).sum(axis=1, keepdims=True)
+    is_between = (beyond > 0.0) & (beyond < 1.0 - 1e-9) & (amounts * bones[bone, 6, 3] > 0.5)
+    is_between &= (weights * (joints == bone)).any(axis=1, keepdims=True)
+    return np.where(is_between, 4.0 * turns * np.arctan2(beyond, 1.0 - beyond), 0.0)
 
 
 def to_segments(heads, along, points):

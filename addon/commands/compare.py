@@ -130,7 +130,16 @@ def _write_viewer(
     # The painted mix is that of the file.
     own = {obj: properties.of(obj).method for obj in scene.objects if properties.has_sinew(obj)}
     meshes, left_out = characters.deformable_meshes(scene, path, [*methods, viewer.PLAYED], args.object)
-    characters.use_methods([(obj, own.get(obj, viewer.PLAYED)) for obj in meshes])
+    preset = next((name for name in methods if name in PRESETS), None)
+    errors = characters.use_methods([(obj, preset or own.get(obj, viewer.PLAYED)) for obj in meshes])
+    left_out += [str(error) for error in errors if error is not None]
+    for sentence in characters.sentences() if preset else ():
+        console.note(f"{path}: {sentence}")
+    # Its stages follow all methods of the page.
+    chosen = [properties.of(obj).method for obj in meshes]
+    methods = list(
+        dict.fromkeys(each for name in methods for each in (chosen if name in PRESETS else [name]))
+    )
     attached = viewer.attached_to(scene, meshes)
     of_each = dict.fromkeys(meshes, ())
     steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out)

@@ -18,7 +18,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import sinew
 
-from .bone_buffer import add_segments, add_twists, along_chain, of_motions
+from .bone_buffer import add_segments, add_turns, add_twists, along_chain, of_motions, quaternions, twist_angles
 from .errors import SinewError
 from .heat import HeatScale
 from .influences import Influences
@@ -69,7 +69,6 @@ class Part:
     by_hierarchy  the methods whose signs are from the hierarchy
     parents       int32 [bones], -1 for none; given where there are such methods
     stages        None without any
-    has_turned    a bone is twisted beyond half a turn in a frame, which the shaders do not follow
     """
 
     name: str
@@ -84,7 +83,6 @@ class Part:
     by_hierarchy: Sequence[str] = ()
     parents: np.ndarray | None = None
     stages: Stages | None = None
-    has_turned: bool = False
     _palettes: list[np.ndarray] = field(default_factory=list)
     _worlds: list[np.ndarray] = field(default_factory=list)
     _rests: list[np.ndarray] = field(default_factory=list)
@@ -148,8 +146,7 @@ class Part:
         split = sinew.affine.split_scale(motions, self.rest_bones.astype(np.float64))
         rotations = np.roll(rotations_of(split.rigid[:, :3, :3]), -1, axis=0).T
         if self.parents is not None:
-            mirrors = np.linalg.det(motions[:, :3, :3]) < 0.0
-            rotations = along_chain(rotations, self.parents, mirrors, turns)
+            rotations = self._signed(rotations, motions, turns)
         buffer = of_motions(motions, rotations)
         if self.stages is not None:
             add_segments(buffer, *self.stages.segments)
@@ -158,16 +155,32 @@ class Part:
         self._posed, self._turns = posed, turns
         self._worlds.append(np.asarray(world, dtype=np.float64))
 
+    def _signed(self, rotations: np.ndarray, motions: np.ndarray, turns: np.ndarray | None) -> np.ndarray:
+        """Returns quaternions [bones, 4] with the signs of the library's, which takes them from the axes as they
+        are where a bone is sheared."""
+        assert self.parents is not None
+        mirrors = np.linalg.det(motions[:, :3, :3]) < 0.0
+        lengths = np.linalg.norm(motions[:, :3, :3], axis=1, keepdims=True)
+        of_axes = quaternions(motions[:, :3, :3] / np.where(lengths > 0.0, lengths, 1.0))
+        of_axes[mirrors] = rotations[mirrors]
+        along = along_chain(of_axes, self.parents, mirrors, turns)
+        return np.where((along * rotations).sum(axis=1, keepdims=True) < 0.0, -rotations, rotations)
+
     def _add_twists(self, buffer: np.ndarray, motions: np.ndarray, twists: TwistInputs) -> None:
         assert self._twist is not None
         assert self.stages is not None
         inputs = np.array(twists, np.float32).reshape(self._twist.twist_count, -1)
         amounts, curves, channels = inputs[:, 0], inputs[:, 1], inputs[:, 2:]
-        is_within = np.abs(self._twist.angles(motions, channels)) <= np.pi
-        self.has_turned |= not is_within.all()
-        channels = channels * is_within[:, None]
-        angles = amounts * self._twist.angles(motions, channels)
-        add_twists(buffer, self.stages.twists.rows, angles, curves)
+        of, angles = self.stages.twists, self._twist.angles(motions, channels)
+        add_twists(buffer, of.rows, amounts * angles, curves)
+        shorter, _swings = twist_angles(motions.astype(np.float64), self.rest_bones.astype(np.float64), of.rows)
+        # The parts that are left of each angle by that many turns more than the shorter way; the largest is it.
+        turns = np.arange(-2, 3)[:, None]
+        parts = angles / np.where(angles == 0.0, 1.0, shorter + 2.0 * np.pi * turns)
+        parts[parts > 1.0 + 1e-3] = 0.0
+        around = turns[parts.argmax(axis=0), 0] * (angles != 0.0)
+        if around.any():
+            add_turns(buffer, of.rows, around, amounts * parts.max(axis=0, initial=0.0), of.parents)
         self._inputs = motions, {"amounts": amounts, "curves": curves, "channels": channels}
 
     def world_points(self, method: str) -> np.ndarray:

@@ -54,16 +54,17 @@ class Made:
     """A page, and what `sinew points` has for it."""
 
     def __init__(self, folder, source, frames, methods, options=(), first="dq"):
-        self.page, self.frames = folder / f"{source.stem}-{len(options)}.html", frames
+        kind = "mix" if "mix." in str(options) else "".join(options)
+        self.page, self.frames = folder / f"{source.stem}{kind}.html", frames
         sinew("compare", source, "--methods", ",".join(methods), "--viewer", self.page, *options)
         self.points = {}
-        for method in [first] if options else methods:
+        for method in [first] if kind == "mix" else methods:
             out = folder / f"{self.page.stem}-{method}.npz"
             words = "--frames", ",".join(map(str, frames)), "--out", out
             sinew("points", source, "--method", method, *words, *options)
             arrays = np.load(out)
             (name,) = set(arrays.files) - {"frames"}
-            self.points["mix" if options else method] = arrays[name]
+            self.points["mix" if kind == "mix" else method] = arrays[name]
 
 
 @pytest.fixture(scope="session")
@@ -86,9 +87,12 @@ def made(tmp_path_factory):
     words = [SINEW.with_name("python"), "-c", ADD_KEY, files / "wrist.blend", folder / "keyed.blend"]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     mix = "--set", "mix.method=cor", "--set", "mix.group=Hand"
+    stages = "twist_spread=on", "twist_spread.amount=0.8", "bulge_limit=on", "bulge_limit.group=Hand", "dq.signs=hierarchy"
+    staged = [word for setting in stages for word in ("--set", setting)]
     found = {
         "wrist": Made(folder, files / "wrist.blend", [1, 12, 24], methods),
         "mix": Made(folder, files / "wrist.blend", [12, 24], ["dq"], mix),
+        "staged": Made(folder, files / "wrist.blend", [1, 12, 24], methods, staged),
         "keyed": Made(folder, folder / "keyed.blend", [1, 12, 24], methods),
         "shoulder": Made(folder, files / "shoulder.blend", [1, 12, 24], methods),
     }

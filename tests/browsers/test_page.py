@@ -42,7 +42,7 @@ def points(browser, *arguments):
     return browser.floats(f"window.sinew.points({', '.join(map(str, arguments))})").reshape(-1, 4)[:, :3]
 
 
-@pytest.mark.parametrize("name", ["wrist", "mix", "keyed", "shoulder", "human"])
+@pytest.mark.parametrize("name", ["wrist", "mix", "staged", "keyed", "shoulder", "human"])
 def test_points_are_those_of_sinew(browser, made, name):
     if name not in made:
         pytest.skip("human.blend is in no folder SINEW_RIGS")
@@ -138,6 +138,23 @@ def test_keys_and_controls(browser, made):
     assert after[0] != yaw
     assert after[1] > zoom
     assert browser.run("return window.sinew.gl.getError()") == 0
+
+
+def test_stages_are_switched(browser, made):
+    browser.show(made["wrist"].page)
+    assert browser.run("return document.getElementById('stages-set').hidden")
+    page = made["staged"]
+    browser.show(page.page)
+    frame = read_page.read(page.page)[0]["frames"].index(page.frames[-1])
+    assert browser.run("return document.getElementById('stages-set').textContent.trim()") == (
+        "Twist Spread and Limit Bulge"
+    )
+    staged = points(browser, 0, "'dq'", frame)
+    browser.press("s")
+    assert browser.run("return document.getElementById('stages').checked") is False
+    assert np.abs(points(browser, 0, "'dq'", frame) - staged).max() > 0.01
+    browser.press("s")
+    assert np.array_equal(points(browser, 0, "'dq'", frame), staged)
 
 
 def test_a_fault_is_shown_at_its_place(browser, bent):

@@ -105,8 +105,6 @@ class _Skinned:
             found.append(f"{name}: weights of envelopes and bendy bones stay as in the first frame.")
         if self.has_shifted:
             found.append(f"{name}: it moves against its armature, and stays as in the first frame here.")
-        if self.part.has_turned:
-            found.append(f"{name}: twists fade beyond half a turn here, and go on in Blender.")
         if stage_settings.is_on(properties.of(self.obj), "delta_mush"):
             found.append(f"{name}: shown without Delta Mush.")
         return found

@@ -9,7 +9,7 @@ const sources = JSON.parse(find("shaders").textContent);
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 // Of textures with a texel for each vertex, corner or influence.
 const SHIFT = 10, WIDTH = 1 << SHIFT;
-const METHODS = { lbs: 0, dq: 1, cor: 2 }, HIERARCHY = 4, BONE = 7, FORMS = { kim_han: 1 };
+const METHODS = { lbs: 0, dq: 1, cor: 2 }, HIERARCHY = 4, BONE = 8, FORMS = { kim_han: 1 };
 // Of the grid: lines each way, each in pieces that fade out.
 const LINES = 31, PIECES = 12, GROUND_VERTICES = 2 * 2 * LINES * PIECES;
 
