@@ -6,20 +6,22 @@ twist of `tip` against `base` is spread along `bone`.
 """
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 
-Twist = Sequence[int]
+Twists: TypeAlias = Sequence[tuple[int, int, int, bool]] | np.ndarray
+Numbers: TypeAlias = Sequence[float] | np.ndarray
 
 
 def bone_buffer(
     posed: np.ndarray,
     rest: np.ndarray,
-    parents: Sequence[int] | None = None,
-    lengths: np.ndarray | None = None,
-    twists: Sequence[Twist] = (),
-    amounts: Sequence[float] = (),
-    curves: Sequence[float] = (),
+    parents: Numbers | None = None,
+    lengths: Numbers | None = None,
+    twists: Twists = (),
+    amounts: Numbers = (),
+    curves: Numbers = (),
 ) -> np.ndarray:
     """float32 [bones, 8, 4]: see docs/engines.md.
 
@@ -39,14 +41,14 @@ def bone_buffer(
         heads = rest[:, :3, 3]
         add_segments(buffer, heads, heads + np.asarray(lengths)[:, None] * rest[:, :3, 1])
         angles, swings = twist_angles(motions, rest, twists)
-        add_twists(buffer, twists, amounts * angles * fade(np.abs(angles)) * fade(swings), curves)
+        add_twists(buffer, twists, np.asarray(amounts) * angles * fade(np.abs(angles)) * fade(swings), curves)
     return buffer
 
 
 def of_motions(motions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """The buffer for methods alone. Bones that are not scaled are rotated by the 3x3 part of their motion.
-    Those that are, by Blender's rule: by what takes the rest axes to the posed ones, made perpendicular with Y
-    kept."""
+    Those that are, by Blender's rule: by what takes the rest axes to the posed ones, made perpendicular with
+    Y kept."""
     buffer = np.zeros((len(motions), 8, 4), np.float32)
     buffer[:, :3], buffer[:, 3] = motions[:, :3], rotations
     return buffer
@@ -85,13 +87,13 @@ def quaternions(r: np.ndarray) -> np.ndarray:
 
 
 def along_chain(
-    rotations: np.ndarray, parents: Sequence[int], mirrors: np.ndarray, turns: np.ndarray | None = None
+    rotations: np.ndarray, parents: Numbers, mirrors: np.ndarray, turns: np.ndarray | None = None
 ) -> np.ndarray:
-    """The same quaternions, each with the sign that brings it nearest to its parent's; a bone that mirrors counts
-    as its parent for those that it carries.
+    """The same quaternions, each with the sign that brings it nearest to its parent's; a bone that mirrors
+    counts as its parent for those that it carries.
 
-    turns  of the first bones: w, x, y, z of the rotation of each against its parent as its own angles give it,
-           where w < 0 is more than half a turn; 0: unknown
+    turns  of the first bones: w, x, y, z of the rotation of each against its parent as its own angles give
+           it, where w < 0 is more than half a turn; 0: unknown
     """
     found = rotations.copy()
     nearby: dict[int, np.ndarray] = {-1: np.array([0.0, 0.0, 0.0, 1.0])}
@@ -122,8 +124,8 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def add_segments(buffer: np.ndarray, heads: np.ndarray, tails: np.ndarray) -> None:
-    """Each bone from its head to its tail at rest, and how much longer its motion makes what is across it, seen
-    along its image, at most."""
+    """Each bone from its head to its tail at rest, and how much longer its motion makes what is across it,
+    seen along its image, at most."""
     along, linear = tails - heads, buffer[:, :3, :3].astype(np.float64)
     image = np.einsum("bij,bj->bi", linear, along)
     across, unaffected = (np.eye(3) - projection(vectors) for vectors in (along, image))
@@ -139,9 +141,7 @@ def projection(vectors: np.ndarray) -> np.ndarray:
     return vectors[:, :, None] * vectors[:, None, :] / np.where(squares > 0, squares, 1)
 
 
-def add_twists(
-    buffer: np.ndarray, twists: Sequence[Twist], angles: np.ndarray, curves: Sequence[float]
-) -> None:
+def add_twists(buffer: np.ndarray, twists: Twists, angles: np.ndarray, curves: Numbers) -> None:
     """angles: radians, with their amounts."""
     for number, ((bone, _base, _tip, is_from_parent), angle, curve) in enumerate(
         zip(twists, angles, curves, strict=True), 1
@@ -152,7 +152,7 @@ def add_twists(
 
 
 def add_turns(
-    buffer: np.ndarray, twists: Sequence[Twist], around: np.ndarray, parts: np.ndarray, parents: Sequence[int]
+    buffer: np.ndarray, twists: Twists, around: np.ndarray, parts: np.ndarray, parents: Numbers
 ) -> None:
     """Only where angles tell of more than half a turn.
 
@@ -163,7 +163,8 @@ def add_turns(
     for bone, parent in enumerate(parents):
         children.setdefault(int(parent), []).append(bone)
     # Those that a bone carries follow it at once.
-    order, left, ends = [], children.get(-1, [])[::-1], {}
+    order: list[int] = []
+    left, ends = children.get(-1, [])[::-1], {}
     while left:
         bone = left.pop()
         if bone < 0:
@@ -177,11 +178,9 @@ def add_turns(
         buffer[bone, 6, 3] = part
 
 
-def twist_angles(
-    motions: np.ndarray, rest: np.ndarray, twists: Sequence[Twist]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Of the rotation of each tip against its base: its angle about the bone's Y axis at rest, and that of the rest
-    of it, radians [twists]. Both fade, as a matrix does not tell which way round the tip went."""
+def twist_angles(motions: np.ndarray, rest: np.ndarray, twists: Twists) -> tuple[np.ndarray, np.ndarray]:
+    """Of the rotation of each tip against its base: its angle about the bone's Y axis at rest, and that of
+    the rest of it, radians [twists]. Both fade, as a matrix does not tell which way round the tip went."""
     if not len(twists):
         return np.empty(0), np.empty(0)
     bones, bases, tips, _from_parent = np.array(twists).T

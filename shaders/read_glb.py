@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A character of a .glb, skinned as the shaders do, with numpy: the mesh and its attributes as trimesh reads
-them, the skin and the animation by glTF 2.0.
+them, the skin and the animation by glTF 2.0, and SINEW_skinning by docs/engines.md.
 
     python read_glb.py character.glb points.npz --times 0,0.5,1
 
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from bone_buffer import bone_buffer
-from skinning import deformed
+from skinning import Skinning, deformed
 
 COMPONENTS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -68,6 +68,17 @@ def world_matrices(file, animation, time):
     return np.array([world(number) for number in range(len(nodes))])
 
 
+def parents_of(file, joints):
+    """For each joint the place of the nearest above it, -1 for none."""
+    above = {child: n for n, node in enumerate(file.header["nodes"]) for child in node.get("children", ())}
+    found = []
+    for joint in joints:
+        while (joint := above.get(joint, -1)) >= 0 and joint not in joints:
+            pass
+        found.append(joints.index(joint) if joint >= 0 else -1)
+    return found
+
+
 def influences(file, attributes):
     """Joints and weights [vertices, 4 n]."""
     sets = range(sum(name.startswith("JOINTS_") for name in attributes))
@@ -95,21 +106,37 @@ def _mesh_at(file, scene, node, world):
     mesh, skin = file.header["meshes"][node["mesh"]], file.header["skins"][node["skin"]]
     # By columns; their inverses are the joints' axes at rest.
     from_rest = file.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
-    bones = bone_buffer(world[skin["joints"]], np.linalg.inv(from_rest.astype(np.float64)))
-    skinning = mesh.get("extensions", {}).get("SINEW_skinning", {"method": "lbs"})
+    own = skin.get("extensions", {}).get("SINEW_skinning", {})
+    twists = own.get("twists", [])
+    content = mesh.get("extensions", {}).get("SINEW_skinning", {"method": "lbs"})
+    values, stages = content.get("parameters", {}), content.get("stages", [])
+    bones = bone_buffer(
+        world[skin["joints"]],
+        np.linalg.inv(from_rest.astype(np.float64)),
+        parents_of(file, skin["joints"]),
+        own.get("lengths"),
+        [(each["bone"], each["base"], each["tip"], each["from"] == "parent") for each in twists],
+        [each["amount"] * values.get("twist_spread.amount", 1.0) for each in twists],
+        [each["curve"] for each in twists],
+    )
     # trimesh has a geometry for each primitive, in the order of the file.
     before = sum(len(each["primitives"]) for each in file.header["meshes"][: node["mesh"]])
     geometries = list(scene.geometry.values())[before:]
     parts = []
     for primitive, geometry in zip(mesh["primitives"], geometries, strict=False):
-        own = geometry.vertex_attributes
-        joints, weights = influences(file, primitive["attributes"])
-        arguments = (np.asarray(geometry.vertices), own.get("_SINEW_CENTRE"), joints, weights, bones)
-        points = skinned(skinning["method"], *arguments)
-        if "mix" in skinning:
-            share = np.asarray(own["_SINEW_MIX"]).reshape(-1, 1)
-            points += share * (skinned(skinning["mix"], *arguments) - points)
-        parts.append(points)
+        attributes = geometry.vertex_attributes
+        by = Skinning(content["method"], content.get("mix", content["method"]))
+        by.by_hierarchy = [name for name in ("dq", "cor") if values.get(f"{name}.signs") == "hierarchy"]
+        if "mix" in content:
+            by.share = attributes["_SINEW_MIX"]
+        if "twist_spread" in stages:
+            by.twist = attributes.get("_SINEW_TWIST_SPREAD", 1.0)
+        if "bulge_limit" in stages:
+            by.bulge = values["bulge_limit.strength"] * attributes.get("_SINEW_BULGE_LIMIT", np.ones(1))
+            by.form = values["bulge_limit.form"]
+        influencing = influences(file, primitive["attributes"])
+        centres = attributes.get("_SINEW_CENTRE")
+        parts.append(deformed(by, np.asarray(geometry.vertices), centres, *influencing, bones))
     x, y, z = np.vstack(parts).T
     return np.column_stack([x, -z, y])
 

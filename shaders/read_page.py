@@ -7,7 +7,7 @@ import re
 import zlib
 
 import numpy as np
-from skinning import deformed
+from skinning import Skinning, deformed
 
 
 def read(path):
@@ -43,17 +43,17 @@ def points(about, arrays, method, frame):
     bones[slots], weights[slots] = arrays["bones"], arrays["weights"]
     still = weights.sum(axis=1) <= 1e-4
     weights[still, 0] = 1.0
-    first, second = about["mix"] if method == "mix" else (method, method)
-    share = arrays["shares"] if method == "mix" else np.zeros(len(counts))
-    amounts, by_hierarchy = arrays.get("amounts"), about["hierarchy"]
+    by = Skinning(*(about["mix"] if method == "mix" else (method, method)), about["hierarchy"])
     if method == "blender":
-        first, second, amounts, by_hierarchy = about["blender"], about["blender"], None, ()
+        by = Skinning(about["blender"], about["blender"])
+    elif "amounts" in arrays:
+        (by.twist, by.bulge), by.form = arrays["amounts"].T, about["form"]
+    if method == "mix":
+        by.share = arrays["shares"].astype(np.float64)
     rest, palette = arrays["rest"].astype(np.float64), arrays["palettes"][frame]
     if "moving" in arrays:
         rest[arrays["moving"]] = arrays["moved"][frame]
     if not len(arrays["bones"]):
         return rest
-    amounts = np.zeros((len(counts), 2)) if amounts is None else amounts
-    of_rest = rest, arrays.get("centres"), bones, weights, palette
-    found = deformed(first, second, share, amounts, about["form"], *of_rest, by_hierarchy)
+    found = deformed(by, rest, arrays.get("centres"), bones, weights, palette)
     return np.where(still[:, None], rest, found)

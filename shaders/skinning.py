@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What the shaders compute, with numpy for all vertices at once. Joints and weights are [vertices, n], bones those
-of bone_buffer()."""
+"""What the shaders compute, with numpy for all vertices at once. Joints and weights are [vertices, n], bones
+those of bone_buffer()."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,7 +69,10 @@ def twist_spread(blended, linear_share, amounts, rest, joints, weights, bones):
     numbers = bones[:, 6, 2]
     # Those that other bones carry first.
     for bone in np.argsort(-numbers)[: np.count_nonzero(numbers)]:
-        rows, (head, curve_of, twist) = bones[bone, :3].astype(np.float64), bones[bone, 4:7].astype(np.float64)
+        rows, (head, curve_of, twist) = (
+            bones[bone, :3].astype(np.float64),
+            bones[bone, 4:7].astype(np.float64),
+        )
         matrix, head, along = rows[:, :3], head[:3], curve_of[:3]
         weight = (weights * (joints == bone)).sum(axis=1, keepdims=True)
         share = np.clip((rest - head) @ along / (along @ along), 0.0, 1.0)[:, None]
@@ -84,8 +90,8 @@ def twist_spread(blended, linear_share, amounts, rest, joints, weights, bones):
 
 
 def left_out(bone, amounts, joints, weights, bones):
-    """What a blend the shorter way leaves out where bones are whole turns farther apart. In Blender it is also added
-    to vertices that have bones on either side, but not the twisted one."""
+    """What a blend the shorter way leaves out where bones are whole turns farther apart. In Blender it is
+    also added to vertices that have bones on either side, but not the twisted one."""
     _number, first, end, turns = bones[bone, 7]
     numbers = bones[joints, 7, 0]
     beyond = (weights * ((numbers >= first) & (numbers < end))).sum(axis=1, keepdims=True)
@@ -120,13 +126,35 @@ def bulge_limit(points, form, amounts, rest, joints, weights, bones):
     return points + amounts * back * to_bones
 
 
-def deformed(method, mix, share, amounts, form, points, centres, joints, weights, bones, by_hierarchy=()):
-    """By a method, the painted mix and the stages: share [vertices], amounts [vertices, 2] of the stages."""
+@dataclass
+class Skinning:
+    """
+    mix           the second method, or the first again
+    by_hierarchy  the methods whose signs are from the hierarchy
+    share         of the second method, [vertices]
+    twist, bulge  of the stages, [vertices]
+    form          of Limit Bulge
+    """
+
+    method: str
+    mix: str
+    by_hierarchy: Collection[str] = ()
+    share: np.ndarray | float = 0.0
+    twist: np.ndarray | float = 0.0
+    bulge: np.ndarray | float = 0.0
+    form: str = "continuous"
+
+
+def deformed(by, points, centres, joints, weights, bones):
+    """Points [vertices, 3] by a Skinning."""
     first, second = (
-        skinned(each, points, centres, joints, weights, bones, each in by_hierarchy) for each in (method, mix)
+        skinned(each, points, centres, joints, weights, bones, each in by.by_hierarchy)
+        for each in (by.method, by.mix)
     )
-    share = share[:, None]
-    points, of_rest = first + share * (second - first), (points, joints, weights, bones)
-    linear_share = (method == "lbs") * (1.0 - share) + (mix == "lbs") * share
-    points = twist_spread(points, linear_share, amounts[:, :1], *of_rest)
-    return bulge_limit(points, form, amounts[:, 1:], *of_rest)
+    share, twist, bulge = (
+        np.zeros((len(points), 1)) + np.reshape(a, (-1, 1)) for a in (by.share, by.twist, by.bulge)
+    )
+    moved, of_rest = first + share * (second - first), (points, joints, weights, bones)
+    linear_share = (by.method == "lbs") * (1.0 - share) + (by.mix == "lbs") * share
+    moved = twist_spread(moved, linear_share, twist, *of_rest)
+    return bulge_limit(moved, by.form, bulge, *of_rest)

@@ -18,13 +18,21 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import sinew
 
-from .bone_buffer import add_segments, add_turns, add_twists, along_chain, of_motions, quaternions, twist_angles
+from .bone_buffer import (
+    add_segments,
+    add_turns,
+    add_twists,
+    along_chain,
+    of_motions,
+    quaternions,
+    twist_angles,
+)
 from .errors import SinewError
 from .heat import HeatScale
 from .influences import Influences
 from .metrics import METRICS
 from .page import legend_texts
-from .twist_spread import TwistInputs, blend_of
+from .twist_spread import NOT_TOLD, TwistInputs, blend_of
 from .twists import Twists
 from .vectors import rotations_of, transformed
 
@@ -156,8 +164,8 @@ class Part:
         self._worlds.append(np.asarray(world, dtype=np.float64))
 
     def _signed(self, rotations: np.ndarray, motions: np.ndarray, turns: np.ndarray | None) -> np.ndarray:
-        """Returns quaternions [bones, 4] with the signs of the library's, which takes them from the axes as they
-        are where a bone is sheared."""
+        """Returns quaternions [bones, 4] with the signs of the library's, which takes them from the axes as
+        they are where a bone is sheared."""
         assert self.parents is not None
         mirrors = np.linalg.det(motions[:, :3, :3]) < 0.0
         lengths = np.linalg.norm(motions[:, :3, :3], axis=1, keepdims=True)
@@ -169,19 +177,20 @@ class Part:
     def _add_twists(self, buffer: np.ndarray, motions: np.ndarray, twists: TwistInputs) -> None:
         assert self._twist is not None
         assert self.stages is not None
-        inputs = np.array(twists, np.float32).reshape(self._twist.twist_count, -1)
+        inputs = np.array(twists, np.float32).reshape(-1, 2 + len(NOT_TOLD))
         amounts, curves, channels = inputs[:, 0], inputs[:, 1], inputs[:, 2:]
         of, angles = self.stages.twists, self._twist.angles(motions, channels)
         add_twists(buffer, of.rows, amounts * angles, curves)
-        shorter, _swings = twist_angles(motions.astype(np.float64), self.rest_bones.astype(np.float64), of.rows)
-        # The parts that are left of each angle by that many turns more than the shorter way; the largest is it.
+        rest = self.rest_bones.astype(np.float64)
+        shorter, _swings = twist_angles(motions.astype(np.float64), rest, of.rows)
+        # What fades leave of each angle, if it is so many turns beyond the shorter way: the most of it is right.
         turns = np.arange(-2, 3)[:, None]
         parts = angles / np.where(angles == 0.0, 1.0, shorter + 2.0 * np.pi * turns)
         parts[parts > 1.0 + 1e-3] = 0.0
         around = turns[parts.argmax(axis=0), 0] * (angles != 0.0)
         if around.any():
             add_turns(buffer, of.rows, around, amounts * parts.max(axis=0, initial=0.0), of.parents)
-        self._inputs = motions, {"amounts": amounts, "curves": curves, "channels": channels}
+        self._motions, self._inputs = motions, (amounts, curves, channels)
 
     def world_points(self, method: str) -> np.ndarray:
         """float64 [vertices, 3], of the frame that was added last; those of Blender's method where it lacks
@@ -205,10 +214,18 @@ class Part:
             turns=self._turns,
         )
         if is_own and self._twist is not None and self._bulge is not None and self.stages is not None:
-            motions, inputs = self._inputs
-            blends = blend_of(first), blend_of(second)
-            self._twist.apply(points, motions, points, blend=blends[0], mix_blend=blends[1], **inputs)
-            self._bulge.apply(points, motions, points, form=self.stages.form)
+            amounts, curves, channels = self._inputs
+            self._twist.apply(
+                points,
+                self._motions,
+                points,
+                amounts=amounts,
+                curves=curves,
+                channels=channels,
+                blend=blend_of(first),
+                mix_blend=blend_of(second),
+            )
+            self._bulge.apply(points, self._motions, points, form=self.stages.form)
         return transformed(points, self._worlds[-1])
 
     def world_rest(self) -> np.ndarray:

@@ -24,7 +24,10 @@ from sinew_addon import cli
 from sinew_addon.deform import characters
 from sinew_addon.features.gltf import export
 
-SCHEMA = json.loads((REPOSITORY / "docs" / "SINEW_skinning.schema.json").read_text(encoding="utf-8"))
+SCHEMA, SKIN_SCHEMA = (
+    json.loads((REPOSITORY / "docs" / f"SINEW_skinning{of}schema.json").read_text(encoding="utf-8"))
+    for of in (".", ".skin.")
+)
 FRAMES = [1, 6, 11]
 GROUP = "Painted"
 
@@ -44,10 +47,10 @@ def switch_on() -> None:
         addons.new().module = sinew_addon.__name__
 
 
-def make_character(materials: int = 1) -> bpy.types.Object:
+def make_character(materials: int = 1, bones: int = 3) -> bpy.types.Object:
     """An arm, moved, rotated and scaled; faces with several materials, and vertices with their index as
     an attribute."""
-    obj, armature = scenes.make_arm(bones=3)
+    obj, armature = scenes.make_arm(bones)
     armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), Euler((0.5, 0.2, -0.3))
     armature.scale = (1.3, 1.3, 1.3)
     obj.parent = armature
@@ -128,6 +131,49 @@ def test_it_plays_elsewhere_as_here(tmp_path, method, mixed):
     assert ("_SINEW_CENTRE" in primitive["attributes"]) == ("cor" in (method, mixed))
     assert ("_SINEW_MIX" in primitive["attributes"]) == bool(mixed)
     assert_plays(tmp_path / "a.glb", obj, FRAMES)
+
+
+def make_limb() -> bpy.types.Object:
+    """An arm whose hand and upper arm are twisted more from frame to frame, and spread that unequally."""
+    obj = make_character(bones=4)
+    bones = obj.parent.pose.bones
+    for bone, name in zip(bones, ("shoulder.L", "upper_arm.L", "forearm.L", "hand.L"), strict=True):
+        bone.name = name
+    for name, twist in (("upper_arm.L", 60.0), ("hand.L", 140.0)):
+        last = Euler((0.3, np.radians(twist), 0.4)).to_quaternion()
+        scenes.key(bones[name], "rotation_quaternion", [(1, (1.0, 0.0, 0.0, 0.0)), (11, last)])
+    scenes.key(bones["forearm.L"], "scale", [(1, (1.0, 1.0, 1.0)), (11, (1.2, 1.2, 1.2))])
+    bones["forearm.L"].sinew_twist_curve = 0.5
+    bones["upper_arm.L"].sinew_twist_amount = 0.7
+    return obj
+
+
+@pytest.mark.parametrize("form", ["continuous", "kim_han"])
+@pytest.mark.parametrize(("method", "mixed"), [("lbs", ""), ("dq", ""), ("cor", "lbs")])
+def test_stages_play_elsewhere_as_here(tmp_path, method, mixed, form):
+    obj = make_limb()
+    use(obj, method, mixed)
+    if not mixed:
+        paint(obj)
+    settings = obj.sinew
+    settings.twist_spread.enabled = settings.bulge_limit.enabled = True
+    settings.twist_spread.amount, settings.bulge_limit.strength = 0.9, 0.8
+    settings.twist_spread.group, settings.bulge_limit.form = GROUP, form
+    settings.dq.signs = settings.cor.signs = "hierarchy"
+    file = write(tmp_path / "a.glb")
+    content = file.header["meshes"][0]["extensions"]["SINEW_skinning"]
+    of_skin = file.header["skins"][0]["extensions"]["SINEW_skinning"]
+    jsonschema.validate(content, SCHEMA)
+    jsonschema.validate(of_skin, SKIN_SCHEMA)
+    assert content["stages"] == ["twist_spread", "bulge_limit"]
+    own = {
+        name for name in file.header["meshes"][0]["primitives"][0]["attributes"] if name.startswith("_SINEW")
+    }
+    assert own - {"_SINEW_CENTRE", "_SINEW_MIX"} == {"_SINEW_TWIST_SPREAD"}
+    assert [twist["from"] for twist in of_skin["twists"]] == ["parent", "child"]
+    got = assert_plays(tmp_path / "a.glb", obj, FRAMES)
+    settings.twist_spread.enabled = settings.bulge_limit.enabled = False
+    assert scenes.worst(got[-1], world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.05
 
 
 def test_centres_matter_and_are_of_each_primitive(tmp_path):
@@ -277,7 +323,13 @@ def test_parameters_and_stages_are_named(tmp_path):
     assert content == {
         "version": 1,
         "method": "ddm",
-        "parameters": {"ddm.variant": "2", "ddm.radius": 0.25, "ddm.weld": True},
+        "parameters": {
+            "ddm.variant": "2",
+            "ddm.radius": 0.25,
+            "ddm.weld": True,
+            "bulge_limit.strength": 1.0,
+            "bulge_limit.form": "continuous",
+        },
         "stages": ["bulge_limit"],
     }
 
@@ -336,12 +388,18 @@ def test_command_errors(tmp_path, capfd):
     assert not (tmp_path / "a.glb").exists()
 
 
-def test_human(tmp_path, real_rig):
+@pytest.mark.parametrize("chosen", ["cor", "recommended"])
+def test_human(tmp_path, real_rig, chosen):
     file, glb = real_rig("human.blend"), tmp_path / "human.glb"
     bpy.ops.wm.open_mainfile(filepath=str(file))
     obj = max((o for o in bpy.data.objects if o.type == "MESH"), key=lambda o: len(o.data.vertices))
     numbers = obj.data.attributes.new("_NUMBER", "FLOAT", "POINT")
     numbers.data.foreach_set("value", np.arange(len(obj.data.vertices), dtype=np.float32))
-    use(obj, "cor")
-    write(glb, export_all_influences=True)
+    use(obj, chosen)
+    if chosen == "recommended":
+        # It chooses this one where joints bend more than in these frames.
+        obj.sinew.bulge_limit.enabled = True
+    file = write(glb, export_all_influences=True)
+    content = file.header["meshes"][0]["extensions"]["SINEW_skinning"]
+    assert content.get("stages") == (None if chosen == "cor" else ["twist_spread", "bulge_limit"])
     assert_plays(glb, obj, [1, 16, 32])

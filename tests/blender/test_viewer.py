@@ -96,7 +96,7 @@ def test_the_painted_mix_is_that_of_the_file(tmp_path):
 
 
 def make_limb(angle=150.0, mode="QUATERNION"):
-    """An arm that spreads twists from the hand and from the upper arm, twisted more from frame to frame, with a
+    """An arm that spreads twists of the hand and of the upper arm, twisted more from frame to frame, with a
     scaled bone and a vertex group."""
     obj = make_character(bones=4)
     names = ["shoulder.L", "upper_arm.L", "forearm.L", "hand.L"]

@@ -87,7 +87,13 @@ def made(tmp_path_factory):
     words = [SINEW.with_name("python"), "-c", ADD_KEY, files / "wrist.blend", folder / "keyed.blend"]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     mix = "--set", "mix.method=cor", "--set", "mix.group=Hand"
-    stages = "twist_spread=on", "twist_spread.amount=0.8", "bulge_limit=on", "bulge_limit.group=Hand", "dq.signs=hierarchy"
+    stages = (
+        "twist_spread=on",
+        "twist_spread.amount=0.8",
+        "bulge_limit=on",
+        "bulge_limit.group=Hand",
+        "dq.signs=hierarchy",
+    )
     staged = [word for setting in stages for word in ("--set", setting)]
     found = {
         "wrist": Made(folder, files / "wrist.blend", [1, 12, 24], methods),

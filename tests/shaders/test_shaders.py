@@ -16,7 +16,7 @@ import skin as reader
 import stages as reader_stages
 from bone_buffer import add_segments, add_turns, add_twists, bone_buffer, fade, twist_angles
 from conftest import REPOSITORY
-from skinning import deformed
+from skinning import Skinning, deformed
 
 GOLDEN, SHADERS = REPOSITORY / "tests" / "golden", REPOSITORY / "shaders"
 METHODS = {"lbs": 0, "dq": 1, "cor": 2, "hierarchy": 4}
@@ -73,10 +73,9 @@ class Mesh:
         counts = self.weights.sum(axis=1, keepdims=True)
         moves = counts > 1e-4
         weights = np.where(moves, self.weights, np.eye(MOST)[0]).astype(np.float64)
-        _share, twist, bulge = (np.asarray(each, np.float64) for each in self.amounts(TURNED))
-        amounts, nothing = np.column_stack([twist, bulge]), np.zeros(len(twist))
-        of_rest = self.points, self.centres, self.bones.astype(int), weights, self.palette(TURNED)
-        found = np.where(moves, deformed("dq", "dq", nothing, amounts, "continuous", *of_rest), self.points)
+        by = Skinning("dq", "dq", twist=np.asarray(self.amounts(TURNED)[1], np.float64))
+        bones = self.bones.astype(int), weights, self.palette(TURNED)
+        found = np.where(moves, deformed(by, self.points, self.centres, *bones), self.points)
         return reader.moved_by(np.linalg.inv(self.case["armature_from_mesh"]), found)
 
     def amounts(self, result):
@@ -106,7 +105,9 @@ class Mesh:
                     share = np.clip((point - head) @ along / (along @ along), 0.0, 1.0)
                     axis = pose.motion[bone][:3, :3] @ along
                     axis *= np.sign(np.linalg.det(pose.motion[bone][:3, :3])) / np.linalg.norm(axis)
-                    angle = weights[of == bone].sum() * twist[vertex] * (at_head + share * (at_tail - at_head))
+                    angle = (
+                        weights[of == bone].sum() * twist[vertex] * (at_head + share * (at_tail - at_head))
+                    )
                     if twist[vertex] * buffer[bone, 6, 3] > 0.5:
                         beyond = weights[of > bone].sum()
                         angle += 4.0 * buffer[bone, 7, 3] * np.arctan2(beyond, 1.0 - beyond) * (beyond < 1.0)

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes how Sinew deforms a mesh to a glTF file: the extension SINEW_skinning of the mesh names the method,
-and application-specific vertex attributes (glTF 2.0, 3.7.2.1: names that begin with an underscore) have the
-method's vertex data.
+"""Writes how Sinew deforms a mesh to a glTF file: the extension SINEW_skinning of the mesh names the method
+and stages, that of its skin has what stages know of bones, and application-specific vertex attributes (glTF
+2.0, 3.7.2.1: names that begin with an underscore) have the method's vertex data.
 
 Meshes have these attributes only during an export, as the exporter splits vertices at seams, and copies
 attributes to the right ones. They are made when it calls before an export, and removed when it has read all.
 """
+
+from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
@@ -21,14 +23,18 @@ from ...attach import properties, stage_settings
 from ...attach.updates import may_change_file
 from ...core.engines import ENGINES
 from ...core.errors import SinewError
+from ...core.rig import Bones
 from ...core.skin_stack import LINEAR
 from ...core.vectors import transformed
-from ...deform import session
-from ...io import mesh_io, spaces
+from ...deform import pose, session
+from ...io import armature_io, mesh_io, spaces
 
 # Raised when readers of earlier files could not read new ones correctly.
 VERSION = 1
 CENTRE, SHARE = "_SINEW_CENTRE", "_SINEW_MIX"
+# The weights of the vertex groups of stages, where they have one.
+AMOUNTS = {"twist_spread": "_SINEW_TWIST_SPREAD", "bulge_limit": "_SINEW_BULGE_LIMIT"}
+ATTRIBUTES = (CENTRE, SHARE, *AMOUNTS.values())
 EXTENSION = "SINEW_skinning"
 
 # In glTF's axes: x, z, -y.
@@ -41,13 +47,56 @@ class Skinning:
 
     content  of the extension
     centres  float32 [vertices, 3], object space; None where its methods have none
-    shares   float32 [vertices], of the mixed method; None without one
+    values   float32 [vertices] by the names of attributes: of the mixed method, of stages
+    bones    what stages know of bones; None without stages
     """
 
     obj: bpy.types.Object
     content: dict[str, Any]
     centres: np.ndarray | None = None
-    shares: np.ndarray | None = None
+    values: dict[str, np.ndarray] = field(default_factory=dict)
+    bones: StageBones | None = None
+
+
+@dataclass
+class StageBones:
+    """
+    armature  the name of the object
+    lengths   of its bones, by their names
+    twists    as in the file, with bones' names
+    """
+
+    armature: str
+    lengths: dict[str, float]
+    twists: list[dict[str, Any]]
+
+    @classmethod
+    def of(cls, evaluated_armature: bpy.types.Object, bones: Bones) -> StageBones:
+        twists, found = bones.twists, []
+        inputs = armature_io.read_twists(evaluated_armature, bones)
+        for (bone, base, tip, is_from_parent), (amount, curve, *_channels) in zip(
+            twists.rows, inputs, strict=True
+        ):
+            names = {"bone": bones.names[bone], "base": bones.names[base], "tip": bones.names[tip]}
+            values = {"amount": round(amount, 6), "curve": round(curve, 6)}
+            found.append({**names, "from": "parent" if is_from_parent else "child", **values})
+        return cls(
+            evaluated_armature.name, dict(zip(bones.names, bones.lengths.tolist(), strict=True)), found
+        )
+
+    def content(self, joints: Sequence[str]) -> dict[str, Any]:
+        """Of the extension of a skin with joints of these names."""
+        numbers = {name: number for number, name in enumerate(joints)}
+        twists = [
+            {key: numbers[value] if key in ("bone", "base", "tip") else value for key, value in twist.items()}
+            for twist in self.twists
+            if {twist["bone"], twist["base"], twist["tip"]} <= numbers.keys()
+        ]
+        return {
+            "version": VERSION,
+            "lengths": [self.lengths.get(name, 0.0) for name in joints],
+            "twists": twists,
+        }
 
 
 @dataclass
@@ -56,12 +105,14 @@ class _Export:
 
     written     contents of the extension by the names of objects
     left_out    a sentence for each object without the extension
+    bones       by the names of armature objects
     meshes      that have attributes during the export
     all_custom  the artist exports the meshes' other attributes that begin with an underscore, too
     """
 
     written: dict[str, dict[str, Any]] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
+    bones: dict[str, StageBones] = field(default_factory=dict)
     meshes: list[bpy.types.Mesh] = field(default_factory=list)
     all_custom: bool = True
 
@@ -110,15 +161,22 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
     skinning = Skinning(obj, {"version": VERSION, "method": method})
     if mixed:
         skinning.content["mix"] = mixed
-        skinning.shares = deformer.mix_weights
+        skinning.values[SHARE] = deformer.mix_weights
     parameters = stage_settings.method_values(settings, [method, mixed])
-    stages = [name for name in stage_settings.names_on(settings) if name != "mix"]
+    after, stages = states[0][1].bound.skin_stack.stages_after, []
+    for name, own in pose.stage_values(settings).items() if after is not None else ():
+        stages.append(name)
+        parameters |= {f"{name}.{key}": value for key, value in own.items() if key != "enabled"}
+        if name in AMOUNTS and name in after.masks:
+            skinning.values[AMOUNTS[name]] = after.masks[name]
     skinning.content |= {
         name: value for name, value in (("parameters", parameters), ("stages", stages)) if value
     }
+    armature = settings.armature
+    assert armature is not None
+    if not AMOUNTS.keys().isdisjoint(stages):
+        skinning.bones = StageBones.of(armature.evaluated_get(depsgraph), deformer.bones)
     if "cor" in (settings.method, mixed):
-        armature = settings.armature
-        assert armature is not None
         assert deformer.vertex_data is not None
         space = spaces.bones_from_model_in(depsgraph, obj, armature)
         skinning.centres = deformer.vertex_data.of("cor", space)
@@ -132,7 +190,7 @@ def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str
     settings         the exporter's own
     """
     end()
-    _current.written, _current.left_out = {}, list(left_out)
+    _current.written, _current.left_out, _current.bones = {}, list(left_out), {}
     _current.all_custom = settings["gltf_attributes"]
     for skinning in found:
         _add(skinning, y_up=settings["gltf_yup"])
@@ -154,14 +212,16 @@ def _add(skinning: Skinning, y_up: bool) -> None:
         )
         return
     _current.written[obj.name] = skinning.content
+    if skinning.bones is not None:
+        _current.bones[skinning.bones.armature] = skinning.bones
     if skinning.centres is not None:
         # In world space, as the exporter writes the positions of a skin.
         space = np.array(obj.matrix_world, dtype=np.float64)
         space = _Y_UP @ space if y_up else space
         mesh_io.write_vectors(mesh, CENTRE, transformed(skinning.centres, space).astype(np.float32))
-    if skinning.shares is not None:
-        mesh_io.write_values(mesh, SHARE, np.clip(skinning.shares, 0.0, 1.0))
-    if skinning.centres is not None or skinning.shares is not None:
+    for name, values in skinning.values.items():
+        mesh_io.write_values(mesh, name, np.clip(values, 0.0, 1.0))
+    if skinning.centres is not None or skinning.values:
         _current.meshes.append(mesh)
 
 
@@ -171,7 +231,7 @@ def end() -> None:
     for mesh in meshes:
         # After an export that failed, another file may be open.
         with suppress(ReferenceError):
-            for name in (CENTRE, SHARE):
+            for name in ATTRIBUTES:
                 mesh_io.remove_attribute(mesh, name)
 
 
@@ -201,12 +261,20 @@ def left_out() -> list[str]:
     return list(_current.left_out)
 
 
+def _extend(of: Any, content: dict[str, Any]) -> None:
+    """of: a mesh or a skin of the exporter's"""
+    from io_scene_gltf2.io.com.gltf2_io_extensions import Extension
+
+    made = Extension(EXTENSION, content, required=False)
+    of.extensions = {**(of.extensions or {}), EXTENSION: made}
+
+
 class GltfExtension:
     """The functions that the exporter calls while it reads meshes, and when it has read all."""
 
     def gather_attribute_keep(self, attribute: Any, _settings: dict[str, Any]) -> None:
         """Keeps attributes that begin with an underscore: all or only these, as the artist chose."""
-        if not _current.all_custom and attribute.attr_name not in (CENTRE, SHARE):
+        if not _current.all_custom and attribute.attr_name not in ATTRIBUTES:
             attribute.keep = False
 
     def gather_mesh_hook(
@@ -215,15 +283,17 @@ class GltfExtension:
         """obj: the object that the mesh is exported for, None for one without a skin."""
         content = _current.written.get(obj.name) if obj is not None else None
         if content is not None:
-            from io_scene_gltf2.io.com.gltf2_io_extensions import Extension
-
-            made = Extension(EXTENSION, content, required=False)
-            gltf_mesh.extensions = {**(gltf_mesh.extensions or {}), EXTENSION: made}
+            _extend(gltf_mesh, content)
             return
         # The attributes belong to another object with this mesh.
         for primitive in gltf_mesh.primitives:
-            for name in (CENTRE, SHARE):
+            for name in ATTRIBUTES:
                 primitive.attributes.pop(name, None)
+
+    def gather_skin_hook(self, skin: Any, armature: bpy.types.Object, *_: Any) -> None:
+        bones = _current.bones.get(armature.name)
+        if bones is not None:
+            _extend(skin, bones.content([joint.name for joint in skin.joints]))
 
     def gather_gltf_hook(self, *_: Any) -> None:
         """Called before anything is written, which can fail."""
