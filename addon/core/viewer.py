@@ -183,7 +183,7 @@ class Part:
         add_twists(buffer, of.rows, amounts * angles, curves)
         rest = self.rest_bones.astype(np.float64)
         shorter, _swings = twist_angles(motions.astype(np.float64), rest, of.rows)
-        # What fades leave of each angle, if it is so many turns beyond the shorter way: the most of it is right.
+        # What fades leave of an angle, if it is so many turns beyond the shorter way: the most is right.
         turns = np.arange(-2, 3)[:, None]
         parts = angles / np.where(angles == 0.0, 1.0, shorter + 2.0 * np.pi * turns)
         parts[parts > 1.0 + 1e-3] = 0.0
