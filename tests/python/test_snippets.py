@@ -35,7 +35,8 @@ def blocks(document: str) -> list[tuple[str, str]]:
 
 def test_the_mesh_in_gltf():
     (text,) = [text for language, text in blocks("docs/engines.md") if language == "json"]
-    (mesh,) = json.loads("{" + text + "}")["meshes"]
+    example = json.loads("{" + text + "}")
+    (mesh,), (skin,) = example["meshes"], example["skins"]
     writer = (ROOT / "addon/features/gltf/export.py").read_text(encoding="utf-8")
     (primitive,) = mesh["primitives"]
     own = [name for name in primitive["attributes"] if name.startswith("_")]
@@ -47,6 +48,11 @@ def test_the_mesh_in_gltf():
     jsonschema.validate(mesh["extensions"]["SINEW_skinning"], schema)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(mesh["extensions"]["SINEW_skinning"] | {"mix": "none"}, schema)
+    of_skins = json.loads((ROOT / "docs/SINEW_skinning.skin.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(of_skins)
+    jsonschema.validate(skin["extensions"]["SINEW_skinning"], of_skins)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"version": 1, "lengths": [-1.0], "twists": []}, of_skins)
     methods, stages = (schema["properties"][name] for name in ("method", "stages"))
     assert methods["enum"] == [method.name for method in sinew.methods()]
     assert stages["items"]["enum"] == [stage.name for stage in sinew.stages() if stage.name != "mix"]
