@@ -1,6 +1,7 @@
 # Installs the library, builds the programs of this folder against it and runs them.
 #   cmake -DSOURCE=... -DBUILD=... [-DGLM=...] -P test.cmake
 # GLM  a folder with GLM's headers: installs as on a system without GLM, with these headers instead of fetched ones
+# GLES whether there is OpenGL ES: also builds native/example
 set(folder "${BUILD}/consumer")
 set(build "${BUILD}")
 set(without_glm "")
@@ -56,10 +57,8 @@ foreach(program library calls_plain calls_aligned)
   run("${folder}/build/${program}")
 endforeach()
 
-# The engine of docs/engines.md, where there is OpenGL ES.
-find_path(egl EGL/egl.h)
-find_path(gles GLES3/gl3.h)
-if(egl AND gles AND NOT GLM)
+# The engine of docs/engines.md.
+if(GLES)
   run(${CMAKE_COMMAND} -S "${SOURCE}/native/example" -B "${folder}/example" -G Ninja
     "-DCMAKE_PREFIX_PATH=${folder}/installed" "-DCMAKE_CXX_FLAGS=${FLAGS}")
   run(${CMAKE_COMMAND} --build "${folder}/example")
