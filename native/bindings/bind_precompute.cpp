@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/numpy.h>
 
-#include <optional>
+#include <memory>
 #include <stdexcept>
 #include <unordered_set>
 
@@ -45,13 +45,16 @@ private:
 
 /// Vertex data in the making. All members but `numbers_`, until the work has ended, belong to whoever has the GIL.
 class Precomputation {
+    using Numbers = std::shared_ptr<std::vector<float>>;
+
 public:
     /// make(mesh, job) returns rows of `width` floats.
     template <class Make>
     Precomputation(std::size_t threads, bool gives_way, Mesh mesh, std::size_t width, Make make)
         : width_(static_cast<py::ssize_t>(width)),
-          job_(threads, gives_way,
-               [this, mesh = std::move(mesh), make](Job& job) { numbers_ = make(mesh, job); }) {
+          job_(threads, gives_way, [this, mesh = std::move(mesh), make](Job& job) {
+              numbers_ = std::make_shared<std::vector<float>>(make(mesh, job));
+          }) {
         all().insert(this);
     }
     ~Precomputation() {
@@ -95,10 +98,11 @@ public:
         if (result_) return result_;
         if (!is_cancelled_) job_.rethrow();
         if (is_cancelled_ || !numbers_) return py::none();
-        const std::span<const float> numbers(*numbers_);
-        const auto rows = static_cast<py::ssize_t>(numbers.size()) / width_;
-        result_ = array_of(numbers).reshape({rows, width_});
-        numbers_.reset();
+        // Not copied: numpy lets other threads run meanwhile, which may want the result, too.
+        const py::capsule owner(new Numbers(numbers_), [](void* of) { delete static_cast<Numbers*>(of); });
+        const auto rows = static_cast<py::ssize_t>(numbers_->size()) / width_;
+        const py::array_t<float> made({rows, width_}, numbers_->data(), owner);
+        if (!result_) result_ = made;
         return result_;
     }
 
@@ -124,7 +128,7 @@ private:
     py::ssize_t width_;
     bool is_cancelled_ = false;
     py::object result_;
-    std::optional<std::vector<float>> numbers_;
+    Numbers numbers_;
     BackgroundJob job_;
 };
 

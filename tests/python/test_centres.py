@@ -6,9 +6,11 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -163,6 +165,25 @@ def test_progress_ends_at_one(start):
     assert shares[-1] == 1.0
     assert run.has_ended
     assert run.result() is run.result()
+
+
+@every_precomputation
+def test_threads_get_the_same_result(start):
+    """Blender evaluates meshes that share a computation on several threads."""
+    tube, count = Tube(81, 64), 4
+    expected, together = start(tube).result().copy(), Barrier(count)
+
+    def result_of(run):
+        together.wait()
+        return run.result()
+
+    with ThreadPoolExecutor(count) as threads:
+        for _again in range(100):
+            run = start(tube)
+            assert run.wait()
+            found = list(threads.map(result_of, [run] * count))
+            assert all(each is found[0] for each in found)
+            np.testing.assert_array_equal(found[0], expected)
 
 
 def test_it_works_on_copies():
