@@ -138,8 +138,7 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
         reason = str(error).strip().removeprefix("Error: ")
         raise SinewError(f"{obj.name}: Sinew can not be added to its modifiers: {reason}") from error
     finally:
-        if active is not None:
-            obj.modifiers.active = active
+        obj.modifiers.active = active
 
 
 def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
@@ -247,8 +246,7 @@ def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
     if nodes is not None:
         active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
         obj.modifiers.remove(nodes)
-        if active is not None:
-            obj.modifiers.active = active
+        obj.modifiers.active = active
     if settings.before.parent_type:
         modifier = armature_modifier(obj)
         if modifier is not None:

@@ -112,8 +112,7 @@ def _new(obj: bpy.types.Object, name: str, kind: str) -> bpy.types.Modifier:
     active = obj.modifiers.active
     made = obj.modifiers.new(name, kind)
     made.show_expanded = made.show_in_editmode = made.show_viewport = made.show_render = False
-    if active is not None:
-        obj.modifiers.active = active
+    obj.modifiers.active = active
     return made
 
 

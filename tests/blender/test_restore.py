@@ -64,6 +64,7 @@ def full_scene(folder: Path) -> Path:
     block.value = 1.0
     block.keyframe_insert("value", frame=11)
     keyed.active_shape_key_index = 1
+    keyed.modifiers.active = None
 
     # Empty animation data, which unlinking an action leaves behind.
     bare, _ = scenes.make_arm(sides=6, rings=9, name="Bare")
