@@ -511,6 +511,7 @@ PROGRAMS = {
     "fuzz": "tests/blender/fuzz_parity.py",
     "walk": "tests/blender/walk.py",
     "soak": "tests/blender/soak.py",
+    "corpus": "tests/blender/corpus.py",
     "pictures": "docs/draw_methods.py",
     "golden": "tests/blender/make_golden.py",
 }

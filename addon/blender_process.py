@@ -14,7 +14,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from .core import pipes
@@ -60,11 +60,12 @@ class BlenderProcess:
     """One Blender: bpy in this Python, or the Blender program that runs this code. While it is at work, the
     caller has to call poll(), which also ends it where it exceeds a limit.
 
-    wait  waits until it has started, and raises SinewError where it cannot be started; otherwise poll() does
-          so
+    wait     waits until it has started, and raises SinewError where it cannot be started; otherwise poll()
+             does so
+    program  the words that start it, where it has other tasks than those of worker.py
     """
 
-    def __init__(self, limits: Limits, wait: bool = True) -> None:
+    def __init__(self, limits: Limits, wait: bool = True, program: Sequence[str] = ()) -> None:
         # Blender's own temporary folder is inside: it remains when Blender is killed.
         self._folder = ScratchFolder()
         own = str(self._folder.path)
@@ -72,7 +73,7 @@ class BlenderProcess:
             end_all_with_this_process()
         try:
             self._process = subprocess.Popen(
-                _command(),
+                program or _command(),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=None if limits.verbose else subprocess.DEVNULL,

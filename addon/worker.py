@@ -7,9 +7,10 @@ import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import MappingProxyType
 
 from .blender_process import DOING, PROCESSORS
 from .core.errors import SinewError
@@ -17,19 +18,22 @@ from .jobs.journal import content_hash
 
 Report = Callable[..., None]
 """Called with what is being done to the file, such as "opening it", and with details by keyword."""
+Action = Callable[[dict, Report], dict]
+"""Performs a task, and returns its outcome."""
 
 
-def run(task: dict, report: Report) -> dict:
+def run(task: dict, report: Report, others: Mapping[str, Action] = MappingProxyType({})) -> dict:
     """Performs one task in this process; returns its outcome with the hash of the file that was read."""
     from .features.bake import bake_apart
     from .jobs.tasks import flex, preflight, reskin
 
-    actions = {
+    actions: dict[str, Action] = {
         "reskin": reskin.reskin,
         "restore": reskin.restore,
         "export": bake_apart.export,
         "check": preflight.check,
         "flex": flex.flex,
+        **others,
     }
     try:
         # Hashed first, so that a later change of the file is noticed.
@@ -42,7 +46,8 @@ def run(task: dict, report: Report) -> dict:
         return {"error": f"{task['source']}: {type(error).__name__}: {error}"}
 
 
-def main() -> None:
+def main(others: Mapping[str, Action] = MappingProxyType({})) -> None:
+    """others: what it can do beside Sinew's own tasks, by the command of a task."""
     # Blender may print to standard output at any time, and scripts may read standard input: both are
     # replaced.
     tasks, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb", buffering=0)
@@ -73,7 +78,7 @@ def main() -> None:
 
         for line in tasks:
             report("starting on it")
-            reply(run(json.loads(line), report))
+            reply(run(json.loads(line), report, others))
 
 
 @contextmanager

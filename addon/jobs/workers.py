@@ -159,13 +159,18 @@ def run_here(
         yield task, _last(_steps(task, Limits(), at_once, versions))
 
 
-def run_one_by_one(tasks: Iterable[dict], limits: Limits) -> Generator[dict, None, None]:
+def run_one_by_one(
+    tasks: Iterable[dict], limits: Limits, program: Sequence[str] = ()
+) -> Generator[dict, None, None]:
     """Yields the outcome of each task, which writes nothing, from a Blender process that is restarted if it
-    crashes or is ended. Raises SinewError where none can be started."""
+    crashes or is ended. Raises SinewError where none can be started.
+
+    program  as of BlenderProcess
+    """
     blender = None
     try:
         for task in tasks:
-            blender = blender or BlenderProcess(limits)
+            blender = blender or BlenderProcess(limits, program=program)
             try:
                 yield blender.run(task, limits)
             except BlenderLost as lost:

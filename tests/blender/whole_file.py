@@ -75,10 +75,11 @@ class Column:
         ]
 
 
-def of_open_file(only: str = "") -> dict[str, object]:
+def of_open_file(only: str = "", named: str = "") -> dict[str, object]:
     """Path of each value -> the value.
 
-    only  the name of the one kind of datablocks to read
+    only   the name of the one kind of datablocks to read
+    named  the name of a kind of which only names and numbers of users are read
     """
     found: dict[str, object] = {}
     collections = [p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
@@ -91,16 +92,18 @@ def of_open_file(only: str = "") -> dict[str, object]:
                 if isinstance(item, bpy.types.ID) and not is_render:
                     path = f"{kind}[{item.name_full}]"
                     found[path] = item.users
+                    if kind == named:
+                        continue
                     _Walk(found, item).struct(item, path)
     return found
 
 
-def content() -> dict[str, object]:
+def content(named: str = "") -> dict[str, object]:
     """The open file once it is evaluated, which fills in bounds and caches, and read, which makes Blender 5.2
-    expand attributes with a single value."""
+    expand attributes with a single value. named: as of of_open_file()"""
     bpy.context.scene.frame_set(bpy.context.scene.frame_current)
     of_open_file("meshes")
-    return of_open_file()
+    return of_open_file(named=named)
 
 
 def assert_same(before: dict[str, object]) -> None:
