@@ -120,8 +120,8 @@ LEAST = 5.0
 
 _ARM, _LEG = r"(?<![a-z])arm(?![a-z])", r"(?<![a-z])leg(?![a-z])"
 _OTHERS = (
-    ("thumb", r"thumb"),
-    ("finger", r"index|middle|ring|pinky|little|finger"),
+    ("thumb", r"thumb|finger_?1-"),
+    ("finger", r"index|middle|ring|pinky|little|finger(?!_?base)"),
     ("hand", r"hand|wrist"),
     ("toe", r"toe|(?<![a-z])ball(?![a-z])"),
     ("foot", r"foot|ankle"),
@@ -129,7 +129,7 @@ _OTHERS = (
     ("jaw", r"jaw"),
     ("neck", r"neck|(?<![a-z])head(?![a-z])"),
     ("spine", r"spine|chest|abdomen|waist|torso"),
-    ("still", r"pelvis|hips?(?![a-z])|root|master|tongue|eye|metacarpal|palm|carpal"),
+    ("still", r"pelvis|hips?(?![a-z])|root|master|tongue|eye|carpal|palm|finger_?base"),
 )
 _LEFT, _RIGHT = r"left|(?<![a-z])l(?![a-z])", r"right|(?<![a-z])r(?![a-z])"
 

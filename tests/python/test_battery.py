@@ -2,6 +2,7 @@
 """The battery of poses: joints bend by the stated angles, as limbs do, whatever a rig calls them."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -148,6 +149,14 @@ def test_a_figure_bends_as_people_do(naming):
         np.testing.assert_allclose(tail[:3], poses["Elbows bent"][hand, :3, 3], atol=1e-6)
     turned = poses["Neck turned"][number["head", ""], :3, :3] @ rest[number["head", ""], :3, :3].T
     assert math.degrees(math.acos((np.trace(turned) - 1) / 2)) == pytest.approx(80.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "role"),
+    [("finger1-2.L", "thumb"), ("finger2-1.L", "finger"), ("LeftFingerBase", "still"), ("metacarpal2", "still")],
+)
+def test_hands_of_makehuman(name, role):
+    assert next((role for role, names in battery._OTHERS if re.search(names, name.lower())), "") == role
 
 
 def test_an_elbow_that_is_bent_at_rest_bends_as_far():

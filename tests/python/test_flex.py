@@ -24,6 +24,7 @@ from sinew_addon.core.flex.report import junit, lines, markdown, of_file
 from sinew_addon.core.flex.verdict import OWN, Pose, judge
 from sinew_addon.core.flex.weights import WeightCheck
 from sinew_addon.core.metrics import FrameOfRig
+from sinew_addon.core.surface import Surface, coincident_vertices
 from test_battery import figure
 from test_metrics import LENGTH, RADIUS, Tube, influences_of
 
@@ -181,6 +182,53 @@ def test_a_vertex_far_over_the_surface_bleeds_as_far_as_it_is():
     # Along the tube, to the first ring that follows the second bone most.
     core = x[(shares > 0.5)].min()
     assert found.value == pytest.approx((core - x[far]) / (LENGTH / 2), rel=1e-6)
+
+
+def test_a_bone_that_nothing_follows_alone_has_no_pivot():
+    """As a breast's, whose head is in the chest."""
+    tube = Tube()
+    assert Region(Bent(0, 0.0, 0.6 * (tube.rest[:, 0] > 0.25 * LENGTH)).character, 1).pivot == 0.0
+    assert Region(Bent(0, 0.0, 1.0 * (tube.rest[:, 0] > 0.0)).character, 1).pivot == 0.0
+    assert Region(Bent(0, 0.0, np.clip(4.0 * tube.second - 3.0, 0.0, 1.0)).character, 1).pivot > 1.0
+
+
+@pytest.mark.parametrize(("share", "factor"), [(0.0, 1.0), (0.3, 0.4), (0.5, 0.0)])
+def test_what_follows_the_nearest_bone_alike_is_not_astray(share, factor):
+    """share: that of the nearest bone"""
+
+    def value(share):
+        shares = Tube().second.copy()
+        shares[-1] = share
+        found = WeightCheck(Bent(0, 0.0, shares).character).values()
+        return max(each.value for each in found if each.name == "astray")
+
+    assert value(share) == pytest.approx(factor * value(0.0), rel=1e-3, abs=1e-6)
+
+
+def boxes_with_legs(moved=0.0):
+    """Two legs that touch in the middle, each of its own bone, on either side of X = 0; the first vertex of
+    the left one follows the other by `moved`."""
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 3.0)])
+    points = np.concatenate([corners, corners * [-1.0, 1.0, 1.0]])
+    weights = np.repeat(np.eye(2), 8, axis=0)
+    weights[7] = 1.0 - moved, moved
+    rest = np.tile(np.eye(4), (2, 1, 1))
+    rest[:, :3, 3] = [[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0]]
+    no, none = np.zeros(2, int), np.full(2, -1)
+    sides = np.array([1, -1]), np.array([1, 0])
+    tails = rest[:, :3, 3] + [0.0, 0.0, 3.0]
+    names, deform = ("leg.L", "leg.R"), np.ones(2, bool)
+    skeleton = Skeleton(names, rest, tails, none, deform, ("", ""), *sides, no, ("Rig",))
+    triangles = np.array([[0, 1, 2], [1, 3, 2], [8, 10, 9], [9, 10, 11]], np.int32)
+    surface = Surface(16, triangles, np.empty((0, 2), np.int32), coincident_vertices(points))
+    return Character(surface, points, influences_of(weights), np.arange(2), skeleton, [("Legs", 16)])
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.5])
+def test_legs_that_touch_are_each_other_s_image(moved):
+    values = [each for each in WeightCheck(boxes_with_legs(moved)).values() if each.name == "asymmetry"]
+    # Of the vertex and of its image; vertices in the middle follow both by half.
+    assert [each.value for each in values] == pytest.approx([2.0 * moved / (8.0 + moved)])
 
 
 def test_graphs_are_those_of_scipy():

@@ -161,7 +161,7 @@ LIMITS: dict[str, Limit] = {
         Limit(
             "bulge",
             "Bulge",
-            0.75,
+            0.9,
             "girths",
             "The surface leaves the bone's axis.",
             "Use method cor or the stage Limit Bulge; check the weights there.",

@@ -59,6 +59,8 @@ class Region:
         self.vertices, corners = np.unique(surface.triangles[is_bent], return_inverse=True)
         self._corners = corners.reshape(-1, 3).astype(np.int32)
         self.shares = shares[self.vertices]
+        # Otherwise it moves flesh, as a breast's, and no limb.
+        self._has_limb = bool(shares.max(initial=0.0) >= 1.0 - BENT)
 
     @property
     def is_empty(self) -> bool:
@@ -113,10 +115,11 @@ class Region:
 
     @cached_property
     def pivot(self) -> float:
-        """How far the bone's head is from the middle of what it bends, in spreads of that."""
+        """How far the bone's head is from the middle of what it bends, in spreads of that; 0 where no vertex
+        follows the bone alone."""
         weights = self.shares * (1.0 - self.shares)
         total = float(weights.sum())
-        if total < 1.0:
+        if total < 1.0 or not self._has_limb:
             return 0.0
         points = self.rest.points
         middle = (points * weights).sum(axis=1) / total

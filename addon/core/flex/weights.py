@@ -100,12 +100,12 @@ class WeightCheck:
 
     def _astray(self) -> Iterator[Value]:
         """How much farther vertices are from the bone that they follow most than from the nearest, in girths
-        of that bone."""
+        of that bone, times how much more they follow it: two that share a vertex alike are both right."""
         character = self._character
         weighted = np.flatnonzero(character.heaviest >= 0)
-        heaviest = character.heaviest[weighted]
-        own = self._distances[weighted, heaviest]
-        beyond = own - self._distances[weighted].min(axis=1)
+        heaviest, nearest = character.heaviest[weighted], self._distances[weighted].argmin(axis=1)
+        beyond = self._distances[weighted, heaviest] - self._distances[weighted, nearest]
+        beyond *= character.weights[weighted, heaviest] - character.weights[weighted, nearest]
         for bone in np.unique(heaviest):
             core = np.flatnonzero(heaviest == bone)
             values = beyond[core] / self._sizes[bone]
@@ -202,12 +202,20 @@ class WeightCheck:
         image = _matches(
             points, points - 2.0 * np.outer((points - middle) @ across, across), character.diagonal
         )
+        first = character.surface.coincident
+        first = np.arange(len(points)) if first is None else first
+        # In folds of the skin, the nearest vertex may be the image of another.
+        is_image = (image >= 0) & (first[image[image]] == first)
         moved = np.flatnonzero(character.weights[:, np.r_[left, right]].any(axis=1))
-        known = moved[image[moved] >= 0]
+        known = moved[is_image[moved]]
         if len(known) < SYMMETRIC * len(moved) or not len(moved):
             return
         for bone, other in zip(left, right, strict=True):
-            own, there = character.weights[known, bone], character.weights[image[known], other]
+            # Of vertices at one place, as of boxes that touch, any may be the image.
+            weights = character.weights[:, [bone, other]]
+            at_place = np.stack([np.bincount(first, each, len(first)) for each in weights.T])
+            at_place = (at_place / np.maximum(np.bincount(first, minlength=len(first)), 1))[:, first]
+            own, there = at_place[0, known], at_place[1, image[known]]
             differs = np.abs(own - there)
             total = max(float(own.sum()), float(there.sum()))
             if total > 0.0:
