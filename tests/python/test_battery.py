@@ -153,7 +153,12 @@ def test_a_figure_bends_as_people_do(naming):
 
 @pytest.mark.parametrize(
     ("name", "role"),
-    [("finger1-2.L", "thumb"), ("finger2-1.L", "finger"), ("LeftFingerBase", "still"), ("metacarpal2", "still")],
+    [
+        ("finger1-2.L", "thumb"),
+        ("finger2-1.L", "finger"),
+        ("LeftFingerBase", "still"),
+        ("palm.01.L", "still"),
+    ],
 )
 def test_hands_of_makehuman(name, role):
     assert next((role for role, names in battery._OTHERS if re.search(names, name.lower())), "") == role
