@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./dev corpus`: each file is a row, also one that can not be read; another shape than Blender's is a failure."""
+"""`./dev corpus`: each file is a row, also one that can not be read; another shape than Blender's is a
+failure."""
 
 from __future__ import annotations
 
