@@ -457,6 +457,7 @@ class Shape:
 
     @cached_property
     def volume(self) -> float:
+        """In cubed units of the points; see volume()."""
         if len(self.surface.triangles) == 0:
             return 0.0
         # Relative to the mean: far from the origin, the terms of a small mesh would be large and cancel.
@@ -484,7 +485,7 @@ class Measured:
 
     @cached_property
     def distance(self) -> np.ndarray:
-        """float64 [vertices]: distance to the other shape; 0 without one."""
+        """float64 [vertices]: distance to the other shape, in the unit of the points; 0 without one."""
         if self._other is None:
             return np.zeros(self.shape.surface.vertex_count)
         other = self._other() if callable(self._other) else self._other
@@ -493,7 +494,8 @@ class Measured:
 
     @cached_property
     def bulge(self) -> np.ndarray:
-        """float64 [vertices]"""
+        """float64 [vertices]: how much farther each is from its bone's axis than at rest, in the unit of the
+        points; 0 without weights."""
         bulge, pose = np.zeros(self.shape.surface.vertex_count), self._pose
         skin = pose.skin
         bulge[skin.weighted] = skin.distances_from_axes(self.shape.points, pose.frame.posed_axes)
@@ -502,7 +504,7 @@ class Measured:
 
     @cached_property
     def flipped(self) -> np.ndarray:
-        """bool [triangles]"""
+        """bool [triangles]: those that are inside out against the bones that move them."""
         return dots(self.shape.normals, self._pose.rotated_normals) < 0.0
 
     @cached_property
@@ -535,12 +537,12 @@ class Measured:
 
     @cached_property
     def stretch(self) -> np.ndarray:
-        """float64 [edges]"""
+        """float64 [edges]: lengths as parts of those at rest; 1 for an edge without length there."""
         return _ratios(self.shape.lengths, self.rest.lengths)
 
     @cached_property
     def area_ratios(self) -> np.ndarray:
-        """float64 [triangles]"""
+        """float64 [triangles]: areas as parts of those at rest; 1 for a triangle without area there."""
         return _ratios(self.shape.areas, self.rest.areas)
 
     def entry(self, name: str) -> float:

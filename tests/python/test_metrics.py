@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Protects metrics: on shapes whose measures are known in closed form, and compared with trimesh."""
 
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sinew
 import trimesh
 from rigs import about, random_motion, transform
+from sinew_addon.core.flex.limits import LIMITS
 from sinew_addon.core.influences import Influences
 from sinew_addon.core.metrics import METRICS, FrameOfRig, Gauge, Measured, Shape, volume
 from sinew_addon.core.surface import Parts, Surface, coincident_vertices, joined
@@ -329,3 +336,48 @@ def test_an_empty_mesh_measures_nothing():
     gauge.set_frame(FrameOfRig(np.empty((0, 3)), axes, axes, np.eye(3)[None]))
     summary = gauge.measure(np.empty((0, 3))).summary()
     assert (summary.area, summary.volume, summary.flipped_faces) == (0.0, 0.0, 0)
+
+
+DOCUMENTED = """
+import json, sys
+sys.modules["bpy"] = None  # so that importing it fails
+import numpy as np
+from test_metrics import LENGTH, Tube
+from rigs import about
+tube, motion = Tube(), about([1, 0, 0], 180)
+rest, posed, triangles, edges = tube.rest, tube.deform("lbs", motion), tube.surface.triangles, tube.surface.edges
+offsets, bones, weights = tube.influences.offsets, tube.influences.bones, tube.influences.weights
+other, lengths, parents = tube.deform("dq", motion), np.full(2, LENGTH / 2), np.array([-1, 0])
+rest_bones = np.tile(np.eye(4), (2, 1, 1))
+rest_bones[:, :3, :3] = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]
+rest_bones[0, 0, 3] = -LENGTH / 2
+posed_bones = np.stack([np.eye(4), motion]) @ rest_bones
+exec(sys.stdin.read())
+print(json.dumps([summary.volume_change, summary.bulge_min, summary.distance_max, worst]))
+assert all(each.shape == (len(rest),) for each in maps.values())
+"""
+
+
+def test_the_documented_code_runs_without_blender():
+    root = Path(__file__).resolve().parents[2]
+    blocks = re.findall(
+        r"```python\n(.*?)```", (root / "docs" / "metrics.md").read_text(encoding="utf-8"), re.S
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", DOCUMENTED],
+        input="\n".join(blocks),
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    volume_change, bulge, distance, worst = json.loads(done.stdout)
+    assert volume_change == pytest.approx(-2 / 3, abs=1e-5)
+    assert bulge == pytest.approx(-RADIUS, rel=1e-5)
+    assert distance == pytest.approx(RADIUS, rel=1e-2)
+    assert worst["radius"][0] < 0.5
+    assert worst["volume_loss"][0] == pytest.approx(2 / 3, abs=0.05)
+    assert worst["pivot"][0] == pytest.approx(0.0, abs=1e-6)
+    assert {limit.name for limit in LIMITS.values() if limit.posed} <= set(worst)

@@ -93,7 +93,8 @@ class Region:
 
     @cached_property
     def girth(self) -> float:
-        """The mean distance of the bent vertices from the axes of their bones at rest."""
+        """The mean distance of the bent vertices from the axes of their bones at rest, in the unit of the
+        points."""
         bones = self.character.heaviest[self.vertices]
         known = np.flatnonzero(bones >= 0)
         distances = self.character.skeleton.distances(
@@ -128,6 +129,7 @@ class Region:
         return float(np.linalg.norm(head - middle) / max(spread, 1e-12))
 
     def crossing(self, points: np.ndarray, crossings: Crossings) -> set[tuple[int, int]]:
+        """Pairs of the region's triangles that cross, for its points [vertices of the region, 3]."""
         surface = self.surface
         first = surface.coincident
         # Parts that only a seam divides do not cross.
@@ -140,11 +142,14 @@ class Region:
         crossings: Crossings,
         at_rest: set[tuple[int, int]],
     ) -> dict[str, tuple[float, Place]]:
-        """Returns each measure that depends on the pose (limits.LIMITS) and that the region has, with its
-        place.
+        """Returns each measure that depends on the pose and that the region has, with its place, in the units
+        of limits.LIMITS: volumes, flips and crossings are shares of the region, `radius` and `stretch`
+        ratios, `bulge` is in girths.
 
-        frame   of the whole character
-        points  [vertices, 3] of the whole
+        frame      of the whole character
+        points     float [vertices, 3] of the whole, posed
+        crossings  finds triangles that cross
+        at_rest    its pairs at rest, which do not count
         """
         own = points[self.vertices]
         if not np.isfinite(own).all():
