@@ -150,7 +150,12 @@ def test_stages_are_switched(browser, made):
         "Twist Spread and Limit Bulge"
     )
     staged = points(browser, 0, "'dq'", frame)
+    browser.run("window.sinew.set({ methods: ['blender', 'dq'] })")
+    labels = "return ['pane-0', 'pane-1'].map((id) => document.getElementById(id).textContent)"
+    plain = ["Armature modifier", "Dual Quaternion"]
+    assert browser.run(labels) == [plain[0], f"{plain[1]} with Twist Spread and Limit Bulge"]
     browser.press("s")
+    assert browser.run(labels) == plain
     assert browser.run("return document.getElementById('stages').checked") is False
     assert np.abs(points(browser, 0, "'dq'", frame) - staged).max() > 0.01
     browser.press("s")

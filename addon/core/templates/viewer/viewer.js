@@ -503,6 +503,9 @@ function changed() {
 }
 
 const methodLabel = (name) => header.methods[name];
+const staged = [...new Set(header.parts.flatMap((part) => part.stages))], stagesLabel = staged.join(" and ");
+const hasStages = (name) => staged.length && state.stages && name !== "blender";
+const shownLabel = (name) => methodLabel(name) + (hasStages(name) ? ` with ${stagesLabel}` : "");
 
 function say(text) {
   find("said").textContent = text;
@@ -516,7 +519,6 @@ function showFrame() {
 
 // What a frame is called.
 const step = header.flex ? "pose" : "frame";
-const staged = [...new Set(header.parts.flatMap((part) => part.stages))];
 // The stops of the slider.
 const stops = [1, 2, 3, 4, 8].filter((n) => n < most).concat(Infinity);
 
@@ -535,12 +537,12 @@ function show() {
     find(`method-${i}`).value = name;
     find(`label-${i}`).textContent = state.panes === 2 ? ["Left", "Right"][i] : ["Shown", "Flip to"][i];
     const pane = find(`pane-${i}`);
-    pane.textContent = methodLabel(name);
+    pane.textContent = shownLabel(name);
     pane.hidden = i >= state.panes;
     pane.style.left = `${100 * (i + 0.5) / state.panes}%`;
   });
   find("stage").classList.toggle("has-two", state.panes === 2);
-  const shown = state.methods.slice(0, state.panes).map(methodLabel).join(" and ");
+  const shown = state.methods.slice(0, state.panes).map(shownLabel).join(" and ");
   const measure = header.measures[state.measure - 1];
   canvas.setAttribute("aria-label", `${header.title}: ${shown}${measure ? `, ${measure.label}` : ""}`);
   find("legend").hidden = !measure;
@@ -572,7 +574,7 @@ function set(values) {
 
 function flip() {
   set({ methods: [state.methods[1], state.methods[0]] });
-  say(`Now ${state.methods.slice(0, state.panes).map(methodLabel).join(" and ")}`);
+  say(`Now ${state.methods.slice(0, state.panes).map(shownLabel).join(" and ")}`);
 }
 
 // --- Flex
@@ -672,7 +674,7 @@ const actions = {
   ...(staged.length && {
     s: () => {
       set({ stages: !state.stages });
-      say(`${staged.join(" and ")} ${state.stages ? "on" : "off"}`);
+      say(`${stagesLabel} ${state.stages ? "on" : "off"}`);
     },
   }),
   h: () => {
@@ -723,7 +725,7 @@ function connect() {
   find("frame").addEventListener("input", ({ target }) => set({ playing: false, frame: Number(target.value) }));
   find("time").hidden = last === 0;
   find("stages-set").hidden = !staged.length;
-  find("stages-shown").textContent = staged.join(" and ");
+  find("stages-shown").textContent = stagesLabel;
   find("stages").addEventListener("change", ({ target }) => set({ stages: target.checked }));
   find("influences").max = stops.length - 1;
   find("influences-set").hidden = stops.length === 1;
