@@ -145,6 +145,21 @@ def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
     assert_has_points(page, points_of(path, "blender"), "blender", obj)
 
 
+def test_recommended_is_a_method_with_its_stages(tmp_path):
+    obj = make_character(bones=2)
+    scenes.forget_keys(obj.parent)
+    bone = obj.parent.pose.bones[1]
+    bone.rotation_mode = "XYZ"
+    scenes.key(bone, "rotation_euler", [(1, (0.0, 0.0, 0.0)), (11, (0.0, np.radians(150.0), 0.0))])
+    path = save(tmp_path)
+    page = write_page(path, "--methods", "blender,recommended", "--frames", "1,6,11")
+    run_sinew("points", path, "--preset", "recommended", "--frames", "1,6,11", "--out", tmp_path / "own.npz")
+    header, _meshes = read_page.read(page)
+    blender, method = header["methods"]
+    assert (blender, header["parts"][0]["stages"]) == ("blender", ["Twist Spread"])
+    assert_has_points(page, np.load(tmp_path / "own.npz")["Arm"], method, obj)
+
+
 @pytest.mark.parametrize("angle", [175.0, 180.0, -300.0, 540.0])
 def test_turns_that_euler_angles_tell(tmp_path, angle):
     obj = make_limb(angle, "XYZ")
