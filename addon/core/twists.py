@@ -18,6 +18,8 @@ NEITHER = (
     r"metacarpal|palm|pelvis|hips?|head|eye|jaw|tongue|root|breast"
 )
 OWN_TWIST = r"twist|roll"
+# Bones that Sinew makes, named as the limbs that they follow.
+MADE = r"segment_|helper_|centre_"
 # Mixamo has Arm above ForeArm and UpLeg above Leg.
 ARM, LEG = r"(?<![a-z])arm(?![a-z])", r"(?<![a-z])leg(?![a-z])"
 # A child starts at its parent's tail within so many of the parent's lengths.
@@ -163,7 +165,7 @@ class TwistFinder:
     def _role(self, bone: int) -> str:
         """UPPER, LOWER or NEITHER by its name, or empty."""
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._names[bone]).lower()
-        if re.search(OWN_TWIST, name):
+        if re.search(OWN_TWIST, name) or re.match(MADE, name):
             return NEITHER
         for role in (LOWER, UPPER):
             if re.search(role, name):

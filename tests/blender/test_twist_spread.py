@@ -147,6 +147,8 @@ def test_bones_are_found_by_names_and_chains():
         bone("thigh" + side, "spine", (0.1 * x, 0, 0), (0.1 * x, 0, -0.5))
         bone("shin" + side, "thigh" + side, (0.1 * x, 0, -0.5), (0.1 * x, 0, -1))
         bone("foot" + side, "shin" + side, (0.1 * x, 0, -1), (0.1 * x, -0.2, -1))
+        # What Sinew puts in the place of bendy bones.
+        bone(f"Segment_upper_arm{side}_1", "clavicle" + side, (0.2 * x, 0, 1), (0.3 * x, 0, 1))
     bone("hub", "", (3, 0, 0), (3, 0, 1))
     for number in range(3):
         bone(f"spoke{number}", "hub", (3, 0, 1), (3, 0.2 * number, 2))
