@@ -89,8 +89,10 @@ def test_a_click_poses_the_bone_as_it_was_bent(arm_with_a_bare_patch):
 
 
 def test_the_poses_are_saved_as_a_page(arm_with_a_bare_patch, tmp_path):
-    """Its shapes are those that Blender makes of the same poses, also of an eye; nothing is changed."""
+    """Its shapes are those that Blender makes of the same poses, with stages, also of an eye; nothing is
+    changed."""
     obj, armature, _bare = arm_with_a_bare_patch
+    obj.sinew.twist_spread.enabled = obj.sinew.bulge_limit.enabled = True
     bpy.ops.mesh.primitive_cube_add(size=0.2)
     eye = bpy.context.object
     eye.parent, eye.parent_type, eye.parent_bone = armature, "BONE", armature.data.bones[-1].name
