@@ -513,6 +513,7 @@ PROGRAMS = {
     "soak": "tests/blender/soak.py",
     "corpus": "tests/blender/corpus.py",
     "pictures": "docs/draw_methods.py",
+    "benchmark": "docs/draw_benchmark.py",
     "golden": "tests/blender/make_golden.py",
 }
 COMMANDS: dict[str, Callable[[list[str]], int]] = {

@@ -4,6 +4,7 @@ reports."""
 
 import math
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -46,19 +47,8 @@ class Bent:
         # Y of a bone goes along it.
         rest[:, :3, :3] = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
         rest[0, 0, 3] = -LENGTH / 2
-        none = np.full(2, -1)
-        skeleton = Skeleton(
-            ("first", "second"),
-            rest,
-            np.array([[0.0, 0, 0], [LENGTH / 2, 0, 0]]),
-            np.array([-1, 0]),
-            np.ones(2, bool),
-            ("", ""),
-            none * 0,
-            none,
-            none * 0,
-            ("Rig",),
-        )
+        skeleton = Skeleton.of(rest, np.full(2, LENGTH / 2), np.array([-1, 0]))
+        skeleton = replace(skeleton, names=("first", "second"))
         tube = self.tube
         count = len(tube.rest)
         return Character(tube.surface, tube.rest, self.influences, np.arange(2), skeleton, [("Tube", count)])
@@ -214,11 +204,9 @@ def boxes_with_legs(moved=0.0):
     weights[7] = 1.0 - moved, moved
     rest = np.tile(np.eye(4), (2, 1, 1))
     rest[:, :3, 3] = [[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0]]
-    no, none = np.zeros(2, int), np.full(2, -1)
-    sides = np.array([1, -1]), np.array([1, 0])
-    tails = rest[:, :3, 3] + [0.0, 0.0, 3.0]
-    names, deform = ("leg.L", "leg.R"), np.ones(2, bool)
-    skeleton = Skeleton(names, rest, tails, none, deform, ("", ""), *sides, no, ("Rig",))
+    rest[:, :3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    skeleton = Skeleton.of(rest, np.full(2, 3.0), np.full(2, -1))
+    skeleton = replace(skeleton, side=np.array([1, -1]), mirror=np.array([1, 0]))
     triangles = np.array([[0, 1, 2], [1, 3, 2], [8, 10, 9], [9, 10, 11]], np.int32)
     surface = Surface(16, triangles, np.empty((0, 2), np.int32), coincident_vertices(points))
     return Character(surface, points, influences_of(weights), np.arange(2), skeleton, [("Legs", 16)])

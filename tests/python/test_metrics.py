@@ -345,7 +345,8 @@ import numpy as np
 from test_metrics import LENGTH, Tube
 from rigs import about
 tube, motion = Tube(), about([1, 0, 0], 180)
-rest, posed, triangles, edges = tube.rest, tube.deform("lbs", motion), tube.surface.triangles, tube.surface.edges
+rest, posed = tube.rest, tube.deform("lbs", motion)
+triangles, edges = tube.surface.triangles, tube.surface.edges
 offsets, bones, weights = tube.influences.offsets, tube.influences.bones, tube.influences.weights
 other, lengths, parents = tube.deform("dq", motion), np.full(2, LENGTH / 2), np.array([-1, 0])
 rest_bones = np.tile(np.eye(4), (2, 1, 1))

@@ -42,6 +42,19 @@ class Skeleton:
     rig: np.ndarray
     rigs: tuple[str, ...]
 
+    @classmethod
+    def of(cls, rest: np.ndarray, lengths: np.ndarray, above: np.ndarray) -> Skeleton:
+        """One armature, whose bones' names say nothing.
+
+        rest     float [bones, 4, 4], Y along the bone
+        lengths  float [bones], in the unit of the points
+        above    int [bones], the parent of each; -1 for none
+        """
+        count, none = len(rest), np.full(len(rest), -1)
+        tails = rest[:, :3, 3] + lengths[:, None] * rest[:, :3, 1]
+        names, no = tuple(map(str, range(count))), np.zeros(count, int)
+        return cls(names, rest, tails, above, np.ones(count, bool), ("",) * count, no, none, no, ("rig",))
+
     @property
     def heads(self) -> np.ndarray:
         return self.rest[:, :3, 3]

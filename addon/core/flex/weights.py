@@ -213,9 +213,9 @@ class WeightCheck:
         for bone, other in zip(left, right, strict=True):
             # Of vertices at one place, as of boxes that touch, any may be the image.
             weights = character.weights[:, [bone, other]]
-            at_place = np.stack([np.bincount(first, each, len(first)) for each in weights.T])
-            at_place = (at_place / np.maximum(np.bincount(first, minlength=len(first)), 1))[:, first]
-            own, there = at_place[0, known], at_place[1, image[known]]
+            sums = np.stack([np.bincount(first, each, len(first)) for each in weights.T])
+            means = (sums / np.maximum(np.bincount(first, minlength=len(first)), 1))[:, first]
+            own, there = means[0, known], means[1, image[known]]
             differs = np.abs(own - there)
             total = max(float(own.sum()), float(there.sum()))
             if total > 0.0:
