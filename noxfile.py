@@ -156,7 +156,7 @@ for _version in ("3.11", "3.12", "3.13", "3.14"):
             os.utime(wheel_of(version), (start, start))
 
 
-OTHERS = ("browsers", "cross", "lint", "shaders")
+OTHERS = ("cross", "lint", "shaders")
 # The locks of a Blender: its own wheel, and what that needs with the tests.
 LOCKS = {bpy: f"{'tests-numpy-1' if bpy in NUMPY_1 else 'tests'} bpy-{bpy}" for bpy in BLENDERS}
 # Name, locks, Python, whether it has the library, whether the extension. bpy contains Blender's program for
@@ -164,6 +164,7 @@ LOCKS = {bpy: f"{'tests-numpy-1' if bpy in NUMPY_1 else 'tests'} bpy-{bpy}" for 
 ENVIRONMENTS = [(f"bpy-{bpy}", LOCKS[bpy], python, True, True) for bpy, python in BLENDERS.items()]
 ENVIRONMENTS += [("bundle", LOCKS[EVERYDAY], EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [("site", "site", EVERYDAY_PYTHON, True, False)]
+ENVIRONMENTS += [("browsers", "browsers three", EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [(name, name, EVERYDAY_PYTHON, False, False) for name in OTHERS]
 for _name, _locks, _version, _library, _addon in ENVIRONMENTS:
     _wheel = [f"wheel-{_version}"] * _library

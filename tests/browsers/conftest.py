@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-sys.path.append(str(REPOSITORY / "shaders"))
+sys.path += [str(REPOSITORY / folder) for folder in ("shaders", "tests/golden", "tests/shaders")]
 SINEW = REPOSITORY / ".venv" / "bin" / "sinew"
 # The wrist with a shape key that swells a part of it.
 ADD_KEY = """
