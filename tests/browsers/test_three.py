@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""three.js plays files of the golden set as they are, by shaders/sinew-three.js.
-
-SINEW_PICTURES  a folder for pictures, to look at
-"""
+"""Protects shaders/sinew-three.js: by it three.js plays files of the golden set as that has them."""
 
 import functools
 import http.server
 import importlib.util
 import json
+import re
 import struct
 import threading
 from pathlib import Path
@@ -36,7 +34,11 @@ class Writer:
             {"buffer": 0, "byteOffset": len(self.binary), "byteLength": array.nbytes}
         )
         self.binary += array.tobytes()
-        about = {"componentType": COMPONENTS[array.dtype], "count": len(array), "type": WIDTHS[array.shape[1]]}
+        about = {
+            "componentType": COMPONENTS[array.dtype],
+            "count": len(array),
+            "type": WIDTHS[array.shape[1]],
+        }
         about |= {"bufferView": len(self.header["accessors"]), **others}
         self.header["accessors"].append(about)
         return len(self.header["accessors"]) - 1
@@ -64,7 +66,7 @@ def values_of(matrix):
 
 
 def write(mesh, results, path, influences):
-    """A node with a skinned mesh for each result, by the name of its array, at rest; the pose is a second later."""
+    """A .glb with a mesh for each result, by the name of its array, at rest; the pose is a second later."""
     case, made = mesh.case, Writer()
     rest, posed, parents, count = case["rest"], case["posed"], case["parents"].tolist(), len(case["rest"])
     # glTF wants weights of sum 1. A joint of its own, the last, has the vertices that stay.
@@ -91,7 +93,9 @@ def write(mesh, results, path, influences):
     for bone, parent in enumerate(parents):
         if parent >= 0:
             nodes[parent].setdefault("children", []).append(bone)
-        at_rest, at_pose = (values_of(np.linalg.inv(m[parent]) @ m[bone] if parent >= 0 else m[bone]) for m in (rest, posed))
+        at_rest, at_pose = (
+            values_of(np.linalg.inv(m[parent]) @ m[bone] if parent >= 0 else m[bone]) for m in (rest, posed)
+        )
         nodes[bone] |= {name: value.tolist() for name, value in at_rest.items()}
         for name, value in at_pose.items():
             samplers.append({"input": times, "output": made.add([at_rest[name], value, value])})
@@ -101,7 +105,9 @@ def write(mesh, results, path, influences):
     for result in results:
         stages, attributes = dict(result["stages"]), dict(shared)
         content = {"version": 1, "method": result["method"], "parameters": {}}
-        content["parameters"] = {f"{result['method']}.{key}": value for key, value in result["parameters"].items()}
+        content["parameters"] = {
+            f"{result['method']}.{key}": value for key, value in result["parameters"].items()
+        }
         if "mix" in stages:
             content["mix"], attributes["_SINEW_MIX"] = stages.pop("mix")["method"], painted
         for name, values in stages.items():
@@ -112,7 +118,14 @@ def write(mesh, results, path, influences):
         primitives = [{"attributes": attributes}]
         meshes.append({"primitives": primitives, "extensions": {"SINEW_skinning": content}})
     twists = [
-        {"bone": int(bone), "base": int(bone), "tip": int(bone) + 1, "from": "child", "amount": 1.0, "curve": 0.0}
+        {
+            "bone": int(bone),
+            "base": int(bone),
+            "tip": int(bone) + 1,
+            "from": "child",
+            "amount": 1.0,
+            "curve": 0.0,
+        }
         for bone in np.flatnonzero(case["segments"][:-1] == 1)
     ]
     lengths = [*case["lengths"].tolist(), *[0.0] * (count + 1 - len(case["lengths"]))]
@@ -131,12 +144,17 @@ def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("three")
     package = Path(importlib.util.find_spec("nicegui").origin).parent
     (folder / "three").symlink_to(package / "elements/scene/dist")
-    (folder / "shaders").symlink_to(REPOSITORY / "shaders")
-    (folder / "three.html").symlink_to(Path(__file__).with_name("three.html"))
-    source = (REPOSITORY / "shaders/sinew-three.js").read_text(encoding="utf-8")
-    names = source.split("import {")[1].split("} from")[0]
-    shim = f'import {{ THREE }} from "./three/index.js";\nexport const {{ {names} }} = THREE;\n'
-    (folder / "shim.js").write_text(shim, encoding="utf-8")
+    for name in ("sinew.glsl", "sinew-three.js"):
+        (folder / name).symlink_to(REPOSITORY / "shaders" / name)
+    document = (REPOSITORY / "docs/engines.md").read_text(encoding="utf-8")
+    (documented,) = re.findall(r"^```js\n(.*?)^```$", document, re.MULTILINE | re.DOTALL)
+    page = Path(__file__).with_name("three.html").read_text(encoding="utf-8")
+    (folder / "three.html").write_text(page.replace("DOCUMENTED", documented), encoding="utf-8")
+    # The module has three.js as an object, under the name of no package.
+    source = (folder / "sinew-three.js").read_text(encoding="utf-8")
+    (names,) = re.findall(r'import {([^}]*)} from "three"', source)
+    shim = 'import { THREE, GLTFLoader } from "./three/index.js"; export { GLTFLoader };'
+    (folder / "shim.js").write_text(f"{shim} export const {{{names}}} = THREE;", encoding="utf-8")
     handler = functools.partial(Quiet, directory=folder)
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -145,24 +163,33 @@ def site(tmp_path_factory):
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
+    def end_headers(self):
+        # Each test has its own file.
+        self.send_header("Cache-Control", "no-store")
+        super().end_headers()
+
     def log_message(self, *_):
         pass
 
 
 @pytest.mark.parametrize(
-    ("how", "influences"), [("", 4), ("moved", 4), ("cloned", 4), ("", 8)], ids=["", "moved", "cloned", "eight"]
+    ("case", "how", "influences"),
+    [
+        *[(path.stem, "", 4) for path in sorted(GOLDEN.glob("*.npz"))],
+        ("scaled", "moved", 8),
+        ("antipodal", "cloned", 4),
+    ],
 )
-@pytest.mark.parametrize("path", sorted(GOLDEN.glob("*.npz")), ids=lambda path: path.stem)
-def test_points_and_normals_are_golden(browser, site, path, how, influences):
+def test_points_and_normals_are_golden(browser, site, case, how, influences):
     folder, address = site
-    mesh = Mesh(path)
+    mesh = Mesh(GOLDEN / f"{case}.npz")
     results = [result for result in mesh.results if result["array"] != "turned"]
     if mesh.case["segments"].max() > 1:
         # Segments of a bendy bone are no joints' own.
         results = [result for result in results if "bulge_limit" not in result["stages"]]
-    file = folder / f"{path.stem}-{influences}.glb"
+    file = folder / "human.glb"
     write(mesh, results, file, influences)
-    browser.open(f"{address}/three.html?file={file.name}&how={how}")
+    browser.open(f"{address}/three.html?{how}")
     said = browser.wait("window.sinew ? 'drawn' : document.getElementById('message').textContent")
     assert said == "drawn", said
     assert browser.run("return window.sinew.error") == 0
