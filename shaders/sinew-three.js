@@ -200,13 +200,16 @@ export class SinewSkinning {
       scene.userData.isSpaceOfSinew = true;
       scene.traverse((mesh) => mesh.isSkinnedMesh && meshes.push(mesh));
     }
-    const glsl = await (await fetch(new URL("sinew.glsl", import.meta.url))).text();
+    const answer = await fetch(new URL("./sinew.glsl", import.meta.url));
+    if (!answer.ok) throw new Error(`${answer.url}: ${answer.status}`);
+    const glsl = await answer.text();
     for (const mesh of meshes) {
       const content = json.meshes[associations.get(mesh).meshes].extensions?.[NAME];
       if (!content) continue;
       const { method, mix = method, parameters } = content, amount = parameters?.["twist_spread.amount"] ?? 1;
-      if (!(method in METHODS && mix in METHODS)) {
-        console.warn(`${mesh.name}: skinned linearly, as sinew.glsl lacks ${method} or ${mix}`);
+      const missing = [method, mix].find((name) => !(name in METHODS));
+      if (missing) {
+        console.warn(`${mesh.name}: skinned linearly, as sinew.glsl lacks ${missing}`);
         continue;
       }
       // A mesh of several primitives has a node above it.
