@@ -16,8 +16,8 @@ class SinewGltf(bpy.types.PropertyGroup):
 
     skinning: bpy.props.BoolProperty(
         name="Skinning Data",
-        description="Write for engines how Sinew deforms each mesh: its method and stages, with what these keep "
-        "of its vertices and bones",
+        description="Write for engines how Sinew deforms each mesh: its method and stages, with what these "
+        "keep of its vertices and bones",
         default=False,
         options=set(),
     )
