@@ -144,8 +144,8 @@ int sinew_twisted(float before, int bones[SINEW_INFLUENCES], float weights[SINEW
     int found = -1;
     float number = 0.0;
     for (int i = 0; i < SINEW_INFLUENCES; ++i) {
-        float own = SINEW_BONE(bones[i], 6).z;
-        if (weights[i] > 0.0 && own > number && own < before) {
+        float own = weights[i] > 0.0 ? SINEW_BONE(bones[i], 6).z : 0.0;
+        if (own > number && own < before) {
             found = i;
             number = own;
         }
@@ -271,6 +271,7 @@ vec3 sinew_bulge_limit(vec3 moved, int form, float amount, vec3 x, int bones[SIN
     float stretch = 0.0;
     for (int i = 0; i < SINEW_INFLUENCES; ++i) {
         float weight = form == SINEW_KIM_HAN ? (i == heaviest ? 1.0 : 0.0) : weights[i] / total;
+        if (weight == 0.0) continue;
         vec4 head = SINEW_BONE(bones[i], 4);
         vec3 along = SINEW_BONE(bones[i], 5).xyz;
         vec3 posed = sinew_by_bone(bones[i], vec4(along, 0.0));

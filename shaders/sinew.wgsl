@@ -159,8 +159,9 @@ fn sinew_twisted(before: f32, own: SinewInfluences) -> i32 {
     var found = -1;
     var number = 0.0;
     for (var i = 0u; i < SINEW_INFLUENCES; i++) {
+        if !(influences.weights[i] > 0.0) { continue; }
         let its = sinew_bones[influences.bones[i]].twist.z;
-        if influences.weights[i] > 0.0 && its > number && its < before {
+        if its > number && its < before {
             found = i32(i);
             number = its;
         }
@@ -291,6 +292,7 @@ fn sinew_bulge_limit(moved: vec3f, form: u32, amount: f32, x: vec3f, own: SinewI
     for (var i = 0u; i < SINEW_INFLUENCES; i++) {
         let bone = influences.bones[i];
         let weight = select(influences.weights[i] / total, f32(i == heaviest), form == SINEW_KIM_HAN);
+        if weight == 0.0 { continue; }
         let head = sinew_bones[bone].head;
         let along = sinew_bones[bone].along.xyz;
         let posed = sinew_by_bone(bone, vec4f(along, 0.0));
