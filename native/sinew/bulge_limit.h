@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/strided.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
-#include "sinew/strided.h"
 
 namespace sinew {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/strided.h"
 #include "sinew/binding.h"
-#include "sinew/strided.h"
 
 namespace sinew {
 

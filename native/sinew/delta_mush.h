@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/strided.h"
 #include "sinew/export.h"
 #include "sinew/mesh/mesh_topology.h"
-#include "sinew/strided.h"
 #include "sinew/transform/quat.h"
 
 namespace sinew {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/strided.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
-#include "sinew/strided.h"
 
 namespace sinew {
 

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "sinew/strided.h"
+#include "sinew/base/strided.h"
 
 namespace sinew {
 

@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "sinew/base/strided.h"
 #include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
 #include "sinew/lanes/spaces.h"
 #include "sinew/mesh/packed_mesh.h"
-#include "sinew/strided.h"
 
 namespace sinew {
 

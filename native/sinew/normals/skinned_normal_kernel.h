@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "sinew/base/strided.h"
 #include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
-#include "sinew/strided.h"
 
 namespace sinew {
 
