@@ -44,6 +44,7 @@ WRITERS = {
         )
         for kind in ("shape-keys", "mdd", "alembic", "usd")
     },
+    "flex": (("flex", "FILE", "--out", OUT), "out"),
     "compare": (
         ("compare", "FILE", "--frames", "1,6", "--pictures", "1", "--size", "64", "--out", OUT),
         "out",
