@@ -29,6 +29,7 @@ from sinew_addon.core.battery import JOINTS, SWING, TWIST, Move
 from sinew_addon.core.flex.limits import LIMITS, Limit, Table
 from sinew_addon.core.flex.verdict import OWN
 from sinew_addon.core.parameters import PRESETS
+from sinew_addon.core.steps import result_of
 from sinew_addon.deform import characters
 from sinew_addon.features.flex import flex
 from sinew_addon.features.pages import render
@@ -110,12 +111,7 @@ RIGS = (
 
 
 def bend(meshes: Sequence[bpy.types.Object], methods: Sequence[str], own: str | None) -> flex.Result:
-    steps = flex.flex(meshes, methods, TABLE, dict.fromkeys(meshes, own))
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
+    return result_of(flex.flex(meshes, methods, TABLE, dict.fromkeys(meshes, own)))
 
 
 def values_of(result: flex.Result, method: str) -> dict[str, Any]:

@@ -46,9 +46,11 @@ def bone_buffer(
 
 
 def of_motions(motions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-    """The buffer for methods alone. Bones that are not scaled are rotated by the 3x3 part of their motion.
-    Those that are, by Blender's rule: by what takes the rest axes to the posed ones, made perpendicular with
-    Y kept."""
+    """The buffer for methods alone.
+
+    rotations  [bones, 4]: of a bone that is not scaled, the 3x3 part of its motion. Of one that is, by
+               Blender's rule: what takes the rest axes to the posed ones, both made perpendicular with Y kept
+    """
     buffer = np.zeros((len(motions), 8, 4), np.float32)
     buffer[:, :3], buffer[:, 3] = motions[:, :3], rotations
     return buffer

@@ -22,7 +22,7 @@ def by_bones(bones, points):
 def skinned(method, points, centres, joints, weights, bones, keeps_signs=False):
     """As the shaders: points [vertices, 3] by lbs, dq or cor.
 
-    bones        float [bones, 7, 4], of bone_buffer()
+    bones        float [bones, 8, 4], of bone_buffer()
     keeps_signs  those of the hierarchy
     """
     weights = weights / weights.sum(axis=1, keepdims=True)

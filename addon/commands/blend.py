@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..core import interrupt
 from ..core.errors import SinewError, WrongUse
 from ..core.motion.blend import METHODS, Settings
 from ..core.output import file_to_write
+from ..core.steps import result_of
 from .arguments import count
 from .console import Console
 
@@ -130,10 +129,5 @@ def _make(
     if args.weights_from is not None:
         weights = [args.weights_from, weights]
     steps = blend_actions.make(armature, chosen, weights, settings, args.name)
-    with console.bar(f"Blending {len(chosen)} actions", len(chosen)) as show, closing(steps):
-        while True:
-            try:
-                show(next(steps))
-            except StopIteration as end:
-                return end.value
-            interrupt.check()
+    with console.bar(f"Blending {len(chosen)} actions", len(chosen)) as show:
+        return result_of(steps, show)

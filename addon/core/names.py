@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patterns of names, and names as file names."""
+"""Patterns of names, names as file names, and how names of bones begin that Sinew makes."""
 
 import re
 from fnmatch import fnmatchcase
@@ -11,6 +11,8 @@ _NOT_IN_FILE_NAMES = re.compile(r"[/\\\x00-\x1f\x7f]|^\.+$|[. ]$|(?<=^[A-Za-z]):
 _DEVICE = re.compile(
     r"(CON|PRN|AUX|NUL|CONIN\$|CONOUT\$|(COM|LPT)[0-9\u00b9\u00b2\u00b3]) *(\.|$)", re.IGNORECASE
 )
+# Then an underscore, and the bone that they follow.
+MADE_BONES = HELPER, CENTRE, SEGMENT = "Helper", "Centre", "Segment"
 
 
 def fits(name: str, pattern: str) -> bool:

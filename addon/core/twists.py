@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .names import MADE_BONES
 from .phrases import phrase
 
 # Words of bones' names, in the common rigs: Rigify, Mixamo, Unreal, MakeHuman, MikuMikuDance.
@@ -19,7 +20,7 @@ NEITHER = (
 )
 OWN_TWIST = r"twist|roll"
 # Bones that Sinew makes, named as the limbs that they follow.
-MADE = r"segment_|helper_|centre_"
+MADE = rf"({'|'.join(MADE_BONES).lower()})_"
 # Mixamo has Arm above ForeArm and UpLeg above Leg.
 ARM, LEG = r"(?<![a-z])arm(?![a-z])", r"(?<![a-z])leg(?![a-z])"
 # A child starts at its parent's tail within so many of the parent's lengths.

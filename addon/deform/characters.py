@@ -337,6 +337,21 @@ def kept_frame(scene: bpy.types.Scene) -> Iterator[None]:
         set_frame(scene, frame)
 
 
+@contextmanager
+def at_rest(armatures: Iterable[bpy.types.Object]) -> Iterator[None]:
+    """Context in which armatures are in their rest position, so that nothing is deformed by them."""
+    before = {armature.data: armature.data.pose_position for armature in armatures}
+    try:
+        for data in before:
+            data.pose_position = "REST"
+        bpy.context.view_layer.update()
+        yield
+    finally:
+        for data, position in before.items():
+            data.pose_position = position
+        bpy.context.view_layer.update()
+
+
 def whole_views(
     meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
 ) -> list[View]:

@@ -10,6 +10,7 @@ from mathutils import Matrix
 
 from ..core.bendy import points_of_joints
 from ..core.helper_bones import Blend
+from ..core.names import CENTRE, HELPER, SEGMENT
 from ..core.pose_samples import Joints
 from ..core.rig import Bones
 from . import actions, mesh_io, spaces
@@ -38,9 +39,6 @@ def read_joints(rig: bpy.types.Object, bones: Bones) -> Joints:
             elif getattr(pose_bone, f"use_ik_limit_{axis}"):
                 limits[bone, at] = (getattr(pose_bone, f"ik_{end}_{axis}") for end in ("min", "max"))
     return Joints(bones.rest[: len(bones.names)], parents, limits)
-
-
-HELPER, CENTRE, SEGMENT = "Helper", "Centre", "Segment"
 
 
 def add_bones(

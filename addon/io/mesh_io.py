@@ -44,6 +44,13 @@ def attribute_to_write(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute |
     return mesh.attributes.get(name)
 
 
+def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
+    """int32 [corners], the vertex of each."""
+    vertices = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    return vertices
+
+
 def corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
     """float32 [corners, 3], object space."""
     normals = np.empty((len(mesh.loops), 3), dtype=np.float32)

@@ -15,6 +15,7 @@ from program import run_sinew
 from sinew import quat_vec
 from sinew_addon.core.motion import blend as core
 from sinew_addon.core.motion.blend import Settings
+from sinew_addon.core.steps import result_of
 from sinew_addon.features.blend import blend_actions
 from sinew_addon.io import actions, clips, files
 
@@ -80,15 +81,6 @@ def make_walks(modes=("QUATERNION",), run_start=0.3):
     return armature, [key_clip(armature, clip) for clip in pair], pair
 
 
-def finished(steps):
-    """Runs a generator to its end, and returns its result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
-
-
 def film(armature, frames):
     """float64 [frames, bones, 4, 4]: the evaluated pose in armature space, in the order of the rig."""
     names, shown = clips.rig_of(armature).names, []
@@ -111,7 +103,7 @@ def played(armature, action, frames):
 def test_a_clip_is_what_blender_plays(modes):
     armature, (walk, run), pair = make_walks(modes)
     for action, source in ((walk, pair[0]), (run, pair[1])):
-        clip = finished(clips.read(armature, action))
+        clip = result_of(clips.read(armature, action))
         assert clip.length == source.length
         assert not clip.is_cyclic
         shown = played(armature, action, range(1, 2 + round(clip.length)))
@@ -128,8 +120,8 @@ def test_random_poses_with_scale_come_back_in_every_rotation_mode():
     # A connected bone has no location.
     clip.poses.rigid[:, [walks.is_connected(name) for name in clip.rig.names], 4:] = 0.0
     action = key_clip(armature, clip)
-    read = finished(clips.read(armature, action))
-    again = finished(clips.write(armature, read, "again", 1.0, set()))
+    read = result_of(clips.read(armature, action))
+    again = result_of(clips.write(armature, read, "again", 1.0, set()))
     frames = range(1, 14)
     assert np.abs(played(armature, again, frames) - played(armature, action, frames)).max() < CLOSE
     for curve in actions.all_curves(again, actions.slot_for(again, armature)):
@@ -146,7 +138,7 @@ def test_random_poses_with_scale_come_back_in_every_rotation_mode():
 def test_blender_plays_the_blend(method):
     armature, chosen, pair = make_walks(MODES)
     settings = Settings(method=method, cycles=2)
-    made = finished(blend_actions.make(armature, chosen, (0.4, 0.6), settings))
+    made = result_of(blend_actions.make(armature, chosen, (0.4, 0.6), settings))
     blend = core.blend(pair, (0.4, 0.6), settings)
     order = [blend.rig.names.index(name) for name in clips.rig_of(armature).names]
     shown = played(armature, made.action, range(1, 1 + made.frames))

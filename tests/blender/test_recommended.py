@@ -15,6 +15,7 @@ from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
 from sinew_addon.core import battery
+from sinew_addon.core.steps import result_of
 from sinew_addon.features.suggest import recommend
 from whole_file import assert_same, content
 
@@ -105,14 +106,8 @@ def test_without_an_action_poses_are_measured_and_the_file_stays(monkeypatch):
         recommend.battery, "posed", lambda *args, own=battery.posed: posed.append(args[1].name) or own(*args)
     )
     before, shape = content(), scenes.final_points(obj)
-    steps = recommend.search(bpy.context.scene, [obj])
-    shares = []
-    while True:
-        try:
-            shares.append(next(steps))
-        except StopIteration as end:
-            choice = end.value
-            break
+    shares: list[float] = []
+    choice = result_of(recommend.search(bpy.context.scene, [obj]), shares.append)
     assert_same(before)
     np.testing.assert_array_equal(scenes.final_points(obj), shape)
     assert {"Swing X 1", "Twist 1"} <= set(posed)

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..influences import Influences
-from ..metrics import FrameOfRig, Gauge, Measured, Shape
+from ..metrics import LEAST_IN_RING, FrameOfRig, Gauge, Measured, Shape
 from ..surface import Surface
 from .character import Character
 
@@ -22,8 +22,6 @@ Crossings = Callable[[np.ndarray, np.ndarray], set[tuple[int, int]]]
 BENT = 0.02
 # Rings of the surface, by the share of what moves with the joint.
 RINGS = (0.2, 0.4, 0.6, 0.8)
-# Fewer vertices are no ring.
-LEAST_IN_RING = 6
 # In girths; vertices at a seam may all be at one place.
 LEAST_SPREAD = 0.2
 # Edges that are shorter than this part of the girth count as so long: of a short one, any change is large.

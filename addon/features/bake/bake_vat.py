@@ -5,8 +5,7 @@ textures each vertex is."""
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Generator, Sequence
 from pathlib import Path
 
 import bpy
@@ -111,7 +110,7 @@ class VatBake(Started):
     def _write(self) -> None:
         with writing(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-        with _at_rest(self.armatures):
+        with characters.at_rest(self.armatures):
             rest, _normals = self._read()
             uv_map = self._export(self.files[0][0])
         axes, units = self.options.axes, vat.AXES[self.options.axes][1]
@@ -187,17 +186,10 @@ def _vertex_normals(mesh: bpy.types.Mesh) -> np.ndarray:
     """float [vertices, 3]: one for each vertex, also at a sharp edge."""
     normals = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     if mesh.has_custom_normals:
-        np.add.at(normals, _corners(mesh), mesh_io.corner_normals(mesh))
+        np.add.at(normals, mesh_io.corner_vertices(mesh), mesh_io.corner_normals(mesh))
     else:
         mesh.vertex_normals.foreach_get("vector", normals.ravel())
     return normals
-
-
-def _corners(mesh: bpy.types.Mesh) -> np.ndarray:
-    """int32 [corners], the vertex of each."""
-    vertices = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", vertices)
-    return vertices
 
 
 def _add_places(mesh: bpy.types.Mesh, places: np.ndarray, number: int) -> None:
@@ -207,20 +199,5 @@ def _add_places(mesh: bpy.types.Mesh, places: np.ndarray, number: int) -> None:
         if mesh.uv_layers.new(name=name, do_init=False) is None:
             raise SinewError("a mesh has as many UV maps as Blender allows, and needs one more; remove one")
     # Blender's begin at the bottom.
-    uvs = places[_corners(mesh)] * (1.0, -1.0) + (0.0, 1.0)
+    uvs = places[mesh_io.corner_vertices(mesh)] * (1.0, -1.0) + (0.0, 1.0)
     mesh.uv_layers[number].uv.foreach_set("vector", uvs.astype(np.float32).ravel())
-
-
-@contextmanager
-def _at_rest(armatures: set[bpy.types.Object]) -> Iterator[None]:
-    """Context in which these armatures are in their rest position."""
-    before = {armature.data: armature.data.pose_position for armature in armatures}
-    try:
-        for data in before:
-            data.pose_position = "REST"
-        bpy.context.view_layer.update()
-        yield
-    finally:
-        for data, position in before.items():
-            data.pose_position = position
-        bpy.context.view_layer.update()

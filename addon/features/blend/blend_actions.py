@@ -3,15 +3,13 @@
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import bpy
 
 from ...core.errors import SinewError
 from ...core.motion import blend as core
+from ...core.steps import as_part
 from ...io import actions, clips, spaces
-
-Result = TypeVar("Result")
 
 # Share of the progress: reading curves takes as long as writing keys.
 READING = 0.5
@@ -65,33 +63,17 @@ def make(
     rig, sources = clips.rig_of(armature), []
     for number, action in enumerate(chosen):
         steps = clips.read(armature, action, rig)
-        clip = yield from _part(steps, READING * number / len(chosen), READING / len(chosen))
+        clip = yield from as_part(steps, READING * number / len(chosen), READING / len(chosen))
         sources.append(clip)
     blend = core.blend(sources, weights, settings, spaces.up_of(armature))
     keyed = set().union(*(clips.keyed_properties(armature, action) for action in chosen))
     name = name or f"Blend {' '.join(action.name for action in chosen)}"
     first = float(bpy.context.scene.frame_start)
     steps = clips.write(armature, blend.clip(name), name, first, keyed)
-    made = yield from _part(steps, READING, 1.0 - READING)
+    made = yield from as_part(steps, READING, 1.0 - READING)
     return Made(made, blend)
 
 
 def play(armature: bpy.types.Object, action: bpy.types.Action) -> None:
     """Has the armature play the new action; the previous one stays in the file."""
     actions.play(armature, action, actions.slot_for(action, armature))
-
-
-def _part(
-    steps: Generator[float, None, Result], start: float, share: float
-) -> Generator[float, None, Result]:
-    """Runs a generator as part of another: scales the progress that it yields, and returns its result."""
-    while True:
-        try:
-            done = next(steps)
-        except StopIteration as end:
-            return end.value
-        try:
-            yield start + share * done
-        except GeneratorExit:
-            steps.close()
-            raise

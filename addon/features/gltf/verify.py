@@ -101,8 +101,7 @@ class _Mesh:
         self._from_rest = np.linalg.inv(self.bones.rest.astype(np.float64))
         self._basis = mesh_io.read_points(obj.data).astype(np.float64)
         self._has_keys = obj.data.shape_keys is not None
-        self._corners = np.empty(len(obj.data.loops), dtype=np.int32)
-        obj.data.loops.foreach_get("vertex_index", self._corners)
+        self._corners = mesh_io.corner_vertices(obj.data)
         self._normals = mesh_io.corner_normals(obj.data)
         self._world = np.array(obj.matrix_world, dtype=np.float64)
         self._bones_from_model = state.shown.frames[0].bones_from_model.astype(np.float64)

@@ -112,7 +112,7 @@ def gather(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> Subjec
         characters.use_method_on(meshes, characters.BLENDER)
         for obj in meshes:
             _show(attach.armature_of(obj))
-        with _at_rest(meshes):
+        with characters.at_rest(map(attach.armature_of, meshes)):
             depsgraph = bpy.context.evaluated_depsgraph_get()
             parts = [_read_part(obj, depsgraph) for obj in meshes]
             surface = joined([mesh_io.read_surface(obj.evaluated_get(depsgraph).data) for obj in meshes])
@@ -176,22 +176,6 @@ def skinning_alone(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
             modifier.show_viewport = True
 
 
-@contextmanager
-def _at_rest(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Context in which armatures are in rest position, so that nothing is deformed by them."""
-    armatures = {attach.armature_of(obj).data for obj in meshes}
-    before = {armature: armature.pose_position for armature in armatures}
-    for armature in armatures:
-        armature.pose_position = "REST"
-    bpy.context.view_layer.update()
-    try:
-        yield
-    finally:
-        for armature, position in before.items():
-            armature.pose_position = position
-        bpy.context.view_layer.update()
-
-
 def _play(
     subject: Subject,
     method: str,
@@ -227,7 +211,7 @@ def _play_rest(subject: Subject, frames: Sequence[float]) -> list[tuple[np.ndarr
     bones."""
     characters.use_method_on(subject.meshes, characters.BLENDER)
     rests = []
-    with _at_rest(subject.meshes):
+    with characters.at_rest(map(attach.armature_of, subject.meshes)):
         for frame in frames:
             characters.set_frame(subject.scene, frame)
             rests.append((_world_points(subject, frame), [_bone_matrices(part) for part in subject.parts]))

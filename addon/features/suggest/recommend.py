@@ -10,12 +10,13 @@ import bpy
 import numpy as np
 
 from ...attach import attach, properties, property_groups, stage_settings
-from ...core import battery, interrupt, recommendation
+from ...core import battery, recommendation
 from ...core.errors import SinewError
 from ...core.parameters import OFF, Value
 from ...core.phrases import phrase
 from ...core.recommendation import Choice
 from ...core.rig import Bones
+from ...core.steps import as_part, result_of
 from ...deform import characters, session
 from ...io import armature_io
 from ...ui import stepped
@@ -71,12 +72,8 @@ def search(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> Gener
 
     names = [(each.name, np.sqrt(each.moment.pose.bent_areas)) for each in moments]
     diagonal = moments[0].moment.pose.rest.diagonal
-    shares = recommendation.search(measure, names, diagonal, crude)
-    while True:
-        try:
-            yield LOOKING + (1.0 - LOOKING) * next(shares)
-        except StopIteration as end:
-            return end.value
+    steps = recommendation.search(measure, names, diagonal, crude)
+    return (yield from as_part(steps, LOOKING, 1.0 - LOOKING))
 
 
 def _new_crossings(moment: live.Moment, points: np.ndarray, at_rest: set[tuple[int, int]]) -> np.ndarray:
@@ -163,14 +160,8 @@ def _angles(moment: live.Moment) -> np.ndarray:
 
 def choose(objects: Sequence[bpy.types.Object]) -> characters.Chosen:
     """See characters.choosers."""
-    steps = search(bpy.context.scene, objects)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            choice: Choice = end.value
-            return choice.method, choice.values, choice.text
-        interrupt.check()
+    choice = result_of(search(bpy.context.scene, objects))
+    return choice.method, choice.values, choice.text
 
 
 def use(objects: Sequence[bpy.types.Object], choice: Choice) -> None:

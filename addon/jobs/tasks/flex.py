@@ -12,6 +12,7 @@ from ...attach import properties
 from ...core import interrupt
 from ...core.flex.limits import Table, read_table
 from ...core.output import write_text
+from ...core.steps import result_of
 from ...deform import characters
 from ...features.flex import flex as bending
 from ...features.flex import page as flex_page
@@ -44,13 +45,7 @@ def flex(task: dict, report: Callable[..., None]) -> dict:
         own[obj] = None if obj in own_methods else properties.BLENDER
     of_bending = 0.5 if page else 1.0
     steps = bending.flex(meshes, methods, table, own)
-    while True:
-        try:
-            report("bending it", share=of_bending * next(steps))
-        except StopIteration as end:
-            result = end.value
-            break
-        interrupt.check()
+    result = result_of(steps, lambda done: report("bending it", share=of_bending * done))
     if page:
         for step in flex_page.page(scene, path.stem, meshes, result, left_out):
             if isinstance(step, str):

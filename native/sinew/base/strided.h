@@ -36,7 +36,8 @@ public:
     [[nodiscard]] T* data() const noexcept { return first_; }
     [[nodiscard]] std::size_t size() const noexcept { return count_; }
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
-    [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
+    /// Whether nothing lies between elements.
+    [[nodiscard]] bool is_contiguous() const noexcept { return stride_ == sizeof(T); }
 
     [[nodiscard]] T& operator[](std::size_t i) const noexcept {
         using Byte = std::conditional_t<std::is_const_v<T>, const std::byte, std::byte>;

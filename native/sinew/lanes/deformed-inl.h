@@ -18,7 +18,7 @@ template <class D>
 HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b, std::size_t lane) {
     const Block& block = from.blocks[b];
     const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
-    if (!is_contiguous(from.points)) {
+    if (HWY_UNLIKELY(!from.points.is_contiguous())) {
         return load_apart(
             d, [ vertices, points = from.points ](std::size_t i) -> auto& { return points[vertices[i]]; });
     }

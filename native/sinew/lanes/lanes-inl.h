@@ -351,11 +351,6 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>*
 
 #endif
 
-/// Whether nothing lies between points.
-HWY_INLINE bool is_contiguous(const Strided<Vec3<float>>& points) {
-    return HWY_LIKELY(points.stride() == sizeof(Vec3<float>));
-}
-
 /// Stores each point by itself.
 ///
 /// to_point  returns where that of a lane is
@@ -384,14 +379,14 @@ HWY_NOINLINE Points<D> load_apart(D d, const ToPoint& to_point) {
 /// Elements from `i` on.
 template <class D>
 HWY_INLINE Points<D> load_at(D d, const Strided<const Vec3<float>>& from, std::size_t i) {
-    if (from.stride() == sizeof(Vec3<float>)) return load_consecutive(d, &from[i].x);
+    if (from.is_contiguous()) return load_consecutive(d, &from[i].x);
     return load_apart(
         d, [ from, i ](std::size_t k) -> auto& { return from[i + k]; });
 }
 
 template <class D>
 HWY_INLINE void store_at(D d, const Points<D>& p, const Strided<Vec3<float>>& to, std::size_t i) {
-    if (is_contiguous(to)) return store_consecutive(d, p, &to[i].x);
+    if (to.is_contiguous()) return store_consecutive(d, p, &to[i].x);
     store_apart(
         d, p.x, p.y, p.z, [ to, i ](std::size_t k) -> auto& { return to[i + k]; });
 }
@@ -405,7 +400,7 @@ HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::si
     if constexpr (hn::MaxLanes(D()) == 1) {
         store_consecutive(d, p, &to.points[*vertices].x);
     } else {
-        if (!is_contiguous(to.points)) {
+        if (HWY_UNLIKELY(!to.points.is_contiguous())) {
             // A copy: of what a function refers to, the compiler would reload the members.
             return store_apart(
                 d, p.x, p.y, p.z,
