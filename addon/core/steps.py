@@ -26,7 +26,9 @@ def result_of(
             interrupt.check()
 
 
-def as_part(steps: Generator[float, None, Result], start: float, share: float) -> Generator[float, None, Result]:
+def as_part(
+    steps: Generator[float, None, Result], start: float, share: float
+) -> Generator[float, None, Result]:
     """Runs a generator as part of another: scales the progress that it yields, and returns its result."""
     with closing(steps):
         while True:
