@@ -3,8 +3,8 @@
 
 FILE has a human whose bones are called as Unreal's. A stage was tried that keeps each vertex on that side of
 its joint on which it rests. The sides are those of the plane through the joint whose normal is the mean of
-both bones' posed directions. This counts pairs of triangles that cross, before and after. It is not part of
-Sinew (docs/methods.md).
+both bones' posed directions. This counts pairs of triangles that cross, before and after, and in frames of
+the action those that no plane of a joint can part. It is not part of Sinew (docs/methods.md).
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ import sinew
 from sinew_addon.core import battery
 from sinew_addon.core.rig import Bones
 from sinew_addon.core.vectors import transformed
-from sinew_addon.features.suggest.suggest import crossing_triangles
+from sinew_addon.features.suggest.crossings import crossing_triangles
 from sinew_addon.io import armature_io, mesh_io
 
 MARGIN = 0.2  # of the distance from the plane at rest: how near to it a vertex may come
 JOINTS = {"elbow": ("lowerarm_l", (0.0, -1.0, 0.0)), "knee": ("calf_l", (0.0, 1.0, 0.0))}
 DEGREES = 90.0, 120.0, 140.0, 155.0
+FRAMES = 16, 32
 
 
 @dataclass
@@ -47,6 +48,15 @@ class Human:
         turn = sinew.affine.from_axis_angle(unit(axis), np.radians(degrees) - angle)[:3, :3]
         pose = battery.posed(self.bones, battery.Pose("bent", {bone: turn}))
         return (pose @ np.linalg.inv(self.bones.rest)).astype(np.float32)
+
+    def share_no_joint(self, pairs: np.ndarray) -> int:
+        """The pairs of triangles whose bones are neither the same nor next to each other nor siblings."""
+        parents = np.array(self.bones.parents)
+        heaviest = self.weights.argmax(axis=1)[self.triangles]
+        first, second = heaviest[pairs[:, 0], :, None], heaviest[pairs[:, 1], None, :]
+        joined = (first == second) | (parents[first] == second) | (parents[second] == first)
+        joined |= (parents[first] == parents[second]) & (parents[first] >= 0)
+        return int((~joined.any(axis=(1, 2))).sum())
 
     def deformed(self, method: str, motions: np.ndarray) -> np.ndarray:
         used = self.weights > 0
@@ -78,10 +88,22 @@ def unit(v: np.ndarray) -> np.ndarray:
     return v / np.linalg.norm(v)
 
 
+def mesh() -> bpy.types.Object:
+    skinned = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature()]
+    return max(skinned, key=lambda each: len(each.data.vertices))
+
+
+def motions_at(bones: Bones, frame: int) -> np.ndarray:
+    """float32 [bones, 4, 4]"""
+    bpy.context.scene.frame_set(frame)
+    posed = mesh().find_armature().evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    pose = np.array([posed[name].matrix for name in bones.names])
+    return (pose @ np.linalg.inv(bones.rest)).astype(np.float32)
+
+
 def read(path: str) -> Human:
     bpy.ops.wm.open_mainfile(filepath=path)
-    skinned = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature()]
-    obj = max(skinned, key=lambda each: len(each.data.vertices))
+    obj = mesh()
     armature = obj.find_armature()
     bones = armature_io.read_bones(armature.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     space = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
@@ -110,6 +132,11 @@ def main() -> None:
                 shapes = [posed, *(human.kept_apart(posed, bone, motions, every) for every in (False, True))]
                 before, both, either = (len(crossing_triangles(s, human.triangles) - at_rest) for s in shapes)
                 print(f"{f'{joint}, {degrees:g}, {method}':20}{before:8}{both:24}{either:12}")
+    print("of the action, with dq: those, and how many of them are between parts that share no joint")
+    for frame in FRAMES:
+        posed = human.deformed("dq", motions_at(human.bones, frame))
+        pairs = np.array(sorted(crossing_triangles(posed, human.triangles) - at_rest)).reshape(-1, 2)
+        print(f"{f'frame {frame}':20}{len(pairs):8}{human.share_no_joint(pairs):8}")
 
 
 if __name__ == "__main__":

@@ -56,7 +56,6 @@ STAGES = (
     Candidate("bulge_limit", 0.05, "bent joints bulge less"),
     Candidate("delta_mush", 0.2, "creases are smoothed", crude=True, often=0.25),
 )
-STAGE_NAMES = tuple(each.name for each in STAGES)
 # The weights of a vertex differ from those of its neighbour by so much, in the mean over where they differ:
 # joints have no more than two edges to bend in.
 CRUDE = 0.45
@@ -176,7 +175,7 @@ def search(
         ]
         if not known:
             known = values
-        elif is_kept(candidate, gains):
+        elif _is_kept(candidate, gains):
             best, known = tried, values
             place = phrase(moments[gains.index(max(gains))][0])
             why = phrase("{why} (most: {place})", why=phrase(candidate.why), place=place)
@@ -184,7 +183,7 @@ def search(
     return replace(best, why=tuple(whys.values()) if moments else ())
 
 
-def is_kept(candidate: Candidate, gains: Sequence[float]) -> bool:
+def _is_kept(candidate: Candidate, gains: Sequence[float]) -> bool:
     """Whether the candidate is better, by its gains in all moments."""
     changed = [each for each in gains if abs(each) > SAME]
     better = sum(each > SAME for each in gains)

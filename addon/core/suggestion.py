@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which method suits a character, over some frames, and which is best at what."""
+"""Which method is best at what, over some frames."""
 
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -18,7 +18,6 @@ class Criterion:
     label   for people
     entry   of a metrics.Summary, or "" for what is counted separately; the nearer to 0 the better
     unit    "share", "length" or "count"
-    weight  in the choice of the recommended method: what the eye sees first counts most
     praise  what the best method does
     text    one sentence
     """
@@ -27,7 +26,6 @@ class Criterion:
     label: str
     entry: str
     unit: str
-    weight: float
     praise: str
     text: str
 
@@ -38,7 +36,6 @@ CRITERIA = (
         "Stretch",
         "stretch_rms",
         "share",
-        0.5,
         "stretches least",
         "How evenly edges keep their length (RMS)",
     ),
@@ -47,7 +44,6 @@ CRITERIA = (
         "Volume",
         "limb_change",
         "share",
-        2.0,
         "keeps volume best",
         "How much volume the limbs lose or gain, each by itself",
     ),
@@ -56,7 +52,6 @@ CRITERIA = (
         "Bulge",
         "bulge_worst",
         "length",
-        2.0,
         "bulges least",
         "How far a vertex leaves or nears its bone's axis",
     ),
@@ -65,7 +60,6 @@ CRITERIA = (
         "Flips",
         "flipped_area",
         "share",
-        1.0,
         "folds over least",
         "How much of the surface is folded over",
     ),
@@ -74,13 +68,10 @@ CRITERIA = (
         "Crossings",
         "",
         "count",
-        1.0,
         "crosses itself least",
         "How many triangles cross others that they do not at rest",
     ),
 )
-# Scores that differ by less are equal: the first method that is best at something is recommended.
-AS_GOOD = 0.2
 LONGEST = "longest"
 """The longest edge, as a part of its length at rest, by which torn shapes are found."""
 MEASURED = {**{c.name: c.entry for c in CRITERIA if c.entry}, LONGEST: "stretch_max"}
@@ -88,8 +79,6 @@ MEASURED = {**{c.name: c.entry for c in CRITERIA if c.entry}, LONGEST: "stretch_
 # Values that differ by less are equally good: as a share of the best, and absolutely.
 SAME_PART = 0.02
 SAME = {"share": 1e-4, "length": 1e-4, "count": 0.5}
-# Smaller values are hardly seen, so they count little in the choice of the recommended method.
-SEEN = {"share": 1e-2, "length": 5e-3, "count": 20.0}
 
 
 @dataclass(frozen=True)
@@ -109,7 +98,7 @@ class Tear:
 
 TEARS = {
     LONGEST: Tear(2.0, 2.0, "share", "an edge has {value:.3g} times its length"),
-    "bulge": Tear(3.0, SEEN["length"], "length", "it bulges {beside:.3g} times as far"),
+    "bulge": Tear(3.0, 5e-3, "length", "it bulges {beside:.3g} times as far"),
 }
 
 
@@ -123,30 +112,23 @@ class Worst:
 class Suggestion:
     """The worst values of each method, and what follows from them, once all are added.
 
-    methods   name -> label, in order; stages among them stand for the recommended method with the stage
+    methods   name -> label, in order
     frames    that were measured
     diagonal  of the rest shape: lengths are judged relative to it
     worst     by method and criterion: the largest magnitude over the frames, and its frame; missing for a
               criterion that could not be measured
-    helping   the stages that make the recommended method better, each with what it does
     """
 
     methods: dict[str, str]
     frames: Sequence[float]
     diagonal: float
     worst: dict[tuple[str, str], Worst] = field(default_factory=dict)
-    helping: dict[str, Phrase] = field(default_factory=dict)
 
     def add(self, method: str, criterion: str, value: float, frame: float) -> None:
         """Adds a value. NaN, as the volume of a flat mesh, does not count."""
         known = self.worst.get((method, criterion))
         if value == value and (known is None or abs(value) > abs(known.value)):
             self.worst[method, criterion] = Worst(value, frame)
-
-    def add_stages(self, labels: Mapping[str, str]) -> None:
-        """Adds stages. What is recommended, and why, is said of methods alone."""
-        self.methods |= labels if self.recommended and self.reason else {}
-        vars(self).pop("torn", None)
 
     @cached_property
     def torn(self) -> dict[str, Phrase]:
@@ -172,50 +154,19 @@ class Suggestion:
         chosen = [method for method, value in values.items() if value <= most]
         return chosen if len(chosen) < len(values) else []
 
-    @cached_property
-    def recommended(self) -> str:
-        """The method whose values are smallest beside the medians of those that are not torn; empty where all
-        are equally good."""
-        scores = dict.fromkeys(self.methods, 0.0)
-        for criterion in CRITERIA:
-            values, least = self._values(criterion), self._scaled(SEEN[criterion.unit], criterion.unit)
-            usual = statistics.median(values.values()) if values else 0.0
-            for method, value in values.items():
-                scores[method] += criterion.weight * math.log((value + least) / (usual + least))
-        for method in self.torn:
-            del scores[method]
-        if not any(self.best(criterion) for criterion in CRITERIA):
-            return ""
-        least = min(scores.values())
-        as_good = [method for method, score in scores.items() if score <= least + AS_GOOD]
-        best = {method for criterion in CRITERIA for method in self.best(criterion)}
-        return next((method for method in as_good if method in best), as_good[0])
-
-    @cached_property
-    def reason(self) -> Phrase:
-        """Why the recommended method is, in its two strongest points."""
-        best_at = [criterion for criterion in CRITERIA if self.recommended in self.best(criterion)]
-        best_at.sort(key=lambda criterion: -criterion.weight)
-        praises = [phrase(criterion.praise) for criterion in best_at] or [phrase("is good at all measures")]
-        if len(praises) == 1:
-            return praises[0]
-        return phrase("{first} and {second}", first=praises[0], second=praises[1])
-
     def order(self, criterion: Criterion) -> list[str]:
         """Returns the methods, the best at it first; then those that are torn; those without a value last."""
         known = self._magnitudes(criterion.name)
         return sorted(self.methods, key=lambda m: (m not in known, m in self.torn, known.get(m, 0.0)))
 
     @property
-    def text(self) -> Phrase:
-        """One sentence: the recommended method and why."""
-        if not self.recommended:
-            return phrase("All methods are equally good here")
-        text = phrase("{method}: {why}", method=phrase(self.methods[self.recommended]), why=self.reason)
-        for stage, why in self.helping.items():
-            helps = phrase("with {stage} {why}", stage=phrase(self.methods[stage]), why=why)
-            text = phrase("{first}; {second}", first=text, second=helps)
-        return text
+    def text(self) -> str:
+        """One sentence: what each method is best at."""
+        said = []
+        for method, label in self.methods.items():
+            praises = [criterion.praise for criterion in CRITERIA if method in self.best(criterion)]
+            said += [f"{label} {' and '.join(praises)}"] if praises else []
+        return "; ".join(said) or "All methods are equally good here"
 
     def _magnitudes(self, name: str) -> dict[str, float]:
         """The worst values by method, without their signs."""

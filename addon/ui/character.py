@@ -15,7 +15,6 @@ from ..attach import properties, property_groups
 from ..attach.feature import Feature
 from ..attach.properties import SETTING_GROUPS, SHARED
 from ..attach.subscribers import subscribers
-from ..core import recommendation
 from ..deform import session
 from . import operators
 
@@ -35,14 +34,12 @@ def lead(context: bpy.types.Context) -> bpy.types.Object | None:
     return min(known_meshes(context), key=lambda obj: properties.of(obj).is_own, default=None)
 
 
-def set_method(context: bpy.types.Context, method: str, stage: str = "") -> None:
+def set_method(context: bpy.types.Context, method: str) -> None:
     """Sets `method` for all meshes that follow, with all of their Armature modifiers: wherever it is chosen
-    for the character. A stage is switched on, as it is by default."""
+    for the character."""
     with session.changing(context):
         for obj in followers(context):
             properties.of(obj).method = method
-            for name, value in recommendation.values_on(stage).items() if stage else ():
-                property_groups.assign(getattr(properties.of(obj), stage), name, value)
 
 
 class _Known:

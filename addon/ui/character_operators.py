@@ -6,7 +6,6 @@ import contextlib
 import bpy
 
 from ..attach import properties
-from ..core import recommendation
 from ..core.errors import SinewError
 from ..deform import session
 from . import character
@@ -21,9 +20,6 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     method: bpy.props.StringProperty(name="Method", description="Its short name, as in the table of methods")
-    stage: bpy.props.StringProperty(
-        name="Stage", description="One to switch on, too, as it is by default", options={"SKIP_SAVE"}
-    )
 
     @classmethod
     def description(cls, _context: bpy.types.Context, given: bpy.types.OperatorProperties) -> str:
@@ -34,9 +30,7 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
         if self.method not in properties.METHODS:
             names = ", ".join(properties.METHODS)
             raise SinewError(tr("Method {name}: choose one of {names}", name=repr(self.method), names=names))
-        if self.stage and self.stage not in recommendation.STAGE_NAMES:
-            raise SinewError(tr("There is no stage {name}", name=repr(self.stage)))
-        character.set_method(context, self.method, self.stage)
+        character.set_method(context, self.method)
         return {"FINISHED"}
 
 

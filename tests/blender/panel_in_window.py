@@ -125,7 +125,7 @@ def auto_mixed() -> Iterator[None]:
 
 def recommended_by_click() -> Iterator[None]:
     """Method and stages of all, in one undo step."""
-    from bl_ext.user_default.sinew.features.suggest.feature import _View
+    from bl_ext.user_default.sinew.features.suggest import recommend
 
     names = ("twist_spread", "bulge_limit", "delta_mush")
 
@@ -136,10 +136,10 @@ def recommended_by_click() -> Iterator[None]:
     before = settings()
     yield from window.click(METHOD)
     yield from window.click(RECOMMENDED)
-    yield from window.until(lambda: scene().session_uid in _View.choices, "a recommendation")
+    yield from window.until(lambda: scene().session_uid in recommend.choices, "a recommendation")
     window.press("ESC", RECOMMENDED)
     yield from window.wait()
-    choice = _View.choices[scene().session_uid]
+    choice = recommend.choices[scene().session_uid]
     wanted = [choice.values[f"{name}.enabled"] for name in names]
     check("recommended", settings(), [(choice.method, wanted)] * 5)
     check("another than before", settings() != before)
@@ -309,10 +309,10 @@ def suggested_by_click() -> Iterator[None]:
         bpy.ops.sinew.suggest("EXEC_DEFAULT", over="SCENE")
     yield from window.wait()
     yield from window.click(BEST)
-    from bl_ext.user_default.sinew.features.suggest import suggest
+    from bl_ext.user_default.sinew.features.suggest import recommend
 
     check("one for all", len(set(methods())), 1)
-    check("the recommended one", methods()[0], suggest.suggestions[scene().session_uid].recommended)
+    check("the recommended one", methods()[0], recommend.choices[scene().session_uid].method)
     with window.in_view3d():
         bpy.ops.sinew.suggestions_by(measure="crossings")
     yield from window.wait(4)

@@ -12,13 +12,14 @@ from sinew_addon.attach import properties
 from sinew_addon.core import thumbnail
 from sinew_addon.core.suggestion import CRITERIA, MEASURED, Suggestion
 from sinew_addon.features.heat import live
-from sinew_addon.features.suggest import suggest, worst_pictures
-from sinew_addon.features.suggest.suggest import crossing_triangles
+from sinew_addon.features.suggest import recommend, suggest, worst_pictures
+from sinew_addon.features.suggest.crossings import crossing_triangles
 
 
 @pytest.fixture(autouse=True)
 def nothing_known():
     suggest.suggestions.clear()
+    recommend.choices.clear()
 
 
 def found() -> Suggestion:
@@ -46,34 +47,34 @@ def test_numbers_are_those_of_each_method():
     assert "lbs" not in suggestion.best(next(c for c in CRITERIA if c.name == "volume"))
 
 
-def test_stages_are_measured_with_the_recommended_method_and_a_click_uses_one():
+def test_one_combination_is_recommended_and_a_click_uses_it():
+    """The same one as by Recommended, measured in a row of its own."""
     obj, armature = scenes.skinned_arm("lbs", sides=16, rings=41)
     armature.animation_data_clear()
     bone = armature.pose.bones[1]
     bone.rotation_mode, bone.location = "XYZ", (0.0, 0.0, 0.0)
     scenes.key(bone, "rotation_euler", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 2.5, 0.0))))
     bpy.ops.sinew.suggest()
-    suggestion = found()
-    stages = [name for name in suggestion.methods if name not in properties.METHODS]
-    assert stages == ["twist_spread", "bulge_limit", "delta_mush"]
-    assert list(suggestion.helping) == ["twist_spread"]
-    assert "with Twist Spread" in suggestion.text
-    assert suggestion.recommended in properties.METHODS
-    bpy.ops.sinew.use_method(method=suggestion.recommended, stage="twist_spread")
-    assert (properties.of(obj).method, properties.of(obj).twist_spread.enabled) == (
-        suggestion.recommended,
-        True,
-    )
+    suggestion, choice = found(), recommend.choices[bpy.context.scene.session_uid]
+    assert choice == recommend.result_of(recommend.search(bpy.context.scene, [obj]))
+    assert choice.stages == ("twist_spread",)
+    assert suggestion.methods[suggest.RECOMMENDED] == choice.label
+    bpy.ops.sinew.use_recommended()
+    assert (properties.of(obj).method, properties.of(obj).twist_spread.enabled) == (choice.method, True)
     bpy.context.scene.frame_set(11)
     measured = live.measure(scenes.states_of(obj), "blender", bpy.context.evaluated_depsgraph_get()).measured
-    known = suggestion.worst["twist_spread", "volume"]
+    known = suggestion.worst[suggest.RECOMMENDED, "volume"]
     assert known.frame == 11
     assert known.value == pytest.approx(measured.entry(MEASURED["volume"]), rel=1e-4)
     bpy.ops.sinew.suggest()
-    # What is on is part of each method's shape.
-    assert "twist_spread" not in found().methods
-    with pytest.raises(RuntimeError, match="There is no stage 'mush'"):
-        bpy.ops.sinew.use_method(method="dq", stage="mush")
+    # What is on is part of each method's shape, but not of what is recommended.
+    assert recommend.choices[bpy.context.scene.session_uid] == choice
+
+
+def test_nothing_is_used_before_it_is_recommended():
+    scenes.skinned_arm("lbs")
+    with pytest.raises(RuntimeError, match="Nothing is recommended yet"):
+        bpy.ops.sinew.use_recommended()
 
 
 def test_it_leaves_all_as_it_was():

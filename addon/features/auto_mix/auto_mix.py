@@ -19,7 +19,7 @@ from ...ui import stepped
 from ...ui.translations import tr
 from ..heat import live
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
-from ..suggest.suggest import crossings, frames_to_count
+from ..suggest.crossings import crossings, frames_to_count
 
 STAGE = stage_settings.STAGES["mix"]
 # The second method where none is chosen: linear blending collapses where rotations bulge, and the reverse.

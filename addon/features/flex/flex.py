@@ -22,7 +22,7 @@ from ...core.rig import Bones
 from ...deform import session
 from ...io import armature_io
 from ..heat import live
-from ..suggest.suggest import crossing_triangles
+from ..suggest.crossings import crossing_triangles
 
 
 @dataclass

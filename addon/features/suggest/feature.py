@@ -5,7 +5,6 @@ Nothing is stored in files.
 Beside them the preset Recommended, which measures and sets."""
 
 from collections.abc import Iterator
-from typing import ClassVar
 
 import bpy
 
@@ -45,7 +44,7 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         return suggest.scan(context.scene, sinew_targets(context), self.over)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
-        self.report({"INFO"}, suggest.suggestions[context.scene.session_uid].text)
+        self.report({"INFO"}, recommend.choices[context.scene.session_uid].text)
         return {"FINISHED"}
 
 
@@ -66,8 +65,22 @@ class SINEW_OT_recommend(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     def finish(self, context: bpy.types.Context) -> set[str]:
         with session.changing(context):
             recommend.use(character.followers(context), self.choice)
-        _View.choices[context.scene.session_uid] = self.choice
+        recommend.choices[context.scene.session_uid] = self.choice
         self.report({"INFO"}, self.choice.text)
+        return {"FINISHED"}
+
+
+class SINEW_OT_use_recommended(OnSinewObjects, bpy.types.Operator):
+    bl_label = "Use Recommended"
+    bl_description = "Deform all meshes of the character by the recommended method and stages"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        choice = recommend.choices.get(context.scene.session_uid)
+        if choice is None:
+            raise SinewError("Nothing is recommended yet: click Suggest first")
+        with session.changing(context):
+            recommend.use(character.followers(context), choice)
         return {"FINISHED"}
 
 
@@ -92,11 +105,9 @@ class SINEW_OT_suggestions_by(bpy.types.Operator):
 
 
 class _View:
-    """What the panel shows: BEST, or a criterion's name; and what was recommended last, by the session_uid of
-    the scene."""
+    """What the panel shows: BEST, or a criterion's name."""
 
     measure = BEST
-    choices: ClassVar[dict[int, Choice]] = {}
 
 
 class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
@@ -104,26 +115,18 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        is_any = context.scene.session_uid in suggest.suggestions or _choice(context) is not None
+        is_any = context.scene.session_uid in recommend.choices
         return is_any and operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.active = operators.are_any_on(context)
-        choice, suggestion = _choice(context), suggest.suggestions.get(context.scene.session_uid)
-        if choice is not None:
-            draw_text(layout, context, tr(choice.text), icon="SOLO_ON")
+        choice = recommend.choices[context.scene.session_uid]
+        suggestion, used = suggest.suggestions.get(context.scene.session_uid), _used(context)
+        _draw_recommended(layout, choice, used)
+        draw_text(layout, context, tr(choice.text), icon="SOLO_ON")
         if suggestion is None:
             return
-        used = _used(context)
-        if suggestion.recommended:
-            _draw_method(layout, suggestion, suggestion.recommended, used)
-            draw_text(layout, context, tr("It {why}", why=tr(suggestion.reason)), icon="SOLO_ON")
-            for stage, why in suggestion.helping.items():
-                _draw_method(layout, suggestion, stage, used)
-                draw_text(layout, context, tr("Then {why}", why=tr(why)), icon="SOLO_ON")
-        else:
-            draw_text(layout, context, tr(suggestion.text), icon="INFO")
         for method, why in suggestion.torn.items():
             text = tr("{method} tears here: {why}", method=tr(suggestion.methods[method]), why=tr(why))
             draw_text(layout, context, text, icon="ERROR")
@@ -161,13 +164,6 @@ class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
                 cell = grid.column(align=True)
                 cell.template_icon(number, scale=PICTURE_HEIGHT)
                 _draw_method(cell, suggestion, method, used)
-
-
-def _choice(context: bpy.types.Context) -> Choice | None:
-    """What was recommended last, as long as it is what the character has."""
-    choice = _View.choices.get(context.scene.session_uid)
-    is_there = choice is not None and {choice.method, *choice.stages} <= _used(context)
-    return choice if is_there else None
 
 
 def _used(context: bpy.types.Context) -> set[str]:
@@ -213,12 +209,17 @@ def _draw_order(
 
 
 def _draw_method(layout: bpy.types.UILayout, suggestion: Suggestion, method: str, used: set[str]) -> None:
-    """method: or a stage, with the recommended method"""
-    text, own = suggestion.methods[method], method
-    if method not in properties.METHODS:
-        text, own = tr("with {stage}", stage=tr(text)), suggestion.recommended
-    button = layout.operator("sinew.use_method", text=text, depress={method, own} <= used)
-    button.method, button.stage = own, "" if own == method else method
+    """method: or suggest.RECOMMENDED"""
+    if method == suggest.RECOMMENDED:
+        _draw_recommended(layout, recommend.choices[bpy.context.scene.session_uid], used)
+        return
+    button = layout.operator("sinew.use_method", text=suggestion.methods[method], depress=method in used)
+    button.method = method
+
+
+def _draw_recommended(layout: bpy.types.UILayout, choice: Choice, used: set[str]) -> None:
+    is_used = used == {choice.method, *choice.stages}
+    layout.operator("sinew.use_recommended", text=tr(choice.label), translate=False, depress=is_used)
 
 
 def _value(context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion, method: str) -> str:
@@ -241,7 +242,7 @@ def _end() -> None:
     del characters.choosers[RECOMMENDED]
     suggest.suggestions.clear()
     worst_pictures.clear()
-    _View.choices.clear()
+    recommend.choices.clear()
 
 
 (RECOMMENDED,) = parameters.PRESETS
@@ -250,6 +251,7 @@ FEATURE = Feature(
     (
         SINEW_OT_suggest,
         SINEW_OT_recommend,
+        SINEW_OT_use_recommended,
         SINEW_OT_suggestions_by,
         SINEW_PT_suggest,
         SINEW_PT_suggest_pictures,

@@ -22,7 +22,7 @@ from ...io import armature_io
 from ...ui import stepped
 from ..heat import live
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
-from .suggest import crossing_triangles
+from .crossings import crossing_triangles
 
 # Frames of an action that are looked at, and most of them that are measured.
 LOOKED_AT, MEASURED = 100, 12
@@ -33,6 +33,9 @@ BENDS = np.radians(30.0)
 # Crossings take longest, and only strong bends have some.
 MOST_CROSSINGS = 6
 
+# What was recommended last, by the session_uid of the scene.
+choices: dict[int, Choice] = {}
+
 
 class Moment(NamedTuple):
     """A frame or a pose, with its crossings at rest; None where they are not counted."""
@@ -42,13 +45,17 @@ class Moment(NamedTuple):
     at_rest: set[tuple[int, int]] | None
 
 
-def search(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> Generator[float, None, Choice]:
+def search(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str = "ACTION"
+) -> Generator[float, None, Choice]:
     """Yields the progress; returns the choice. Objects, actions and the scene's frame are as before.
+
+    over  the frames, as for stepped.frames_over()
 
     Raises SinewError where an object cannot be measured.
     """
     check_measurable(objects)
-    named = yield from _in_frames(scene, objects)
+    named = yield from _in_frames(scene, objects, over)
     if not named:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         subject = live.measure(session.states_of(objects, depsgraph), properties.BLENDER, depsgraph)
@@ -120,13 +127,12 @@ def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
 
 
 def _in_frames(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str
 ) -> Generator[float, None, list[tuple[str, live.Moment]]]:
-    """Returns the frames of the action in which joints bend most; none without an action, or where none bends
-    by much."""
+    """Returns the frames in which joints bend most; none without an action, or where none bends by much."""
     armatures = armatures_of(objects)
     try:
-        frames = stepped.frames_over(scene, armatures, "ACTION")
+        frames = stepped.frames_over(scene, armatures, over)
     except SinewError:
         return []
     places = np.linspace(0, len(frames) - 1, min(len(frames), LOOKED_AT)).round().astype(int)
