@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a plane in each joint does to folds: python bench/limit_fold.py FILE
 
-FILE has a human whose bones are called as Unreal's. A stage was tried that keeps each vertex on that side of
-its joint on which it rests. The sides are those of the plane through the joint whose normal is the mean of
-both bones' posed directions. This counts pairs of triangles that cross, before and after, and in frames of
-the action those that no plane of a joint can part. It is not part of Sinew (docs/methods.md).
+FILE has a human whose bones are called as Unreal's; a tube is bent beside it. A stage was tried that keeps each
+vertex on that side of its joint on which it rests. The sides are those of the plane through the joint whose
+normal is the mean of both bones' posed directions. This counts pairs of triangles that cross, before and after,
+and in frames of the action those that no plane of a joint can part. It is not part of Sinew (docs/methods.md).
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -25,10 +25,11 @@ MARGIN = 0.2  # of the distance from the plane at rest: how near to it a vertex 
 JOINTS = {"elbow": ("lowerarm_l", (0.0, -1.0, 0.0)), "knee": ("calf_l", (0.0, 1.0, 0.0))}
 DEGREES = 90.0, 120.0, 140.0, 155.0
 FRAMES = 16, 32
+RINGS, AROUND = 81, 32  # of the tube
 
 
 @dataclass
-class Human:
+class Skin:
     bones: Bones
     points: np.ndarray
     triangles: np.ndarray
@@ -88,6 +89,31 @@ def unit(v: np.ndarray) -> np.ndarray:
     return v / np.linalg.norm(v)
 
 
+def tube() -> Skin:
+    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over 1 unit."""
+    z = np.repeat(np.linspace(0.0, 4.0, RINGS), AROUND)
+    angle = np.tile(np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), RINGS)
+    t = np.clip(z - 1.5, 0.0, 1.0)
+    share = t * t * (3.0 - 2.0 * t)
+    ring, i = np.divmod(np.arange((RINGS - 1) * AROUND), AROUND)
+    near, far = ring * AROUND + i, ring * AROUND + (i + 1) % AROUND
+    corners = [near, far, far + AROUND], [near, far + AROUND, near + AROUND]
+    triangles = np.concatenate(corners, axis=1).T
+    rest = np.tile(sinew.affine.from_axis_angle([1.0, 0.0, 0.0], np.pi / 2), (2, 1, 1))
+    rest[1, 2, 3] = 2.0
+    bones = replace(
+        Bones.none(),
+        names=("first", "second"),
+        deform=np.ones(2, bool),
+        rest=rest,
+        lengths=np.full(2, 2.0),
+        segments=np.ones(2, int),
+        parents=np.array([-1, 0]),
+    )
+    points = np.stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), z], axis=1).astype(np.float32)
+    return Skin(bones, points, triangles, np.stack([1.0 - share, share], axis=1))
+
+
 def mesh() -> bpy.types.Object:
     skinned = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature()]
     return max(skinned, key=lambda each: len(each.data.vertices))
@@ -101,7 +127,7 @@ def motions_at(bones: Bones, frame: int) -> np.ndarray:
     return (pose @ np.linalg.inv(bones.rest)).astype(np.float32)
 
 
-def read(path: str) -> Human:
+def read(path: str) -> Skin:
     bpy.ops.wm.open_mainfile(filepath=path)
     obj = mesh()
     armature = obj.find_armature()
@@ -115,24 +141,29 @@ def read(path: str) -> Human:
                 weights[vertex.index, of_groups[entry.group]] += entry.weight
     weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
     points = transformed(mesh_io.read_points(obj.data), space).astype(np.float32)
-    return Human(bones, points, mesh_io.read_triangles(obj.data), weights)
+    return Skin(bones, points, mesh_io.read_triangles(obj.data), weights)
+
+
+def bend(skin: Skin, joint: str, bone: int, towards: tuple[float, float, float]) -> None:
+    at_rest = crossing_triangles(skin.points, skin.triangles)
+    for degrees in DEGREES:
+        motions = skin.bent(bone, degrees, np.array(towards))
+        for method in ("lbs", "dq"):
+            posed = skin.deformed(method, motions)
+            shapes = [posed, *(skin.kept_apart(posed, bone, motions, every) for every in (False, True))]
+            before, both, either = (len(crossing_triangles(s, skin.triangles) - at_rest) for s in shapes)
+            print(f"{f'{joint}, {degrees:g}, {method}':20}{before:8}{both:24}{either:12}")
 
 
 def main() -> None:
-    human = read(sys.argv[1])
-    at_rest = crossing_triangles(human.points, human.triangles)
     print("pairs of triangles that cross, without those at rest")
     print(f"{'':20}{'before':>8}{'vertices of both bones':>24}{'of either':>12}")
+    bend(tube(), "tube", 1, (0.0, 1.0, 0.0))
+    human = read(sys.argv[1])
     for joint, (name, towards) in JOINTS.items():
-        bone = human.bones.names.index(name)
-        for degrees in DEGREES:
-            motions = human.bent(bone, degrees, np.array(towards))
-            for method in ("lbs", "dq"):
-                posed = human.deformed(method, motions)
-                shapes = [posed, *(human.kept_apart(posed, bone, motions, every) for every in (False, True))]
-                before, both, either = (len(crossing_triangles(s, human.triangles) - at_rest) for s in shapes)
-                print(f"{f'{joint}, {degrees:g}, {method}':20}{before:8}{both:24}{either:12}")
+        bend(human, joint, human.bones.names.index(name), towards)
     print("of the action, with dq: those, and how many of them are between parts that share no joint")
+    at_rest = crossing_triangles(human.points, human.triangles)
     for frame in FRAMES:
         posed = human.deformed("dq", motions_at(human.bones, frame))
         pairs = np.array(sorted(crossing_triangles(posed, human.triangles) - at_rest)).reshape(-1, 2)
