@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a plane in each joint does to folds: python bench/limit_fold.py FILE
 
-FILE has a human whose bones are called as Unreal's; a tube is bent beside it. A stage was tried that keeps each
-vertex on that side of its joint on which it rests. The sides are those of the plane through the joint whose
-normal is the mean of both bones' posed directions. This counts pairs of triangles that cross, before and after,
-and in frames of the action those that no plane of a joint can part. It is not part of Sinew (docs/methods.md).
+FILE has a human whose bones are called as Unreal's; a tube is bent beside it. A stage was tried that keeps
+each vertex on that side of its joint on which it rests. The sides are those of the plane through the joint
+whose normal is the mean of both bones' posed directions. This counts pairs of triangles that cross, before
+and after, and in frames of the action those that no plane of a joint can part. It is not part of Sinew
+(docs/methods.md).
 """
 
 from __future__ import annotations
