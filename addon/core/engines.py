@@ -6,16 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import sinew
 
 from .influences import Influences
-
-if TYPE_CHECKING:
-    from .parameters import Value
-
 
 ENGINE_GROUP = "As in Engines"
 
@@ -72,7 +67,7 @@ METHODS: dict[str, sinew.Method | Engine] = {method.name: method for method in s
 """All that a mesh can be deformed by, by name."""
 
 
-def influences_kept(method: str, values: Mapping[str, Value]) -> int:
+def influences_kept(method: str, values: Mapping[str, float | str]) -> int:
     """Returns how many of a vertex an engine keeps.
 
     values  of parameters, by full names
