@@ -219,7 +219,7 @@ def _draw_method(layout: bpy.types.UILayout, suggestion: Suggestion, method: str
 
 def _draw_recommended(layout: bpy.types.UILayout, choice: Choice, used: set[str]) -> None:
     is_used = used == {choice.method, *choice.stages}
-    layout.operator("sinew.use_recommended", text=tr(choice.label), translate=False, depress=is_used)
+    layout.operator("sinew.use_recommended", text="Recommended", depress=is_used)
 
 
 def _value(context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion, method: str) -> str:

@@ -44,7 +44,7 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     choice = yield from as_part(recommend.search(scene, objects, over), 0.0, CHOOSING)
     counted = frames_to_count(frames)
     labels = {method.name: method.label for method in sinew.methods()}
-    suggestion = Suggestion(labels | ({RECOMMENDED: choice.label} if choice.stages else {}), frames, 0.0)
+    suggestion = Suggestion(labels | ({RECOMMENDED: "Recommended"} if choice.stages else {}), frames, 0.0)
     moments: list[Moment] = []
     with stepped.kept_frame(scene, armatures):
         for frame in frames:
