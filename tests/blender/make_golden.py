@@ -104,6 +104,16 @@ def antipodal(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
             obj.vertex_groups[group].add([vertex], weight, "ADD")
 
 
+def twisted(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    """Each bone twisted by 160 degrees against its parent, vertices of the first and the last: signs by
+    hierarchy are others than Blender's"""
+    turned(obj, armature)
+    for bone in armature.pose.bones:
+        bone.rotation_quaternion = Quaternion((0.0, 1.0, 0.0), math.radians(160.0))
+    for group in (obj.vertex_groups[0], obj.vertex_groups[-1]):
+        group.add(range(len(obj.data.vertices)), 0.3, "ADD")
+
+
 def bendy(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     """Bendy bones of four segments with straight mapping, curved and rolled"""
     turned(obj, armature)
@@ -119,6 +129,7 @@ CASES = (
     scaled,
     mirrored,
     antipodal,
+    twisted,
     bendy,
 )
 

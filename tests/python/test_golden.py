@@ -54,7 +54,7 @@ def test_library(path, method, name):
 
 
 def test_there_are_cases():
-    assert {"rotated", "scaled", "mirrored", "antipodal", "bendy"} <= {path.stem for path in CASES}
+    assert {"rotated", "scaled", "mirrored", "antipodal", "twisted", "bendy"} <= {path.stem for path in CASES}
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
