@@ -105,8 +105,7 @@ def antipodal(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
 
 
 def twisted(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    """Each bone twisted by 160 degrees against its parent, vertices of the first and the last: signs by
-    hierarchy are others than Blender's"""
+    """Bones twisted by 160 degrees each, vertices of the first and the last: other signs by hierarchy"""
     turned(obj, armature)
     for bone in armature.pose.bones:
         bone.rotation_quaternion = Quaternion((0.0, 1.0, 0.0), math.radians(160.0))
