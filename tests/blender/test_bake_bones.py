@@ -133,49 +133,6 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
     assert found[file] < 0.5 * found[keyed]
 
 
-def test_pose_helpers_in_the_file(arm, tmp_path):
-    """They have no action of their own, no driver, and constraints that refer to the rig's own bones."""
-    obj, path = arm
-    scenes.add_sinew(obj, METHOD)
-    file, (report,) = baked(path, tmp_path / "out", "--motion", "pose")
-    bpy.ops.wm.open_mainfile(filepath=str(file))
-    rig = bpy.data.objects["Arm Rig"]
-    helpers = [bone for bone in rig.pose.bones if bone.name.startswith("Helper_")]
-    assert len(helpers) == report["helpers"] == 2
-    assert rig.animation_data.action.name == "Arm RigAction"
-    assert not rig.animation_data.drivers
-    for bone in helpers:
-        (constraint,) = bone.constraints
-        assert bone.parent is None
-        assert (constraint.type, constraint.use_deform_preserve_volume) == ("ARMATURE", True)
-        assert {target.subtarget for target in constraint.targets} <= {"bone.0", "bone.1"}
-        assert abs(sum(target.weight for target in constraint.targets) - 1.0) < 1e-5
-
-
-def test_centres_of_rotation_in_the_file(arm, tmp_path):
-    """Helper bones of cor follow bones that move nothing else, linearly."""
-    obj, path = arm
-    scenes.add_sinew(obj, "cor")
-    file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", method="cor")
-    bpy.ops.wm.open_mainfile(filepath=str(file))
-    rig = bpy.data.objects["Arm Rig"]
-    helpers = [bone for bone in rig.pose.bones if bone.name.startswith("Helper_")]
-    assert len(helpers) == report["helpers"] == 2
-    for helper in helpers:
-        blend, follow = helper.constraints
-        assert (blend.type, blend.use_deform_preserve_volume) == ("ARMATURE", True)
-        centre = rig.pose.bones[follow.subtarget]
-        assert (follow.type, follow.target, centre.bone.use_deform) == ("COPY_LOCATION", rig, False)
-        assert centre.name not in bpy.data.objects["Arm"].vertex_groups
-        assert centre.bone.head_local == helper.bone.head_local
-        (linear,) = centre.constraints
-        assert (linear.type, linear.use_deform_preserve_volume) == ("ARMATURE", False)
-        assert [(t.subtarget, t.weight) for t in linear.targets] == [
-            (t.subtarget, t.weight) for t in blend.targets
-        ]
-        assert {bone.collections[0].name for bone in (centre.bone, helper.bone)} == {"Sinew helpers"}
-
-
 def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     """They share helper bones; shape keys still play, as do motion and scale of the object."""
     obj, path = arm

@@ -198,15 +198,6 @@ def test_the_operator_blends_and_undo_takes_it_back():
     assert len(bpy.data.actions) == 2
 
 
-def test_weights_change_from_the_first_frame_to_the_last():
-    armature, chosen, _pair = make_walks()
-    first = played(armature, chosen[0], [1])
-    actions = rows(chosen, (0.0, 1.0), (1.0, 0.0))
-    assert bpy.ops.sinew.blend_actions(changes=True, cycles=4, actions=actions) == {"FINISHED"}
-    assert armature.animation_data.action.frame_range[1] == 101.0
-    assert np.abs(film(armature, [1]) - first).max() < 1e-5
-
-
 @pytest.mark.parametrize("steps", [1, 40, 90])
 def test_stopped_nothing_has_changed(steps):
     armature, chosen, _pair = make_walks()

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 
@@ -194,27 +193,6 @@ def test_reskin_never_writes_to_the_input_folder(arm_file):
     before = path.read_bytes()
     assert "input" in run_sinew("reskin", path, "--method", "dq", "--out", path.parent, status=2).stderr
     assert path.read_bytes() == before
-
-
-def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
-    path, _expected = arm_file
-    folder = tmp_path / "studio"
-    (folder / "sub").mkdir(parents=True)
-    shutil.copy(path, folder / "a good one.blend")
-    shutil.copy(path, folder / "sub" / "名前.blend")
-    (folder / "empty.blend").touch()
-    (folder / "text.blend").write_text("not a blend file")
-    (folder / "truncated.blend").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    result = run_sinew(
-        "reskin", folder, "--method", "dq", "--out", tmp_path / "out", "--no-pictures", status=1
-    )
-    assert "2 of 5 files" in result.stdout
-    written = sorted(
-        p.relative_to(tmp_path / "out").as_posix() for p in (tmp_path / "out").rglob("*.blend") if p.is_file()
-    )
-    assert written == ["a good one.blend", "sub/名前.blend"]
-    for name in ("empty.blend", "text.blend", "truncated.blend"):
-        assert sum(name in line for line in result.stderr.splitlines()) == 1, result.stderr
 
 
 @pytest.mark.once

@@ -491,19 +491,6 @@ def test_labels_stand_over_the_characters():
         assert np.allclose(place, (*middle[:2], points[:, 2].max()), atol=1e-4)
 
 
-def test_labels_do_not_cover_each_other():
-    # Of four copies in a row that goes away from the viewer, and of three at one place.
-    labels = [(100, 50, 80), (150, 58, 90), (230, 66, 60), (400, 50, 80), (402, 50, 70), (404, 50, 75)]
-    heights = comparison_labels.apart(labels, line=20, gap=12)
-    for n, (left, _own, width) in enumerate(labels):
-        for m in range(n):
-            meet = left < labels[m][0] + labels[m][2] + 12 and labels[m][0] < left + width + 12
-            assert not meet or abs(heights[n] - heights[m]) >= 20
-    assert heights[0] == 50
-    assert heights[3:] == [50, 70, 90]
-    assert comparison_labels.apart([(0, 10, 50), (100, 10, 50)], line=20, gap=12) == [10, 10]
-
-
 def test_the_copies_are_not_rendered_unless_asked_for():
     obj, _armature = scenes.make_arm()
     compare(obj, {"dq"})

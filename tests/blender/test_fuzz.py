@@ -9,10 +9,7 @@ import bpy
 import fuzz_parity
 import pytest
 import routes
-import scenes
 from conftest import IS_NEWEST
-from sinew_addon.attach import attach, properties
-from sinew_addon.deform import session, small_meshes
 
 # The newest Blender runs the first 100 rigs, each other one 40 different ones: all of them must have the same
 # shapes (docs/parity.md), and together they check more rigs.
@@ -46,37 +43,3 @@ def test_random_rigs_equal_the_modifier(tmp_path):
     within = sum(each[routes.EVALUATION] == routes.EVALUATION for each in taken)
     assert within > 0.3 * rigs
     assert all(each[routes.UPDATE] == routes.UPDATE for each in taken)
-
-
-def test_every_feature_takes_part():
-    features, seeds = set(fuzz_parity.FEATURES), range(FIRST, FIRST + RIGS)
-    for feature in fuzz_parity.FEATURES:
-        assert sum(fuzz_parity.has(seed, feature, features) for seed in seeds) > 0.1 * RIGS, feature
-
-
-def test_a_shape_that_blender_made_is_a_failure(monkeypatch):
-    """If small meshes used the Armature modifier, the fuzzer would compare Blender with itself."""
-    force = routes.force
-
-    def force_and_leave_small(route: str) -> None:
-        force(route)
-        small_meshes.is_used = True
-
-    monkeypatch.setattr(routes, "force", force_and_leave_small)
-    outcome = fuzz_parity.check(0, set())
-    assert outcome.failed
-    assert "not deformed" in outcome.reason or "is on" in outcome.reason
-
-
-def test_a_shape_of_another_pose_is_not_taken_for_this_one():
-    obj, _armature = scenes.make_arm()
-    routes.force(routes.EVALUATION)
-    scenes.add_sinew(obj)
-    bpy.context.scene.frame_set(5)
-    state = session.state_of(obj)
-    with pytest.raises(routes.NotBySinewError, match="for this pose"):
-        routes.taken(obj, state.shown.number)
-    properties.of(obj).enabled = False
-    with pytest.raises(routes.NotBySinewError, match="off"):
-        routes.taken(obj, -1)
-    attach.remove(obj)

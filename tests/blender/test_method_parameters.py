@@ -12,8 +12,7 @@ import sinew
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
 from sinew_addon.core.engines import METHODS
-from sinew_addon.core.parameters import parse
-from sinew_addon.deform import characters, session
+from sinew_addon.deform import session
 from test_sdef import make_model
 
 FRAME = 9
@@ -92,18 +91,6 @@ def test_keys_and_drivers_set_it(route):
     assert scenes.worst(scenes.final_points(obj), found["nlerp"]) == 0.0
 
 
-def test_it_is_mixed_in_with_its_parameters(route):
-    obj = skinned_model()
-    found = shape_of_each(obj)
-    obj.vertex_groups.new(name="All").add(range(len(obj.data.vertices)), 1.0, "REPLACE")
-    obj.sinew.method, obj.sinew.mix.group, obj.sinew.mix.method = "dq", "All", "sdef"
-    for choice in CHOICES:
-        obj.sinew.sdef.interpolation = choice
-        bpy.context.view_layer.update()
-        tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
-        assert scenes.worst(scenes.final_points(obj), found[choice]) <= tolerance
-
-
 def test_files_and_copies_carry_it(tmp_path):
     obj = skinned_model()
     found = shape_of_each(obj)
@@ -157,13 +144,3 @@ def test_commands_take_it_by_its_full_name(tmp_path):
     run_sinew(
         "points", path, "--method", "sdef", "--frames", 1, "--set", f"{name}=x", "--out", path, status=2
     )
-
-
-def test_scripts_set_it_for_all():
-    obj, _armature = make_model()
-    characters.set_parameters(parse(["sdef.interpolation=slerp"]))
-    try:
-        characters.use_method(obj, "sdef")
-    finally:
-        characters.set_parameters({})
-    assert obj.sinew.sdef.interpolation == "slerp"

@@ -11,7 +11,7 @@ import pytest
 import scenes
 import sinew
 from conftest import REPOSITORY
-from sinew_addon.attach import attach, properties
+from sinew_addon.attach import attach
 from sinew_addon.io import files
 
 sys.path.append(str(REPOSITORY / "tests" / "python"))
@@ -76,15 +76,6 @@ def test_a_real_rig(method, real_rig):
     scenes.add_sinew(obj, method)
     bpy.context.scene.frame_set(16)
     assert_equal_to_reference(obj, method, centres_of(obj))
-
-
-def test_methods_are_switched_while_bound(route):
-    obj, _armature = scenes.skinned_arm("lbs", bones=3)
-    centres = centres_of(obj)
-    for method in ("cor", "dib", "cor", "sbs"):
-        properties.of(obj).method = method
-        bpy.context.scene.frame_set(8)
-        assert_equal_to_reference(obj, method, centres)
 
 
 def test_centres_are_made_anew_when_the_mesh_changes(route):

@@ -23,10 +23,6 @@ def make_chained():
     return obj
 
 
-def shown_names(obj):
-    return [modifier.name for modifier in scenes.modifiers(obj)]
-
-
 def names(obj):
     return [modifier.name for modifier in obj.modifiers]
 
@@ -39,39 +35,10 @@ def put(obj, name, ahead_of):
     bpy.context.view_layer.update()
 
 
-def swap(obj, over_sinew):
-    """Moves the first of two Armature modifiers behind the other, or behind Sinew's as well."""
-    obj.modifiers.move(0, 2 if over_sinew else 1)
-    bpy.context.view_layer.update()
-
-
 def check(obj, expected):
     got = scenes.shapes(obj, FRAMES)
     assert properties.of(obj).error == ""
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.mark.parametrize("over_sinew", [False, True])
-def test_chained_modifiers_in_another_order(over_sinew):
-    """Each has its own Preserve Volume."""
-    obj = make_chained()
-    before = scenes.shapes(obj, FRAMES)
-    put(obj, "Second", "Armature")
-    swapped = scenes.shapes(obj, FRAMES)
-    assert scenes.worst(swapped, before) > 0.1
-    put(obj, "Armature", "Second")
-    scenes.add_sinew(obj)
-    check(obj, before)
-    swap(obj, over_sinew)
-    check(obj, swapped)
-    assert shown_names(obj) == ["Second", "Armature", "Sinew"]
-    assert [replaced.name for replaced in properties.of(obj).replaced_modifiers] == ["Second", "Armature"]
-    swap(obj, over_sinew)
-    check(obj, before)
-    attach.remove(obj)
-    session.refresh(bpy.context)
-    assert shown_names(obj) == ["Armature", "Second"]
-    check(obj, before)
 
 
 def test_what_is_kept_of_many_modifiers_is_of_each():

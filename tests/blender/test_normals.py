@@ -98,7 +98,7 @@ def random_mesh(seed: int, size: int = 22) -> bpy.types.Mesh:
             points.append(rng.normal(0, size, 3))
             faces += [[a, b, c, d], [a, b, len(points) - 1]]
         elif kind == 4:
-            ring = np.linspace(0, 6, 3 + int(rng.integers(12)))
+            ring = np.linspace(0, 6, int(rng.choice([*range(3, 15), 30, 31, 66])))
             first = len(points)
             points += list(np.stack([np.cos(ring), np.sin(ring), rng.normal(size=len(ring))], axis=1))
             faces.append([a, b, *range(first, len(points)), c, d])

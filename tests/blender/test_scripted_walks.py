@@ -241,6 +241,21 @@ CASES = {
     "converted and undone": "+add Arm dq; +frame 6; +convert_to_mesh Arm; frame 11; undo; frame 4",
     "an armature deleted and undone": "+add Arm; +add Leg; +frame 6; +delete_armature Rig; frame 11; undo; "
     "frame 4",
+    # In an opened file, whose first undo step has the modifiers that Sinew replaces; also while it is hidden
+    **{
+        f"undone: {edit}": "add_shape_key Arm; add Arm dq; frame 8; save_and_load; +frame 6; "
+        f"+{edit}; undo; redo; undo; frame 4; +{edit}; +hide Arm viewport; undo; undo; frame 9; remove_all"
+        for edit in (
+            *("weights Arm lower", "move_vertices Arm", "edit_mesh Arm move", "edit_mesh Arm delete"),
+            *("swap_mesh Arm", "shape_key_points Arm", "shape_key_value Arm 0.9 0.9", "pose Rig lower"),
+            *("edit_bones Rig roll lower", "edit_bones Rig move lower", "rename_bone Rig lower"),
+            *("bone_options Rig deform lower", "groups Arm rename lower", "groups Arm move"),
+            *("armature_options Arm mask lower", "add_modifier Arm CAST", "add_modifier Arm CAST 0.9"),
+            *("another_armature Arm 'Other Rig'", "method Arm lbs", "remove Arm"),
+        )
+    },
+    "deleted and undone": "add Arm dq; frame 8; save_and_load; +frame 6; +delete_object Arm; undo; redo; "
+    "undo; frame 4; remove_all",
 }  # fmt: skip
 
 

@@ -196,14 +196,6 @@ def test_a_bake_plays_it_elsewhere(arm, stage, kind, tmp_path):
     assert scenes.worst(read, shapes) <= test_bake.TOLERANCE * scenes.diagonal(obj)
 
 
-def test_the_bake_operator_takes_what_is_set(arm, stage):
-    obj, _path = arm
-    _without, shapes = with_stage(obj, stage)
-    assert bpy.ops.sinew.bake(kind="shape-keys", frames="1-11") == {"FINISHED"}
-    assert not properties.has_sinew(obj)
-    assert scenes.worst(scenes.shapes(obj, FRAMES), shapes) <= test_bake.TOLERANCE * scenes.diagonal(obj)
-
-
 def test_points_and_job_files_take_it(arm, stage, tmp_path):
     obj, path = arm
     _without, shapes = with_stage(obj, stage)

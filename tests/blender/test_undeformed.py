@@ -182,28 +182,6 @@ def test_node_groups_in_front_that_lose_the_mark(rendered, route, make):
             scenes.add_sinew(obj, "lbs")
 
 
-def _in_viewport(obj):
-    """Its shape and its undeformed shape, as viewports get them that draw materials."""
-    bpy.context.scene.frame_set(9)
-    return scenes.final_points(obj), scenes.final_points(obj, "undeformed_co")
-
-
-@pytest.mark.parametrize("name", CHARACTERS)
-@pytest.mark.parametrize("route", routes.ROUTES)
-def test_coordinates_in_viewports(route, name):
-    routes.force(route)
-    obj, _armature = scenes.make_arm()
-    CHARACTERS[name](obj)
-    # Without a window, hair alone has Blender make the coordinates.
-    obj.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings.count = 1
-    shape, rest = _in_viewport(obj)
-    assert scenes.worst(shape, rest) > 0.1
-    scenes.add_sinew(obj, "lbs")
-    got, coordinates = _in_viewport(obj)
-    assert scenes.worst(got, shape) <= 1e-5
-    assert scenes.worst(coordinates, rest) <= 1e-6
-
-
 # Blender applies no modifier of the others, as their meshes have two users.
 @pytest.mark.parametrize("name", [n for n in CHARACTERS if n != "shared mesh" and "in front" not in n])
 @pytest.mark.parametrize("is_hidden", [False, True])
@@ -235,20 +213,12 @@ def test_the_mark_that_somebody_applied_is_made_again(rendered):
     assert node_group.IN_STACK not in obj.data.attributes
 
 
-@pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Sinew gives no normals")
-def test_also_where_sinew_gives_the_normals(rendered):
+@pytest.mark.parametrize(("name", "value"), [("normals", properties.SKINNED_NORMALS), ("heat", True)])
+def test_also_where_sinew_gives_normals_or_shows_a_heat_map(rendered, name, value):
     obj, _armature = scenes.make_arm()
     expected = rendered(obj)
     scenes.add_sinew(obj, "lbs")
-    properties.of(obj).normals = properties.SKINNED_NORMALS
-    _assert_same(rendered(obj), expected)
-
-
-def test_also_with_a_heat_map(rendered):
-    obj, _armature = scenes.make_arm()
-    expected = rendered(obj)
-    scenes.add_sinew(obj, "lbs")
-    properties.of(obj).heat = True
+    setattr(properties.of(obj), name, value)
     _assert_same(rendered(obj), expected)
 
 

@@ -112,11 +112,6 @@ def test_a_range_fitted_to_frames_holds_all_their_values():
     assert settings.length == pytest.approx(largest, rel=1e-5)
 
 
-def test_a_button_goes_to_the_frame():
-    bpy.ops.sinew.go_to_frame(frame=17.0)
-    assert bpy.context.scene.frame_current == 17
-
-
 def test_what_can_not_be_measured_is_said():
     obj, armature = waving_arm()
     scenes.add_sinew(obj, "dq")

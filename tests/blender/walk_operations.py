@@ -7,7 +7,6 @@ An operation raises NothingError if the file has nothing for it: choosing among 
 
 from __future__ import annotations
 
-import os
 import random
 import shlex
 from collections.abc import Callable, Sequence
@@ -2140,35 +2139,3 @@ def says(w: Walker, r: random.Random) -> None:
     if w.side.is_sinew and not any(str(word) in obj.sinew.error for word in r.words):
         raise ValueError(f"{obj.name}: says {obj.sinew.error!r}")
     r.words.clear()
-
-
-# --- Faults that test_walk plants, to check that they are found; never chosen
-
-
-@operation(0)
-def plant_shape(w: Walker, r: random.Random) -> None:
-    if w.side.is_sinew:
-        bpy.data.objects["Arm"].data.vertices[0].co.z += 0.001
-
-
-@operation(0)
-def plant_state(w: Walker, r: random.Random) -> None:
-    if w.side.is_sinew:
-        bpy.data.objects["Arm"].modifiers["Armature"].show_render = False
-
-
-@operation(0)
-def plant_exception(w: Walker, r: random.Random) -> None:
-    def fail(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
-        bpy.app.handlers.frame_change_post.remove(fail)
-        raise ValueError("planted")
-
-    if w.side.is_sinew:
-        bpy.app.handlers.frame_change_post.append(fail)
-        bpy.context.scene.frame_set(2)
-
-
-@operation(0)
-def plant_crash(w: Walker, r: random.Random) -> None:
-    if w.side.is_sinew:
-        os.abort()

@@ -112,11 +112,6 @@ def test_splines_and_skeletons_promote_all_of_a_call():
     assert skeleton.spline_vector(keys[None], [0], 0.5)[0].dtype == np.float64
 
 
-@pytest.mark.parametrize("threads", [0, 1, np.int8(2), np.uint64(3), True, np.array(2), 10**30])
-def test_threads_are_any_integer(threads):
-    np.testing.assert_array_equal(RIG.deform("dq", threads=threads), EXPECTED)
-
-
 # --- Pickles
 
 

@@ -38,27 +38,6 @@ def test_agrees_with_the_reference(form, scaled, most):
 
 
 @every_form
-def test_bones_may_have_another_space(form):
-    rig = random_rig(2, vertices=200, most_influences=4)
-    heads, tails = bones_of(rig)
-    bones_from_model = random_motion(np.random.default_rng(3), 2.0) @ np.diag([2.0, 2.0, 2.0, 1.0])
-    back = np.linalg.inv(bones_from_model)
-    points = rig.deform("dq") * np.float32(1.3)
-    rest, moved = (
-        transform(back, p.astype(np.float64)).astype(np.float32) for p in (rig.rest_points, points)
-    )
-    here = sinew.BulgeLimit(sinew.Binding(*rig.mesh), heads, tails).apply(points, rig.transforms, form=form)
-    limit = sinew.BulgeLimit(
-        sinew.Binding(rest, *rig.mesh[1:]), heads, tails, bones_from_model=bones_from_model
-    )
-    there = limit.apply(moved, rig.transforms, form=form)
-    np.testing.assert_allclose(transform(bones_from_model, there), here, atol=20 * TOLERANCE)
-    again = sinew.BulgeLimit(sinew.Binding(*rig.mesh), heads, tails)
-    again.set_rest_points(rest, bones_from_model)
-    np.testing.assert_array_equal(again.apply(moved, rig.transforms, form=form), there)
-
-
-@every_form
 def test_rest_poses_and_rigid_motions_change_nothing(form):
     rig = random_rig(5)
     limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *bones_of(rig))
@@ -82,35 +61,6 @@ def test_vertices_of_one_bone_and_scaled_bones_keep_their_place(form):
     points = 2.0 * rig.rest_points
     limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *bones_of(rig))
     np.testing.assert_allclose(limit.apply(points, larger, form=form), points, atol=TOLERANCE)
-
-
-def test_strength_and_weights_say_how_much():
-    rig = random_rig(9)
-    ends = bones_of(rig)
-    points = rig.deform("dq") * np.float32(1.3)
-    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *ends)
-    full = limit.apply(points, rig.transforms)
-    np.testing.assert_array_equal(limit.apply(points, rig.transforms, strength=0.0), points)
-    half = limit.apply(points, rig.transforms, strength=0.5)
-    np.testing.assert_allclose(half, 0.5 * (points + full), atol=TOLERANCE)
-    mask = np.where(np.arange(len(points)) % 2, 0.0, 1.0).astype(np.float32)
-    masked = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *ends, weights=mask).apply(points, rig.transforms)
-    np.testing.assert_array_equal(masked[1::2], points[1::2])
-    np.testing.assert_array_equal(masked[::2], full[::2])
-
-
-@every_form
-def test_threads_and_out_change_no_bit(form):
-    rig = random_rig(10, vertices=3000)
-    mask = np.random.default_rng(11).uniform(size=3000).astype(np.float32)
-    space = random_motion(np.random.default_rng(12))
-    limit = sinew.BulgeLimit(sinew.Binding(*rig.mesh), *bones_of(rig), weights=mask, bones_from_model=space)
-    points = rig.deform("dq") * np.float32(1.3)
-    expected = limit.apply(points, rig.transforms, form=form, threads=1)
-    np.testing.assert_array_equal(limit.apply(points, rig.transforms, form=form, threads=7), expected)
-    assert repr(limit) == "<sinew.BulgeLimit: 3000 vertices, 15 bones>"
-    assert limit.apply(points, rig.transforms, points, form=form) is points
-    np.testing.assert_array_equal(points, expected)
 
 
 @every_form

@@ -134,24 +134,6 @@ def test_each_variant_agrees_with_its_definition(variant, scaled, most_influence
         np.testing.assert_array_equal(deformer.deform(rig.transforms), points)
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_another_space_of_bones_is_that_by_hand(variant):
-    rig, rows = near_rig(5)
-    space = random_motion(np.random.default_rng(6), 2.0)
-    space[:3, :3] = space[:3, :3] @ np.diag([0.5, 1.0, 2.0])
-    parameters = {"ddm.variant": variant}
-    deformer = sinew.Deformer(*rig.mesh, "ddm", rig.rest_bones, {"ddm": rows})
-    points = deformer.deform(rig.transforms, bones_from_model=space.astype(np.float32), parameters=parameters)
-    moved = rows.astype(np.float64)
-    moved[:, 3:6] = rows[:, 3:6] @ space[:3, :3].T + rows[:, 2:3] * space[:3, 3]
-    xx, yy, zz, yz, xz, xy = rows[:, 6:].T
-    seconds = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
-    seconds = space[:3, :3] @ seconds @ space[:3, :3].T
-    moved[:, 6:] = seconds.reshape(-1, 9)[:, [0, 4, 8, 5, 2, 1]]
-    other = rig.with_(rest_points=transform(space, rig.rest_points).astype(np.float32))
-    assert_agrees(transform(space, points.astype(np.float64)), other, moved, parameters, 3e-5)
-
-
 def test_rest_and_rigid_motions_are_exact():
     tube = Tube()
     deformer = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": moments(tube, 0.3)})
@@ -213,12 +195,6 @@ def test_half_turns_are_finite_and_near(variant, degrees, axis):
     points = deformer.deform(motions, parameters={"ddm.variant": variant})
     assert np.isfinite(points).all()
     assert np.abs(points).max() < 10.0
-
-
-def test_it_is_linear_blending_if_asked_to():
-    rig = random_rig(3, scaled=True)
-    points = sinew.Deformer(*rig.mesh, "ddm", rig.rest_bones, {"ddm": None}).deform(rig.transforms)
-    np.testing.assert_allclose(points, rig.deform("lbs"), atol=2e-5)
 
 
 def test_without_radius_or_triangles_vertices_are_their_own_neighbourhoods():

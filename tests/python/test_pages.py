@@ -142,20 +142,6 @@ def marks_of(svg):
     return [(float(u.get("x")), float(u.get("y"))) for group in groups for u in group.iter(f"{SVG}use")]
 
 
-def test_a_plot_is_drawn_to_scale():
-    values = [0.0, 1.0, 2.0, -1.0]
-    svg = line_plot("A <b>", "m", [1, 2, 3, 4], {"one & two": [values]})
-    (line,) = paths_of(svg, "A-b--line-0-0")
-    x, y = np.array(line).T
-    np.testing.assert_allclose(np.diff(x), np.diff(x)[0], atol=0.01)
-    assert np.corrcoef(y, values)[0, 1] == pytest.approx(-1.0, abs=1e-5)
-    width, height = map(float, ElementTree.fromstring(svg).get("viewBox").split()[2:])
-    assert (x > 0).all()
-    assert (x < width).all()
-    assert (y > 0).all()
-    assert (y < height).all()
-
-
 def test_gaps_and_single_values_are_drawn():
     svg = line_plot("Gaps", "", [1, 2, 3, 4, 5], {"a": [[1.0, 2.0, float("nan"), 3.0, float("inf")]]})
     assert [len(run) for run in paths_of(svg, "Gaps-line") if len(run) > 1] == [2]

@@ -41,13 +41,6 @@ def test_nlerp_is_the_default_and_slerp_another_shape():
     assert np.abs(rig.deform("sdef", parameters=SLERP) - nlerp).max() > 0.01
 
 
-def test_it_is_linear_blending_if_asked_to():
-    rig = pairs(3, scaled=True)
-    deformer = sinew.Deformer(*rig.mesh, "sdef", rig.rest_bones, {"sdef": None})
-    points = deformer.deform(rig.transforms, parameters=SLERP)
-    np.testing.assert_allclose(points, rig.deform("lbs"), atol=4 * TOLERANCE)
-
-
 def test_the_mixed_method_has_its_parameters_and_other_methods_none():
     rig = pairs(4)
     slerp = rig.deform("sdef", parameters=SLERP)

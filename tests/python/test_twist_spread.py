@@ -117,38 +117,6 @@ def test_with_linear_blending_it_is_exact():
 
 
 @every_blend
-def test_bones_may_have_another_space_and_another_order(blend):
-    rig = random_rig(6, vertices=200, most_influences=4)
-    twists, *ends = chain(rig)
-    points = posed(rig, blend)
-    expected = sinew.TwistSpread(sinew.Binding(*rig.mesh), twists, *ends).apply(
-        points, rig.transforms, blend=blend
-    )
-    bones_from_model = random_motion(np.random.default_rng(7), 2.0) @ np.diag([2.0, 2.0, 2.0, 1.0])
-    back = np.linalg.inv(bones_from_model)
-    rest, moved = (
-        transform(back, p.astype(np.float64)).astype(np.float32) for p in (rig.rest_points, points)
-    )
-    binding = sinew.Binding(rest, *rig.mesh[1:])
-    there = sinew.TwistSpread(binding, twists, *ends, bones_from_model=bones_from_model)
-    got = there.apply(moved, rig.transforms, blend=blend)
-    np.testing.assert_allclose(transform(bones_from_model, got), expected, atol=20 * TOLERANCE)
-    again = sinew.TwistSpread(sinew.Binding(*rig.mesh), twists, *ends)
-    again.set_rest_points(rest, bones_from_model)
-    np.testing.assert_array_equal(again.apply(moved, rig.transforms, blend=blend), got)
-    # Bones numbered anew.
-    order = np.random.default_rng(8).permutation(len(rig.transforms))
-    number = np.argsort(order).astype(np.int32)
-    mesh = (rig.rest_points, rig.offsets, number[rig.bones], rig.weights)
-    other = twists.copy()
-    other[:, :3] = number[twists[:, :3]]
-    spread = sinew.TwistSpread(sinew.Binding(*mesh), other, *ends[:2], ends[2][order])
-    np.testing.assert_allclose(
-        spread.apply(points, rig.transforms[order], blend=blend), expected, atol=TOLERANCE
-    )
-
-
-@every_blend
 def test_rest_poses_stay_and_rigid_motions_commute(blend):
     rig = random_rig(9)
     twists, *ends = chain(rig)
@@ -167,48 +135,6 @@ def test_rest_poses_stay_and_rigid_motions_commute(blend):
         blend=blend,
     )
     np.testing.assert_allclose(second, transform(motion, first), atol=50 * TOLERANCE)
-
-
-@every_blend
-def test_mirrored_rigs_are_mirror_images(blend):
-    rig = random_rig(11, vertices=200, most_influences=4)
-    twists, heads, tails, rest_bones = chain(rig)
-    points = posed(rig, blend)
-    got = sinew.TwistSpread(sinew.Binding(*rig.mesh), twists, heads, tails, rest_bones).apply(
-        points, rig.transforms, blend=blend
-    )
-    mirror = np.diag([-1.0, 1.0, 1.0, 1.0]).astype(np.float32)
-    # Of axes, all but X are images: they stay right-handed.
-    bones = mirror @ rest_bones @ mirror
-    flip = mirror[:3, :3]
-    spread = sinew.TwistSpread(
-        sinew.Binding(rig.rest_points @ flip, *rig.mesh[1:]), twists, heads @ flip, tails @ flip, bones
-    )
-    other = spread.apply(points @ flip, mirror @ rig.transforms @ mirror, blend=blend)
-    np.testing.assert_allclose(other @ flip, got, atol=10 * TOLERANCE)
-
-
-@every_blend
-def test_threads_and_out_change_no_bit(blend):
-    rig = random_rig(12, vertices=3000)
-    twists, *ends = chain(rig)
-    rng = np.random.default_rng(13)
-    mask, mix = rng.uniform(size=(2, 3000)).astype(np.float32)
-    spread = sinew.TwistSpread(
-        sinew.Binding(*rig.mesh),
-        twists,
-        *ends,
-        parents=np.arange(-1, len(rig.transforms) - 1),
-        bones_from_model=random_motion(rng),
-        weights=mask,
-        mix=mix,
-    )
-    points, how = posed(rig, blend), {"blend": blend, "channels": true_channels(rig, twists, 1.4)}
-    expected = spread.apply(points, rig.transforms, threads=1, **how)
-    np.testing.assert_array_equal(spread.apply(points, rig.transforms, threads=7, **how), expected)
-    assert repr(spread) == "<sinew.TwistSpread: 3000 vertices, 7 twists>"
-    assert spread.apply(points, rig.transforms, points, **how) is points
-    np.testing.assert_array_equal(points, expected)
 
 
 @every_blend
