@@ -317,7 +317,7 @@ for _bpy in BLENDERS:
 
 @job("browser")
 def browser(session: nox.Session) -> None:
-    """All: the page that turns and three.js, in browsers that the system brings where it can."""
+    """All: the page that turns and three.js, in browsers that the system brings where it can; Godot."""
     missing = [name for name, programs in BROWSERS.items() if not any(map(shutil.which, programs.split()))]
     if missing and shutil.which("apt-get") and (os.geteuid() == 0 or shutil.which("sudo")):
         start = ["sudo"] * (os.geteuid() != 0)

@@ -268,7 +268,7 @@ func _update() -> void:
 		if _boxes[bind].size:
 			box = box.merge(motion * _boxes[bind]) if box.size else motion * _boxes[bind]
 	# Bent skin may be outside of the bones' boxes.
-	_instance.custom_aabb = box.grow(0.1 * box.get_longest_axis_size())
+	_instance.custom_aabb = box.grow(0.25 * box.get_longest_axis_size())
 	var nearby := {-1: Quaternion.IDENTITY}
 	for bone in _bones:
 		_write_rotation(bone, motions, nearby)

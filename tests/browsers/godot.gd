@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Godot plays a glTF file for a second, and writes the points and normals of each mesh as the GPU computes them.
-# Arguments: the file (res://: as it was imported), the folder for what is written, and with --linear: without the
-# extension, by the method that the node of sinew.gd has on its own.
+# Godot plays a glTF file, and writes the points and normals of each mesh as its shader has them.
+# Arguments: the file (res://: as the editor has imported it), a time in seconds, a folder for what is written; a method
+# for meshes without the extension.
 extends SceneTree
 
 const WIDTH := 256
-# Points that are drawn, each on a pixel of its own, have four bits of a number in each colour.
+# Each vertex is a point on a pixel of its own, the colours of which have four bits each of the bits of a number.
+# `first` is also the name of an argument in sinew.glsl.
 const READ := """
 shader_type spatial;
-render_mode unshaded, cull_disabled;
+render_mode unshaded;
 uniform int first;
 uniform int part;
 varying flat vec3 colour;
@@ -32,46 +33,53 @@ func _initialize() -> void:
 	var shader := Shader.new()
 	shader.code = READ.replace("WIDTH", str(WIDTH))
 	var about := {}
-	var materials: Array[ShaderMaterial] = []
 	var first := 0
-	for instance: MeshInstance3D in scene.find_children("*", "MeshInstance3D"):
-		var numbers := []
+	var instances := scene.find_children("*", "MeshInstance3D")
+	for instance: MeshInstance3D in instances:
+		var arrays := instance.mesh.surface_get_arrays(0)
+		var format: int = instance.mesh.surface_get_format(0) & ~(Mesh.ARRAY_FORMAT_CUSTOM0 - 1)
+		var own := {"first": first, "count": arrays[Mesh.ARRAY_VERTEX].size()}
+		for number in [Mesh.ARRAY_VERTEX, Mesh.ARRAY_BONES, Mesh.ARRAY_WEIGHTS]:
+			var file := FileAccess.open("%s/%s.%d" % [arguments[2], instance.name, number], FileAccess.WRITE)
+			file.store_buffer(arrays[number].to_byte_array())
 		var points := ArrayMesh.new()
-		var start := first
-		for surface in instance.mesh.get_surface_count():
-			var arrays := instance.mesh.surface_get_arrays(surface)
-			arrays[Mesh.ARRAY_INDEX] = null
-			var flags: int = instance.mesh.surface_get_format(surface) & ~(Mesh.ARRAY_FORMAT_CUSTOM0 - 1)
-			points.add_surface_from_arrays(Mesh.PRIMITIVE_POINTS, arrays, [], {}, flags)
-			var material := ShaderMaterial.new()
-			material.shader = shader
-			material.set_shader_parameter("first", first)
-			points.surface_set_material(surface, material)
-			first += arrays[Mesh.ARRAY_VERTEX].size()
-			numbers.append(Array(arrays[Mesh.ARRAY_CUSTOM0] if arrays[Mesh.ARRAY_CUSTOM0] else []))
+		arrays[Mesh.ARRAY_INDEX] = null
+		points.add_surface_from_arrays(Mesh.PRIMITIVE_POINTS, arrays, [], {}, format)
+		var material := ShaderMaterial.new()
+		material.shader = shader
+		material.set_shader_parameter("first", first)
+		points.surface_set_material(0, material)
 		instance.mesh = points
 		instance.extra_cull_margin = 1000.0
-		about[instance.name] = {"first": start, "count": first - start, "numbers": numbers}
+		first += own["count"]
+		about[instance.name] = own
+		if arguments.size() > 3:
+			var sinew: Node = load("res://addons/sinew/sinew.gd").new()
+			sinew.method = arguments[3]
+			instance.add_child(sinew)
 	RenderingServer.set_default_clear_color(Color.BLACK)
 	root.add_child(scene)
 	root.add_child(Camera3D.new())
 	var player: AnimationPlayer = scene.find_children("*", "AnimationPlayer")[0]
 	player.play(player.get_animation_list()[0])
-	player.seek(float(arguments[2]), true)
+	player.seek(float(arguments[1]), true)
 	player.pause()
 	for part in 21:
-		for instance: MeshInstance3D in scene.find_children("*", "MeshInstance3D"):
-			for surface in instance.mesh.get_surface_count():
-				instance.get_active_material(surface).set_shader_parameter("part", part)
+		for instance: MeshInstance3D in instances:
+			instance.get_active_material(0).set_shader_parameter("part", part)
 		for frame in 2:
 			await RenderingServer.frame_post_draw
 		var image := root.get_texture().get_image()
 		image.convert(Image.FORMAT_RGB8)
-		FileAccess.open("%s/%d" % [arguments[1], part], FileAccess.WRITE).store_buffer(image.get_data())
-	for instance: MeshInstance3D in scene.find_children("*", "MeshInstance3D"):
-		about[instance.name]["box"] = var_to_str(instance.custom_aabb)
-	FileAccess.open(arguments[1] + "/about.json", FileAccess.WRITE).store_string(JSON.stringify(about))
+		FileAccess.open("%s/%d" % [arguments[2], part], FileAccess.WRITE).store_buffer(image.get_data())
+	for instance: MeshInstance3D in instances:
+		about[instance.name]["box"] = [instance.custom_aabb.position, instance.custom_aabb.end].map(_list)
+	FileAccess.open(arguments[2] + "/about.json", FileAccess.WRITE).store_string(JSON.stringify(about))
 	quit()
+
+
+func _list(vector: Vector3) -> Array:
+	return [vector.x, vector.y, vector.z]
 
 
 func _loaded(path: String) -> Node:

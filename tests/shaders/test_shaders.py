@@ -219,6 +219,52 @@ def test_glsl_vertex_shader(gl, mesh):
         mesh.assert_has_normals(result, normals)
 
 
+@pytest.mark.parametrize("influences", [4, MOST])
+def test_what_godot_gets_computes_the_same(gl, mesh, influences):
+    script = (SHADERS / "godot/sinew.gd").read_text()
+    (text,) = re.findall(r'^const SKIN := """(.*?)"""', script, re.MULTILINE | re.DOTALL)
+    texels = [f"texelFetch(sinew_vertices, at + ivec2({{}}, 0), 0).{'xyzw'[i % 4]}" for i in range(influences)]
+    values = {"influences": influences, "texels": 2 + influences // 2, "row": 1024, "functions": glsl("sinew.glsl")}
+    values["joints"] = ", ".join(f"int({each.format(2 + i // 4 * 2)})" for i, each in enumerate(texels))
+    values["weights"] = ", ".join(each.format(3 + i // 4 * 2) for i, each in enumerate(texels))
+    for name, value in values.items():
+        text = text.replace(f"{{{name}}}", str(value))
+    source = f"""#version 330
+        {text.replace(" : filter_nearest", "")}
+        in vec3 position, at_rest;
+        out vec3 point, normal;
+        void main() {{
+            point = position, normal = at_rest;
+            vec3 tangent = normal, binormal = normal;
+            sinew(gl_VertexID, point, normal, tangent, binormal);
+        }}"""
+    program = gl.program(source, varyings=["point", "normal"])
+    content = [
+        (gl.buffer(values.astype(np.float32).tobytes()), "3f", name)
+        for values, name in ((mesh.points, "position"), (mesh.normals, "at_rest"))
+    ]
+    vertices, count = gl.vertex_array(program, content), len(mesh.points)
+    bones = gl.texture((8, len(mesh.case["rest"])), 4, dtype="f4")
+    data = gl.texture((1024 * (2 + influences // 2), 1), 4, dtype="f4")
+    bones.use(0), data.use(1)
+    program["sinew_bones"], program["sinew_vertices"] = 0, 1
+    out = gl.buffer(reserve=24 * count)
+    for result in mesh.results:
+        program["sinew_first"], program["sinew_second"], program["sinew_form"] = numbers(result)
+        bones.write(mesh.palette(result).tobytes())
+        own = np.zeros((1024, 2 + influences // 2, 4), np.float32)
+        own[:count, 0, :3] = mesh.centres
+        own[:count, 0, 3], own[:count, 1, 0], own[:count, 1, 1] = mesh.amounts(result)
+        for k in range(influences // 4):
+            four = slice(4 * k, 4 * k + 4)
+            own[:count, 2 + 2 * k], own[:count, 3 + 2 * k] = mesh.bones[:, four], mesh.weights[:, four]
+        data.write(own.tobytes())
+        vertices.transform(out, mode=gl.POINTS)
+        points, normals = np.frombuffer(out.read(), np.float32).reshape(-1, 2, 3).swapaxes(0, 1)
+        mesh.assert_is(result, points)
+        mesh.assert_has_normals(result, normals)
+
+
 def packed(mesh, influences, result):
     """float32 words of the struct Vertex of the compute shaders, [vertices, 12 + 2 * influences]."""
     words = np.zeros((len(mesh.points), 12 + 2 * influences), np.float32)
