@@ -223,8 +223,15 @@ def test_glsl_vertex_shader(gl, mesh):
 def test_what_godot_gets_computes_the_same(gl, mesh, influences):
     script = (SHADERS / "godot/sinew.gd").read_text()
     (text,) = re.findall(r'^const SKIN := """(.*?)"""', script, re.MULTILINE | re.DOTALL)
-    texels = [f"texelFetch(sinew_vertices, at + ivec2({{}}, 0), 0).{'xyzw'[i % 4]}" for i in range(influences)]
-    values = {"influences": influences, "texels": 2 + influences // 2, "row": 1024, "functions": glsl("sinew.glsl")}
+    texels = [
+        f"texelFetch(sinew_vertices, at + ivec2({{}}, 0), 0).{'xyzw'[i % 4]}" for i in range(influences)
+    ]
+    values = {
+        "influences": influences,
+        "texels": 2 + influences // 2,
+        "row": 1024,
+        "functions": glsl("sinew.glsl"),
+    }
     values["joints"] = ", ".join(f"int({each.format(2 + i // 4 * 2)})" for i, each in enumerate(texels))
     values["weights"] = ", ".join(each.format(3 + i // 4 * 2) for i, each in enumerate(texels))
     for name, value in values.items():
