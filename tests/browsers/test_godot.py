@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects shaders/godot: by it Godot plays files of the golden set as that has them, in each of its renderers."""
+"""Protects shaders/godot: by it each renderer of Godot plays files of the golden set as that has them."""
 
 import json
 import os
@@ -26,7 +26,7 @@ NORMALS = 2e-4
 
 
 class Played:
-    """A mesh of a file, as Godot has it: vertices that are rest, points, normals [n, 3], bones, weights [n, k]."""
+    """A mesh as Godot has it: rest, points, normals [vertices, 3], bones, weights [vertices, 4 or 8]."""
 
     def __init__(self, folder, name, about, words):
         arrays = {number: np.fromfile(folder / f"{name}.{number}", kind) for number, kind in KINDS.items()}
