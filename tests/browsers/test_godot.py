@@ -12,7 +12,7 @@ import pytest
 import read_glb
 from conftest import REPOSITORY, sinew
 from test_shaders import GOLDEN, Mesh
-from test_three import twist, write
+from test_three import write
 
 VERTEX, BONES, WEIGHTS = 0, 10, 11
 KINDS = {VERTEX: "<f4", BONES: "<i4", WEIGHTS: "<f4"}
@@ -115,9 +115,7 @@ def of_file(file, played, mesh):
     ],
 )
 def test_points_and_normals_are_golden(project, case, renderer, influences, is_imported):
-    mesh = Mesh(GOLDEN / f"{'weights' if case == 'twisted' else case}.npz")
-    if case == "twisted":
-        twist(mesh.case)
+    mesh = Mesh(GOLDEN / f"{case}.npz")
     results = [result for result in mesh.results if result["array"] != "turned"]
     if mesh.case["segments"].max() > 1:
         # Segments of a bendy bone are no joints' own.
@@ -134,8 +132,7 @@ def test_points_and_normals_are_golden(project, case, renderer, influences, is_i
         points, normals = found.points[order], found.normals[order]
         x, y, z = points.T
         assert np.abs(np.column_stack([x, -z, y]) - read[result["array"]][0]).max() <= mesh.tolerance, result
-        if case != "twisted":
-            mesh.assert_is(result, points)
+        mesh.assert_is(result, points)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         assert np.abs(normals - mesh.expected_normals(result)).max() <= NORMALS, result
 

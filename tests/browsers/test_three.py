@@ -15,7 +15,7 @@ import pytest
 import read_glb
 from conftest import REPOSITORY
 from test_shaders import GOLDEN, Mesh
-from trimesh.transformations import quaternion_from_matrix, rotation_matrix
+from trimesh.transformations import quaternion_from_matrix
 
 WIDTHS = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 COMPONENTS = {np.dtype("f4"): 5126, np.dtype("u2"): 5123}
@@ -137,15 +137,6 @@ def write(mesh, results, path, influences):
     made.write(path)
 
 
-def twist(case):
-    """Each bone against its parent: so far that signs by hierarchy matter, and that twists fade."""
-    rest, posed, by = case["rest"], case["posed"], rotation_matrix(np.radians(160), (0.1, 1.0, 0.05))
-    for bone, parent in enumerate(case["parents"]):
-        posed[bone] = (
-            (posed[parent] @ np.linalg.inv(rest[parent]) if parent >= 0 else np.eye(4)) @ rest[bone] @ by
-        )
-
-
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """A folder and its address: pages of files may not import modules."""
@@ -190,9 +181,7 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 )
 def test_points_and_normals_are_golden(browser, site, case, how, influences):
     folder, address = site
-    mesh = Mesh(GOLDEN / f"{'weights' if case == 'twisted' else case}.npz")
-    if case == "twisted":
-        twist(mesh.case)
+    mesh = Mesh(GOLDEN / f"{case}.npz")
     results = [result for result in mesh.results if result["array"] != "turned"]
     if mesh.case["segments"].max() > 1:
         # Segments of a bendy bone are no joints' own.
@@ -205,15 +194,12 @@ def test_points_and_normals_are_golden(browser, site, case, how, influences):
     assert browser.run("return window.sinew.error") == 0
     world = browser.floats("window.sinew.matrix").reshape(4, 4).T.astype(np.float64)
     read = read_glb.points_at(file, [1.0])
-    if case == "twisted":
-        assert np.abs(read["dq_hierarchy"] - read["preserve_volume"]).max() > 0.1
     for result in results:
         found = browser.floats(f"window.sinew.points.{result['array']}").reshape(-1, 7)
         assert np.all(found[:, 3] == 1)
         points = (found[:, :3] - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T
         x, y, z = points.T
         assert np.abs(np.column_stack([x, -z, y]) - read[result["array"]][0]).max() <= mesh.tolerance, result
-        if case != "twisted":
-            mesh.assert_is(result, points)
+        mesh.assert_is(result, points)
         normals = found[:, 4:] @ world[:3, :3]
         mesh.assert_has_normals(result, normals / np.linalg.norm(normals, axis=1, keepdims=True))
