@@ -41,7 +41,8 @@ METHODS = ("lbs", "dq", "cor")
 Form: TypeAlias = Literal["continuous", "kim_han"]
 BLENDER, MIX = "blender", "mix"
 FOLDER = Path(__file__).parent / "templates/viewer"
-_SHADERS = (".glsl", ".vert", ".frag")
+_SHADERS = (".glsl", ".vert", ".frag", ".wgsl")
+_SCRIPTS = ("gl.js", "gpu.js", "viewer.js")
 _RAMP_STOPS = 64
 _TEXTS = {"distance": "The distance of each vertex from where Blender's Armature modifier takes it."}
 
@@ -352,7 +353,7 @@ class Viewer:
             "HEADER": _in_script(self._header(places)),
             "ARRAYS": data,
             "SHADERS": _in_script({name: texts[name] for name in texts if name.endswith(_SHADERS)}),
-            "SCRIPT": texts["viewer.js"],
+            "SCRIPT": "\n".join(texts[name] for name in _SCRIPTS),
         }
         return re.sub("%([A-Z]+)%", lambda match: values[match[1]], texts["viewer.html"])
 

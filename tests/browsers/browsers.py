@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Browsers without a screen, with WebGL in software, for tests of pages: all are asked alike."""
+"""Browsers without a screen, with WebGL and WebGPU in software, for tests of pages: all are asked alike."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ import numpy as np
 SECONDS = 120
 # Drivers take far longer for a list of numbers.
 _AS_TEXT = """
-const bytes = new Uint8Array(Float32Array.from(%s).buffer);
+const found = await %s;
+// Firefox hides the numbers of pages from scripts.
+const bytes = new Uint8Array(Float32Array.from(found.wrappedJSObject || found).buffer);
 let text = "";
 for (let i = 0; i < bytes.length; i += 4096) text += String.fromCharCode(...bytes.subarray(i, i + 4096));
 return btoa(text)
@@ -62,14 +64,15 @@ class Browser:
             time.sleep(0.05)
         raise AssertionError(f"not within {SECONDS} s: {condition}")
 
-    def show(self, page, width=1280, height=800, is_dark=False, is_still=False):
+    def show(self, page, width=1280, height=800, is_dark=False, is_still=False, way="webgl"):
         """Opens a page, and waits until it has drawn the character.
 
         is_still  as if somebody had the system show as little motion as it can
+        way       to draw: webgl or webgpu
         """
         self.resize(width, height)
         self.prefer(is_dark, is_still)
-        self.open(page.as_uri())
+        self.open(f"{page.as_uri()}?draw={way}")
         said = self.wait("window.sinew ? 'drawn' : document.getElementById('message').textContent")
         assert said == "drawn", said
 
@@ -88,7 +91,11 @@ class Chromium(Browser):
 
         options = webdriver.ChromeOptions()
         options.binary_location = self.program(0)
-        for word in ("headless=new", "no-sandbox", "use-angle=swiftshader", "enable-unsafe-swiftshader"):
+        words = ["headless=new", "no-sandbox", "use-angle=swiftshader", "enable-unsafe-swiftshader"]
+        # Without Vulkan it has an adapter, and no textures to show.
+        words += ["enable-unsafe-webgpu", "use-webgpu-adapter=swiftshader"]
+        words += ["enable-features=Vulkan", "use-vulkan=swiftshader"]
+        for word in words:
             options.add_argument(f"--{word}")
         service = webdriver.ChromeService(self.program(1))
         self._driver = webdriver.Chrome(options=options, service=service)
@@ -138,6 +145,7 @@ class Firefox(Browser):
         settings = {
             "marionette.port": str(port),
             "webgl.force-enabled": "true",
+            "dom.webgpu.enabled": "true",
             "browser.shell.checkDefaultBrowser": "false",
             "datareporting.policy.dataSubmissionEnabled": "false",
         }
@@ -194,7 +202,12 @@ class Firefox(Browser):
 
     def run(self, code):
         # Scripts have windows of their own, which do not show what pages add to theirs.
-        return self._driver.execute_script(code.replace("window.sinew", "window.wrappedJSObject.sinew"))
+        own = code.replace("window.sinew", "window.wrappedJSObject.sinew")
+        ends = "(found) => end([found, null]), (error) => end([null, String(error)])"
+        words = f"const end = arguments[0]; (async () => {{{own}}})().then({ends})"
+        found, error = self._driver.execute_async_script(words)
+        assert error is None, error
+        return found
 
     def press(self, key):
         self._driver.actions.sequence("key", "keyboard").send_keys(key).perform()

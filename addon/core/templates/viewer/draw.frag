@@ -6,8 +6,6 @@ uniform vec3 eye;
 uniform vec3 right;
 uniform vec3 up;
 uniform sampler2D ramp;
-uniform bool has_heat;
-uniform bool is_logarithmic;
 uniform vec2 range;  // the values at both ends of the ramp
 
 in vec3 position;
@@ -24,11 +22,14 @@ void main() {
     float fill = max(dot(n, normalize(view + 0.9 * right + 0.1 * up)), 0.0);
     float light = 0.26 + 0.62 * key + 0.16 * fill + 0.1 * n.z;
     vec3 base = vec3(0.80, 0.765, 0.72);
-    if (has_heat) {
+    if (HAS_HEAT == 1) {
+        bool is_logarithmic = IS_LOGARITHMIC == 1;
         vec2 ends = is_logarithmic ? log(range) : range;
         float at = is_logarithmic ? log(max(value, 1e-12)) : value;
-        float share = clamp((at - ends.x) / (ends.y - ends.x), 0.0, 1.0);
-        base = texture(ramp, vec2(share, 0.5)).rgb;
+        int last = textureSize(ramp, 0).x - 1;
+        float stop = float(last) * clamp((at - ends.x) / (ends.y - ends.x), 0.0, 1.0);
+        vec3 next = texelFetch(ramp, ivec2(ceil(stop), 0), 0).rgb;
+        base = mix(texelFetch(ramp, ivec2(stop, 0), 0).rgb, next, fract(stop));
         light = 0.5 + 0.5 * light;
     }
     colour = vec4(base * min(light, 1.15), 1.0);

@@ -8,5 +8,5 @@ in float share;
 out vec4 colour;
 
 void main() {
-    colour = vec4(line, 0.3 * share);
+    colour = 0.3 * share * vec4(line, 1.0);
 }

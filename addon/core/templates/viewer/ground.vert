@@ -16,7 +16,7 @@ void main() {
     float across = float(line % LINES - LINES / 2) * spacing;
     float along = (2.0 * float(piece % PIECES + (gl_VertexID & 1)) / float(PIECES) - 1.0) * radius;
     vec2 place = line < LINES ? vec2(across, along) : vec2(along, across);
-    share = smoothstep(1.0, 0.1, length(place) / radius);
+    share = 1.0 - smoothstep(0.1, 1.0, length(place) / radius);
     vec2 start = floor(middle.xy / spacing + 0.5) * spacing;
     gl_Position = clip_from_world * vec4(start + place, middle.z, 1.0);
 }

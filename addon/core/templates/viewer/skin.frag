@@ -7,13 +7,9 @@ precision highp sampler2D;
 
 #include "sinew.glsl"
 
-uniform int method;
-uniform int second_method;
-uniform int bulge_form;
 uniform sampler2D rest;        // position, and the share of the second method
 uniform sampler2D centres;
 uniform sampler2D amounts;     // of Twist Spread and Limit Bulge
-uniform float stages;          // 1, or 0 without them
 uniform sampler2D influences;  // bone and weight, SINEW_INFLUENCES for each vertex
 
 out vec4 point;
@@ -32,9 +28,9 @@ void main() {
     vec4 at_rest = texelFetch(rest, place, 0);
     vec3 x = at_rest.xyz;
     vec3 centre = texelFetch(centres, place, 0).xyz;
-    vec2 amount = stages * texelFetch(amounts, place, 0).xy;
-    vec3 moved = sinew_mix(method, second_method, at_rest.w, x, centre, bones, weights);
-    float linear_share = sinew_linear_share(method, second_method, at_rest.w);
+    vec2 amount = float(STAGES) * texelFetch(amounts, place, 0).xy;
+    vec3 moved = sinew_mix(METHOD, SECOND_METHOD, at_rest.w, x, centre, bones, weights);
+    float linear_share = sinew_linear_share(METHOD, SECOND_METHOD, at_rest.w);
     moved = sinew_twist_spread(moved, linear_share, amount.x, x, bones, weights);
-    point = vec4(sinew_bulge_limit(moved, bulge_form, amount.y, x, bones, weights), 1.0);
+    point = vec4(sinew_bulge_limit(moved, BULGE_FORM, amount.y, x, bones, weights), 1.0);
 }

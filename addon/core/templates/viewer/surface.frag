@@ -12,8 +12,7 @@ uniform sampler2D rest;
 uniform usampler2D around;   // of each vertex: first and number of its corners, then of its edges
 uniform usampler2D corners;  // the other two vertices of each triangle
 uniform usampler2D ends;     // the other end of each edge
-uniform mat3 world_from_armature;
-uniform int measure;         // 1: distance, 2: edge stretch
+uniform mat4 world_from_armature;
 
 out vec4 surface;
 
@@ -22,7 +21,7 @@ ivec2 place_of(int k) {
 }
 
 vec3 to(sampler2D shape, uint vertex, vec3 from) {
-    return world_from_armature * (texelFetch(shape, place_of(int(vertex)), 0).xyz - from);
+    return mat3(world_from_armature) * (texelFetch(shape, place_of(int(vertex)), 0).xyz - from);
 }
 
 void main() {
@@ -36,8 +35,8 @@ void main() {
         normal += cross(to(points, others.x, own), to(points, others.y, own));
     }
     float value = 0.0;
-    if (measure == 1) value = length(world_from_armature * (own - texelFetch(reference, place, 0).xyz));
-    if (measure == 2) {
+    if (MEASURE == 1) value = length(mat3(world_from_armature) * (own - texelFetch(reference, place, 0).xyz));
+    if (MEASURE == 2) {
         float worst = 0.0;
         for (uint k = 0u; k < span.w; ++k) {
             uint end = texelFetch(ends, place_of(int(span.z + k)), 0).x;

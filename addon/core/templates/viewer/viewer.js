@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: MIT
 // A character that the browser skins and draws: core/viewer.py writes the page, docs/viewer.md describes it.
-"use strict";
 
 (async () => {
 const find = (id) => document.getElementById(id);
 const header = JSON.parse(find("header").textContent);
 const sources = JSON.parse(find("shaders").textContent);
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
-// Of textures with a texel for each vertex, corner or influence.
-const SHIFT = 10, WIDTH = 1 << SHIFT;
 const METHODS = { lbs: 0, dq: 1, cor: 2 }, HIERARCHY = 4, BONE = 8, FORMS = { kim_han: 1 };
 // Of the grid: lines each way, each in pieces that fade out.
-const LINES = 31, PIECES = 12, GROUND_VERTICES = 2 * 2 * LINES * PIECES;
+const LINES = 31, PIECES = 12, GROUND_ENDS = 2 * 2 * LINES * PIECES;
 
 function fail(text) {
   find("message").textContent = text;
@@ -31,102 +28,41 @@ async function readArrays() {
   })));
 }
 
-// --- WebGL
-
-const canvas = find("view");
-const gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: false });
-if (!gl || !gl.getExtension("EXT_color_buffer_float")) {
-  fail("This page needs WebGL 2 with textures of floats, which this browser does not offer.");
-  return;
-}
 if (typeof DecompressionStream === "undefined") {
   fail("This page needs a newer browser: Chromium 80, Firefox 113 or Safari 16.4.");
   return;
 }
 
-const programs = new Map();
+// --- What draws: gpu.js or gl.js
 
-function program(vertex, fragment, defines = "") {
-  const key = vertex + fragment + defines;
-  if (programs.has(key)) return programs.get(key);
-  const made = gl.createProgram();
-  for (const [name, type] of [[vertex, gl.VERTEX_SHADER], [fragment, gl.FRAGMENT_SHADER]]) {
-    const shader = gl.createShader(type);
-    const text = sources[name].replace('#include "sinew.glsl"', () => sources["sinew.glsl"]);
-    gl.shaderSource(shader, text.replace("\n", `\n#define WIDTH ${WIDTH}\n#define SHIFT ${SHIFT}\n#define LINES ${LINES}\n#define PIECES ${PIECES}\n${defines}\n`));
-    gl.compileShader(shader);
-    gl.attachShader(made, shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(name + ": " + gl.getShaderInfoLog(shader));
-  }
-  gl.linkProgram(made);
-  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
-  const places = {};
-  for (let i = 0; i < gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS); ++i) {
-    const { name } = gl.getActiveUniform(made, i);
-    places[name] = gl.getUniformLocation(made, name);
-  }
-  programs.set(key, { made, places });
-  return programs.get(key);
-}
+const wanted = new URLSearchParams(location.search).get("draw");
+let canvas = find("view"), way, meshes, ramps, isFast = false;
 
-// Sets uniforms: textures are objects with `texture`, whole numbers come as { int }, the rest by their length.
-function use(its, values) {
-  gl.useProgram(its.made);
-  let unit = 0;
-  for (const [name, value] of Object.entries(values)) {
-    const place = its.places[name];
-    if (place === undefined) continue;
-    if (value.texture) {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, value.texture);
-      gl.uniform1i(place, unit++);
-    } else if (value.int !== undefined) gl.uniform1i(place, value.int);
-    else if (value.length === 16) gl.uniformMatrix4fv(place, false, value);
-    else if (value.length === 9) gl.uniformMatrix3fv(place, false, value);
-    else if (value.length === 3) gl.uniform3fv(place, value);
-    else if (value.length === 2) gl.uniform2fv(place, value);
-    else gl.uniform1f(place, value);
+// Begins with the first that can draw. Where it ends later, the next one goes on, on a canvas of its own.
+async function begin([make, ...others]) {
+  const next = (text) => {
+    if (!others.length) return fail(text);
+    const old = canvas, hasFocus = document.activeElement === old;
+    canvas = old.cloneNode();
+    old.replaceWith(canvas);
+    if (hasFocus) canvas.focus();
+    return begin(others);
+  };
+  try {
+    way = await make(canvas, sources, { LINES, PIECES }, next);
+  } catch (error) {
+    return next(error.message);
   }
-}
-
-const FORMATS = {
-  rgba: [gl.RGBA32F, gl.RGBA, gl.FLOAT, 4, Float32Array],
-  rg: [gl.RG32F, gl.RG, gl.FLOAT, 2, Float32Array],
-  whole4: [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 4, Uint32Array],
-  whole2: [gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT, 2, Uint32Array],
-  whole1: [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT, 1, Uint32Array],
-};
-
-// A texture with `values` in rows of `width` texels; null for `count` texels to draw to.
-function texture(format, values, count, width = WIDTH) {
-  const [inside, outside, type, components, Kind] = FORMATS[format];
-  const height = Math.max(Math.ceil(count / width), 1);
-  let data = null;
-  if (values) {
-    data = new Kind(width * height * components);
-    data.set(values);
-  }
-  const made = { texture: gl.createTexture(), width, height, outside, type };
-  gl.bindTexture(gl.TEXTURE_2D, made.texture);
-  gl.texImage2D(gl.TEXTURE_2D, 0, inside, width, height, 0, outside, type, data);
-  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
-  for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
-  if (!values) {
-    made.frame = gl.createFramebuffer();
-    gl.bindFramebuffer(gl.FRAMEBUFFER, made.frame);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, made.texture, 0);
-  }
-  return made;
-}
-
-function drawTo(target, its, values) {
-  gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
-  gl.viewport(0, 0, target.width, target.height);
-  gl.disable(gl.DEPTH_TEST);
-  gl.disable(gl.SCISSOR_TEST);
-  gl.disable(gl.BLEND);
-  use(its, values);
-  gl.drawArrays(gl.TRIANGLES, 0, 3);
+  meshes = header.parts.map((about, i) => new Mesh(about, arrays[i]));
+  ramps = header.measures.map(({ ramp }) => {
+    const stops = Array.from({ length: ramp.length / 3 }, (_, i) => [...ramp.slice(3 * i, 3 * i + 3), 255]).flat();
+    return way.array("float4", Float32Array.from(stops, (x) => x / 255), stops.length / 4, stops.length / 4);
+  });
+  skinnedFor = "";
+  connectCanvas();
+  listNotes();
+  isFast = await measureSpeed();
+  changed();
 }
 
 // --- Meshes
@@ -152,7 +88,7 @@ class Mesh {
     this.most = 1;
     for (let v = 0; v < this.count; ++v) this.most = Math.max(this.most, arrays.offsets[v + 1] - arrays.offsets[v]);
     const wide = (points, last) => {
-      const found = new Float32Array(4 * WIDTH * Math.max(Math.ceil(this.count / WIDTH), 1));
+      const found = new Float32Array(4 * this.count);
       for (let v = 0; v < this.count; ++v) {
         for (let i = 0; i < 3; ++i) found[4 * v + i] = points[3 * v + i];
         found[4 * v + 3] = last ? last[v] : 0;
@@ -160,19 +96,15 @@ class Mesh {
       return found;
     };
     this.restRows = wide(arrays.rest, arrays.shares);
-    this.rest = texture("rgba", this.restRows, this.count);
-    this.centres = texture("rgba", wide(arrays.centres || arrays.rest), this.count);
-    this.amounts = texture("rg", arrays.amounts || new Float32Array(2 * this.count), this.count);
-    this.palette = texture("rgba", arrays.palettes.subarray(0, 4 * BONE * this.bones), BONE * this.bones, BONE);
+    this.rest = way.array("float4", this.restRows, this.count);
+    this.centres = way.array("float4", wide(arrays.centres || arrays.rest), this.count);
+    this.amounts = way.array("float2", arrays.amounts || new Float32Array(2 * this.count), this.count);
+    this.palette = way.array("float4", arrays.palettes.subarray(0, 4 * BONE * this.bones), BONE * this.bones, BONE);
     this.drawAround(arrays.triangles, arrays.edges);
-    const target = () => texture("rgba", null, this.count);
+    const target = () => way.array("float4", null, this.count);
     this.panes = [0, 1].map(() => ({ points: target(), surface: target() }));
     this.reference = target();
-    this.vertices = gl.createVertexArray();
-    gl.bindVertexArray(this.vertices);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, arrays.triangles, gl.STATIC_DRAW);
-    gl.bindVertexArray(null);
+    this.triangles = way.triangles(arrays.triangles);
   }
 
   drawAround(triangles, edges) {
@@ -188,9 +120,9 @@ class Mesh {
     for (let v = 0; v < this.count; ++v) {
       [corners, links].forEach(({ first }, i) => spans.set([first[v], first[v + 1] - first[v]], 4 * v + 2 * i));
     }
-    this.around = texture("whole4", spans, this.count);
-    this.corners = texture("whole2", corners.rows, triangles.length);
-    this.ends = texture("whole1", links.rows, edges.length);
+    this.around = way.array("whole4", spans, this.count);
+    this.corners = way.array("whole2", corners.rows, triangles.length);
+    this.ends = way.array("whole1", links.rows, edges.length);
   }
 
   // The `most` heaviest influences of each vertex, in the order that they have in Blender.
@@ -206,27 +138,23 @@ class Mesh {
         }
         own.forEach((k, i) => rows.set([bones[k], weights[k]], 2 * (v * number + i)));
       }
-      this.packed.set(number, texture("rg", rows, number * this.count));
+      this.packed.set(number, way.array("float2", rows, number * this.count));
     }
     return { number, influences: this.packed.get(number) };
   }
 
   setFrame(index) {
     const size = 4 * BONE * this.bones;
-    gl.bindTexture(gl.TEXTURE_2D, this.palette.texture);
-    const values = this.arrays.palettes.subarray(index * size, (index + 1) * size);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, BONE, this.bones, gl.RGBA, gl.FLOAT, values);
+    this.palette.write(this.arrays.palettes.subarray(index * size, (index + 1) * size));
     if (this.arrays.moving) this.moveRest(index);
     this.world = transposed(this.arrays.worlds.subarray(16 * index, 16 * index + 16));
-    this.turn = [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => this.world[i]);
   }
 
   // By shape keys, or modifiers in front of the skinning.
   moveRest(index) {
     const { moving, moved } = this.arrays, first = 3 * moving.length * index;
     moving.forEach((vertex, k) => this.restRows.set(moved.subarray(first + 3 * k, first + 3 * k + 3), 4 * vertex));
-    gl.bindTexture(gl.TEXTURE_2D, this.rest.texture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, this.rest.width, this.rest.height, gl.RGBA, gl.FLOAT, this.restRows);
+    this.rest.write(this.restRows);
   }
 
   skin(method, most, target) {
@@ -235,22 +163,23 @@ class Mesh {
     const [first, second] = (method === "mix" && mix || Array(2).fill(isOwn ? method : blender))
       .map((name) => METHODS[name] + (isOwn && hierarchy.includes(name) ? HIERARCHY : 0));
     const { number, influences } = this.influences(most);
-    drawTo(target, program("screen.vert", "skin.frag", `#define SINEW_INFLUENCES ${number}`), {
+    way.run("skin", target, {
       sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts: this.amounts, influences,
-      method: { int: first }, second_method: { int: second }, bulge_form: { int: FORMS[form] ?? 0 },
-      stages: Number(isOwn && state.stages),
+    }, {
+      SINEW_INFLUENCES: number, METHOD: first, SECOND_METHOD: second, BULGE_FORM: FORMS[form] ?? 0,
+      STAGES: Number(Boolean(isOwn && state.stages)),
     });
   }
 
   measure(pane, measure) {
-    drawTo(pane.surface, program("screen.vert", "surface.frag"), {
+    way.run("surface", pane.surface, {
       points: pane.points, reference: this.reference, rest: this.rest, around: this.around,
-      corners: this.corners, ends: this.ends, world_from_armature: this.turn, measure: { int: measure },
-    });
+      corners: this.corners, ends: this.ends, world_from_armature: this.world,
+    }, { MEASURE: measure });
   }
 }
 
-// --- Matrices by columns, as WebGL takes them
+// --- Matrices by columns, as shaders take them
 
 function transposed(m) {
   return Float32Array.from(m, (_, i) => m[(i % 4) * 4 + (i >> 2)]);
@@ -318,24 +247,14 @@ try {
   fail("The data of this page is damaged: " + error.message);
   return;
 }
-const meshes = header.parts.map((about, i) => new Mesh(about, arrays[i]));
-const most = Math.max(...meshes.map((mesh) => mesh.most));
-const ramps = header.measures.map(({ ramp }) => {
-  const made = { texture: gl.createTexture() };
-  gl.bindTexture(gl.TEXTURE_2D, made.texture);
-  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB8, ramp.length / 3, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, Uint8Array.from(ramp));
-  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.LINEAR);
-  for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
-  return made;
-});
+const most = Math.max(...arrays.flatMap(({ offsets }) => Array.from(offsets.subarray(1), (end, v) => end - offsets[v])));
 
 // --- Drawing
 
 // What the points on the graphics card were made for: a camera that moves needs no others.
 let skinnedFor = "";
-// Of each pane, where the vertex of the chosen finding is in the world, and its normal.
-let marks = [];
+// Of each pane, where the vertex of the chosen finding is in the world, and its normal; and when they are known.
+let marks = [], marking;
 
 function skinAll() {
   const { frame, panes, methods, measure, most, stages, finding } = state;
@@ -350,19 +269,22 @@ function skinAll() {
       mesh.measure(pane, measure);
     });
   }
-  marks = [0, 1].slice(0, state.panes).map(markOf);
+  marking = readMarks(wanted);
 }
 
-function markOf(pane) {
+async function readMarks(wanted) {
+  const found = await Promise.all([0, 1].slice(0, state.panes).map(markOf));
+  if (wanted !== skinnedFor) return;
+  marks = found;
+  showMarks();
+}
+
+async function markOf(pane) {
   const { mesh: name, vertex } = findings[state.finding] ?? {}, mesh = meshes.find(({ about }) => about.name === name);
   if (!mesh || vertex >= mesh.count) return null;
-  const [point, normal] = [mesh.panes[pane].points, mesh.panes[pane].surface].map((target) => {
-    const found = new Float32Array(4);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
-    gl.readPixels(vertex & (WIDTH - 1), vertex >> SHIFT, 1, 1, gl.RGBA, gl.FLOAT, found);
-    return found;
-  });
-  return { point: moved(mesh.world, point).slice(0, 3), normal: Array.from(normal.slice(0, 3)) };
+  const { points, surface } = mesh.panes[pane], { world } = mesh;
+  const [point, normal] = await Promise.all([points, surface].map((array) => way.read(array, vertex, 1)));
+  return { point: moved(world, point).slice(0, 3), normal: Array.from(normal.slice(0, 3)) };
 }
 
 function showMarks() {
@@ -376,45 +298,18 @@ function showMarks() {
   }
 }
 
-function drawPane(index, width, height) {
-  const its = camera(width / height), measure = header.measures[state.measure - 1];
-  gl.viewport(index * width, 0, width, height);
-  gl.scissor(index * width, 0, width, height);
-  for (const mesh of meshes) {
-    use(program("draw.vert", "draw.frag"), {
-      ...its, ...mesh.panes[index], world_from_armature: mesh.world,
-      ramp: ramps[Math.max(state.measure - 1, 0)], has_heat: { int: state.measure ? 1 : 0 },
-      is_logarithmic: { int: measure && measure.isLogarithmic ? 1 : 0 }, range: measure ? [measure.low, measure.high] : [0, 1],
-    });
-    gl.bindVertexArray(mesh.vertices);
-    gl.drawElements(gl.TRIANGLES, mesh.arrays.triangles.length, gl.UNSIGNED_INT, 0);
-  }
-  gl.bindVertexArray(null);
-  gl.enable(gl.BLEND);
-  gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-  gl.depthMask(false);
-  use(program("ground.vert", "ground.frag"), {
-    ...its, middle: [its.middle[0], its.middle[1], whole[0][2]], spacing,
-    radius: 3 * radius, line: prefersDark.matches ? [0.9, 0.92, 0.95] : [0.35, 0.37, 0.4],
-  });
-  gl.drawArrays(gl.LINES, 0, GROUND_VERTICES);
-  gl.depthMask(true);
-  gl.disable(gl.BLEND);
-}
-
-// Four samples a pixel, where they are wanted: in software they take longer than all else.
-const smooth = { frame: gl.createFramebuffer(), colour: gl.createRenderbuffer(), depth: gl.createRenderbuffer(), size: "" };
-
-function bindSmooth(width, height) {
-  gl.bindFramebuffer(gl.FRAMEBUFFER, smooth.frame);
-  if (smooth.size === `${width} ${height}`) return;
-  smooth.size = `${width} ${height}`;
-  const kinds = [["colour", gl.RGBA8, gl.COLOR_ATTACHMENT0], ["depth", gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT]];
-  for (const [name, format, place] of kinds) {
-    gl.bindRenderbuffer(gl.RENDERBUFFER, smooth[name]);
-    gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, width, height);
-    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, smooth[name]);
-  }
+function inPane(pane, aspect) {
+  const its = camera(aspect), measure = header.measures[state.measure - 1];
+  const constants = { HAS_HEAT: measure ? 1 : 0, IS_LOGARITHMIC: measure && measure.isLogarithmic ? 1 : 0 };
+  const shared = { ...its, ramp: ramps[Math.max(state.measure - 1, 0)], range: measure ? [measure.low, measure.high] : [0, 1] };
+  const ground = {
+    ...its, middle: [its.middle[0], its.middle[1], whole[0][2]], spacing, radius: 3 * radius,
+    line: prefersDark.matches ? [0.27, 0.28, 0.29] : [0.1, 0.11, 0.12],
+  };
+  return [...meshes.map((mesh) => ({
+    name: "draw", pane, constants, triangles: mesh.triangles,
+    values: { ...shared, ...mesh.panes[pane], world_from_armature: mesh.world },
+  })), { name: "ground", pane, ends: GROUND_ENDS, values: ground }];
 }
 
 function draw(isSmooth = false) {
@@ -422,33 +317,20 @@ function draw(isSmooth = false) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   skinAll();
-  if (isSmooth) bindSmooth(width, height);
-  else gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-  gl.disable(gl.SCISSOR_TEST);
-  gl.clearColor(0, 0, 0, 0);
-  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  gl.enable(gl.DEPTH_TEST);
-  gl.enable(gl.SCISSOR_TEST);
-  for (let i = 0; i < state.panes; ++i) drawPane(i, Math.floor(width / state.panes), height);
+  const { panes } = state, aspect = Math.floor(width / panes) / height;
+  way.draw([0, 1].slice(0, panes).flatMap((pane) => inPane(pane, aspect)), panes, isSmooth);
   showMarks();
-  if (!isSmooth) return;
-  gl.disable(gl.SCISSOR_TEST);
-  gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
-  gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
 }
 
 // --- For tests and for the curious
 
-function read(target, mesh) {
-  const { width, height } = target, found = new Float32Array(4 * width * height);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
-  gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, found);
+function read(array, mesh) {
   skinnedFor = "";
   changed();
-  return found.subarray(0, 4 * mesh.count);
+  return way.read(array, 0, mesh.count);
 }
 
-// The points of a mesh in armature space, four numbers each, of which the last is 1.
+// Soon the points of a mesh in armature space, four numbers each, of which the last is 1.
 function points(part, method, frame, influences = Infinity) {
   const mesh = meshes[part], target = mesh.panes[0].points;
   mesh.setFrame(frame);
@@ -470,15 +352,15 @@ function values(part, method, frame, measure) {
 
 const SLOW_MILLISECONDS = 20, STILL_MILLISECONDS = 150;
 const FLIGHT_MILLISECONDS = 700, prefersStill = matchMedia("(prefers-reduced-motion: reduce)");
-let isWaiting = false, playedFrom = null, isFast = null, whenStill = 0, flight = null;
+let isWaiting = false, playedFrom = null, whenStill = 0, flight = null;
 
 // Whether a smooth frame is drawn fast enough to draw none but smooth ones.
-function measureSpeed() {
+async function measureSpeed() {
   draw(true);
+  await way.finish();
   const started = performance.now();
   draw(true);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  await way.finish();
   return performance.now() - started < SLOW_MILLISECONDS;
 }
 
@@ -494,7 +376,6 @@ function changed() {
       showFrame();
     }
     if (flight) flyOn();
-    isFast ??= measureSpeed();
     draw(isFast);
     clearTimeout(whenStill);
     if (state.playing || flight) changed();
@@ -581,20 +462,22 @@ function flip() {
 
 const HOME = { yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0] };
 
-function choose(index) {
+async function choose(index) {
   const { joint, measure, value, limit, size, frame, mends } = findings[index];
   // A method that mends it is a flip away.
   const methods = [names[0], mends.find((name) => names.includes(name)) ?? state.methods[1]];
   set({ finding: index, frame, playing: false, methods });
-  skinAll();
-  fly(marks[0] ? viewOf(marks[0], size) : HOME);
+  say([`${joint}: ${measure}`, value, limit, header.frames[frame]].filter(Boolean).join(", "));
   const button = find("findings").children[index].firstChild;
   button.scrollIntoView({ block: "nearest" });
-  say([`${joint}: ${measure}`, value, limit, header.frames[frame]].filter(Boolean).join(", "));
+  skinAll();
+  await marking;
+  const to = marks[0] ? await viewOf(marks[0], size) : HOME;
+  if (state.finding === index) fly(to);
 }
 
 // Along the normal, or as near to that as nothing is in between; some lengths of the bone around the place.
-function viewOf({ point, normal }, size) {
+async function viewOf({ point, normal }, size) {
   const its = camera(canvas.clientWidth / state.panes / canvas.clientHeight);
   const reach = Math.min(Math.max(1.6 * size, radius / 12), radius / 2);
   const [yaw, pitch] = [Math.atan2(normal[0], -normal[1]), Math.min(Math.max(Math.asin(normal[2]), -1), 1)];
@@ -602,14 +485,14 @@ function viewOf({ point, normal }, size) {
   for (let k = 0; k < 12; ++k) for (const other of [-0.5, 0, 0.5, 1]) views.push({ yaw: yaw + k * Math.PI / 6, pitch: other });
   const closeness = new Map(views.map((view) => [view, dot(backOf(view), normal)]));
   views.sort((a, b) => closeness.get(b) - closeness.get(a));
-  const corners = meshes.flatMap((mesh) => trianglesNear(mesh, point, reach / its.half));
+  const corners = (await Promise.all(meshes.map((mesh) => trianglesNear(mesh, point, reach / its.half)))).flat();
   const best = views.find((view) => !isHidden(point, backOf(view), 0.03 * reach, reach / its.half, corners)) ?? views[0];
   return { ...best, zoom: state.zoom * its.distance * its.half / reach, offset: plus(point, its.middle, -1) };
 }
 
 // Of the left pane, in the world: the corners of triangles of which one is within a distance.
-function trianglesNear(mesh, point, distance) {
-  const shape = read(mesh.panes[0].points, mesh), { triangles } = mesh.arrays, found = [];
+async function trianglesNear(mesh, point, distance) {
+  const shape = await way.read(mesh.panes[0].points, 0, mesh.count), { triangles } = mesh.arrays, found = [];
   const world = Array.from({ length: mesh.count }, (_, v) => moved(mesh.world, shape.subarray(4 * v, 4 * v + 4)));
   const isNear = world.map((p) => Math.hypot(p[0] - point[0], p[1] - point[1], p[2] - point[2]) < distance);
   for (let k = 0; k < triangles.length; k += 3) {
@@ -730,14 +613,13 @@ function connect() {
   find("influences").max = stops.length - 1;
   find("influences-set").hidden = stops.length === 1;
   find("influences").addEventListener("input", ({ target }) => set({ most: stops[Number(target.value)] }));
-  find("notes").replaceChildren(...header.notes.map((text) => {
-    const item = document.createElement("li");
-    item.textContent = text;
-    return item;
-  }));
   const vertices = meshes.reduce((sum, mesh) => sum + mesh.count, 0);
   const frames = last ? `${last + 1} ${step}s` : `${step} ${header.frames[0]}`;
   find("facts").textContent = `${vertices.toLocaleString("en")} vertices, ${frames}`;
+}
+
+function listNotes() {
+  find("notes").replaceChildren(...[...header.notes, `${way.name} draws it.`].map((textContent) => Object.assign(document.createElement("li"), { textContent })));
 }
 
 function connectKeys() {
@@ -759,7 +641,7 @@ function connectKeys() {
   });
 }
 
-function connectPointers() {
+function connectCanvas() {
   const pointers = new Map();
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("pointerdown", (event) => {
@@ -785,15 +667,15 @@ function connectPointers() {
     event.preventDefault();
     zoomBy(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)));
   }, { passive: false });
+  new ResizeObserver(changed).observe(canvas);
 }
 
+await begin(wanted === "webgl" ? [webgl] : wanted === "webgpu" ? [webgpu] : [webgpu, webgl]);
+if (!way) return;
 connect();
 listFindings();
 connectKeys();
-connectPointers();
-new ResizeObserver(changed).observe(canvas);
 prefersDark.addEventListener("change", changed);
-canvas.addEventListener("webglcontextlost", () => fail("The browser took the graphics away. Load the page again."));
 show();
-window.sinew = { header, state, set, draw, points, values, gl };
+window.sinew = { header, state, set, draw, points, values, get way() { return way; } };
 })();
