@@ -42,6 +42,7 @@ Form: TypeAlias = Literal["continuous", "kim_han"]
 BLENDER, MIX = "blender", "mix"
 FOLDER = Path(__file__).parent / "templates/viewer"
 _SHADERS = (".glsl", ".vert", ".frag", ".wgsl")
+_COMMENTS = re.compile("^ *//.*\n", re.MULTILINE)
 _SCRIPTS = ("gl.js", "gpu.js", "viewer.js")
 _RAMP_STOPS = 64
 _TEXTS = {"distance": "The distance of each vertex from where Blender's Armature modifier takes it."}
@@ -352,7 +353,7 @@ class Viewer:
             "STYLE": texts["style.css"],
             "HEADER": _in_script(self._header(places)),
             "ARRAYS": data,
-            "SHADERS": _in_script({name: texts[name] for name in texts if name.endswith(_SHADERS)}),
+            "SHADERS": _in_script({name: _COMMENTS.sub("", texts[name]) for name in texts if name.endswith(_SHADERS)}),
             "SCRIPT": "\n".join(texts[name] for name in _SCRIPTS),
         }
         return re.sub("%([A-Z]+)%", lambda match: values[match[1]], texts["viewer.html"])

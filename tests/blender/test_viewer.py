@@ -329,5 +329,6 @@ def test_texts_have_contrast():
                 assert (light + 0.05) / (dark + 0.05) >= 4.5, (text, back)
 
 
-def test_the_shader_is_that_of_engines():
-    assert (viewer.FOLDER / "sinew.glsl").read_bytes() == (REPOSITORY / "shaders/sinew.glsl").read_bytes()
+@pytest.mark.parametrize("name", ["sinew.glsl", "sinew.wgsl"])
+def test_the_shader_is_that_of_engines(name):
+    assert (viewer.FOLDER / name).read_bytes() == (REPOSITORY / "shaders" / name).read_bytes()

@@ -31,10 +31,12 @@ class Browser:
     """What all have. Subclasses have PROGRAMS, and run() and picture() of the page that is open.
 
     PROGRAMS  packages of Debian, by the programs that are needed; of each row any
+    way       of drawing: webgl, webgpu, or what the page chooses
     """
 
     PROGRAMS: tuple[tuple[str, ...], ...] = ()
     PACKAGES = ""
+    way = ""
 
     @classmethod
     def missing(cls):
@@ -64,15 +66,14 @@ class Browser:
             time.sleep(0.05)
         raise AssertionError(f"not within {SECONDS} s: {condition}")
 
-    def show(self, page, width=1280, height=800, is_dark=False, is_still=False, way="webgl"):
+    def show(self, page, width=1280, height=800, is_dark=False, is_still=False):
         """Opens a page, and waits until it has drawn the character.
 
         is_still  as if somebody had the system show as little motion as it can
-        way       to draw: webgl or webgpu
         """
         self.resize(width, height)
         self.prefer(is_dark, is_still)
-        self.open(f"{page.as_uri()}?draw={way}")
+        self.open(f"{page.as_uri()}?draw={self.way}")
         said = self.wait("window.sinew ? 'drawn' : document.getElementById('message').textContent")
         assert said == "drawn", said
 
@@ -85,17 +86,16 @@ class Browser:
 class Chromium(Browser):
     PROGRAMS = (("chromium", "chromium-browser", "google-chrome"), ("chromedriver",))
     PACKAGES = "chromium and chromium-driver"
+    # Without these WebGPU has an adapter, and nothing to show textures by.
+    VULKAN = ("enable-features=Vulkan", "use-vulkan=swiftshader")
 
     def start(self, stack):
         from selenium import webdriver
 
         options = webdriver.ChromeOptions()
         options.binary_location = self.program(0)
-        words = ["headless=new", "no-sandbox", "use-angle=swiftshader", "enable-unsafe-swiftshader"]
-        # Without Vulkan it has an adapter, and no textures to show.
-        words += ["enable-unsafe-webgpu", "use-webgpu-adapter=swiftshader"]
-        words += ["enable-features=Vulkan", "use-vulkan=swiftshader"]
-        for word in words:
+        words = "headless=new", "no-sandbox", "use-angle=swiftshader", "enable-unsafe-swiftshader"
+        for word in (*words, "enable-unsafe-webgpu", "use-webgpu-adapter=swiftshader", *self.VULKAN):
             options.add_argument(f"--{word}")
         service = webdriver.ChromeService(self.program(1))
         self._driver = webdriver.Chrome(options=options, service=service)
@@ -146,6 +146,7 @@ class Firefox(Browser):
             "marionette.port": str(port),
             "webgl.force-enabled": "true",
             "dom.webgpu.enabled": "true",
+            "gfx.webgpu.ignore-blocklist": "true",
             "browser.shell.checkDefaultBrowser": "false",
             "datareporting.policy.dataSubmissionEnabled": "false",
         }

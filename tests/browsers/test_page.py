@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page that turns, in browsers: its points are those of `sinew points`, its heat maps those of
+"""The page that turns, in browsers, by WebGL and by WebGPU: its points are those of `sinew points`, its heat maps those of
 docs/metrics.md; keys and controls do what they say; it fits on small screens; faults of Flex are found.
 
 SINEW_PICTURES  a folder for pictures, to look at
@@ -8,6 +8,7 @@ SINEW_PICTURES  a folder for pictures, to look at
 import os
 from pathlib import Path
 
+import browsers
 import numpy as np
 import pytest
 import read_page
@@ -16,18 +17,14 @@ KEYS_ARE_NAMED = """
 return [...document.querySelectorAll("button, input, select, canvas")].filter((one) =>
   !(one.labels && one.labels.length) && !one.getAttribute("aria-label") && !one.textContent.trim()).length
 """
-# Of each pane, the share of pixels that are not transparent.
-DRAWN = """
-const { gl, draw, state } = window.sinew;
-draw();
-const [width, height] = [gl.canvas.width, gl.canvas.height];
-const found = new Uint8Array(4 * width * height), counts = Array(state.panes).fill(0);
-gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, found);
-for (let k = 3; k < found.length; k += 4) {
-  if (found[k] === 255) counts[Math.floor((((k >> 2) % width) * state.panes) / width)]++;
-}
-return counts.map((count) => count / width / height * state.panes)
-"""
+# What is drawn, red, green, blue and opacity for each pixel.
+PIXELS = """(() => {
+  const { width, height } = document.getElementById("view");
+  window.sinew.draw(IS_SMOOTH);
+  const copy = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
+  copy.drawImage(document.getElementById("view"), 0, 0);
+  return copy.getImageData(0, 0, width, height).data;
+})()"""
 
 # The middle of the mark of what is chosen, from that of the view, in pixels.
 MARKED = """
@@ -35,7 +32,20 @@ const boxes = ["mark-0", "view"].map((id) => document.getElementById(id).getBoun
 const [mark, view] = boxes.map((box) => [box.x + box.width / 2, box.y + box.height / 2]);
 return [mark[0] - view[0], mark[1] - view[1]]
 """
+IS_MARKED = f"(() => {{{MARKED}}})().every((x) => Math.abs(x) < 2)"
+DRAWS = "document.getElementById('notes').lastChild.textContent"
 VIEW = "const { yaw, pitch, zoom, offset } = window.sinew.state; return [yaw, pitch, zoom, ...offset]"
+
+
+@pytest.fixture(params=["webgl", "webgpu"], autouse=True)
+def way(request, browser):
+    browser.way = request.param
+
+
+def pixels(browser, is_smooth="false"):
+    """uint8 [height, width, 4]"""
+    found = browser.floats(PIXELS.replace("IS_SMOOTH", is_smooth))
+    return found.astype(np.uint8).reshape(browser.run("return document.getElementById('view').height"), -1, 4)
 
 
 def points(browser, *arguments):
@@ -137,7 +147,7 @@ def test_keys_and_controls(browser, made):
     after = browser.run("return [window.sinew.state.yaw, window.sinew.state.zoom]")
     assert after[0] != yaw
     assert after[1] > zoom
-    assert browser.run("return window.sinew.gl.getError()") == 0
+    assert browser.run("return window.sinew.way.error()") == 0
 
 
 def test_stages_are_switched(browser, made):
@@ -185,6 +195,7 @@ def test_a_fault_is_shown_at_its_place(browser, bent):
         pose = f"{joint}: {fault['pose']}" if fault["pose"] else "At rest"
         assert shown == header["frames"][frame] == pose
         # The view is at the vertex at once, and nothing moves afterwards.
+        browser.wait(IS_MARKED)
         view = browser.run(VIEW)
         browser.run("window.sinew.draw()")
         assert np.abs(browser.run(MARKED)).max() < 2.0
@@ -207,13 +218,59 @@ def test_the_way_to_a_fault_is_flown(browser, bent):
     # Enter.
     browser.press("\ue007")
     browser.wait(f"window.sinew.state.zoom !== {before[2]}")
-    browser.wait(f"(() => {{{MARKED}}})().every((x) => Math.abs(x) < 2)")
+    browser.wait(IS_MARKED)
     pressed = "document.querySelector('#findings button').getAttribute('aria-pressed')"
     assert browser.run(f"return {pressed}") == "true"
     assert "Pivot outside" in browser.run("return document.getElementById('said').textContent")
     assert browser.run(KEYS_ARE_NAMED) == 0
     browser.press("\ue011")
     assert browser.run(VIEW) == before
+
+
+@pytest.mark.parametrize("way", ["webgpu"], indirect=True)
+def test_both_ways_give_one_picture(browser, made, way):
+    found = []
+    for name in ("webgpu", "webgl"):
+        browser.way = name
+        browser.show(made["wrist"].page)
+        browser.run("window.sinew.set({ measure: 1 })")
+        found.append([pixels(browser, is_smooth).astype(int) for is_smooth in ("false", "true")])
+    for one, other in zip(*found, strict=True):
+        # Lines, and edges of the mesh, may differ by a pixel.
+        assert (np.abs(one - other).max(axis=2) > 8).mean() < 0.005
+        assert len(np.unique(one.reshape(-1, 4), axis=0)) > 1000
+
+
+class WithoutTextures(browsers.Chromium):
+    """Its WebGPU ends when it is to show something."""
+
+    VULKAN = ()
+
+
+@pytest.mark.parametrize("browser", [WithoutTextures], indirect=True)
+@pytest.mark.parametrize("way", [""], indirect=True)
+def test_webgl_draws_where_webgpu_can_not(browser, made, way):
+    browser.show(made["wrist"].page)
+    browser.wait(f"{DRAWS} === 'WebGL 2 draws it.'")
+    assert 0.01 < (pixels(browser)[:, :, 3] == 255).mean() < 0.9
+    methods = browser.run("return window.sinew.state.methods")
+    browser.press("f")
+    assert browser.run("return window.sinew.state.methods") == methods[::-1]
+
+
+@pytest.mark.parametrize("way", [""], indirect=True)
+def test_webgl_goes_on_where_webgpu_ends(browser, made, way):
+    page = made["wrist"]
+    browser.show(page.page)
+    assert browser.run(f"return {DRAWS}") == "WebGPU draws it."
+    before, found = pixels(browser), points(browser, 0, "'dq'", 1)
+    browser.run("document.getElementById('view').focus(); window.sinew.way.lose()")
+    browser.wait(f"{DRAWS} === 'WebGL 2 draws it.'")
+    np.testing.assert_allclose(points(browser, 0, "'dq'", 1), found, atol=1e-5)
+    assert (np.abs(before.astype(int) - pixels(browser)).max(axis=2) > 8).mean() < 0.005
+    yaw = browser.run("return window.sinew.state.yaw")
+    browser.press("\ue014")
+    assert browser.run("return window.sinew.state.yaw") != yaw
 
 
 @pytest.mark.parametrize("is_dark", [False, True], ids=["light", "dark"])
@@ -225,14 +282,13 @@ def test_it_fits_and_is_drawn(browser, made, bent, width, is_dark, kind):
     if kind == "bent":
         browser.press("n")
     panes = 2 if width > 720 and kind == "compared" else 1
-    shares = browser.run(DRAWN)
-    assert len(shares) == panes
-    for share in shares:
-        assert 0.01 < share < 0.9
+    assert browser.run("return window.sinew.state.panes") == panes
+    for pane in np.array_split(pixels(browser), panes, axis=1):
+        assert 0.01 < (pane[:, :, 3] == 255).mean() < 0.9
     # Firefox has a least width of a window.
     inner = browser.run("return innerWidth")
     assert browser.run("return document.documentElement.scrollWidth") <= inner
     folder = os.environ.get("SINEW_PICTURES")
     if folder:
-        name = f"{type(browser).__name__.lower()}-{kind}-{width}-{'dark' if is_dark else 'light'}.png"
+        name = f"{type(browser).__name__.lower()}-{browser.way}-{kind}-{width}-{'dark' if is_dark else 'light'}.png"
         Path(folder, name).write_bytes(browser.picture())

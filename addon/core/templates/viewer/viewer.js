@@ -61,7 +61,8 @@ async function begin([make, ...others]) {
   skinnedFor = "";
   connectCanvas();
   listNotes();
-  isFast = await measureSpeed();
+  // What ended meanwhile is not fast.
+  isFast = await measureSpeed().catch(() => false);
   changed();
 }
 
@@ -80,13 +81,17 @@ function sorted(count, owners, list, width) {
   return { first, rows };
 }
 
+// The most influences of a vertex, 1 where none has any.
+function mostOf({ offsets }) {
+  return offsets.reduce((most, end, v) => Math.max(most, end - (offsets[v - 1] ?? end)), 1);
+}
+
 class Mesh {
   constructor(about, arrays) {
     Object.assign(this, { about, arrays, packed: new Map() });
     this.count = arrays.rest.length / 3;
     this.bones = about.arrays.palettes.shape[1];
-    this.most = 1;
-    for (let v = 0; v < this.count; ++v) this.most = Math.max(this.most, arrays.offsets[v + 1] - arrays.offsets[v]);
+    this.most = mostOf(arrays);
     const wide = (points, last) => {
       const found = new Float32Array(4 * this.count);
       for (let v = 0; v < this.count; ++v) {
@@ -247,7 +252,7 @@ try {
   fail("The data of this page is damaged: " + error.message);
   return;
 }
-const most = Math.max(...arrays.flatMap(({ offsets }) => Array.from(offsets.subarray(1), (end, v) => end - offsets[v])));
+const most = Math.max(...arrays.map(mostOf));
 
 // --- Drawing
 
@@ -470,6 +475,8 @@ async function choose(index) {
   say([`${joint}: ${measure}`, value, limit, header.frames[frame]].filter(Boolean).join(", "));
   const button = find("findings").children[index].firstChild;
   button.scrollIntoView({ block: "nearest" });
+  marks = [];
+  showMarks();
   skinAll();
   await marking;
   const to = marks[0] ? await viewOf(marks[0], size) : HOME;
