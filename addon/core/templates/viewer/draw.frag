@@ -3,8 +3,8 @@
 precision highp float;
 
 uniform vec3 eye;
-uniform vec3 right;
-uniform vec3 up;
+uniform vec3 key_light;  // where two lights are that go with the camera
+uniform vec3 fill_light;
 uniform sampler2D ramp;
 uniform vec2 range;  // the values at both ends of the ramp
 
@@ -14,13 +14,10 @@ in float value;
 out vec4 colour;
 
 void main() {
-    vec3 view = normalize(eye - position);
     vec3 n = normalize(normal);
-    n = dot(n, view) < 0.0 ? -n : n;
-    // Two lights that go with the camera, and light from above.
-    float key = max(dot(n, normalize(view - 0.6 * right + 0.7 * up)), 0.0);
-    float fill = max(dot(n, normalize(view + 0.9 * right + 0.1 * up)), 0.0);
-    float light = 0.26 + 0.62 * key + 0.16 * fill + 0.1 * n.z;
+    n = dot(n, eye - position) < 0.0 ? -n : n;
+    // The last is light from above.
+    float light = 0.26 + 0.62 * max(dot(n, key_light), 0.0) + 0.16 * max(dot(n, fill_light), 0.0) + 0.1 * n.z;
     vec3 base = vec3(0.80, 0.765, 0.72);
     if (HAS_HEAT == 1) {
         bool is_logarithmic = IS_LOGARITHMIC == 1;

@@ -4,8 +4,8 @@ struct Uniforms {
     @align(16) world_from_armature: mat4x4f,
     @align(16) clip_from_world: mat4x4f,
     @align(16) eye: vec3f,
-    @align(16) right: vec3f,
-    @align(16) up: vec3f,
+    @align(16) key_light: vec3f,  // where two lights are that go with the camera
+    @align(16) fill_light: vec3f,
     @align(16) range: vec2f,  // the values at both ends of the ramp
 }
 @group(0) @binding(0) var<uniform> uniforms: Uniforms;
@@ -30,13 +30,11 @@ fn place(@builtin(vertex_index) vertex: u32) -> Corner {
 
 @fragment
 fn shade(corner: Corner) -> @location(0) vec4f {
-    let view = normalize(uniforms.eye - corner.position);
     var n = normalize(corner.normal);
-    n = select(n, -n, dot(n, view) < 0.0);
-    // Two lights that go with the camera, and light from above.
-    let key = max(dot(n, normalize(view - 0.6 * uniforms.right + 0.7 * uniforms.up)), 0.0);
-    let fill = max(dot(n, normalize(view + 0.9 * uniforms.right + 0.1 * uniforms.up)), 0.0);
-    var light = 0.26 + 0.62 * key + 0.16 * fill + 0.1 * n.z;
+    n = select(n, -n, dot(n, uniforms.eye - corner.position) < 0.0);
+    // The last is light from above.
+    var light = 0.26 + 0.62 * max(dot(n, uniforms.key_light), 0.0) + 0.16 * max(dot(n, uniforms.fill_light), 0.0)
+        + 0.1 * n.z;
     var base = vec3f(0.80, 0.765, 0.72);
     let last = f32(arrayLength(&ramp) - 1u);
     if HAS_HEAT == 1u {

@@ -16,14 +16,14 @@ const programs = new Map();
 
 // Of name.vert, or of the one that covers the target, and of name.frag.
 function program(name, own = {}) {
-  const lines = Object.entries({ SHIFT, WIDTH, ...constants, ...own }).map(([key, value]) => `#define ${key} ${value}\n`);
-  const key = name + lines.join("");
+  const all = Object.entries({ SHIFT, WIDTH, ...constants, ...own });
+  const lines = all.map(([key, value]) => `#define ${key} ${value}\n`).join(""), key = name + lines;
   if (programs.has(key)) return programs.get(key);
   const made = gl.createProgram(), vertex = sources[name + ".vert"] ? name + ".vert" : "screen.vert";
   for (const [file, type] of [[vertex, gl.VERTEX_SHADER], [name + ".frag", gl.FRAGMENT_SHADER]]) {
     const shader = gl.createShader(type);
     const text = sources[file].replace('#include "sinew.glsl"', () => sources["sinew.glsl"]);
-    gl.shaderSource(shader, text.replace("\n", "\n" + lines.join("")));
+    gl.shaderSource(shader, text.replace("\n", "\n" + lines));
     gl.compileShader(shader);
     gl.attachShader(made, shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(file + ": " + gl.getShaderInfoLog(shader));
@@ -72,8 +72,8 @@ function array(format, values, count, width = WIDTH) {
   const made = { texture, width, height, write };
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texStorage2D(gl.TEXTURE_2D, 1, inside, width, height);
-  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
-  for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
   // As many values as the array has.
   function write(values) {
     const full = new Kind(width * height * components);
@@ -111,7 +111,8 @@ function run(name, target, values, own) {
 
 // Float32Array [4 * count] of an array that run() wrote, from `first` on.
 async function read({ frame }, first, count) {
-  const row = first >> SHIFT, rows = ((first + count - 1) >> SHIFT) - row + 1, found = new Float32Array(4 * WIDTH * rows);
+  const row = first >> SHIFT, rows = ((first + count - 1) >> SHIFT) - row + 1;
+  const found = new Float32Array(4 * WIDTH * rows);
   gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
   gl.readPixels(0, row, WIDTH, rows, gl.RGBA, gl.FLOAT, found);
   const start = first - WIDTH * row;
@@ -119,7 +120,8 @@ async function read({ frame }, first, count) {
 }
 
 // Four samples a pixel, where they are wanted: in software they take longer than all else.
-const smooth = { frame: gl.createFramebuffer(), colour: gl.createRenderbuffer(), depth: gl.createRenderbuffer(), size: "" };
+const smooth = { frame: gl.createFramebuffer(), size: "" };
+for (const name of ["colour", "depth"]) smooth[name] = gl.createRenderbuffer();
 
 function bindSmooth(width, height) {
   gl.bindFramebuffer(gl.FRAMEBUFFER, smooth.frame);

@@ -24,14 +24,15 @@ function program(name, own = {}, samples = 0) {
   if (programs.has(key)) return programs.get(key);
   const skinning = sources["sinew.wgsl"].replace(/const SINEW_INFLUENCES.*\n/, "");
   const code = lines + sources[name + ".wgsl"].replace('#include "sinew.wgsl"', () => skinning);
-  const module = device.createShaderModule({ code }), layout = "auto";
+  const module = device.createShaderModule({ code }), layout = "auto", areLines = name === "ground";
   const pipeline = samples ? device.createRenderPipeline({
-    layout, vertex: { module }, multisample: { count: samples }, primitive: { topology: name === "ground" ? "line-list" : "triangle-list" },
+    layout, vertex: { module }, multisample: { count: samples },
     fragment: { module, targets: [{ format, blend: { color: OVER, alpha: OVER } }] },
-    depthStencil: { format: "depth24plus", depthWriteEnabled: name !== "ground", depthCompare: "less" },
+    primitive: { topology: areLines ? "line-list" : "triangle-list" },
+    depthStencil: { format: "depth24plus", depthWriteEnabled: !areLines, depthCompare: "less" },
   }) : device.createComputePipeline({ layout, compute: { module } });
-  const bindings = [...code.matchAll(/@binding\((\d+)\) var<[^>]*> (\w+)/g)].map(([, place, name]) => [Number(place), name]);
-  const members = [...code.matchAll(/@align\(16\) (\w+)/g)].map(([, name]) => name);
+  const bindings = [...code.matchAll(/@binding\((\d+)\) var<[^>]*> (\w+)/g)];
+  const members = [...code.matchAll(/@align\(16\) (\w+)/g)];
   programs.set(key, { pipeline, bindings, members });
   return programs.get(key);
 }
@@ -41,13 +42,13 @@ const OVER = { srcFactor: "one", dstFactor: "one-minus-src-alpha" };
 function bind(pass, { pipeline, bindings, members }, values, number = 0) {
   uniforms[number] ??= device.createBuffer({ size: 256, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
   const numbers = [];
-  for (const name of members) {
+  for (const [, name] of members) {
     numbers.push(...[values[name]].flatMap((value) => (value.length ? [...value] : [value])));
     while (numbers.length % 4) numbers.push(0);
   }
   queue.writeBuffer(uniforms[number], 0, Float32Array.from(numbers));
-  const entries = bindings.map(([binding, name]) => {
-    return { binding, resource: { buffer: name === "uniforms" ? uniforms[number] : values[name].buffer } };
+  const entries = bindings.map(([, binding, name]) => {
+    return { binding: Number(binding), resource: { buffer: name === "uniforms" ? uniforms[number] : values[name].buffer } };
   });
   pass.setPipeline(pipeline);
   pass.setBindGroup(0, device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries }));
@@ -99,17 +100,20 @@ function target(format, samples) {
   const { width, height } = canvas, key = format + samples, old = targets[key];
   if (old?.width === width && old.height === height) return old.createView();
   old?.destroy();
-  targets[key] = device.createTexture({ size: [width, height], format, sampleCount: samples, usage: GPUTextureUsage.RENDER_ATTACHMENT });
+  const usage = GPUTextureUsage.RENDER_ATTACHMENT;
+  targets[key] = device.createTexture({ size: [width, height], format, sampleCount: samples, usage });
   return targets[key].createView();
 }
 
 function draw(list, panes, isSmooth) {
   const samples = isSmooth ? 4 : 1, { height } = canvas, width = Math.floor(canvas.width / panes);
   const shown = context.getCurrentTexture().createView(), depth = target("depth24plus", samples);
-  const colour = { loadOp: "clear", ...(isSmooth ? { view: target(format, 4), resolveTarget: shown, storeOp: "discard" } : { view: shown, storeOp: "store" }) };
+  const colour = isSmooth
+    ? { view: target(format, 4), resolveTarget: shown, storeOp: "discard" }
+    : { view: shown, storeOp: "store" };
   submit((encoder) => {
     const pass = encoder.beginRenderPass({
-      colorAttachments: [colour],
+      colorAttachments: [{ ...colour, loadOp: "clear" }],
       depthStencilAttachment: { view: depth, depthClearValue: 1, depthLoadOp: "clear", depthStoreOp: "discard" },
     });
     list.forEach(({ name, pane, values, constants: own, triangles, ends }, number) => {

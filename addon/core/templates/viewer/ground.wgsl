@@ -25,7 +25,8 @@ fn place(@builtin(vertex_index) vertex: u32) -> End {
     let start = floor(uniforms.middle.xy / uniforms.spacing + 0.5) * uniforms.spacing;
     let clip = uniforms.clip_from_world * vec4f(start + own, uniforms.middle.z, 1.0);
     // Depth is from 0 to 1 here.
-    return End(vec4f(clip.xy, 0.5 * (clip.z + clip.w), clip.w), 1.0 - smoothstep(0.1, 1.0, length(own) / uniforms.radius));
+    let share = 1.0 - smoothstep(0.1, 1.0, length(own) / uniforms.radius);
+    return End(vec4f(clip.xy, 0.5 * (clip.z + clip.w), clip.w), share);
 }
 
 @fragment

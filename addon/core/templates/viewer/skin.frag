@@ -28,9 +28,12 @@ void main() {
     vec4 at_rest = texelFetch(rest, place, 0);
     vec3 x = at_rest.xyz;
     vec3 centre = texelFetch(centres, place, 0).xyz;
-    vec2 amount = float(STAGES) * texelFetch(amounts, place, 0).xy;
     vec3 moved = sinew_mix(METHOD, SECOND_METHOD, at_rest.w, x, centre, bones, weights);
+#if STAGES
+    vec2 amount = texelFetch(amounts, place, 0).xy;
     float linear_share = sinew_linear_share(METHOD, SECOND_METHOD, at_rest.w);
     moved = sinew_twist_spread(moved, linear_share, amount.x, x, bones, weights);
-    point = vec4(sinew_bulge_limit(moved, BULGE_FORM, amount.y, x, bones, weights), 1.0);
+    moved = sinew_bulge_limit(moved, BULGE_FORM, amount.y, x, bones, weights);
+#endif
+    point = vec4(moved, 1.0);
 }

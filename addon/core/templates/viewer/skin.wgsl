@@ -21,8 +21,11 @@ fn skin(@builtin(global_invocation_id) id: vec3u) {
     }
     let x = rest[vertex].xyz;
     let share = rest[vertex].w;
-    let amount = f32(STAGES) * amounts[vertex];
+    let amount = amounts[vertex];
     var moved = sinew_mix(METHOD, SECOND_METHOD, share, x, centres[vertex].xyz, own);
-    moved = sinew_twist_spread(moved, sinew_linear_share(METHOD, SECOND_METHOD, share), amount.x, x, own);
-    result[vertex] = vec4f(sinew_bulge_limit(moved, BULGE_FORM, amount.y, x, own), 1.0);
+    if STAGES == 1u {
+        moved = sinew_twist_spread(moved, sinew_linear_share(METHOD, SECOND_METHOD, share), amount.x, x, own);
+        moved = sinew_bulge_limit(moved, BULGE_FORM, amount.y, x, own);
+    }
+    result[vertex] = vec4f(moved, 1.0);
 }

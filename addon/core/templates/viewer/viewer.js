@@ -172,7 +172,7 @@ class Mesh {
       sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts: this.amounts, influences,
     }, {
       SINEW_INFLUENCES: number, METHOD: first, SECOND_METHOD: second, BULGE_FORM: FORMS[form] ?? 0,
-      STAGES: Number(Boolean(isOwn && state.stages)),
+      STAGES: isOwn && state.stages && this.arrays.amounts ? 1 : 0,
     });
   }
 
@@ -242,7 +242,10 @@ function camera(aspect) {
   const view = [right, up, back].map((axis) => [...axis, -dot(axis, eye)]).concat([[0, 0, 0, 1]]).flat();
   const depth = near - far;
   const lens = [1 / (half * aspect), 0, 0, 0, 0, 1 / half, 0, 0, 0, 0, (far + near) / depth, -1, 0, 0, 2 * far * near / depth, 0];
-  return { eye, right, up, middle, distance, half, clip_from_world: product(Float32Array.from(lens), transposed(view)) };
+  const towards = (x, y) => plus(plus(back, right, x), up, y), unit = (v) => v.map((x) => x / Math.hypot(...v));
+  const lights = { key_light: unit(towards(-0.6, 0.7)), fill_light: unit(towards(0.9, 0.1)) };
+  const clip_from_world = product(Float32Array.from(lens), transposed(view));
+  return { ...lights, eye, right, up, middle, distance, half, clip_from_world };
 }
 
 let arrays;
@@ -306,7 +309,8 @@ function showMarks() {
 function inPane(pane, aspect) {
   const its = camera(aspect), measure = header.measures[state.measure - 1];
   const constants = { HAS_HEAT: measure ? 1 : 0, IS_LOGARITHMIC: measure && measure.isLogarithmic ? 1 : 0 };
-  const shared = { ...its, ramp: ramps[Math.max(state.measure - 1, 0)], range: measure ? [measure.low, measure.high] : [0, 1] };
+  const range = measure ? [measure.low, measure.high] : [0, 1];
+  const shared = { ...its, ramp: ramps[Math.max(state.measure - 1, 0)], range };
   const ground = {
     ...its, middle: [its.middle[0], its.middle[1], whole[0][2]], spacing, radius: 3 * radius,
     line: prefersDark.matches ? [0.27, 0.28, 0.29] : [0.1, 0.11, 0.12],
@@ -626,7 +630,9 @@ function connect() {
 }
 
 function listNotes() {
-  find("notes").replaceChildren(...[...header.notes, `${way.name} draws it.`].map((textContent) => Object.assign(document.createElement("li"), { textContent })));
+  find("notes").replaceChildren(...[...header.notes, `${way.name} draws it.`].map((textContent) => {
+    return Object.assign(document.createElement("li"), { textContent });
+  }));
 }
 
 function connectKeys() {
