@@ -243,9 +243,9 @@ def test_both_ways_give_one_picture(browser, made, way):
         both = opaque[0] & opaque[1]
         assert (np.abs(one - other).max(axis=2)[both] > 8).mean() < 0.005
         assert len(np.unique(one[both], axis=0)) > 100
-        # Lines are drawn at other samples of a pixel, and as much of them.
+        # Lines are drawn at other pixels, and about as much of them.
         lines = [each[:, :, 3][~opaque[0] & ~opaque[1]].sum() for each in (one, other)]
-        assert lines[0] == pytest.approx(lines[1], rel=0.01)
+        assert lines[0] == pytest.approx(lines[1], rel=0.05)
 
 
 class WithoutTextures(browsers.Chromium):

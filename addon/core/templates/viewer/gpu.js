@@ -27,7 +27,7 @@ function program(name, own = {}, samples = 0) {
   const module = device.createShaderModule({ code }), layout = "auto", areLines = name === "ground";
   const pipeline = samples ? device.createRenderPipeline({
     layout, vertex: { module }, multisample: { count: samples },
-    fragment: { module, targets: [{ format, blend: { color: OVER, alpha: OVER } }] },
+    fragment: { module, targets: [{ format, ...(areLines && { blend: { color: OVER, alpha: OVER } }) }] },
     primitive: { topology: areLines ? "line-list" : "triangle-list" },
     depthStencil: { format: "depth24plus", depthWriteEnabled: !areLines, depthCompare: "less" },
   }) : device.createComputePipeline({ layout, compute: { module } });
