@@ -348,12 +348,13 @@ class Viewer:
             places.append(of_part)
         data = base64.b64encode(zlib.compress(bytes(blob), 9)).decode("ascii")
         texts = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.iterdir()}
+        shaders = {name: _COMMENTS.sub("", text) for name, text in texts.items() if name.endswith(_SHADERS)}
         values = {
             "TITLE": escape(self.title),
             "STYLE": texts["style.css"],
             "HEADER": _in_script(self._header(places)),
             "ARRAYS": data,
-            "SHADERS": _in_script({name: _COMMENTS.sub("", texts[name]) for name in texts if name.endswith(_SHADERS)}),
+            "SHADERS": _in_script(shaders),
             "SCRIPT": "\n".join(texts[name] for name in _SCRIPTS),
         }
         return re.sub("%([A-Z]+)%", lambda match: values[match[1]], texts["viewer.html"])

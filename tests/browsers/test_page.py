@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page that turns, in browsers, by WebGL and by WebGPU: its points are those of `sinew points`, its heat
-maps those of docs/metrics.md; keys and controls do what they say; it fits on small screens; faults of Flex are found.
+maps those of docs/metrics.md; keys and controls do what they say; it fits on small screens; faults of Flex
+are found.
 
 SINEW_PICTURES  a folder for pictures, to look at
 """
@@ -297,5 +298,5 @@ def test_it_fits_and_is_drawn(browser, made, bent, width, is_dark, kind):
     assert browser.run("return document.documentElement.scrollWidth") <= inner
     folder = os.environ.get("SINEW_PICTURES")
     if folder:
-        name = f"{type(browser).__name__.lower()}-{browser.way}-{kind}-{width}-{'dark' if is_dark else 'light'}.png"
-        Path(folder, name).write_bytes(browser.picture())
+        words = type(browser).__name__.lower(), browser.way, kind, str(width), "dark" if is_dark else "light"
+        Path(folder, f"{'-'.join(words)}.png").write_bytes(browser.picture())
