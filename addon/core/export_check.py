@@ -17,12 +17,13 @@ EXPLAINED = 1e-5
 
 # In degrees; and a cosine.
 _SMALL_ANGLE, _SAME_NORMAL = 0.1, 0.9999
-# The sine of an angle.
-_NEAR_LIMIT = 0.99
+# The sine of an angle; how far rounding that a chain of bones amplifies may take their axes.
+_NEAR_LIMIT, _ROUNDED = 0.99, 0.01
 
 CAUSES: dict[str, str] = {
     "modifiers": "modifiers behind the armature, which the file leaves out",
     "method": "method and stages, where engines blend linearly",
+    "pose": "a pose without keys, where the file has no animation and plays the rest pose",
     "bendy": "bendy bones",
     "influences": "influences that were cut, or are of envelopes",
     "shape_keys": "shape keys",
@@ -43,7 +44,7 @@ class Moment:
     rest     float [vertices, 3], object space, with shape keys
     motions  float64 [bones, 4, 4], from object space at rest to the world
     bound    the same, by the object's place at the export
-    damaged  bool [bones], whether location, rotation and scale of it or of a bone above do not give its pose
+    damaged  float [bones], of damaged_bones()
     influences  of this frame
     normals  float32 [corners, 3], world, of the final mesh; None where it has other corners
     """
@@ -176,6 +177,18 @@ class Comparison:
         motions[self._none] = moment.bound[self._none]
         return motions
 
+    def _expected(self, moment: Moment) -> np.ndarray:
+        """What the file should have of them: without an animation the rest pose."""
+        return moment.bound if self._played.is_animated else np.broadcast_to(moment.bound[-1], moment.bound.shape)
+
+    def _damaged(self, moment: Moment, motions: np.ndarray) -> np.ndarray:
+        """bool [bones, 1, 1]: those whose motions may be different in the file."""
+        if not self._played.is_animated:
+            return np.zeros((len(motions), 1, 1), dtype=bool)
+        axes = moment.bound[:, :3, :3]
+        apart = np.abs(motions[:, :3, :3] - axes).max(axis=(1, 2))
+        return (apart <= moment.damaged * np.abs(axes).max())[:, None, None]
+
     def _rest(self, moment: Moment) -> np.ndarray:
         """The file's rest points, in object space."""
         points, matrix = self._played.rest_at(moment.frame), self._object_from_file
@@ -218,22 +231,23 @@ class Comparison:
             linear = blended(*own, moment.motions, rest)
             motions = self._motions(moment)
             points = self._rest(moment) if seen.has_keys else rest
-            damaged = moment.damaged[:, None, None]
+            damaged, expected = self._damaged(moment, motions), self._expected(moment)
             constant = blended(*self._constant, moment.motions, rest)
             played = self.played(moment)
             pairs["total"].append((played, moment.seen[at]))
             pairs["modifiers"].append((moment.seen[at], moment.shown[at]))
             pairs["method"].append((moment.shown[at], linear))
+            pairs["pose"].append((blended(*own, expected, rest), blended(*own, moment.bound, rest)))
             pairs["bendy"].append((constant, linear))
             pairs["influences"].append((blended(*cut, moment.motions, rest), constant))
             pairs["shape_keys"].append((blended(*own, moment.motions, points), linear))
             of_damaged = np.where(damaged, motions, moment.motions)
             pairs["shear_scale"].append((blended(*own, of_damaged, rest), linear))
             pairs["transforms"].append((blended(*own, moment.bound, rest), linear))
-            pairs["rest"].append((blended(*cut, np.where(damaged, motions, moment.bound), points), played))
-        for moment in seen.between:
+            pairs["rest"].append((blended(*cut, np.where(damaged, motions, expected), points), played))
+        for moment in seen.between if self._played.is_animated else ():
             own, rest = self._rows(moment.influences), moment.rest[at]
-            motions = np.where(moment.damaged[:, None, None], moment.bound, self._motions(moment))
+            motions = np.where(moment.damaged[:, None, None] > 0.0, moment.bound, self._motions(moment))
             pairs["sampling"].append((blended(*own, motions, rest), blended(*own, moment.bound, rest)))
         found = {name: Distance.of(own) for name, own in pairs.items()}
         points = seen.frames[0].seen
@@ -283,8 +297,9 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarray:
-    """bool [bones]: those that location, rotation and scale relative to their parents, as a file stores them,
-    do not pose exactly, and all below them.
+    """float [bones]: how far their axes in the file may be from those seen, as a part of their length. Above 0
+    for those that location, rotation and scale relative to their parents, as a file stores them, do not pose
+    exactly, and for all below them.
 
     poses    float64 [bones, 4, 4]
     parents  int [bones], -1 for none
@@ -295,16 +310,18 @@ def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarr
     products = axes.transpose(0, 2, 1) @ axes
     sizes = np.sqrt(np.einsum("nii->ni", products))
     scale = np.maximum(sizes[:, :, None] * sizes[:, None], 1e-30)
-    damaged = (np.abs(products / scale * (1.0 - np.identity(3))) > 1e-5).any(axis=(1, 2))
-    damaged |= (sizes < 1e-6).any(axis=1)
+    sheared = (np.abs(products / scale * (1.0 - np.identity(3))) > 1e-5).any(axis=(1, 2))
+    sheared |= (sizes < 1e-6).any(axis=1)
+    rounded = np.zeros(len(poses), dtype=bool)
     if kind == ".usdc":
         # Scales are half floats.
-        damaged |= (np.abs(sizes - sizes.astype(np.float16)) > 2e-6).any(axis=1)
+        rounded = (np.abs(sizes - sizes.astype(np.float16)) > 2e-6).any(axis=1)
     elif kind == ".fbx":
         # Angles about X and Z are not exact where that about Y is near 90 degrees.
-        damaged |= np.abs(axes[:, 2, 0]) > _NEAR_LIMIT * sizes[:, 0]
+        rounded = np.abs(axes[:, 2, 0]) > _NEAR_LIMIT * sizes[:, 0]
+    damaged = np.where(sheared, np.inf, np.where(rounded, _ROUNDED, 0.0))
     for _level in range(len(parents)):
-        below = damaged | (damaged[parents] & (parents >= 0))
+        below = np.maximum(damaged, np.where(parents >= 0, damaged[parents], 0.0))
         if (below == damaged).all():
             break
         damaged = below

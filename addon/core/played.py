@@ -34,6 +34,7 @@ class Played:
     motions  for a frame float64 [joints, 4, 4], from the space of `rest` to the world, Z up, in metres
     shapes   for a frame float64 [targets], how much of each
     normals  float64 [vertices, 3] at rest; None where the reader leaves them out
+    is_animated  whether an animation of the file moves the joints
     """
 
     name: str
@@ -45,6 +46,7 @@ class Played:
     motions: Callable[[float], np.ndarray]
     shapes: Callable[[float], np.ndarray]
     normals: np.ndarray | None = None
+    is_animated: bool = True
 
     def rest_at(self, frame: float) -> np.ndarray:
         """float64 [vertices, 3], with its shapes."""
@@ -193,6 +195,13 @@ class _GltfScene:
             self._last = frame, posed
         return self._last[1]
 
+    def moves(self, nodes: Sequence[int]) -> bool:
+        """Whether an animation moves one of the nodes, or one above."""
+        moved = {node for node, path, *_sampler in self._channels if path != "weights"}
+        while nodes and moved.isdisjoint(nodes):
+            nodes = [self._parents[node] for node in nodes if node in self._parents]
+        return bool(nodes)
+
     def world(self, frame: float, joints: Sequence[int]) -> np.ndarray:
         """float64 [joints, 4, 4]"""
         posed, found = self.at(frame), {}
@@ -251,4 +260,5 @@ def _gltf_mesh(scene: _GltfScene, number: int, node: dict[str, Any]) -> Played:
         np.vstack([file.array(part["NORMAL"]) for part in parts]).astype(np.float64)
         if all("NORMAL" in part for part in parts)
         else None,
+        scene.moves(joints),
     )

@@ -31,8 +31,8 @@ def read_fbx(
 ) -> list[Played]:
     """The skinned meshes of an .fbx, at some frames.
 
-    played  for each mesh the actions that play, by name, with their first frames, which are at 0 in the file;
-            its first animation plays where it has none of these
+    played  for each mesh what plays, by OBJECT|ACTION, with its first frames, which are at 0 in the file; its
+            first animation plays where it has none of these
     rate    frames per second
 
     Raises SinewError where ufbx is not installed, or can not read it.
@@ -100,8 +100,7 @@ def _list(made: Any) -> list[Any]:
 def _read(path: str, played: dict[str, dict[str, float]], rate: float, frames: list[float]) -> dict[str, Any]:
     ufbx = import_module("ufbx")
     scene = _keep(ufbx.load_file(path, target_axes=ufbx.axes_right_handed_z_up, target_unit_meters=1.0))
-    # Blender calls them OBJECT|ACTION.
-    stacks = {each.name.partition("|")[2]: _keep(each.anim) for each in _list(scene.anim_stacks)}
+    stacks = {each.name: _keep(each.anim) for each in _list(scene.anim_stacks)}
     anims = [*stacks.values(), _keep(scene.anim)]
     nodes = _list(scene.nodes)
     meshes = [(n.name, _keep(n.mesh)) for n in nodes if n.attrib_type == ufbx.ElementType.MESH]

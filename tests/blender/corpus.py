@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Real files of others: what Sinew makes of each, beside Blender's Armature modifier.
 
-    ./dev corpus FOLDER... [--json FILE] [--timeout SECONDS]
+    ./dev corpus FOLDER... [--exports] [--json FILE] [--timeout SECONDS]
 
 Every .blend, .glb, .gltf and .fbx below the folders is opened, described (`sinew info`), checked (`sinew
 check`) and deformed: linear blend and dual quaternions must equal the Armature modifier, at frames and in
 random poses, and all other methods must be finite. It is saved and opened with Sinew on it, Sinew is removed,
-which must leave nothing, and it is exported to glTF, whose shapes must be those that were seen.
+which must leave nothing, and it is exported to glTF, USD and FBX: each difference between what such a file plays
+and what was seen must have a cause that is known. A second table counts the causes. --exports only exports.
 
 A file is a row of a table, also if it can not be opened, crashes Blender or takes too long. Ctrl-C keeps
 what is done. Exit status 1: a file failed. Files are only read.
@@ -22,6 +23,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -36,6 +38,7 @@ from sinew_addon.blender_process import Limits
 from sinew_addon.commands import info
 from sinew_addon.commands.console import Console
 from sinew_addon.core.errors import SinewError
+from sinew_addon.core.export_check import CAUSES
 from sinew_addon.deform import characters, session
 from sinew_addon.io import files
 from sinew_addon.jobs import workers
@@ -43,6 +46,7 @@ from sinew_addon.jobs.tasks import preflight
 
 KINDS = (".blend", *files.IMPORTERS)
 FRAMES, RANDOM_POSES = 4, 3
+EXPORTS = (".glb", ".usdc", ".fbx")
 # The shape after saving and opening is computed again from the same numbers.
 SAVED_TOLERANCE = 1e-6
 
@@ -52,11 +56,12 @@ def examine(task: dict, report: worker.Report) -> dict:
 
     "vertices", "bones": of the meshes that Sinew deforms; "refused": a sentence for each other one that an
     armature deforms; "worst": the largest distance from the Armature modifier by method, as a part of the
-    diagonal; "by": routes taken; "failures": a sentence for each thing that is not as it should be
+    diagonal; "by": routes taken; "exports": by format the largest distance of each cause, as a part of the
+    diagonal; "failures": a sentence for each thing that is not as it should be
     """
     with tempfile.TemporaryDirectory() as folder:
         one = _File(Path(task["source"]), Path(folder), report)
-        one.examine()
+        one.examine(only_exports=task.get("exports", False))
     return {**one.row, "failures": one.failures}
 
 
@@ -66,10 +71,10 @@ class _File:
         # As Blender saves what it opened or imported.
         self.plain = folder / "plain.blend"
         self.names: list[str] = []
-        self.row: dict = {"vertices": 0, "bones": 0, "refused": [], "worst": {}, "by": []}
+        self.row: dict = {"vertices": 0, "bones": 0, "refused": [], "worst": {}, "by": [], "exports": {}}
         self.failures: list[str] = []
 
-    def examine(self) -> None:
+    def examine(self, only_exports: bool) -> None:
         files.open_file(self.source)
         # Saving drops some of it, and opening then more.
         bpy.data.orphans_purge(do_recursive=True)
@@ -78,10 +83,12 @@ class _File:
         if not self.row["meshes"]:
             return
         self._try("check", self.check)
-        self._try("parity", self.compare)
-        if self.names:
+        if not only_exports:
+            self._try("parity", self.compare)
+        if self.names and not only_exports:
             self._try("save", self.save)
-            self._try("export", self.export)
+        for kind in EXPORTS if self.names else ():
+            self._try(f"export to {kind}", partial(self.export, kind))
 
     def _try(self, name: str, step: Callable[[], None]) -> None:
         self.report(name)
@@ -217,16 +224,24 @@ class _File:
         if changed:
             self.failures.append(f"remove: {len(changed)} values differ, such as {changed[0]}")
 
-    def export(self) -> None:
+    def export(self, kind: str) -> None:
         if not all(obj.data.polygons for obj in self._meshes()):
             return  # glTF has no meshes without faces.
         printed = io.StringIO()
         parser, commands = cli.make_parser()
-        words = ["export", str(self.plain), "--method", "lbs", "--out", str(self.folder / "out.glb")]
-        args = parser.parse_args([*words, "--verify"])
-        if commands["export"].run(args, Console(printed, printed)):
-            lines = [line.strip() for line in printed.getvalue().splitlines() if line.strip()]
-            self.failures.append(f"export: {'; '.join(lines[:-1])}".replace(f"{self.plain}: ", ""))
+        words = ["export", str(self.plain), "--method", "lbs", "--out", str(self.folder / f"out{kind}")]
+        args = parser.parse_args([*words, "--verify", "--json"])
+        commands["export"].run(args, Console(printed, io.StringIO()))
+        said = json.loads(printed.getvalue())
+        self.failures += [f"export to {kind}: {sentence}" for sentence in said["errors"]]
+        found = self.row["exports"][kind] = {}
+        for mesh in said["meshes"]:
+            for cause, distance in mesh["causes"].items():
+                if distance["largest"] > mesh["rounding"]:
+                    share = distance["largest"] / (mesh["diagonal"] or 1.0)
+                    found[cause] = max(found.get(cause, 0.0), share)
+            if not mesh["explained"]:
+                self.failures.append(f"export to {kind}: {mesh['mesh']}: {found['rest']:.1e} without a cause")
 
 
 def files_below(folder: Path) -> Iterator[Path]:
@@ -239,12 +254,14 @@ def main() -> int:
         return 0
     parser = argparse.ArgumentParser(prog="./dev corpus", description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
+    parser.add_argument("--exports", action="store_true", help="only export")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the rows as JSON")
     parser.add_argument("--timeout", type=float, default=600.0, metavar="SECONDS", help="for each file")
     args = parser.parse_args()
     console = Console(sys.stdout, sys.stderr)
     paths = [path for folder in args.folders for path in files_below(folder)]
-    tasks = [{"command": "examine", "source": str(path.absolute())} for path in paths]
+    only = {"command": "examine", "exports": args.exports}
+    tasks = [{**only, "source": str(path.absolute())} for path in paths]
     limits, program = Limits(timeout=args.timeout), [sys.executable, __file__, "--worker"]
     rows: list[dict] = []
     try:
@@ -285,6 +302,11 @@ def _line(row: dict, number: int, count: int) -> str:
     return "\n  ".join([f"[{number}/{count}] {row['file']}: {_result(row)}", *row.get("failures", [])])
 
 
+def _counted(found: list[dict[str, float]], cause: str) -> str:
+    shares = [shares[cause] for shares in found if cause in shares]
+    return f"{len(shares)} ({100.0 * max(shares):.2g}%)" if shares else "0"
+
+
 def _show(rows: list[dict], console: Console) -> None:
     def largest(row: dict, method: str) -> str:
         worst = row.get("worst", {}).get(method)
@@ -300,6 +322,15 @@ def _show(rows: list[dict], console: Console) -> None:
             )
             for row in rows
             if "error" in row or row["meshes"]
+        ],
+    )
+    found = {kind: [r["exports"][kind] for r in skinned if kind in r["exports"]] for kind in EXPORTS}
+    console.table(
+        ("exported: differences by cause, in how many files (the largest, of the diagonal)", *EXPORTS),
+        [
+            ("files", *(str(len(found[kind])) for kind in EXPORTS)),
+            ("none, between frames apart", *(str(sum(not {*f} - {"sampling"} for f in found[k])) for k in EXPORTS)),
+            *((CAUSES[cause], *(_counted(found[kind], cause) for kind in EXPORTS)) for cause in CAUSES),
         ],
     )
     failed = [row for row in rows if _fails(row)]

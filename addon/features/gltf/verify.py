@@ -46,12 +46,15 @@ class Recording:
         scene = bpy.context.scene
         self._rate = scene.render.fps / scene.render.fps_base
         self._played = {obj.name: _animations_of(obj) for obj in meshes}
-        for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
-            if reason := _reason(obj, state):
-                self.left_out.append(f"{obj.name}: not verified: {reason}")
-            else:
-                self._meshes[obj.name] = _Mesh(obj, state)
         with characters.kept_frame(scene):
+            if kind == ".glb":
+                # Its exporter reads what stands still at this frame.
+                characters.set_frame(scene, 0)
+            for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+                if reason := _reason(obj, state):
+                    self.left_out.append(f"{obj.name}: not verified: {reason}")
+                else:
+                    self._meshes[obj.name] = _Mesh(obj, state)
             for frame in (scene.frame_start, *frames, *between):
                 characters.set_frame(scene, frame)
                 depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -69,19 +72,22 @@ class Recording:
         segments  names of the plain bones for joints, by the names of objects
         """
         if self._kind == ".glb":
-            played = {name for own in self._played.values() for name in own}
+            played = {name for own in self._played.values() for _owner, name in own}
             read = readers.read_gltf(path, played, self._rate)
         elif self._kind == ".fbx":
-            read = read_fbx.read_fbx(path, self._played, self._rate, self._times)
+            stacks = {
+                name: {"|".join(names): first for names, first in own.items()}
+                for name, own in self._played.items()
+            }
+            read = read_fbx.read_fbx(path, stacks, self._rate, self._times)
         else:
             read = read_usd.read_usd(path)
         checks = []
         for name, mesh in self._meshes.items():
             found = [each for each in read if plain(each.name) == plain(name)]
-            if len(found) != 1:
-                self.left_out.append(f"{name}: not verified: the file has {len(found)} skinned meshes of it")
-                continue
             try:
+                if len(found) != 1:
+                    raise SinewError(mesh.missing(len(found)))
                 seen = mesh.seen(name, segments.get(name, {}), self._influences)
                 checks.append(mesh.compared(seen, found[0], self._kind).check())
             except SinewError as error:
@@ -90,7 +96,7 @@ class Recording:
 
 
 class _Mesh:
-    """A mesh over frames. What is read of it once is at the current frame, as exporters do.
+    """A mesh over frames. What is read of it once is at the current frame, which is the exporter's.
 
     moments  the scene's first frame, where plain bones get their weights, and those to compare
     """
@@ -131,7 +137,7 @@ class _Mesh:
             rest,
             np.concatenate([armature @ motions @ given.bones_from_model, world[None]]),
             np.concatenate([armature @ motions @ self._bones_from_model, self._world[None]]),
-            np.append(damaged, False),
+            np.append(damaged, 0.0),
             self._influences,
             self._seen_normals(evaluated.data, world),
         )
@@ -165,6 +171,17 @@ class _Mesh:
             self.between,
         )
 
+    def missing(self, count: int) -> str:
+        """Why the file has not one skin of it, but so many."""
+        if count:
+            return f"the file has {count} skinned meshes of this name; rename one"
+        if not len(self._weighting.entries.bones):
+            return (
+                "the file has it without a skin, as no vertex has a weight, and bones' envelopes are in no file: "
+                "paint weights, or parent it to a bone"
+            )
+        return "the file has no skin of it; show it, and its armature, to the exporter"
+
     def compared(self, seen: Seen, found: Played, kind: str) -> Comparison:
         """Raises SinewError where the file has other rest points."""
         # glTF has the rest points of skins in world space.
@@ -175,7 +192,10 @@ class _Mesh:
             return Comparison(seen, found, place, np.arange(len(rest)))
         near = _near(rest, self._basis, EXPLAINED * size)
         if not all(near):
-            raise SinewError("the file has other rest points")
+            raise SinewError(
+                "the file has other rest points, so that nothing can be compared; apply what changes them before "
+                "the armature"
+            )
         # Of vertices at one place, each of the file's is taken for the one that moves like it.
         vertices = np.array([own[0] for own in near])
         comparison = Comparison(seen, found, place, vertices)
@@ -219,12 +239,13 @@ def _reason(obj: bpy.types.Object, state: SkinnedObject) -> str:
     return ""
 
 
-def _animations_of(obj: bpy.types.Object) -> dict[str, float]:
-    """Names of the actions and of the NLA's tracks that move a mesh, with their first frames: exporters name
-    animations by the ones or the others. The armature's are first."""
-    found: dict[str, float] = {}
+def _animations_of(obj: bpy.types.Object) -> dict[tuple[str, str], float]:
+    """Names of the actions and of the NLA's tracks that move a mesh, after those of what they are on, with
+    their first frames: exporters name animations by the ones or the others. The armature's are first."""
+    found: dict[tuple[str, str], float] = {}
     owners = [properties.of(obj).armature, obj.data.shape_keys, obj]
-    for animation in (owner.animation_data for owner in owners if owner is not None):
+    for owner in filter(None, owners):
+        animation = owner.animation_data
         if animation is None:
             continue
         action = animation.action
@@ -235,7 +256,7 @@ def _animations_of(obj: bpy.types.Object) -> dict[str, float]:
         ]
         strips = [strip.action for track in tracks for strip in track.strips]
         for each in filter(None, strips if action is None else [action]):
-            found.setdefault(each.name, float(each.frame_range[0]))
+            found.setdefault((owner.name, each.name), float(each.frame_range[0]))
         for track in tracks:
-            found.setdefault(track.name, 0.0)
+            found.setdefault((owner.name, track.name), 0.0)
     return found
