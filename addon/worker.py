@@ -25,12 +25,14 @@ Action = Callable[[dict, Report], dict]
 def run(task: dict, report: Report, others: Mapping[str, Action] = MappingProxyType({})) -> dict:
     """Performs one task in this process; returns its outcome with the hash of the file that was read."""
     from .features.bake import bake_apart
+    from .features.gltf import export_file
     from .jobs.tasks import flex, preflight, reskin
 
     actions: dict[str, Action] = {
         "reskin": reskin.reskin,
         "restore": reskin.restore,
         "export": bake_apart.export,
+        "write": export_file.write_apart,
         "check": preflight.check,
         "flex": flex.flex,
         **others,

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from .influences import Influences
+from .phrases import Phrase, phrase
 from .played import Played, blended, padded
 
 # Of the diagonal: a smaller distance is rounding.
@@ -32,6 +34,11 @@ CAUSES: dict[str, str] = {
     "sampling": "between frames, straight lines from key to key",
     "rest": "no cause that is known",
 }
+NORMALS = "normals, which engines skin as they were at rest"
+
+# The files that can be written and verified, and how many frames are, unless they are chosen.
+ENDINGS = (".glb", ".usdc", ".fbx", ".vrm")
+FRAMES = 25
 
 
 @dataclass(frozen=True)
@@ -120,25 +127,39 @@ class Check:
     def is_explained(self) -> bool:
         return self.causes["rest"].largest <= self.rounding
 
-    def sentences(self, unit: str) -> list[str]:
-        """unit: the name of a scene unit."""
-        share, total = 100.0 * self.total.largest / (self.diagonal or 1.0), self._said(self.total, unit)
+    @classmethod
+    def of_json(cls, said: dict[str, Any]) -> Check:
+        """said: by dataclasses.asdict()"""
+        causes = {name: Distance(**each) for name, each in said["causes"].items()}
+        normals = said["normals"] and Distance(**said["normals"])
+        return cls(**{**said, "total": Distance(**said["total"]), "causes": causes, "normals": normals})
+
+    def sentences(self, unit: str) -> list[Phrase]:
+        """The whole difference, then a line for each cause. unit: the name of a scene unit."""
+        share = 100.0 * self.total.largest / (self.diagonal or 1.0)
         said = [
-            f"{self.mesh}: the file plays {total} from what was seen ({share:.2g}% of the diagonal)",
+            phrase(
+                "the file plays {distance} from what was seen ({share}% of the diagonal)",
+                distance=self._said(self.total, unit),
+                share=f"{share:.2g}",
+            ),
             *(
-                f"{self.mesh}: {self._said(distance, unit)}: {CAUSES[name]}"
+                self._caused(distance, unit, CAUSES[name])
                 for name, distance in self.causes.items()
                 if distance.largest > self.rounding
             ),
         ]
         if self.normals is not None and self.normals.largest > _SMALL_ANGLE:
-            angles = self._said(self.normals, "degrees")
-            said.append(f"{self.mesh}: {angles}: normals, which engines skin as they were at rest")
+            said.append(self._caused(self.normals, "degrees", NORMALS))
         return said
 
+    def _caused(self, distance: Distance, unit: str, cause: str) -> Phrase:
+        return phrase("{distance}: {cause}", distance=self._said(distance, unit), cause=phrase(cause))
+
     @staticmethod
-    def _said(distance: Distance, unit: str) -> str:
-        return f"{distance.largest:.2g} {unit} at most, {distance.mean:.2g} on average"
+    def _said(distance: Distance, unit: str) -> Phrase:
+        largest, mean = f"{distance.largest:.2g}", f"{distance.mean:.2g}"
+        return phrase("{largest} {unit} at most, {mean} on average", largest=largest, mean=mean, unit=unit)
 
 
 def plain(name: str) -> str:

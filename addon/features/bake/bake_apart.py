@@ -20,36 +20,55 @@ from .bake_export import SceneExport
 
 
 def sample(started: SceneExport) -> Generator[float, None, None]:
-    """Replaces started.sample(): yields the progress, 0 to 1, several times a second. If closed, or on an
-    error, it ends the second Blender and removes its files."""
+    """Replaces started.sample(): yields the progress, 0 to 1, several times a second."""
+    with started.whole_or_nothing():
+        yield from follow(_task(started), started.path)
+
+
+def follow(task: dict, path: Path) -> Generator[float, None, dict]:
+    """Has the second Blender do a task that writes `path`; yields the progress, 0 to 1, and returns the
+    outcome. If closed, or on an error, it ends that Blender and removes its files."""
     images = [image for image in bpy.data.images if image.source != "VIEWER" and image.users]
     painted = [image.name for image in images if image.is_dirty]
     if painted:
         raise SinewError(f"{', '.join(painted)}: painted and not saved; save or pack it first")
-    share, outcome = 0.0, None
-    with started.whole_or_nothing(), _copy(started) as copy:
+    share, outcome = 0.0, {}
+    task |= {
+        "scene": bpy.context.scene.name,
+        "view_layer": bpy.context.view_layer.name,
+        # The same as in this Blender.
+        "scripts": not bpy.app.autoexec_fail,
+        "target": str(path),
+    }
+    with _copy(path) as copy:
         blender = BlenderProcess(Limits(), wait=False)
         try:
-            for outcome in blender.follow(_task(started, copy), Limits()):
+            for outcome in blender.follow({**task, "source": str(copy)}, Limits()):
                 share = (outcome or {}).get("share", share)
                 yield share
         except BlenderLost as lost:
-            raise SinewError(f"{started.path}: can not be written: {lost}") from None
+            raise SinewError(f"{path}: can not be written: {lost}") from None
         finally:
             # It has finished, or is not wanted any more.
             blender.end()
         if "error" in outcome:
             raise SinewError(outcome["error"])
+    return outcome
 
 
-def export(task: dict, report: Callable[..., None]) -> dict:
-    """Runs in the second Blender: exports the objects of a task of _task(), and reports the progress."""
+def open_copy(task: dict, report: Callable[..., None]) -> list[bpy.types.Object]:
+    """Runs in the second Blender: opens the copy of follow(); returns the task's objects."""
     report("opening it")
     files.open_file(Path(task["source"]), load_ui=True, scripts=task["scripts"])
     window = bpy.context.window
     window.scene = bpy.data.scenes[task["scene"]]
     window.view_layer = window.scene.view_layers[task["view_layer"]]
-    meshes = [bpy.data.objects[name, None] for name in task["objects"]]
+    return [bpy.data.objects[name, None] for name in task["objects"]]
+
+
+def export(task: dict, report: Callable[..., None]) -> dict:
+    """Runs in the second Blender: exports the objects of a task of _task(), and reports the progress."""
+    meshes = open_copy(task, report)
     started = SceneExport(meshes, task["kind"], task["frames"], Path(task["target"]))
     started.report_progress = lambda share: report("exporting it", share=share)
     for share in started.sample():
@@ -57,26 +76,20 @@ def export(task: dict, report: Callable[..., None]) -> dict:
     return {}
 
 
-def _task(started: SceneExport, copy: Path) -> dict:
+def _task(started: SceneExport) -> dict:
     return {
         "command": "export",
-        "source": str(copy),
-        "target": str(started.path),
         "kind": started.kind,
         "frames": list(started.frames),
         "objects": [obj.name for obj in started.meshes],
-        "scene": bpy.context.scene.name,
-        "view_layer": bpy.context.view_layer.name,
-        # The same as in this Blender.
-        "scripts": not bpy.app.autoexec_fail,
     }
 
 
 @contextmanager
-def _copy(started: SceneExport) -> Iterator[Path]:
+def _copy(path: Path) -> Iterator[Path]:
     """Context with a copy of the open file as it is now, saved beside the output."""
-    copy = started.unfinished.with_suffix(".blend")
-    files.save_beside(None, started.path, copy)
+    copy = path.with_name(f".{path.stem}.unfinished.blend")
+    files.save_beside(None, path, copy)
     link = copy.with_name(f"blendcache_{copy.stem}")
     try:
         _link_caches(link)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import bpy
@@ -29,6 +29,7 @@ class Recording:
     frames, between  whole frames, and times between them
     influences       of a vertex, at most, that the file will have; 0 for all
     kind             the file's ending
+    report           called with the progress of export and check, 0 to 1
     left_out         a sentence for each mesh that can not be verified
     """
 
@@ -39,6 +40,7 @@ class Recording:
         between: Sequence[float],
         influences: int,
         kind: str,
+        report: Callable[[float], None],
     ) -> None:
         self.left_out: list[str] = []
         self._kind, self._influences, self._times = kind, influences, [*frames, *between]
@@ -55,7 +57,8 @@ class Recording:
                     self.left_out.append(f"{obj.name}: not verified: {reason}")
                 else:
                     self._meshes[obj.name] = _Mesh(obj, state)
-            for frame in (scene.frame_start, *frames, *between):
+            for number, frame in enumerate((scene.frame_start, *self._times)):
+                report(0.5 * number / (len(self._times) + 1))
                 characters.set_frame(scene, frame)
                 depsgraph = bpy.context.evaluated_depsgraph_get()
                 for obj, state in session.states_of(meshes, depsgraph):
