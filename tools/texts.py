@@ -15,6 +15,7 @@ from bl_ui.utils import PresetPanel
 from sinew_addon import registration
 from sinew_addon.core import battery, metrics, recommendation, suggestion
 from sinew_addon.core.engines import METHODS
+from sinew_addon.core.export_check import CAUSES, NORMALS
 from sinew_addon.core.flex import limits
 from sinew_addon.core.vertex_data import PROVIDERS
 from sinew_addon.features.diagnose import mending
@@ -114,6 +115,8 @@ def _of_lists() -> Iterator[tuple[str, str]]:
     for mend in mending.ALL.values():
         yield mend.label, "mending"
         yield mend.description, "mending"
+    for cause in (*CAUSES.values(), NORMALS):
+        yield cause, "CAUSES"
     for provider in PROVIDERS.values():
         yield provider.what, "PROVIDERS"
     for text in heat_panel._WORST.values():

@@ -134,14 +134,18 @@ class Check:
         normals = said["normals"] and Distance(**said["normals"])
         return cls(**{**said, "total": Distance(**said["total"]), "causes": causes, "normals": normals})
 
+    @property
+    def share(self) -> float:
+        """Of the diagonal, how far it is at most."""
+        return self.total.largest / (self.diagonal or 1.0)
+
     def sentences(self, unit: str) -> list[Phrase]:
         """The whole difference, then a line for each cause. unit: the name of a scene unit."""
-        share = 100.0 * self.total.largest / (self.diagonal or 1.0)
         said = [
             phrase(
                 "the file plays {distance} from what was seen ({share}% of the diagonal)",
                 distance=self._said(self.total, unit),
-                share=f"{share:.2g}",
+                share=f"{100.0 * self.share:.2g}",
             ),
             *(
                 self._caused(distance, unit, CAUSES[name])

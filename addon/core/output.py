@@ -68,14 +68,17 @@ def file_to_write(given: str | Path, endings: tuple[str, ...]) -> Path:
     return path
 
 
+def unfinished_path(path: Path) -> Path:
+    """A temporary path in the folder of `path`, with the same suffix, by which some writers choose the format."""
+    return path.with_name(f".{path.stem}.unfinished{path.suffix}")
+
+
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Calls `write` with a temporary path in the folder of `path`, then renames the file; makes missing
-    folders.
+    """Calls `write` with unfinished_path(), then renames the file; makes missing folders.
 
     Raises SinewError where it cannot be written. After any exception the temporary file is removed.
     """
-    # With the same suffix, by which some writers choose the format.
-    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    unfinished = unfinished_path(path)
     made = [folder for folder in path.parents if not folder.exists()]
     # Otherwise a symbolic link of that name, in a folder made by somebody else, would be followed.
     remove(unfinished)

@@ -24,6 +24,7 @@ _SECTIONS = {
     "bpy.ops.sinew.original_action*": "inverse-kinematics",
     "bpy.ops.sinew.bake*": "bake",
     "bpy.ops.sinew.corrective_key*": "bake",
+    "bpy.ops.sinew.export*": "bake",
     "bpy.ops.sinew.compare*": "compare",
     "bpy.ops.sinew.*comparison*": "compare",
     "bpy.ops.sinew.*heat*": "heat-map",

@@ -184,6 +184,7 @@ class SINEW_MT_bake(_Submenu, bpy.types.Menu):
     bl_description = "Shapes as data that plays without Sinew"
     entries = (
         Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
+        Entry("sinew.export", "Export for Engines\u2026", icon="EXPORT"),
         Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
         Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
     )

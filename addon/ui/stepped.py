@@ -4,6 +4,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 import bpy
 
@@ -145,6 +146,29 @@ class WithDialog(Stepped):
             getattr(bpy.ops.sinew, name)("INVOKE_DEFAULT", in_steps=True, **self.values())
             return {"CANCELLED"}
         return super().execute(context)
+
+
+class IntoFolder:
+    """A base class of operators that write files."""
+
+    folder: bpy.props.StringProperty(
+        name="Folder",
+        description="Where files go; // is beside this file",
+        default="//",
+        subtype="DIR_PATH",
+        # Without it, newer versions warn about "//"; older ones do not know it.
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set(),
+    )
+    overwrite: bpy.props.BoolProperty(
+        name="Overwrite", description="Replace files that are there already", default=False
+    )
+
+    def target(self, suffix: str, is_written: bool = True) -> Path:
+        """The file of the open file's name. Raises SinewError where it is to be written, and has no folder."""
+        name = Path(bpy.data.filepath).stem
+        if is_written and self.folder.startswith("//") and not name:
+            raise SinewError("Save the file first, or choose a folder that is not beside it")
+        return Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
 
 
 def frames_over(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object], over: str) -> list[int]:

@@ -11,7 +11,7 @@ import bpy
 from ...attach import properties
 from ...core import bake as core
 from ...core.errors import SinewError
-from ...core.output import remove, writing
+from ...core.output import remove, unfinished_path, writing
 from ...deform import characters
 from ...io import files
 from . import bake_state
@@ -108,7 +108,7 @@ class SceneExport(Started):
         vertices = sum(len(characters.final_points(obj)) for obj in (*self.meshes, *self.carried))
         # Points and normals.
         core.check_space(self.path.parent, 24 * vertices * len(self.frames))
-        unfinished = self.path.with_name(f".{self.path.stem}.unfinished{self.path.suffix}")
+        unfinished = unfinished_path(self.path)
         remove(unfinished)
         with writing(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ from ...attach import properties
 from ...core import bake as core
 from ...core import vat
 from ...core.errors import SinewError
-from ...core.output import remove, writing
+from ...core.output import remove, unfinished_path, writing
 from ...core.vectors import transformed
 from ...deform import characters
 from ...io import files, mesh_io
@@ -66,7 +66,7 @@ class VatBake(Started):
     @property
     def files(self) -> list[tuple[Path, Path]]:
         paths = self.path, self.positions, self.normals, self.path.with_suffix(".json")
-        return [(each.with_name(f".{each.stem}.unfinished{each.suffix}"), each) for each in paths]
+        return [(unfinished_path(each), each) for each in paths]
 
     def discard(self) -> None:
         for unfinished, _path in self.files:

@@ -2,13 +2,11 @@
 """Bakes: an operator, and the panel of what plays without Sinew."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import bpy
 
 from ...attach.feature import Feature
 from ...core.bake import BONES, EXPORTS, FILES, VAT
-from ...core.errors import SinewError
 from ...core.frames import parse_frames
 from ...core.helper_bones import KEYS, POSE, HelperOptions
 from ...core.vat import EXR, EXR_HALF, PNG, VatOptions
@@ -22,7 +20,7 @@ from . import bake, bake_apart, bake_bones, bake_state
 WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
 
 
-class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
+class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.types.Operator):
     bl_label = "Bake"
     bl_description = (
         "Write what Sinew deforms as data that plays without it. A bake into this file takes Sinew off"
@@ -53,17 +51,6 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
     )
     step: bpy.props.IntProperty(
         name="Step", description="Every so many of the frames", default=1, min=1, soft_max=12
-    )
-    folder: bpy.props.StringProperty(
-        name="Folder",
-        description="Where files go; // is beside this file",
-        default="//",
-        subtype="DIR_PATH",
-        # Without it, newer versions warn about "//"; older ones do not know it.
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set(),
-    )
-    overwrite: bpy.props.BoolProperty(
-        name="Overwrite", description="Replace files that are there already", default=False
     )
     helpers: bpy.props.IntProperty(
         name="Helper Bones",
@@ -146,13 +133,11 @@ class SINEW_OT_bake(OnSinewObjects, stepped.WithDialog, bpy.types.Operator):
         return {"FINISHED"}
 
     def _start(self, context: bpy.types.Context) -> bake_state.Started:
-        scene, name = context.scene, Path(bpy.data.filepath).stem
-        if self.kind not in WITHOUT_FILES and self.folder.startswith("//") and not name:
-            raise SinewError("Save the file first, or choose a folder that is not beside it")
+        scene = context.scene
         frames = sorted(set(parse_frames(self.frames))) if self.frames.strip() else None
         frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
         suffix = FILES.get(self.kind, ".blend")
-        target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
+        target = self.target(suffix, self.kind not in WITHOUT_FILES)
         helpers = HelperOptions(self.helpers, self.error, self.influences, self.motion)
         meshes, frames = sinew_targets(context), frames[:: self.step]
         vat = VatOptions(self.axes, self.texels)
@@ -166,6 +151,7 @@ class SINEW_PT_bake(Sidebar, OfSkinned, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")
+        layout.operator("sinew.export", text="Export\u2026", icon="EXPORT")
         draw_text(layout, context, "A bake into this file takes Sinew off", icon="INFO")
         layout.operator("sinew.corrective_key", icon="SHAPEKEY_DATA")
 

@@ -104,7 +104,10 @@ def write_apart(task: dict, report: Callable[..., None]) -> dict:
     """Runs in the second Blender: the task of the operator."""
     skinned = bake_apart.open_copy(task, report)
     options = ExportOptions(**task["options"])
-    done = write(Path(task["target"]), skinned, options, lambda share: report("exporting it", share=share))
+    # Blender does not evaluate hidden objects.
+    with characters.shown(skinned):
+        path = Path(task["target"])
+        done = write(path, skinned, options, lambda share: report("exporting it", share=share))
     return {
         "bendy": [asdict(each) for each in done.bendy],
         "checks": [asdict(check) for check in done.checks],

@@ -1,14 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The glTF export: a check box in the exporter, stored in the scene."""
+"""The glTF export: a check box in the exporter, stored in the scene. The panel's export, of all formats."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from typing import Any
 
 import bpy
 
+from ...attach import attach, properties
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
+from ...core.export_check import Check
+from ...core.output import remove, unfinished_path
+from ...deform import characters
+from ...io import files
+from ...ui import stepped
+from ...ui.operators import OnSinewObjects
+from ...ui.sidebar import Sidebar, draw_text
+from ...ui.translations import counted, tr
+from ..bake import bake_apart
 from . import export
+from .export_file import ExportOptions
+
+# What was verified last, the largest difference first, by the session_uid of the scene. Nothing is stored in
+# files.
+results: dict[int, list[Check]] = {}
 
 
 class SinewGltf(bpy.types.PropertyGroup):
@@ -24,6 +40,89 @@ class SinewGltf(bpy.types.PropertyGroup):
 
 
 _ADDON = __package__.rpartition(".features")[0]
+
+
+class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.types.Operator):
+    bl_label = "Export"
+    bl_description = "Write the scene for engines: bones, weights and animation. This file stays as it is"
+    saying = "Sinew exports"
+    stopped = "Export stopped; nothing was written"
+
+    kind: bpy.props.EnumProperty(
+        name="To",
+        description="What reads the file",
+        items=[
+            (".glb", "glTF", "With Sinew's data, for three.js, Godot and others; bendy bones become plain ones"),
+            (".usdc", "USD", "Skeletons and blend shapes, without Sinew's data"),
+            (".fbx", "FBX", "For Unity and Unreal, without Sinew's data"),
+        ],
+    )
+    influences: bpy.props.IntProperty(
+        name="Influences",
+        description="How many bones move a vertex at most; most engines take four",
+        default=4,
+        min=1,
+        soft_max=8,
+    )
+    verify: bpy.props.BoolProperty(
+        name="Verify",
+        description="Read the file again, play it as an engine does, and say how far that is from what is "
+        "seen here, and why",
+        default=False,
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("kind", *(("influences",) if self.kind == ".glb" else ()), "folder", "overwrite", "verify"):
+            layout.prop(self, name)
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        self.path = self.target(self.kind)
+        files.check_free(self.path, self.overwrite)
+        deformed = attach.deformed_meshes(list(context.scene.objects))
+        skinned = [obj.name for obj in deformed if properties.has_sinew(obj) and properties.of(obj).enabled]
+        options = asdict(ExportOptions(self.influences, self.verify))
+        task = {"command": "write", "objects": skinned, "options": options}
+        try:
+            self.outcome = yield from bake_apart.follow(task, self.path)
+        finally:
+            remove(unfinished_path(self.path))
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        self.report({"INFO"}, tr("Wrote {path}", path=self.path))
+        checks = sorted(map(Check.of_json, self.outcome["checks"]), key=lambda check: -check.share)
+        for check in checks:
+            for sentence in check.sentences(characters.length_unit(context.scene)):
+                self.report({"INFO"}, f"{check.mesh}: {tr(sentence)}")
+        for sentence in self.outcome["left_out"]:
+            self.report({"WARNING"}, sentence)
+        results[context.scene.session_uid] = checks
+        return {"FINISHED"}
+
+
+class SINEW_PT_verified(Sidebar, bpy.types.Panel):
+    bl_label = "Verified"
+    bl_parent_id = "SINEW_PT_bake"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(results.get(context.scene.session_uid))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, (worst, *others) = self.layout, results[context.scene.session_uid]
+        layout.label(text=worst.mesh, icon="OUTLINER_OB_MESH", translate=False)
+        whole, *causes = worst.sentences(characters.length_unit(context.scene))
+        draw_text(layout, context, whole, alert=not worst.is_explained)
+        for cause in causes:
+            draw_text(layout, context, cause, icon="DOT")
+        if others:
+            more = counted(
+                len(others),
+                "{count} more mesh differs less; the Info editor lists it",
+                "{count} more meshes differ less; the Info editor lists them",
+            )
+            draw_text(layout, context, more, icon="INFO")
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
@@ -63,7 +162,7 @@ def _end() -> None:
 
 
 FEATURE = Feature(
-    (SinewGltf,),
+    (SinewGltf, SINEW_OT_export, SINEW_PT_verified),
     {"Scene.sinew_gltf": bpy.props.PointerProperty(type=SinewGltf)},
     subscriptions=((subscribers.saving, export.end), (subscribers.deformed, export.end_if_failed)),
     begin=_begin,
