@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,9 @@ import numpy as np
 from .errors import SinewError
 from .influences import Influences
 
-# Blender's axes from those of glTF.
+# Blender's axes from those of glTF; and from those of VRM 0, where characters look the other way.
 Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
+Z_UP_OF_VRM_0 = Z_UP @ np.diag([-1.0, 1.0, -1.0, 1.0])
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
@@ -35,6 +36,9 @@ class Played:
     shapes   for a frame float64 [targets], how much of each
     normals  float64 [vertices, 3] at rest; None where the reader leaves them out
     is_animated  whether an animation of the file moves the joints
+    up           float64 [4, 4], of glTF: Blender's axes from those of the file
+    binds        float64 [joints, 4, 4], of glTF: the joints at rest, in the world
+    shape_names  of glTF: of its shapes
     """
 
     name: str
@@ -47,6 +51,9 @@ class Played:
     shapes: Callable[[float], np.ndarray]
     normals: np.ndarray | None = None
     is_animated: bool = True
+    up: np.ndarray = field(default_factory=lambda: np.identity(4))
+    binds: np.ndarray | None = None
+    shape_names: tuple[str, ...] = ()
 
     def rest_at(self, frame: float) -> np.ndarray:
         """float64 [vertices, 3], with its shapes."""
@@ -232,6 +239,7 @@ def _gltf_mesh(scene: _GltfScene, number: int, node: dict[str, Any]) -> Played:
     joints = skin["joints"]
     inverses = file.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2).astype(np.float64)
     parts = [primitive["attributes"] for primitive in mesh["primitives"]]
+    up = Z_UP_OF_VRM_0 if "VRM" in file.header.get("extensions", {}) else Z_UP
 
     def stacked(name: str) -> np.ndarray:
         sets = max(sum(key.startswith(f"{name}_") for key in part) for part in parts)
@@ -255,10 +263,13 @@ def _gltf_mesh(scene: _GltfScene, number: int, node: dict[str, Any]) -> Played:
         tuple(scene.nodes[joint].get("name", "") for joint in joints),
         stacked("JOINTS").astype(np.int64),
         of_sum_one(stacked("WEIGHTS").astype(np.float64)),
-        lambda frame: Z_UP @ scene.world(frame, joints) @ inverses,
+        lambda frame: up @ scene.world(frame, joints) @ inverses,
         lambda frame: np.asarray(scene.at(frame)[number].get("weights", plain), dtype=np.float64),
         np.vstack([file.array(part["NORMAL"]) for part in parts]).astype(np.float64)
         if all("NORMAL" in part for part in parts)
         else None,
         scene.moves(joints),
+        up,
+        up @ np.linalg.pinv(inverses),
+        tuple({**mesh["primitives"][0], **mesh}.get("extras", {}).get("targetNames", ())),
     )

@@ -11,9 +11,10 @@ from contextlib import contextmanager, redirect_stderr
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import addon_utils
 import bpy
 
-from ...attach import attach
+from ...attach import attach, properties
 from ...core.bake import is_whole
 from ...core.errors import SinewError
 from ...core.export_check import FRAMES, Check, spread_frames
@@ -24,6 +25,10 @@ from ...io import files
 from ..bake import bake_apart, bake_bones
 from ..bake.bake_export import TEXTURES_STAY
 from . import export, verify
+
+
+# What the add-on for VRM writes of a vertex.
+_VRM_INFLUENCES = 4
 
 
 @dataclass(frozen=True)
@@ -69,15 +74,21 @@ def write(
     """
     scene, kind = bpy.context.scene, path.suffix.lower()
     is_gltf = kind == ".glb"
-    influences = options.influences if is_gltf else 0
+    influences = {".glb": options.influences, ".vrm": _VRM_INFLUENCES}.get(kind, 0)
     recording = None
     if options.verify:
         frames, between = spread_frames(scene.frame_start, scene.frame_end, FRAMES)
         if options.frames is not None:
             frames, between = sorted(set(options.frames)), []
+        if kind == ".vrm":
+            between = []
         recording = verify.Recording(skinned, frames, between, influences, kind, report)
     whole = range(scene.frame_start, scene.frame_end + 1)
-    bendy, segments, left_out = bake_bones.replace_bendy_bones(skinned, whole, influences)
+    # Nothing would move plain bones of a .vrm in the place of bendy ones.
+    bendy, segments, left_out = bake_bones.replace_bendy_bones(
+        skinned if kind != ".vrm" else [], whole, influences
+    )
+    rigs = {properties.of(obj).armature.name for obj in skinned}
     if is_gltf:
         scene.sinew_gltf.skinning = True
     else:
@@ -86,7 +97,7 @@ def write(
             attach.take_off(obj)
     with _known_to_exporters():
         try:
-            write_whole(path, lambda unfinished: _write(unfinished, options.influences))
+            write_whole(path, lambda unfinished: _write(unfinished, options.influences, sorted(rigs)))
         except RuntimeError as error:
             # The exporter's error, with everything that Blender printed.
             raise SinewError(f"{path}: can not be written: {files.telling_line(error)}") from None
@@ -115,11 +126,14 @@ def write_apart(task: dict, report: Callable[..., None]) -> dict:
     }
 
 
-def _write(path: Path, influences: int) -> None:
+def _write(path: Path, influences: int, rigs: list[str]) -> None:
     # If the exporter fails, Blender prints a traceback and raises it as an error.
     with redirect_stderr(io.StringIO()):
-        _WRITERS[path.suffix.lower()](str(path), influences)
-    kind = {".glb": "gltf", ".usdc": "usd"}.get(path.suffix.lower())
+        if path.suffix.lower() == ".vrm":
+            _vrm(str(path), rigs)
+        else:
+            _WRITERS[path.suffix.lower()](str(path), influences)
+    kind = {".glb": "gltf", ".vrm": "gltf", ".usdc": "usd"}.get(path.suffix.lower())
     if kind is not None and not is_whole(path, kind):
         raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
 
@@ -148,6 +162,25 @@ def _fbx(path: str, _influences: int) -> None:
         add_leaf_bones=False,
         bake_anim_simplify_factor=0.0,
     )
+
+
+def _vrm(path: str, rigs: list[str]) -> None:
+    """Writes by the add-on VRM Format, an extension of Blender's platform and a package of PyPI."""
+    if len(rigs) > 1:
+        raise SinewError(f"a .vrm has one armature, and these are several: {', '.join(rigs)}")
+    if not hasattr(bpy.types, "EXPORT_SCENE_OT_vrm"):
+        names = [m.__name__ for m in addon_utils.modules() if m.__name__.startswith("bl_ext.")]
+        found = [name for name in names if name.endswith(".vrm")] or ["io_scene_vrm"]
+        if addon_utils.enable(found[0], default_set=True) is None:
+            raise SinewError(
+                "a .vrm is written by the add-on VRM Format, which is not installed: Get Extensions has it, "
+                "and for bpy `pip install bpy-vrm-format`"
+            )
+    if bpy.ops.export_scene.vrm(filepath=path, armature_object_name=rigs[0]) != {"FINISHED"}:
+        raise SinewError(
+            f"{rigs[0]}: the add-on VRM Format does not take it; Validate, in its tab VRM, says why, such as human "
+            "bones that are not assigned"
+        )
 
 
 _WRITERS: dict[str, Callable[[str, int], None]] = {".glb": _gltf, ".usdc": _usd, ".fbx": _fbx}

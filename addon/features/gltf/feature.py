@@ -55,6 +55,7 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
             (".glb", "glTF", "With Sinew's data, for three.js, Godot and others; bendy bones become plain ones"),
             (".usdc", "USD", "Skeletons and blend shapes, without Sinew's data"),
             (".fbx", "FBX", "For Unity and Unreal, without Sinew's data"),
+            (".vrm", "VRM", "One human character, by the add-on VRM Format where it is installed"),
         ],
     )
     influences: bpy.props.IntProperty(

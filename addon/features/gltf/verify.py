@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -21,6 +22,10 @@ from ...core.vectors import transformed
 from ...deform import characters, session
 from ...deform.skinned_object import SkinnedObject
 from ...io import mesh_io, read_usd
+
+
+# The files that are glTF.
+GLTF = (".glb", ".vrm")
 
 
 class Recording:
@@ -74,7 +79,7 @@ class Recording:
 
         segments  names of the plain bones for joints, by the names of objects
         """
-        if self._kind == ".glb":
+        if self._kind in GLTF:
             played = {name for own in self._played.values() for _owner, name in own}
             read = readers.read_gltf(path, played, self._rate)
         elif self._kind == ".fbx":
@@ -92,7 +97,9 @@ class Recording:
                 if len(found) != 1:
                     raise SinewError(mesh.missing(len(found)))
                 seen = mesh.seen(name, segments.get(name, {}), self._influences)
-                checks.append(mesh.compared(seen, found[0], self._kind).check())
+                # A .vrm has no animation: programs pose its bones.
+                one = mesh.posed(found[0]) if self._kind == ".vrm" else found[0]
+                checks.append(mesh.compared(seen, one, self._kind).check())
             except SinewError as error:
                 self.left_out.append(f"{name}: not verified: {error}")
         return checks
@@ -115,6 +122,8 @@ class _Mesh:
         self._world = np.array(obj.matrix_world, dtype=np.float64)
         self._bones_from_model = state.shown.frames[0].bones_from_model.astype(np.float64)
         self._influences: Influences | None = None
+        # At each frame, the values of shape keys.
+        self._values: dict[float, dict[str, float]] = {}
         self.moments: list[Moment] = []
         self.frames: list[Moment] = []
         self.between: list[Moment] = []
@@ -124,6 +133,8 @@ class _Mesh:
         evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
         rig = properties.of(obj).armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
         world, armature = (np.array(each.matrix_world, dtype=np.float64) for each in (evaluated, rig))
+        keys = evaluated.data.shape_keys if obj.data.shape_keys is not None else None
+        self._values[frame] = {key.name: key.value for key in keys.key_blocks} if keys is not None else {}
         shown, final = transformed(state.points, world), characters.final_points(obj)
         rest = state.shown.rest_points.astype(np.float64)
         if self._influences is None or self._weighting.depends_on_points:
@@ -185,10 +196,28 @@ class _Mesh:
             )
         return "the file has no skin of it; show it, and its armature, to the exporter"
 
+    def posed(self, found: Played) -> Played:
+        """A skin of a .vrm in the poses of the scene's bones, about the file's own joints."""
+        assert found.binds is not None
+        numbers = {name: number for number, name in enumerate(self.bones.names)}
+        bones = np.array([numbers.get(name, -1) for name in found.joints])
+        at_rest = self._world @ np.linalg.inv(self._bones_from_model) @ self.bones.rest.astype(np.float64)
+        # With the axes of the file's joints, which VRM 0 has along those of the world.
+        placed = found.binds.copy()
+        placed[bones >= 0, :3, 3] = at_rest[bones[bones >= 0], :3, 3]
+        from_file = np.linalg.inv(self._world) @ placed @ np.linalg.inv(found.binds) @ found.up
+        moments = {moment.frame: moment for moment in self.moments}
+        return replace(
+            found,
+            motions=lambda frame: moments[frame].bound[bones] @ from_file,
+            shapes=lambda frame: np.array([self._values[frame].get(name, 0.0) for name in found.shape_names]),
+            is_animated=True,
+        )
+
     def compared(self, seen: Seen, found: Played, kind: str) -> Comparison:
         """Raises SinewError where the file has other rest points."""
         # glTF has the rest points of skins in world space.
-        place = np.linalg.pinv(self._world) @ readers.Z_UP if kind == ".glb" else np.identity(4)
+        place = np.linalg.pinv(self._world) @ found.up if kind in GLTF else np.identity(4)
         rest = transformed(found.rest, place)
         size = float(np.linalg.norm(np.ptp(self._basis, axis=0)))
         if len(rest) == len(self._basis) and np.abs(rest - self._basis).max(initial=0.0) <= EXPLAINED * size:
