@@ -6,17 +6,23 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import asdict
+from importlib.util import find_spec
 
+import addon_utils
 import bpy
 import numpy as np
 import other_gltf
+import program
 import pytest
 import scenes
+from mathutils import Matrix
 from program import run_sinew
 from scipy.spatial import cKDTree
 from sinew_addon.core import played
 from sinew_addon.core.export_check import CAUSES, EXPLAINED
-from sinew_addon.features.gltf import verify
+from sinew_addon.features.bake import bake_apart
+from sinew_addon.features.gltf import feature, verify
 from test_segment_bones import make_bendy, world_rest
 
 FRAMES = list(range(1, 12))
@@ -79,6 +85,10 @@ def plant(cause, obj, rig):
         scenes.key(rig.pose.bones[0], "scale", ((1, (1, 1, 1)), (11, (1.1, 1.5, 0.7))))
     elif cause == "transforms":
         scenes.key(obj, "location", ((1, (0, 0, 0)), (11, (0.1, 0.2, 0.0))))
+    elif cause == "pose":
+        rig.animation_data_clear()
+        rig.pose.bones[1].rotation_mode = "XYZ"
+        rig.pose.bones[1].rotation_euler = (0.4, 0.2, 0.7)
     elif cause == "shape_keys":
         # Exporters write all of a key, whatever group limits it to.
         obj.shape_key_add(name="Basis")
@@ -99,6 +109,114 @@ def test_each_cause_alone(scene, tmp_path, cause):
     assert distance > 1e-3 * mesh["diagonal"]
     assert np.isclose(distance, mesh["total"]["largest"], rtol=1e-3)
     assert np.isclose(mesh["causes"][cause]["mean"], mesh["total"]["mean"], rtol=1e-3)
+
+
+@pytest.mark.parametrize("ending", [".glb", ".fbx"])
+def test_what_moves_is_read_where_the_exporter_reads_it(scene, tmp_path, ending):
+    """glTF's exporter is at frame 0; FBX has the action for each armature that could play it."""
+    skip_without_reader(ending)
+    obj, rig = scene
+    scenes.key(rig, "location", ((0, (0.3, -0.4, 0.2)), (11, (0.5, 0.1, 0.2))))
+    other = rig.copy()
+    other.name = "Z"
+    other.animation_data_clear()
+    bpy.context.scene.collection.objects.link(other)
+    bpy.context.scene.frame_set(6)
+    assert found_causes(exported(tmp_path, ending=ending)) == set()
+
+
+def test_without_weights(scene, tmp_path):
+    obj, _rig = scene
+    obj.vertex_groups.clear()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--verify", "--out", tmp_path / "arm.glb")
+    assert "without a skin, as no vertex has a weight" in run_sinew(*words, status=1).stderr
+
+
+def make_human():
+    """At each bone of the add-on's own armature a triangle, which the bone and the one above move."""
+    bpy.ops.icyp.make_basic_armature()
+    rig = bpy.context.object
+    points = [bone.head_local + corner for bone in rig.data.bones for corner in 0.1 * Matrix.Identity(3)]
+    mesh = bpy.data.meshes.new("Human")
+    mesh.from_pydata(points, [], np.arange(len(points)).reshape(-1, 3).tolist())
+    obj = bpy.data.objects.new("Human", mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    obj.parent = rig
+    obj.modifiers.new("Armature", "ARMATURE").object = rig
+    for number, bone in enumerate(rig.data.bones):
+        group = obj.vertex_groups.get(bone.name) or obj.vertex_groups.new(name=bone.name)
+        group.add([3 * number, 3 * number + 1], 1.0, "REPLACE")
+        if bone.parent is not None:
+            obj.vertex_groups[bone.parent.name].add([3 * number + 1, 3 * number + 2], 0.5, "REPLACE")
+    for number, name in enumerate(("spine", "head", "upper_arm.L", "lower_arm.L", "lower_leg.R")):
+        rig.pose.bones[name].rotation_mode = "XYZ"
+        scenes.key(rig.pose.bones[name], "rotation_euler", ((1, (0, 0, 0)), (11, (0.4, 0.2 * number, 0.5))))
+    rig.location, rig.rotation_euler = (0.3, -0.4, 0.2), (0.0, 0.0, 0.6)
+    bpy.context.scene.frame_end = 11
+    return obj, rig
+
+
+@pytest.mark.parametrize("version", ["0.0", "1.0"])
+def test_vrm(empty_file, tmp_path, version):
+    """In the poses of the scene's bones, about the file's joints, with the scene's shape keys."""
+    out, file = tmp_path / "human.vrm", tmp_path / "human.blend"
+    words = ("export", file, "--method", "lbs", "--out", out, "--verify", "--json")
+    if find_spec("io_scene_vrm") is None:
+        scenes.make_arm()
+        bpy.ops.wm.save_as_mainfile(filepath=str(file))
+        assert "the add-on VRM Format, which is not installed" in run_sinew(*words, status=1).stderr
+        assert not out.exists()
+        pytest.skip("the VRM add-on is not installed: pip install bpy-vrm-format")
+    addon_utils.enable("io_scene_vrm", default_set=True)
+    try:
+        obj, rig = make_human()
+        scenes.key_shape(obj)
+        rig.data.vrm_addon_extension.spec_version = version
+        bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    finally:
+        # Blender would wait for it at the end of Python.
+        addon_utils.disable("io_scene_vrm", default_set=True)
+    (mesh,) = json.loads(run_sinew(*words).stdout)["meshes"]
+    assert found_causes(mesh) == set()
+    assert mesh["total"]["largest"] <= 1e-5 * mesh["diagonal"]
+    (found,) = played.read_gltf(out, [], 24.0)
+    assert ("VRM" in played.GltfFile(out).header["extensions"]) == (version == "0.0")
+    assert set(found.joints) >= {bone.name for bone in rig.data.bones}
+
+
+def test_the_panel_exports_and_verifies(scene, tmp_path):
+    """As the command does; the open file stays as it is."""
+    obj, _rig = scene
+    of_command = exported(tmp_path, method="dq")
+    obj = bpy.context.scene.objects["Arm"]
+    scenes.add_sinew(obj, "dq")
+    before = [(modifier.name, modifier.type) for modifier in obj.modifiers]
+    with pytest.raises(RuntimeError, match="is there already"):
+        bpy.ops.sinew.export(kind=".glb", verify=True)
+    assert bpy.ops.sinew.export(kind=".glb", verify=True, overwrite=True) == {"FINISHED"}
+    assert [(modifier.name, modifier.type) for modifier in obj.modifiers] == before
+    (check,) = feature.results[bpy.context.scene.session_uid]
+    assert {**asdict(check), "explained": True} == of_command
+    assert feature.SINEW_PT_verified.poll(bpy.context)
+    assert bpy.ops.sinew.export(kind=".glb", overwrite=True) == {"FINISHED"}
+    assert not feature.SINEW_PT_verified.poll(bpy.context)
+    assert {path.suffix for path in tmp_path.iterdir()} <= {".blend", ".blend1", ".glb"}
+
+
+def test_the_panels_export_that_is_stopped_leaves_nothing(scene, tmp_path):
+    obj, _rig = scene
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_end = 3000
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    before = sorted(tmp_path.iterdir())
+    task = {"command": "write", "objects": [obj.name], "options": {"verify": True}}
+    shares = bake_apart.follow(task, tmp_path / "arm.glb")
+    next(share for share in shares if share > 0.0)
+    (child,) = program.own_children()
+    shares.close()
+    assert not child.is_running()
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_shape_keys_along_bendy_bones(empty_file, tmp_path):
@@ -186,7 +304,7 @@ def test_sentences(scene, tmp_path):
 def test_a_changed_file_has_a_difference_without_a_cause(scene, tmp_path):
     obj, _rig = scene
     scenes.add_sinew(obj, "lbs")
-    recording = verify.Recording([obj], [1, 6, 11], [], 4, ".glb")
+    recording = verify.Recording([obj], [1, 6, 11], [], 4, ".glb", lambda _share: None)
     path = tmp_path / "a.glb"
     bpy.ops.export_scene.gltf(filepath=str(path), export_influence_nb=4)
     (check,) = recording.verify(path, {})

@@ -77,15 +77,15 @@ def test_bones_that_a_file_can_not_store():
     turn = about((0.0, 0.0, 1.0), 40.0)
     poses = np.array([scale, turn, turn @ turn, scale])
     parents = np.array([-1, 0, 1, -1])
-    assert damaged_bones(poses, parents, ".glb").tolist() == [False, True, True, False]
+    assert damaged_bones(poses, parents, ".glb").tolist() == [0.0, np.inf, np.inf, 0.0]
     # All that it inherits is no shear.
     poses[1] = scale @ turn
     poses[2] = poses[1] @ turn
     assert not damaged_bones(poses, parents, ".glb").any()
     poses[3, :3, :3] = 1.1 * np.identity(3)
-    assert damaged_bones(poses, parents, ".usdc").tolist() == [False, False, False, True]
+    assert damaged_bones(poses, parents, ".usdc").tolist() == [0.0, 0.0, 0.0, 0.01]
     poses[3, :3, :3] = about((0.0, 1.0, 0.0), 89.9)[:3, :3]
-    assert damaged_bones(poses, parents, ".fbx").tolist() == [False, False, False, True]
+    assert damaged_bones(poses, parents, ".fbx").tolist() == [0.0, 0.0, 0.0, 0.01]
 
 
 def test_frames_are_spread_evenly():
