@@ -204,7 +204,8 @@ class Comparison:
 
     def _expected(self, moment: Moment) -> np.ndarray:
         """What the file should have of them: without an animation the rest pose."""
-        return moment.bound if self._played.is_animated else np.broadcast_to(moment.bound[-1], moment.bound.shape)
+        bound = moment.bound
+        return bound if self._played.is_animated else np.broadcast_to(bound[-1], bound.shape)
 
     def _damaged(self, moment: Moment, motions: np.ndarray) -> np.ndarray:
         """bool [bones, 1, 1]: those whose motions may be different in the file."""
@@ -322,9 +323,9 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarray:
-    """float [bones]: how far their axes in the file may be from those seen, as a part of their length. Above 0
-    for those that location, rotation and scale relative to their parents, as a file stores them, do not pose
-    exactly, and for all below them.
+    """float [bones]: how far their axes in the file may be from those seen, as a part of their length: above
+    0 for those that location, rotation and scale relative to their parents, as a file stores them, do not
+    pose exactly, and for all below them.
 
     poses    float64 [bones, 4, 4]
     parents  int [bones], -1 for none

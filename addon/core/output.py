@@ -69,7 +69,7 @@ def file_to_write(given: str | Path, endings: tuple[str, ...]) -> Path:
 
 
 def unfinished_path(path: Path) -> Path:
-    """A temporary path in the folder of `path`, with the same suffix, by which some writers choose the format."""
+    """A temporary path in the folder of `path`, with its suffix, by which some writers choose the format."""
     return path.with_name(f".{path.stem}.unfinished{path.suffix}")
 
 

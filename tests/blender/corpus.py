@@ -329,7 +329,10 @@ def _show(rows: list[dict], console: Console) -> None:
         ("exported: differences by cause, in how many files (the largest, of the diagonal)", *EXPORTS),
         [
             ("files", *(str(len(found[kind])) for kind in EXPORTS)),
-            ("none, between frames apart", *(str(sum(not {*f} - {"sampling"} for f in found[k])) for k in EXPORTS)),
+            (
+                "none, between frames apart",
+                *(str(sum(not {*f} - {"sampling"} for f in found[k])) for k in EXPORTS),
+            ),
             *((CAUSES[cause], *(_counted(found[kind], cause) for kind in EXPORTS)) for cause in CAUSES),
         ],
     )

@@ -26,7 +26,6 @@ from ..bake import bake_apart, bake_bones
 from ..bake.bake_export import TEXTURES_STAY
 from . import export, verify
 
-
 # What the add-on for VRM writes of a vertex.
 _VRM_INFLUENCES = 4
 
@@ -178,8 +177,8 @@ def _vrm(path: str, rigs: list[str]) -> None:
             )
     if bpy.ops.export_scene.vrm(filepath=path, armature_object_name=rigs[0]) != {"FINISHED"}:
         raise SinewError(
-            f"{rigs[0]}: the add-on VRM Format does not take it; Validate, in its tab VRM, says why, such as human "
-            "bones that are not assigned"
+            f"{rigs[0]}: the add-on VRM Format does not take it; Validate, in its tab VRM, says why, such as "
+            "human bones that are not assigned"
         )
 
 

@@ -52,7 +52,11 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         name="To",
         description="What reads the file",
         items=[
-            (".glb", "glTF", "With Sinew's data, for three.js, Godot and others; bendy bones become plain ones"),
+            (
+                ".glb",
+                "glTF",
+                "With Sinew's data, for three.js, Godot and others; bendy bones become plain ones",
+            ),
             (".usdc", "USD", "Skeletons and blend shapes, without Sinew's data"),
             (".fbx", "FBX", "For Unity and Unreal, without Sinew's data"),
             (".vrm", "VRM", "One human character, by the add-on VRM Format where it is installed"),
@@ -75,7 +79,13 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        for name in ("kind", *(("influences",) if self.kind == ".glb" else ()), "folder", "overwrite", "verify"):
+        for name in (
+            "kind",
+            *(("influences",) if self.kind == ".glb" else ()),
+            "folder",
+            "overwrite",
+            "verify",
+        ):
             layout.prop(self, name)
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:

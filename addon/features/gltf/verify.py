@@ -23,7 +23,6 @@ from ...deform import characters, session
 from ...deform.skinned_object import SkinnedObject
 from ...io import mesh_io, read_usd
 
-
 # The files that are glTF.
 GLTF = (".glb", ".vrm")
 
