@@ -162,7 +162,7 @@ class Check:
 
     @staticmethod
     def _said(distance: Distance, unit: str) -> Phrase:
-        largest, mean = f"{distance.largest:.2g}", f"{distance.mean:.2g}"
+        largest, mean = (f"{v:.0f}" if v >= 100.0 else f"{v:.2g}" for v in (distance.largest, distance.mean))
         return phrase("{largest} {unit} at most, {mean} on average", largest=largest, mean=mean, unit=unit)
 
 

@@ -164,7 +164,7 @@ class IntoFolder:
     )
 
     def target(self, suffix: str, is_written: bool = True) -> Path:
-        """The file of the open file's name. Raises SinewError where it is to be written, and has no folder."""
+        """The file of the open file's name. Raises SinewError where it is to be written and has no folder."""
         name = Path(bpy.data.filepath).stem
         if is_written and self.folder.startswith("//") and not name:
             raise SinewError("Save the file first, or choose a folder that is not beside it")

@@ -6,8 +6,8 @@
 Every .blend, .glb, .gltf and .fbx below the folders is opened, described (`sinew info`), checked (`sinew
 check`) and deformed: linear blend and dual quaternions must equal the Armature modifier, at frames and in
 random poses, and all other methods must be finite. It is saved and opened with Sinew on it, Sinew is removed,
-which must leave nothing, and it is exported to glTF, USD and FBX: each difference between what such a file plays
-and what was seen must have a cause that is known. A second table counts the causes. --exports only exports.
+which must leave nothing, and it is exported to glTF, USD and FBX: each difference between what such a file
+plays and what was seen must have a known cause. A second table counts the causes. --exports only exports.
 
 A file is a row of a table, also if it can not be opened, crashes Blender or takes too long. Ctrl-C keeps
 what is done. Exit status 1: a file failed. Files are only read.
@@ -330,7 +330,7 @@ def _show(rows: list[dict], console: Console) -> None:
         [
             ("files", *(str(len(found[kind])) for kind in EXPORTS)),
             (
-                "none, between frames apart",
+                "none at frames",
                 *(str(sum(not {*f} - {"sampling"} for f in found[k])) for k in EXPORTS),
             ),
             *((CAUSES[cause], *(_counted(found[kind], cause) for kind in EXPORTS)) for cause in CAUSES),

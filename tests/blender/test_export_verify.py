@@ -115,7 +115,7 @@ def test_each_cause_alone(scene, tmp_path, cause):
 def test_what_moves_is_read_where_the_exporter_reads_it(scene, tmp_path, ending):
     """glTF's exporter is at frame 0; FBX has the action for each armature that could play it."""
     skip_without_reader(ending)
-    obj, rig = scene
+    _obj, rig = scene
     scenes.key(rig, "location", ((0, (0.3, -0.4, 0.2)), (11, (0.5, 0.1, 0.2))))
     other = rig.copy()
     other.name = "Z"

@@ -55,7 +55,7 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
             (
                 ".glb",
                 "glTF",
-                "With Sinew's data, for three.js, Godot and others; bendy bones become plain ones",
+                "With Sinew's data, for three.js, Godot and others, and plain bones for bendy ones",
             ),
             (".usdc", "USD", "Skeletons and blend shapes, without Sinew's data"),
             (".fbx", "FBX", "For Unity and Unreal, without Sinew's data"),
@@ -79,13 +79,8 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        for name in (
-            "kind",
-            *(("influences",) if self.kind == ".glb" else ()),
-            "folder",
-            "overwrite",
-            "verify",
-        ):
+        of_kind = ("influences",) if self.kind == ".glb" else ()
+        for name in ("kind", *of_kind, "folder", "overwrite", "verify"):
             layout.prop(self, name)
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
@@ -101,13 +96,13 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
             remove(unfinished_path(self.path))
 
     def finish(self, context: bpy.types.Context) -> set[str]:
-        self.report({"INFO"}, tr("Wrote {path}", path=self.path))
         checks = sorted(map(Check.of_json, self.outcome["checks"]), key=lambda check: -check.share)
         for check in checks:
             for sentence in check.sentences(characters.length_unit(context.scene)):
                 self.report({"INFO"}, f"{check.mesh}: {tr(sentence)}")
         for sentence in self.outcome["left_out"]:
             self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, tr("Wrote {path}", path=self.path))
         results[context.scene.session_uid] = checks
         return {"FINISHED"}
 
@@ -122,9 +117,8 @@ class SINEW_PT_verified(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, (worst, *others) = self.layout, results[context.scene.session_uid]
-        layout.label(text=worst.mesh, icon="OUTLINER_OB_MESH", translate=False)
         whole, *causes = worst.sentences(characters.length_unit(context.scene))
-        draw_text(layout, context, whole, alert=not worst.is_explained)
+        draw_text(layout, context, f"{worst.mesh}: {tr(whole)}", alert=not worst.is_explained)
         for cause in causes:
             draw_text(layout, context, cause, icon="DOT")
         if others:

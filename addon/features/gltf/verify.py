@@ -190,8 +190,8 @@ class _Mesh:
             return f"the file has {count} skinned meshes of this name; rename one"
         if not len(self._weighting.entries.bones):
             return (
-                "the file has it without a skin, as no vertex has a weight, and bones' envelopes are in no file: "
-                "paint weights, or parent it to a bone"
+                "the file has it without a skin, as no vertex has a weight, and bones' envelopes are in no "
+                "file: paint weights, or parent it to a bone"
             )
         return "the file has no skin of it; show it, and its armature, to the exporter"
 
@@ -224,8 +224,8 @@ class _Mesh:
         near = _near(rest, self._basis, EXPLAINED * size)
         if not all(near):
             raise SinewError(
-                "the file has other rest points, so that nothing can be compared; apply what changes them before "
-                "the armature"
+                "the file has other rest points, so that nothing can be compared; apply what changes them "
+                "before the armature"
             )
         # Of vertices at one place, each of the file's is taken for the one that moves like it.
         vertices = np.array([own[0] for own in near])
