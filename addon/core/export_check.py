@@ -5,7 +5,7 @@ skin has in Blender, and what all of them together do not explain is the rest.""
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ CAUSES: dict[str, str] = {
     "shear_scale": "bones whose shear, scale or rotation the file can not store exactly",
     "transforms": "transforms of objects that move apart",
     "sampling": "between frames, straight lines from key to key",
+    "actions": "other actions, whose values the exporter keeps where this one has no keys",
     "rest": "no cause that is known",
 }
 NORMALS = "normals, which engines skin as they were at rest"
@@ -133,6 +134,10 @@ class Check:
         causes = {name: Distance(**each) for name, each in said["causes"].items()}
         normals = said["normals"] and Distance(**said["normals"])
         return cls(**{**said, "total": Distance(**said["total"]), "causes": causes, "normals": normals})
+
+    def without_actions(self, alone: Check) -> Check:
+        """alone: of the same file without other actions. What it lacks of the rest is theirs."""
+        return replace(self, causes={**alone.causes, "actions": self.causes["rest"]})
 
     @property
     def share(self) -> float:

@@ -100,7 +100,7 @@ def plant(cause, obj, rig):
     return {}
 
 
-@pytest.mark.parametrize("cause", [c for c in CAUSES if c not in ("bendy", "sampling", "rest")])
+@pytest.mark.parametrize("cause", [c for c in CAUSES if c not in ("bendy", "sampling", "actions", "rest")])
 def test_each_cause_alone(scene, tmp_path, cause):
     planted = plant(cause, *scene)
     mesh = exported(tmp_path, *planted.get("options", ()), method=planted.get("method", "lbs"))
@@ -123,6 +123,24 @@ def test_what_moves_is_read_where_the_exporter_reads_it(scene, tmp_path, ending)
     bpy.context.scene.collection.objects.link(other)
     bpy.context.scene.frame_set(6)
     assert found_causes(exported(tmp_path, ending=ending)) == set()
+
+
+def test_other_actions_of_fbx(scene, tmp_path):
+    """One that keys what the current one does not; another comes from the current one alone."""
+    skip_without_reader(".fbx")
+    _obj, rig = scene
+    constraint = rig.pose.bones[2].constraints.new("COPY_ROTATION")
+    constraint.target, constraint.subtarget, constraint.mix_mode = rig, rig.pose.bones[1].name, "BEFORE"
+    current = rig.animation_data.action
+    rig.animation_data.action = before = bpy.data.actions.new("A")
+    before.use_fake_user = True
+    scenes.key(constraint, "influence", ((1, 1.0), (11, 1.0)))
+    rig.animation_data.action = current
+    constraint.influence = 0.0
+    mesh = exported(tmp_path, ending=".fbx")
+    assert found_causes(mesh) == {"actions"}
+    assert np.isclose(mesh["causes"]["actions"]["largest"], mesh["total"]["largest"], rtol=1e-3)
+    assert mesh["total"]["largest"] > 0.01 * mesh["diagonal"]
 
 
 def test_without_weights(scene, tmp_path):
