@@ -17,6 +17,13 @@ from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from . import bake, bake_apart, bake_bones, bake_state
 
+INFLUENCES = {
+    "name": "Influences",
+    "description": "How many bones move a vertex at most; most engines take four",
+    "default": 4,
+    "min": 1,
+    "soft_max": 8,
+}
 WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
 
 
@@ -69,13 +76,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
         precision=3,
         subtype="PERCENTAGE",
     )
-    influences: bpy.props.IntProperty(
-        name="Influences",
-        description="How many bones move a vertex at most; most engines take four",
-        default=4,
-        min=1,
-        soft_max=8,
-    )
+    influences: bpy.props.IntProperty(**INFLUENCES)
     motion: bpy.props.EnumProperty(
         name="Motion",
         description="What moves helper bones",

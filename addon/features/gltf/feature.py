@@ -19,6 +19,7 @@ from ...ui.operators import OnSinewObjects
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
 from ..bake import bake_apart
+from ..bake.feature import INFLUENCES
 from . import export
 from .export_file import ExportOptions
 
@@ -62,13 +63,7 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
             (".vrm", "VRM", "One human character, by the add-on VRM Format where it is installed"),
         ],
     )
-    influences: bpy.props.IntProperty(
-        name="Influences",
-        description="How many bones move a vertex at most; most engines take four",
-        default=4,
-        min=1,
-        soft_max=8,
-    )
+    influences: bpy.props.IntProperty(**INFLUENCES)
     verify: bpy.props.BoolProperty(
         name="Verify",
         description="Read the file again, play it as an engine does, and say how far that is from what is "
