@@ -91,6 +91,18 @@ def test_keys_and_drivers_set_it(route):
     assert scenes.worst(scenes.final_points(obj), found["nlerp"]) == 0.0
 
 
+def test_it_is_mixed_in_with_its_parameters(route):
+    obj = skinned_model()
+    found = shape_of_each(obj)
+    obj.vertex_groups.new(name="All").add(range(len(obj.data.vertices)), 1.0, "REPLACE")
+    obj.sinew.method, obj.sinew.mix.group, obj.sinew.mix.method = "dq", "All", "sdef"
+    for choice in CHOICES:
+        obj.sinew.sdef.interpolation = choice
+        bpy.context.view_layer.update()
+        tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+        assert scenes.worst(scenes.final_points(obj), found[choice]) <= tolerance
+
+
 def test_files_and_copies_carry_it(tmp_path):
     obj = skinned_model()
     found = shape_of_each(obj)

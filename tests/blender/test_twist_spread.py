@@ -107,6 +107,21 @@ def test_bones_have_an_amount_and_a_curve_that_can_be_keyed(route):
     assert routes.taken(obj, 0) == route
 
 
+def test_scaled_bones_and_other_scale_rules(route):
+    obj, armature = arm("dq")
+    armature.pose.bones["bone.1"].scale = (1.5, 1.0, 0.7)
+    twist(armature, 100.0)
+    for rule in ("4.0", "none"):
+        properties.of(obj).twist_spread.enabled = False
+        properties.of(obj).scale_rule = rule
+        before = scenes.final_points(obj)
+        spread(obj)
+        found = scenes.final_points(obj)
+        assert scenes.worst(found, before) > 0.05
+        if rule == "4.0":
+            assert_spread(obj, before)
+
+
 def test_bones_are_found_by_names_and_chains():
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.scene.collection.objects.link(armature)
