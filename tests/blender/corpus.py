@@ -234,7 +234,9 @@ class _File:
         commands["export"].run(args, Console(printed, io.StringIO()))
         said = json.loads(printed.getvalue())
         self.failures += [f"export to {kind}: {sentence}" for sentence in said["errors"]]
-        found = self.row["exports"][kind] = {}
+        found: dict[str, float] = {}
+        if said["meshes"]:
+            self.row["exports"][kind] = found
         for mesh in said["meshes"]:
             for cause, distance in mesh["causes"].items():
                 if distance["largest"] > mesh["rounding"]:
