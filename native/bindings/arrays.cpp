@@ -168,6 +168,19 @@ py::array_t<float> checked_points(const py::handle& value, const char* argument,
     return points;
 }
 
+void refuse_rest_points(const py::array_t<float>& points, std::size_t count) {
+    if (static_cast<std::size_t>(points.shape(0)) != count) {
+        fail("rest_points", std::to_string(count) + " points", std::to_string(points.shape(0)));
+    }
+    for (py::ssize_t i = 0; i < points.shape(0); ++i) {
+        if (is_finite(points.data(i, 0), 3)) continue;
+        fail("rest_points", "finite values", "NaN or infinity at vertex " + std::to_string(i));
+    }
+    refuse_space();
+}
+
+void refuse_space() { fail("bones_from_model", "an invertible transform", "one of determinant 0"); }
+
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument) {
     const std::string wanted = "float32 [n, 4, 4] or [n, 3, 4]";
     const auto array = checked<float>(value, argument, 3, wanted);

@@ -317,9 +317,7 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
         options.rotations = arguments.rotations;
     }
     options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
-    if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
-        fail("bones_from_model", "an invertible transform", "one of determinant 0");
-    }
+    if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) refuse_space();
     return arguments;
 }
 
@@ -340,7 +338,9 @@ py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone
 void set_rest_points(Timed<Deformer>& deformer, const ArrayLike& rest_points) {
     const auto points = checked_points(rest_points, "rest_points");
     // May have to wait for another thread's deformation.
-    without_gil([&] { deformer.set_rest_points(as_points(points)); });
+    bool is_set = false;
+    without_gil([&] { is_set = deformer.set_rest_points(as_points(points)); });
+    if (!is_set) refuse_rest_points(points, deformer.vertex_count());
 }
 
 }  // namespace

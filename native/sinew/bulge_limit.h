@@ -34,9 +34,10 @@ public:
     BulgeLimit(const Binding& binding, const BulgeLimitData& data);
 
     /// Sets other rest points [vertices], or the same points with another bones_from_model. Takes about as long
-    /// as apply(). Throws as the constructor does; the object is then unchanged.
-    void set_rest_points(std::span<const Vec3<float>> rest_points,
-                         const Affine<float>& bones_from_model = {});
+    /// as apply(). Returns whether the size fits, all are finite and the transform has an inverse: else nothing
+    /// changes.
+    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points,
+                                       const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
     /// One more than the highest bone index in the influences.

@@ -59,10 +59,10 @@ public:
     /// The weights of the stage `mix` [vertices], clamped; empty without it.
     [[nodiscard]] std::vector<float> mix_weights() const;
 
-    /// Sets the rest points [vertices] of this deformer alone, such as when shape keys change. Throws as the
-    /// constructor does. Each result of a concurrent deform() has either the old points or the new ones.
-    /// The first call on a deformer of a shared binding copies the mesh; later calls do not allocate.
-    void set_rest_points(std::span<const Vec3<float>> rest_points);
+    /// Sets the rest points [vertices] of this deformer alone, such as when shape keys change. Each result of a
+    /// concurrent deform() has either the old points or the new ones. The first call copies the points of the
+    /// binding; later calls do not allocate. Returns whether the size fits and all are finite: else nothing changes.
+    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points) noexcept;
 
     /// Writes the deformed points, model space.
     ///

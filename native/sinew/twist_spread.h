@@ -45,10 +45,10 @@ public:
     /// without a Y axis, and a singular transform.
     TwistSpread(const Binding& binding, const TwistSpreadData& data);
 
-    /// Sets other rest points [vertices], or the same points with another bones_from_model. Throws as the
-    /// constructor does; the object is then unchanged.
-    void set_rest_points(std::span<const Vec3<float>> rest_points,
-                         const Affine<float>& bones_from_model = {});
+    /// Sets other rest points [vertices], or the same points with another bones_from_model. The first call copies
+    /// the points of the binding; later calls do not allocate. Returns as BulgeLimit::set_rest_points().
+    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points,
+                                       const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
     /// Of rest_bones. Poses have as many, or fewer.

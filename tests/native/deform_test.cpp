@@ -3,6 +3,7 @@
 // rest points beside a frame. tests/python/test_deformer.py has the rest.
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -72,13 +73,26 @@ TEST_P(Deform, writes_nothing_to_points_of_another_number) {
     }
 }
 
+TEST_P(Deform, refuses_rest_points_that_do_not_fit_or_are_not_finite) {
+    const Scene scene = random_scene(19, 30, 1.0);
+    Deformer deformer(scene.data(), method());
+    const auto expected = deformed(deformer, scene);
+    for (const std::size_t size : {0, 29, 31}) {
+        EXPECT_FALSE(deformer.set_rest_points(std::vector<Vec3<float>>(size)));
+    }
+    auto points = scene.rest_points;
+    points.back().y = std::numeric_limits<float>::infinity();
+    EXPECT_FALSE(deformer.set_rest_points(points));
+    EXPECT_TRUE(same_bits(deformed(deformer, scene), expected));
+}
+
 TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
     Scene scene = random_scene(20, 10000, 1.0);
     Deformer deformer(scene.data(), method());
     const std::vector<Vec3<float>> old_rest(scene.rest_points.size(), Vec3<float>(0.25f));
     const std::vector<Vec3<float>> new_rest(scene.rest_points.size(), Vec3<float>(-0.5f));
     const auto results = [&](const std::vector<Vec3<float>>& rest) {
-        deformer.set_rest_points(rest);
+        EXPECT_TRUE(deformer.set_rest_points(rest));
         return deformed(deformer, scene);
     };
     const auto with_new = results(new_rest);
@@ -98,7 +112,9 @@ TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
             }
         });
     }
-    for (int round = 0; round < 20; ++round) deformer.set_rest_points(round % 2 == 0 ? new_rest : old_rest);
+    for (int round = 0; round < 20; ++round) {
+        EXPECT_TRUE(deformer.set_rest_points(round % 2 == 0 ? new_rest : old_rest));
+    }
     done = true;
     for (std::thread& reader : readers) reader.join();
     EXPECT_EQ(torn, 0);

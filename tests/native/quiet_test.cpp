@@ -3,7 +3,9 @@
 // in the process.
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cstdlib>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -12,10 +14,16 @@
 
 #include "polygons.h"
 #include "scene.h"
+#include "sinew/bulge_limit.h"
 #include "sinew/delta_mush.h"
 #include "sinew/ik/solver.h"
+#include "sinew/methods/cor/centres_of_rotation.h"
+#if SINEW_WITH_DDM
+#include "sinew/methods/ddm/direct_delta_mush.h"
+#endif
 #include "sinew/normals.h"
 #include "sinew/skinned_normals.h"
+#include "sinew/twist_spread.h"
 
 #ifdef __GLIBC__
 #include <dlfcn.h>
@@ -30,13 +38,54 @@ namespace {
 std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
 std::atomic<std::size_t> bytes{0};
+std::atomic<int> beside{0};
+
+}  // namespace
+
+// The thread sanitizer defines its own.
+#if defined(__GLIBC__) && !defined(__SANITIZE_THREAD__)
+#define SINEW_COUNTS_ALL
+// Memory that does not come from operator new.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* memory, std::size_t size);
+void* __libc_memalign(std::size_t unit, std::size_t size);
+
+void* malloc(std::size_t size) { return beside.fetch_add(1), __libc_malloc(size); }
+void* calloc(std::size_t count, std::size_t size) { return beside.fetch_add(1), __libc_calloc(count, size); }
+void* realloc(void* memory, std::size_t size) { return beside.fetch_add(1), __libc_realloc(memory, size); }
+void* aligned_alloc(std::size_t unit, std::size_t size) {
+    return beside.fetch_add(1), __libc_memalign(unit, size);
+}
+int posix_memalign(void** memory, std::size_t unit, std::size_t size) {
+    *memory = aligned_alloc(unit, size);
+    return *memory == nullptr ? ENOMEM : 0;
+}
+}
+#endif
+
+namespace {
+
+void* allocate(std::size_t size) {
+#ifdef SINEW_COUNTS_ALL
+    return __libc_malloc(size);
+#else
+    return std::malloc(size);
+#endif
+}
 
 // Windows has other functions for aligned memory, with their own deallocation function.
 void* allocate_aligned(std::size_t unit, std::size_t size) {
 #ifdef _WIN32
     return _aligned_malloc(size, unit);
 #else
-    return std::aligned_alloc(unit, (size + unit - 1) / unit * unit);
+    const std::size_t whole = (size + unit - 1) / unit * unit;
+#ifdef SINEW_COUNTS_ALL
+    return __libc_memalign(unit, whole);
+#else
+    return std::aligned_alloc(unit, whole);
+#endif
 #endif
 }
 
@@ -53,7 +102,7 @@ void free_aligned(void* memory) {
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
     allocations.fetch_add(1);
     bytes.fetch_add(size);
-    return std::malloc(std::max<std::size_t>(size, 1));
+    return allocate(std::max<std::size_t>(size, 1));
 }
 
 void* operator new(std::size_t size) {
@@ -80,9 +129,7 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete(void* memory, std::align_val_t) noexcept { free_aligned(memory); }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { free_aligned(memory); }
 
-// The thread sanitizer defines its own.
-#if defined(__GLIBC__) && !defined(__SANITIZE_THREAD__)
-#define SINEW_COUNTS_LOCKS
+#ifdef SINEW_COUNTS_ALL
 extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) {
     using Lock = int (*)(pthread_mutex_t*);
     static std::atomic<Lock> lock{nullptr};
@@ -103,11 +150,15 @@ TEST(Counting, sees_what_there_is) {
     const int before = allocations;
     const auto number = std::make_unique<int>(1);
     EXPECT_EQ(allocations, before + *number);
-#ifdef SINEW_COUNTS_LOCKS
+#ifdef SINEW_COUNTS_ALL
     const int locks_before = locks;
     static std::mutex mutex;
     const std::lock_guard guard(mutex);
     EXPECT_EQ(locks, locks_before + 1);
+    const int beside_before = beside;
+    std::free(std::malloc(*number));
+    std::free(std::aligned_alloc(64, 64));
+    EXPECT_EQ(beside, beside_before + 2);
 #endif
 }
 
@@ -128,7 +179,7 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
                 EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {{}, threads}, points));
                 EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {bones_from_model, threads}, points));
             }
-            deformer.set_rest_points(other_rest_points);
+            EXPECT_TRUE(deformer.set_rest_points(other_rest_points));
         }
     };
     std::vector<std::vector<Vec3<float>>> points(5, scene.rest_points);
@@ -166,6 +217,74 @@ TEST(DeltaMush, allocates_nothing_once_it_is_bound) {
     for (const std::size_t threads : {1, 4, 0}) EXPECT_TRUE(mush.apply(mesh.rest_points, 1.0f, threads));
     EXPECT_EQ(allocations, allocations_before);
 }
+
+template <auto function>
+constexpr bool is_nothrow_v = false;
+template <class T, class... Arguments, bool (T::*function)(Arguments...) noexcept>
+constexpr bool is_nothrow_v<function> = true;
+
+TEST(Stages, allocate_nothing_once_rest_points_were_set) {
+    Scene scene = random_scene(5, 20000, 1.0);
+    const Binding binding(scene.data());
+    const std::size_t bones = scene.posed_from_rest.size();
+    const std::vector<BoneSegment<float>> segments(bones, {{0, 0, 0}, {0, 1, 0}});
+    const std::vector<Affine<float>> rest_bones(bones);
+    const TwistBone twist{0, 0, 1, false, {0, 0, 0}, {0, 1, 0}};
+    BulgeLimit limit(binding, {segments});
+    TwistSpread spread(binding, {std::span(&twist, 1), rest_bones});
+    auto points = scene.rest_points;
+    const auto frame = [&] {
+        EXPECT_TRUE(limit.set_rest_points(scene.rest_points) && spread.set_rest_points(scene.rest_points));
+        EXPECT_TRUE(spread.apply(points, scene.posed_from_rest, {}));
+        EXPECT_TRUE(limit.apply(points, scene.posed_from_rest, {}));
+    };
+    frame();
+    const int before = allocations;
+    frame();
+    EXPECT_EQ(allocations, before);
+    static_assert(is_nothrow_v<&BulgeLimit::set_rest_points> && is_nothrow_v<&TwistSpread::set_rest_points> &&
+                  is_nothrow_v<&Deformer::set_rest_points>);
+    points.front().x = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_FALSE(limit.set_rest_points(points));
+    EXPECT_FALSE(spread.set_rest_points(points));
+    EXPECT_FALSE(limit.set_rest_points(scene.rest_points, {Mat3<float>(0.0f), {}}));
+    EXPECT_FALSE(spread.set_rest_points(scene.rest_points, {Mat3<float>(0.0f), {}}));
+}
+
+#ifdef SINEW_COUNTS_ALL
+// That of aligned data, too: whoever replaces operator new has all memory of the library.
+TEST(Memory, comes_from_operator_new) {
+    const Scene scene = random_scene(6, 2000, 1.0);
+    const test::Mesh mesh = test::sheet(50);
+    const auto work = [&] {
+        auto points = scene.rest_points;
+        const Binding binding(scene.data());
+        for (const MethodInfo& method : kMethods) {
+            Deformer deformer(binding, method);
+            EXPECT_TRUE(deformer.set_rest_points(scene.rest_points));
+            EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {{}, 4}, points));
+        }
+        const DeltaMush mush(mesh.topology(), mesh.rest_points, {});
+        const Normals normals(mesh.topology(), mesh.rest_points.size(), {});
+        const SkinnedNormals skinned(binding, Dq::info, {points, points});
+        Job job;
+        EXPECT_EQ(centres_of_rotation(scene.data(), {}, job).size(), points.size());
+#if SINEW_WITH_DDM
+        const int of_others = beside;
+        EXPECT_FALSE(direct_delta_mush(scene.data(), {}, 0.1, job).empty());
+        // Eigen's solver has its own.
+        beside = of_others;
+#endif
+    };
+    // Starts threads, which have memory of the system.
+    work();
+    const int before = beside;
+    const int counted = allocations;
+    work();
+    EXPECT_EQ(beside, before);
+    EXPECT_GT(allocations, counted + 100);
+}
+#endif
 
 TEST(Normals, allocate_nothing_once_they_are_made) {
     const test::Mesh mesh = test::sheet(150);

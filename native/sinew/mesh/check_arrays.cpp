@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sinew/mesh/check_arrays.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "sinew/transform/convert.h"
@@ -20,6 +21,11 @@ void check_points(std::span<const Vec3<float>> points, std::size_t count) {
         fail("rest_points", std::to_string(count) + " points", std::to_string(points.size()));
     }
     check_finite("rest_points", points, "vertex");
+}
+
+bool are_points(std::span<const Vec3<float>> points, std::size_t count) noexcept {
+    return points.size() == count &&
+           std::ranges::all_of(points, [](const Vec3<float>& point) { return is_finite(point); });
 }
 
 void check_weights(const std::string& argument, std::span<const float> weights, std::size_t vertex_count) {
@@ -48,9 +54,13 @@ void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bon
 
 void check_space(const Affine<float>& bones_from_model) {
     if (!is_finite(bones_from_model)) fail("bones_from_model", "finite values", "NaN or infinity");
-    if (glm::determinant(Mat3<double>(bones_from_model.linear)) == 0.0) {
+    if (!is_space(bones_from_model)) {
         fail("bones_from_model", "an invertible transform", "one of determinant 0");
     }
+}
+
+bool is_space(const Affine<float>& bones_from_model) noexcept {
+    return is_finite(bones_from_model) && glm::determinant(Mat3<double>(bones_from_model.linear)) != 0.0;
 }
 
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count) {

@@ -18,6 +18,8 @@ void check_finite(const std::string& argument, std::span<const Vec3<float>> vect
 
 /// Throws if the rest points are not `count`, or if one is not finite.
 void check_points(std::span<const Vec3<float>> points, std::size_t count);
+/// Whether check_points() does not throw.
+[[nodiscard]] bool are_points(std::span<const Vec3<float>> points, std::size_t count) noexcept;
 
 /// Throws if the weights are not one for each vertex, or if one is NaN.
 void check_weights(const std::string& argument, std::span<const float> weights, std::size_t vertex_count);
@@ -29,6 +31,8 @@ void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bon
 
 /// Throws if a value is not finite, or if the transform has no inverse.
 void check_space(const Affine<float>& bones_from_model);
+/// Whether check_space() does not throw.
+[[nodiscard]] bool is_space(const Affine<float>& bones_from_model) noexcept;
 
 /// Throws if `triangles` [3 x any number] has a corner that is no vertex.
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);

@@ -78,7 +78,9 @@ struct SkinnedNormals::State {
             std::vector<Vec3<float>> stepped = points;
             for (Vec3<float>& point : stepped) point[axis] += step;
             const auto i = static_cast<std::size_t>(axis);
-            deformers[1 + i].set_rest_points(stepped);
+            if (!deformers[1 + i].set_rest_points(stepped)) {
+                fail("rest_points", "finite values", "infinity beside them");
+            }
             moved[i].resize(points.size());
             if (!vertices.empty()) cofactors[i].resize(points.size());
         }

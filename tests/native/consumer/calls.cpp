@@ -44,7 +44,7 @@ void deform() {
         expect(points[0] == sinew::Vec3<float>(11, 20, 30), "the first point is moved by its bone");
         expect(points[1] == sinew::Vec3<float>(100, 202, 300), "the second point is moved by its bone");
         expect(points[2] == sinew::Vec3<float>(100, 200, 303), "the third point is moved by its bone");
-        deformer.set_rest_points(points);
+        expect(deformer.set_rest_points(points), "the points are finite");
         expect(deformer.vertex_count() == 3 && deformer.influence_count() == 3 &&
                    deformer.bone_count() == 2 && deformer.method() == method,
                "a Deformer says what it was made of");

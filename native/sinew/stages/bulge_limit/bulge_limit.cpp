@@ -42,7 +42,7 @@ bool is_orthonormal(const Mat3<double>& m) {
 struct BulgeLimit::State {
     State(const Binding& binding, const BulgeLimitData& data);
 
-    void measure(std::vector<Vec3<float>> points, const Affine<float>& space);
+    void measure(std::span<const Vec3<float>> points, const Affine<float>& space);
     [[nodiscard]] BulgeFrame frame(Strided<Vec3<float>> points) const;
 
     std::shared_ptr<const PackedBinding> packed;
@@ -81,12 +81,13 @@ BulgeFrame BulgeLimit::State::frame(Strided<Vec3<float>> points) const {
             points};
 }
 
-void BulgeLimit::State::measure(std::vector<Vec3<float>> points, const Affine<float>& space) {
+void BulgeLimit::State::measure(std::span<const Vec3<float>> points, const Affine<float>& space) {
     space_rows = SpaceRows(space);
     for (std::size_t i = 0; i < bones.size(); ++i) {
         bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
     }
-    const BulgeFrame all = frame(points);
+    // The kernel only reads them here.
+    const BulgeFrame all = frame({const_cast<Vec3<float>*>(points.data()), points.size(), sizeof(points[0])});
     parallel_for_blocks(mesh, points.size(), 0, [&](std::size_t begin, std::size_t end) {
         kBulgeKernel.measure[target_in_use()](all, begin, end);
     });
@@ -95,12 +96,12 @@ void BulgeLimit::State::measure(std::vector<Vec3<float>> points, const Affine<fl
 BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
     : state_(make_owned<State>(binding, data)) {}
 
-void BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
-                                 const Affine<float>& bones_from_model) {
-    check_points(rest_points, vertex_count());
-    check_space(bones_from_model);
+bool BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
+                                 const Affine<float>& bones_from_model) noexcept {
+    if (!are_points(rest_points, vertex_count()) || !is_space(bones_from_model)) return false;
     const std::scoped_lock lock(state_->mutex);
-    state_->measure({rest_points.begin(), rest_points.end()}, bones_from_model);
+    state_->measure(rest_points, bones_from_model);
+    return true;
 }
 
 std::size_t BulgeLimit::vertex_count() const noexcept { return state_->packed->vertex_count; }

@@ -267,14 +267,14 @@ bool TwistSpread::State::prepare(std::span<const Affine<float>> posed, const Twi
 TwistSpread::TwistSpread(const Binding& binding, const TwistSpreadData& data)
     : state_(make_owned<State>(binding, data)) {}
 
-void TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
-                                  const Affine<float>& bones_from_model) {
-    check_points(rest_points, vertex_count());
-    check_space(bones_from_model);
+bool TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
+                                  const Affine<float>& bones_from_model) noexcept {
+    if (!are_points(rest_points, vertex_count()) || !is_space(bones_from_model)) return false;
     const std::scoped_lock lock(state_->mutex);
     state_->own_rest_points.resize(kPointRows * state_->mesh.blocks.size());
     pack_points(state_->mesh, rest_points, state_->own_rest_points);
     state_->measure(bones_from_model);
+    return true;
 }
 
 std::size_t TwistSpread::vertex_count() const noexcept { return state_->packed->vertex_count; }
