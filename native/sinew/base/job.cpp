@@ -39,18 +39,21 @@ void give_way() noexcept {
 #endif
 }
 
-/// Since when this thread works without a rest.
-thread_local std::chrono::steady_clock::time_point works_since;
+/// Seconds of now(), since which this thread works without a rest.
+thread_local double works_since = 0.0;
+
+double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 /// Sleeps for as long as this thread has worked, where frames are deformed meanwhile: a thread of low priority still
 /// delays those that Blender wakes many times a frame, and takes their share of memory and caches.
 void make_room() {
-    constexpr std::chrono::milliseconds kShortest{1}, kLongest{50};
-    const auto worked = std::chrono::steady_clock::now() - works_since;
+    constexpr double kShortest = 0.001, kLongest = 0.05;
+    const double worked = now() - works_since;
     if (worked < kShortest) return;
-    if (is_in_use())
-        std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(worked, kLongest));
-    works_since = std::chrono::steady_clock::now();
+    if (is_in_use()) std::this_thread::sleep_for(std::chrono::duration<double>(std::min(worked, kLongest)));
+    works_since = now();
 }
 
 /// Starts a thread. Returns false if the system refuses.
@@ -59,7 +62,7 @@ bool start(std::thread& thread, bool gives_way, const Run& run) {
     try {
         thread = std::thread([gives_way, run] {
             if (gives_way) give_way();
-            works_since = std::chrono::steady_clock::now();
+            works_since = now();
             run();
         });
     } catch (const std::system_error&) {
@@ -151,7 +154,7 @@ BackgroundJob::BackgroundJob(std::size_t threads, bool gives_way, std::function<
 BackgroundJob::~BackgroundJob() {
     if (!is_of_this_process()) {
         // Its threads can not be joined, nor what they may have locked be destroyed.
-        static_cast<void>(state_.release());
+        [[maybe_unused]] const State* const left = state_.release();
         return;
     }
     cancel();

@@ -44,7 +44,7 @@ std::vector<Quat<float>> continued_rotations(const Skeleton& skeleton,
         const Quat<double> rotation = glm::determinant(linear) < 0.0 ? before : rotation_of(linear);
         const Quat<double> turn(bone < turns.size() ? turns[bone] : Quat<float>(0.0f, 0.0f, 0.0f, 0.0f));
         rotations.push_back(is_away(rotation, before, turn) ? -rotation : rotation);
-        result.push_back(Quat<float>(rotations.back()));
+        result.emplace_back(rotations.back());
     }
     return result;
 }

@@ -148,6 +148,7 @@ TwistSpread::State::State(const Binding& binding, const TwistSpreadData& data)
 
 void TwistSpread::State::list_blocks(std::span<const std::int32_t> parents) {
     std::vector<std::vector<std::uint8_t>> are_below;
+    are_below.reserve(twists.size());
     for (const TwistBone& twist : twists) are_below.push_back(below(twist.tip, parents, mesh.used_bones));
     for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
         const std::size_t first = block_twists.size();
