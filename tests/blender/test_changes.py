@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import characters, session, update
+from sinew_addon.deform import characters, safe_mode, session, update
 from sinew_addon.deform.plan import State
 from sinew_addon.io import mesh_io
 from sinew_addon.ui import state_text
@@ -118,6 +118,30 @@ def test_a_character_appended_in_place_of_two_objects(tmp_path):
     for appended in target.objects:
         bpy.context.scene.collection.objects.link(appended)
     assert np.array_equal(scenes.shapes(target.objects[0], [11]), expected)
+
+
+@pytest.mark.usefixtures("route")
+def test_two_objects_swap_their_names():
+    obj, armature = scenes.make_arm()
+    other, other_armature = scenes.make_arm(name="Other")
+    bpy.data.objects.remove(other_armature)
+    other.modifiers["Armature"].object = armature
+    other.vertex_groups[1].add(list(range(80, 200)), 0.2, "REPLACE")
+    for each in (obj, other):
+        scenes.add_sinew(each, "dq")
+    expected = [scenes.shapes(each, [11]) for each in (obj, other)]
+    bpy.context.scene.frame_set(5)
+    obj.name, other.name, obj.name = "Third", "Arm", "Other"
+    seen = []
+    monitor = bpy.app.handlers.frame_change_post
+    monitor.insert(0, lambda *_args: seen.append(scenes.final_points(obj)))
+    try:
+        bpy.context.scene.frame_set(11)
+    finally:
+        monitor.pop(0)
+    for each, shape in zip((obj, other), expected, strict=True):
+        assert np.array_equal(scenes.final_points(each), shape[0])
+    assert safe_mode.is_on() or np.array_equal(seen[0], expected[0][0])
 
 
 def test_what_the_artist_switched_while_off_stays():
