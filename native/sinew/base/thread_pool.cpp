@@ -278,7 +278,7 @@ void run_by_host(std::size_t count, std::size_t jobs, const Work& work, std::siz
         std::size_t count, chunk;
         std::atomic<std::size_t> next{0};
         std::atomic<bool> failed{false};
-        std::exception_ptr error;
+        std::exception_ptr error{};
     } shared{work, count, chunk};
     const auto job = [](void* of_job, std::size_t) {
         Shared& own = *static_cast<Shared*>(of_job);
