@@ -134,6 +134,7 @@ def recommended_by_click() -> Iterator[None]:
 
     choose("lbs")
     before = settings()
+    recommend.choices.clear()
     yield from window.click(METHOD)
     yield from window.click(RECOMMENDED)
     yield from window.until(lambda: scene().session_uid in recommend.choices, "a recommendation")

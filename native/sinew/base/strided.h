@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <span>
 #include <type_traits>
@@ -39,9 +40,10 @@ public:
     /// Whether nothing lies between elements.
     [[nodiscard]] bool is_contiguous() const noexcept { return stride_ == sizeof(T); }
 
-    [[nodiscard]] T& operator[](std::size_t i) const noexcept {
+    template <std::integral Index>
+    [[nodiscard]] T& operator[](Index i) const noexcept {
         using Byte = std::conditional_t<std::is_const_v<T>, const std::byte, std::byte>;
-        return *reinterpret_cast<T*>(reinterpret_cast<Byte*>(first_) + i * stride_);
+        return *reinterpret_cast<T*>(reinterpret_cast<Byte*>(first_) + static_cast<std::size_t>(i) * stride_);
     }
 
 private:
