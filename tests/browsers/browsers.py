@@ -86,7 +86,7 @@ class Browser:
 class Chromium(Browser):
     PROGRAMS = (("chromium", "chromium-browser", "google-chrome"), ("chromedriver",))
     PACKAGES = "chromium and chromium-driver"
-    # Without these WebGPU has an adapter, and nothing to show textures by.
+    # For WebGPU to show textures.
     VULKAN = ("enable-features=Vulkan", "use-vulkan=swiftshader")
 
     def start(self, stack):

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Draws by WebGPU, as gl.js does by WebGL 2, with buffers in place of textures.
 
-async function webgpu(canvas, sources, constants, failed) {
+async function webgpu(canvas, sources, constants, failed, needsCard) {
 const adapter = await navigator.gpu?.requestAdapter();
 if (!adapter) throw new Error("This browser does not offer WebGPU.");
+if (needsCard && (adapter.info ?? adapter).isFallbackAdapter) throw new Error("WebGPU has no graphics card.");
 const device = await adapter.requestDevice(), { queue } = device;
 const context = canvas.getContext("webgpu"), format = navigator.gpu.getPreferredCanvasFormat();
 context.configure({ device, format, alphaMode: "premultiplied" });

@@ -683,7 +683,9 @@ function connectCanvas() {
   new ResizeObserver(changed).observe(canvas);
 }
 
-await begin(wanted === "webgl" ? [webgl] : wanted === "webgpu" ? [webgpu] : [webgpu, webgl]);
+const ways = { webgl, webgpu }, named = (wanted ?? "").split(",").filter((name) => name in ways);
+// Where no card computes, WebGL is faster than WebGPU.
+await begin(named.length ? named.map((name) => ways[name]) : [(...given) => webgpu(...given, true), webgl]);
 if (!way) return;
 connect();
 listFindings();
