@@ -341,13 +341,13 @@ def _show(rows: list[dict], console: Console) -> None:
     failed = [row for row in rows if _fails(row)]
     for row in failed:
         console.say("\n  ".join([row["file"], *_fails(row)]))
-    worst = max((error for row in skinned for error in row["worst"].values()), default=0.0)
+    worst = [error for row in skinned for error in row["worst"].values()]
+    apart = f", worst distance from the Armature modifier {max(worst):.1e} of the diagonal" if worst else ""
     sizes = [row["vertices"] for row in skinned] or [0]
     console.say(
         f"Blender {bpy.app.version_string}: {len(rows)} files, {sum(map(_is_unreadable, rows))} that Blender "
         f"can not read; {len(skinned)} with skins that Sinew deforms, of {min(sizes)} to {max(sizes)} "
-        f"vertices, worst distance from the Armature modifier {worst:.1e} of the diagonal; "
-        f"{len(failed)} failed"
+        f"vertices{apart}; {len(failed)} failed"
     )
 
 
