@@ -157,6 +157,7 @@ def _begin() -> None:
 
 
 def _end() -> None:
+    results.clear()
     export.end()
     _exporters_panels().pop(_ADDON, None)
 

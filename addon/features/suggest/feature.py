@@ -63,9 +63,8 @@ class SINEW_OT_recommend(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         self.choice = yield from recommend.search(context.scene, objects)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
-        with session.changing(context):
-            recommend.use(character.followers(context), self.choice)
         recommend.choices[context.scene.session_uid] = self.choice
+        _use(context, self.choice)
         self.report({"INFO"}, self.choice.text)
         return {"FINISHED"}
 
@@ -79,8 +78,7 @@ class SINEW_OT_use_recommended(OnSinewObjects, bpy.types.Operator):
         choice = recommend.choices.get(context.scene.session_uid)
         if choice is None:
             raise SinewError("Nothing is recommended yet: click Suggest first")
-        with session.changing(context):
-            recommend.use(character.followers(context), choice)
+        _use(context, choice)
         return {"FINISHED"}
 
 
@@ -164,6 +162,11 @@ class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
                 cell = grid.column(align=True)
                 cell.template_icon(number, scale=PICTURE_HEIGHT)
                 _draw_method(cell, suggestion, method, used)
+
+
+def _use(context: bpy.types.Context, choice: Choice) -> None:
+    with session.changing(context):
+        recommend.use(character.followers(context), choice)
 
 
 def _used(context: bpy.types.Context) -> set[str]:

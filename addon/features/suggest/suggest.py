@@ -2,7 +2,6 @@
 """Goes through frames, and measures the shapes that each method would give."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -28,11 +27,6 @@ CHOOSING = 0.5
 suggestions: dict[int, Suggestion] = {}
 
 
-class Moment(NamedTuple):
-    frame: float
-    moment: live.Moment
-
-
 def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str) -> Iterator[float]:
     """Yields the progress; then suggestions[scene.session_uid] has the result, and recommend.choices has what
     is recommended. The objects' own methods do not change.
@@ -45,15 +39,15 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     counted = frames_to_count(frames)
     labels = {method.name: method.label for method in sinew.methods()}
     suggestion = Suggestion(labels | ({RECOMMENDED: "Recommended"} if choice.stages else {}), frames, 0.0)
-    moments: list[Moment] = []
+    moments: dict[float, live.Moment] = {}
     with stepped.kept_frame(scene, armatures):
         for frame in frames:
             subject, depsgraph = measure_at(scene, objects, properties.BLENDER, frame)
             at_rest = crossings(subject.gauge.rest) if frame in counted else None
             suggestion.diagonal = subject.measured.rest.diagonal
-            moments.append(Moment(frame, live.Moment.of(subject, depsgraph)))
+            moments[frame] = moment = live.Moment.of(subject, depsgraph)
             for number, method in enumerate(suggestion.methods, start=1):
-                measured = _measured(method, moments[-1].moment, choice)
+                measured = _measured(method, moment, choice)
                 _add(suggestion, method, frame, measured, choice)
                 if at_rest is not None:
                     new = len(crossings(measured.shape) - at_rest)
@@ -62,8 +56,7 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
                 yield CHOOSING + (1.0 - CHOOSING) * done / len(frames)
     worst_pictures.begin(scene)
     for name in suggestion.methods if worst_pictures.are_drawn() else ():
-        worst = suggestion.worst[name, LONGEST].frame
-        moment = next(each.moment for each in moments if each.frame == worst)
+        moment = moments[suggestion.worst[name, LONGEST].frame]
         worst_pictures.add(scene, name, _measured(name, moment, choice))
         yield 1.0
     suggestions[scene.session_uid], recommend.choices[scene.session_uid] = suggestion, choice

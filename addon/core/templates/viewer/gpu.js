@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Draws by WebGPU, as gl.js does by WebGL 2, with buffers in place of textures.
 
+// needsCard  refuse an adapter that computes on the processor
 async function webgpu(canvas, sources, constants, failed, needsCard) {
 const adapter = await navigator.gpu?.requestAdapter();
 if (!adapter) throw new Error("This browser does not offer WebGPU.");
@@ -39,7 +40,7 @@ function program(name, own = {}, samples = 0) {
 }
 const OVER = { srcFactor: "one", dstFactor: "one-minus-src-alpha" };
 
-// number  of what is bound before the next submit()
+// number  of the draw since the last submit(): each has uniforms of its own until then
 function bind(pass, { pipeline, bindings, members }, values, number = 0) {
   uniforms[number] ??= device.createBuffer({ size: 256, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
   const numbers = [];
