@@ -12,7 +12,6 @@ import pytest
 import scenes
 from conftest import BLEND_FILES, REAL_RIGS
 from sinew_addon.attach import attach, properties, stack
-from sinew_addon.deform import session
 from sinew_addon.io import files, mesh_io
 from sinew_addon.ui import state_text
 
@@ -70,26 +69,6 @@ def test_every_method_follows_rigid_motion(method):
     motion = np.array(root.matrix @ root.bone.matrix_local.inverted())
     expected = scenes.rest_points(obj) @ motion[:3, :3].T + motion[:3, 3]
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def with_a_second_armature(behind: str | None = None) -> bpy.types.Object:
-    """An arm with a second Armature modifier, with another modifier between them if a type is given."""
-    obj, _armature = scenes.make_arm()
-    _unused, other = scenes.make_arm(name="Other")
-    scenes.bend(other, 50.0)
-    if behind is not None:
-        obj.modifiers.new("Between", behind)
-    obj.modifiers.new("Second", "ARMATURE").object = other
-    return obj
-
-
-def test_an_armature_modifier_apart_stays_blenders():
-    obj = with_a_second_armature(behind="CAST")
-    expected = scenes.shapes(obj, [1, 6, 11])
-    scenes.add_sinew(obj)
-    assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert obj.modifiers["Second"].object is not None
-    assert any("Second" in warning for warning in session.state_of(obj).bound.facts.warnings)
 
 
 def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:

@@ -5,17 +5,15 @@ data."""
 from __future__ import annotations
 
 import sys
-import time
 
 import bpy
 import numpy as np
 import pytest
 import scenes
 import sinew
-from conftest import REPOSITORY
+from conftest import REPOSITORY, look_until_done
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.precompute import precomputations
-from sinew_addon.deform import precompute_watch, session
+from sinew_addon.deform import session
 from sinew_addon.deform.plan import State
 
 sys.path.append(str(REPOSITORY / "tests" / "python"))
@@ -25,16 +23,6 @@ if "ddm" not in {method.name for method in sinew.methods()}:
     pytest.skip("built without ddm", allow_module_level=True)
 
 FRAME = 8
-
-
-@pytest.fixture
-def in_window():
-    """As in an interactive session: nothing waits."""
-    precomputations.waits = False
-    yield
-    precomputations.cancel_all()
-    precomputations.waits = True
-    precomputations.stopped.clear()
 
 
 def moments_of(obj: bpy.types.Object, radius: float) -> np.ndarray:
@@ -105,31 +93,3 @@ def test_in_a_window_the_old_radius_stays_until_the_new_is_computed(in_window):
     assert scenes.worst(scenes.final_points(obj), before) < 1e-6
     look_until_done()
     assert_equal_to_reference(obj, 0.3)
-
-
-def look_until_done() -> None:
-    for _ in range(300):
-        if precompute_watch.check() is None:
-            return
-        time.sleep(0.02)
-    raise AssertionError("it goes on and on")
-
-
-def test_it_is_kept_in_the_file(tmp_path, monkeypatch):
-    obj, _armature = scenes.skinned_arm("ddm", bones=3)
-    properties.of(obj).ddm.radius = 0.2
-    bpy.context.scene.frame_set(FRAME)
-    before, name = scenes.final_points(obj), obj.name
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    monkeypatch.setattr(precomputations, "cache", None)
-    precomputations._made.clear()
-
-    def refuse(*_arguments, **_options):
-        raise AssertionError("it is computed again")
-
-    monkeypatch.setattr(sinew, "direct_delta_mush", refuse)
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects[name]
-    bpy.context.scene.frame_set(FRAME)
-    np.testing.assert_array_equal(scenes.final_points(obj), before)

@@ -147,39 +147,6 @@ def test_keys_change_it_from_frame_to_frame():
     assert scenes.worst(scenes.shapes(obj, [10])[0], plain) < 1e-5
 
 
-def test_settings_paint_and_edits_are_seen():
-    obj = make_rough_arm()
-    bpy.context.scene.frame_set(11)
-    mush(obj, group=GROUP)
-
-    def expected(**settings: object) -> np.ndarray:
-        properties.of(obj).enabled = False
-        shape = by_corrective_smooth(obj, [11], vertex_group=GROUP, **settings)[0]
-        properties.of(obj).enabled = True
-        return shape
-
-    def same(shape: np.ndarray) -> bool:
-        return scenes.worst(scenes.final_points(obj), shape) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-    assert same(expected())
-    obj.vertex_groups[GROUP].add(range(100), 1.0, "REPLACE")
-    assert same(expected())
-    properties.of(obj).delta_mush.iterations = 9
-    assert same(expected(iterations=9))
-    obj.data.vertices[50].co.x += 0.05
-    obj.data.update()
-    assert same(expected(iterations=9))
-    made = bmesh.new()
-    made.from_mesh(obj.data)
-    made.edges.ensure_lookup_table()
-    bmesh.ops.delete(made, geom=[f for f in made.faces if len(f.verts) == 3][:10], context="FACES_ONLY")
-    made.to_mesh(obj.data)
-    made.free()
-    assert same(expected(iterations=9))
-    properties.of(obj).delta_mush.group = "none such"
-    assert any("none such" in text for text in session.state_of(obj).bound.facts.warnings)
-
-
 def narrowest(obj: bpy.types.Object, rings: int, sides: int) -> float:
     """The smallest radius of the tube's rings at frame 11, relative to that at rest."""
     points = scenes.shapes(obj, [11])[0][: rings * sides].reshape(rings, sides, 3)
@@ -204,24 +171,6 @@ def test_a_radius_gives_the_same_shape_at_two_densities():
         by_iterations.append(narrowest(obj, rings, sides))
     assert abs(found[0] - found[1]) < 0.01
     assert abs(by_iterations[0] - by_iterations[1]) > 0.05
-
-
-def test_saved_copied_and_removed(tmp_path):
-    obj = make_rough_arm()
-    before = whole_file.content()
-    mush(obj, iterations=8, group=GROUP)
-    expected = scenes.shapes(obj, FRAMES)
-    path = tmp_path / "mushed.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-    copy = scenes.copied(obj, linked=True)
-    assert scenes.worst(scenes.shapes(copy, FRAMES), expected) < 1e-6
-    attach.remove(copy)
-    bpy.data.objects.remove(copy)
-    bpy.context.scene.frame_set(1)
-    attach.remove(obj)
-    whole_file.assert_same(before)
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], FRAMES), expected) < 1e-6
 
 
 def taken_over(**settings: object) -> tuple[bpy.types.Object, np.ndarray]:

@@ -41,23 +41,6 @@ def test_a_grey_add_says_why():
         bpy.ops.sinew.add()
 
 
-@pytest.mark.parametrize("method", ["lbs", "qv", "dq"])
-def test_remove_restores_all(method):
-    obj, _armature = scenes.make_arm()
-    obj.modifiers.new("Subdivision", "SUBSURF")
-    obj.modifiers.active = obj.modifiers["Armature"]
-    obj["mine"] = 1
-    bpy.context.view_layer.update()
-    before = whole_file.content()
-    bpy.ops.sinew.add()
-    properties.of(obj).method = method
-    scenes.shapes(obj, [1, 6, 11])
-    bpy.context.scene.frame_set(1)
-    assert whole_file.differences(before, whole_file.content())
-    bpy.ops.sinew.remove()
-    whole_file.assert_same(before)
-
-
 def shared_mesh(obj):
     bpy.context.scene.collection.objects.link(obj.copy())
 
@@ -128,14 +111,6 @@ def test_an_unchanged_object_is_not_written(monkeypatch):
     assert not written
 
 
-def test_what_is_missing_in_the_rig_is_warned_of():
-    obj, _armature = scenes.make_arm()
-    for group in obj.vertex_groups:
-        group.remove([0, 1])
-    scenes.add_sinew(obj)
-    assert "2 of 252 vertices" in " ".join(session.state_of(obj).bound.facts.warnings)
-
-
 @pytest.mark.by_sinew
 @pytest.mark.parametrize("has_group", [True, False])
 def test_hooks_behind_take_a_vertex_group(has_group):
@@ -182,32 +157,6 @@ def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
     assert bpy.ops.sinew.add() == {"FINISHED"}
     assert [properties.has_sinew(each) for each in (other, obj)] == [True, False]
     assert [modifier.type for modifier in obj.modifiers] == ["MULTIRES"]
-
-
-@pytest.mark.parametrize("kind", ["MULTIRES", "SOFT_BODY"])
-def test_a_modifier_in_front_of_which_sinew_can_not_be_is_added_while_it_deforms(kind):
-    """Blender puts it in front of Sinew's: the Armature modifier deforms, and a sentence says why. Once it is
-    gone, Sinew deforms again."""
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(6)
-    by_sinew = scenes.final_points(obj)
-    bpy.ops.object.modifier_add(type=kind)
-    added = obj.modifiers.active
-    if kind == "MULTIRES":
-        bpy.ops.object.multires_subdivide(modifier=added.name)
-    obj.modifiers["Armature"].use_deform_preserve_volume = True
-    got = scenes.shapes(obj, [5, 6])
-    assert f"in front of {added.name} Blender permits only" in state_text.sentence_of(obj)
-    assert not any(map(stack.is_on, stack.own_modifiers(obj)))
-    properties.of(obj).enabled = False
-    assert scenes.worst(got, scenes.shapes(obj, [5, 6])) == 0.0
-    properties.of(obj).enabled = True
-    obj.modifiers.remove(added)
-    session.rebind(obj, bpy.context)
-    assert not properties.of(obj).error
-    assert scenes.worst(scenes.final_points(obj), by_sinew) <= 1e-6
-    assert [m.name for m in scenes.modifiers(obj)] == ["Armature", "Sinew"]
 
 
 @pytest.mark.parametrize("in_front", [False, True])

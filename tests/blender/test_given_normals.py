@@ -136,6 +136,9 @@ def test_normals_of_every_frame_are_blenders(shading):
         given, left = both(obj)
         np.testing.assert_array_equal(given, of_frame)
         np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        if shading is smooth:
+            of_vertices = both(obj, lambda obj: vectors(evaluated(obj), "vertex_normals"))
+            np.testing.assert_allclose(*of_vertices, rtol=0, atol=NEAR)
         if shading is not custom and has_given(obj):
             # Also equal to what Blender computes from the same points.
             plain = evaluated(obj).copy()
@@ -146,35 +149,6 @@ def test_normals_of_every_frame_are_blenders(shading):
     bpy.context.view_layer.update()
     given, left = both(obj)
     np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-
-
-def test_smooth_meshes_have_the_normals_of_vertices_too():
-    obj, _armature = make(smooth)
-    given, left = both(obj, lambda obj: vectors(evaluated(obj), "vertex_normals"))
-    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-
-
-@needs_support
-def test_edges_that_are_marked_between_frames_are_followed_at_once():
-    obj, _armature = make(smooth)
-    assert evaluated(obj).normals_domain == "POINT"
-    for shading in (sharp, custom, partly_flat, smooth, flat, sharp):
-        if "custom_normal" in obj.data.attributes:
-            obj.data.attributes.remove(obj.data.attributes["custom_normal"])
-        if "sharp_edge" in obj.data.attributes:
-            obj.data.attributes.remove(obj.data.attributes["sharp_edge"])
-        shading(obj)
-        bpy.context.view_layer.update()
-        assert has_given(obj) == bool(DOMAINS[shading]), shading.__name__
-        given, left = both(obj)
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-    # The same domain, but other edges.
-    obj.data.edges[40].use_edge_sharp = not obj.data.edges[40].use_edge_sharp
-    obj.data.update()
-    bpy.context.view_layer.update()
-    given = corners(obj)
-    choose(obj, LEAVE)
-    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
 
 
 def add_nodes_that_read(obj):
@@ -309,6 +283,9 @@ HARMLESS = [
     ("front", "VERTEX_WEIGHT_EDIT", None, {"vertex_group": "bone.1"}, custom),
     ("behind", "VERTEX_WEIGHT_EDIT", None, {"vertex_group": "bone.1"}, custom),
     ("behind", "COLLISION", None, {}, sharp),
+    ("behind", "UV_WARP", None, {}, smooth),
+    ("behind", "CAST", None, {"show_viewport": False, "show_render": False}, smooth),
+    ("behind", "SUBSURF", None, {"levels": 0}, smooth),
 ]
 
 
@@ -355,60 +332,6 @@ def test_upstream_nodes_that_change_the_domain_of_normals():
 
 
 @needs_support
-def test_modifiers_behind_that_are_off_allow_given_normals():
-    obj, _armature = make(smooth)
-    modifier = obj.modifiers.new("Cast", "CAST")
-    modifier.show_viewport = modifier.show_render = False
-    obj.modifiers.new("UV", "UV_WARP")
-    bpy.context.scene.frame_set(4)
-    assert has_given(obj)
-    modifier.show_viewport = True
-    bpy.context.scene.frame_set(5)
-    assert not has_given(obj)
-    obj.modifiers.remove(modifier)
-    subdivision = obj.modifiers.new("Subdivision", "SUBSURF")
-    for levels in (0, 1):
-        subdivision.levels = levels
-        bpy.context.scene.frame_set(6 + levels)
-        assert has_given(obj) == (levels == 0)
-
-
-BEHIND = {
-    "cast": lambda obj: obj.modifiers.new("Cast", "CAST"),
-    "switched on": lambda obj: setattr(obj.modifiers["Off"], "show_viewport", True),
-    "instances": instance_faces,
-}
-
-
-@needs_support
-@pytest.mark.parametrize("act", BEHIND.values(), ids=BEHIND)
-@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
-def test_modifiers_that_a_handler_adds_behind_end_given_normals_at_once(event, act):
-    """Blender evaluates it without notification."""
-    obj, _armature = make(smooth)
-    off = obj.modifiers.new("Off", "CAST")
-    off.show_viewport = off.show_render = False
-    bpy.context.scene.frame_set(4)
-    assert has_given(obj)
-    handlers = getattr(bpy.app.handlers, event)
-
-    def call(*_args):
-        handlers.remove(call)
-        act(obj)
-
-    handlers.append(call)
-    obj.update_tag()
-    if event == "frame_change_post":
-        bpy.context.scene.frame_set(5)
-    else:
-        bpy.context.view_layer.update()
-    assert call not in handlers
-    assert not has_given(obj)
-    given, left = both(obj)
-    np.testing.assert_array_equal(given, left)
-
-
-@needs_support
 def test_free_normals_of_the_mesh_stay():
     obj, _armature = scenes.make_arm()
     smooth(obj)
@@ -441,26 +364,6 @@ def test_applying_adds_no_normals(how, shading):
     assert found[0][0] == found[1][0]
     for left, given in zip(found[0][1:], found[1][1:], strict=True):
         np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-
-
-@needs_support
-def test_files_keep_the_choice_and_the_normals(tmp_path):
-    obj, _armature = make(custom, frame=7)
-    expected = corners(obj)
-    other, _armature = scenes.make_arm(name="Other")
-    smooth(other)
-    scenes.add_sinew(other, "dq")
-    choose(other, LEAVE)
-    bpy.context.scene.frame_set(7)
-    path = str(tmp_path / "kept.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    np.testing.assert_array_equal(corners(obj), expected)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    obj, other = bpy.data.objects["Arm"], bpy.data.objects["Other"]
-    assert (properties.of(obj).normals, properties.of(other).normals) == (GIVE, LEAVE)
-    assert has_given(obj)
-    assert not has_given(other)
-    np.testing.assert_allclose(corners(obj), expected, rtol=0, atol=NEAR)
 
 
 def light_scene(obj):
@@ -615,15 +518,6 @@ def imported_alembic(data, tmp_path):
     for each in made:
         bpy.data.objects.remove(each)
     return found
-
-
-@pytest.mark.skipif(normals.ARE_SUPPORTED, reason="of Blender before 4.5")
-def test_before_4_5_blender_computes_them():
-    obj, _armature = make(sharp)
-    assert properties.of(obj).normals == GIVE
-    assert not has_given(obj)
-    assert session.state_of(obj).plan.normals.domain == ""
-    assert not any("normals" in each.name for each in obj.data.attributes)
 
 
 def test_a_mesh_that_is_not_valid_has_none():

@@ -3,18 +3,14 @@
 
 from __future__ import annotations
 
-import json
-
 import bpy
 import numpy as np
 import pytest
 import routes
 import scenes
-import whole_file
 from bpy.app.handlers import persistent
-from sinew_addon.attach import attach, properties, upstream_proxy
+from sinew_addon.attach import attach, properties
 from sinew_addon.core.errors import SinewError
-from sinew_addon.deform import session
 from sinew_addon.io import mesh_compare, mesh_io
 from test_against_armature_modifier import assert_equal_to_modifier
 
@@ -70,18 +66,6 @@ def test_a_multi_modifier_over_unread_input_is_refused(make):
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-def test_exporters_do_not_find_the_proxy(tmp_path):
-    """glTF's writes all children of an object, also those that are in no scene."""
-    obj, armature = scenes.make_arm()
-    obj.parent = armature
-    scenes.put_in_front(obj, "MIRROR", "Mirror")
-    scenes.add_sinew(obj)
-    assert properties.of(obj).storage.upstream_proxy is not None
-    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "arm.gltf"), export_format="GLTF_SEPARATE")
-    nodes = json.loads((tmp_path / "arm.gltf").read_text())["nodes"]
-    assert [node["name"] for node in nodes if "mesh" in node] == ["Arm"]
-
-
 def test_mirrored_groups_take_the_other_side():
     obj, armature = scenes.make_arm(bones=2)
     for index, side in enumerate("LR"):
@@ -104,34 +88,6 @@ def test_a_lattice_in_front_follows_both_objects():
     assert_equal_to_modifier(obj, FRAMES)
 
 
-@pytest.mark.parametrize("method", ["lbs", "cor"])
-@pytest.mark.parametrize("kind", ["LATTICE", "ARMATURE"])
-def test_a_scale_that_is_not_finite_counts_for_its_frame_alone(kind, method, route):
-    obj, armature = scenes.make_arm(bones=3)
-    spoilt = armature
-    if kind == "LATTICE":
-        spoilt = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
-        bpy.context.scene.collection.objects.link(spoilt)
-        scenes.put_in_front(obj, kind).object = spoilt
-    else:
-        second = armature.copy()
-        bpy.context.scene.collection.objects.link(second)
-        obj.modifiers.new("Second", kind).object = second
-    scenes.add_sinew(obj, method)
-    expected, found = scenes.shapes(obj, [5]), []
-    for frame in (2, 8):
-        spoilt.scale.y = 1.0
-        bpy.context.scene.frame_set(frame)
-        spoilt.scale.y = float("inf")
-        bpy.context.scene.frame_set(9)
-        found.append(scenes.final_points(obj))
-    assert not properties.of(obj).error
-    assert np.isfinite(found).all()
-    np.testing.assert_array_equal(*found)
-    spoilt.scale.y = 1.0
-    assert scenes.worst(scenes.shapes(obj, [5]), expected) <= 1e-6
-
-
 def test_number_of_vertices_that_changes_in_front():
     obj = arm_with("BUILD", frame_start=1, frame_duration=12)
     expected = [scenes.shapes(obj, [frame])[0] for frame in (2, 5, 8)]
@@ -140,57 +96,6 @@ def test_number_of_vertices_that_changes_in_front():
         got = scenes.shapes(obj, [frame])[0]
         assert got.shape == shape.shape
         assert scenes.worst(got, shape) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.mark.parametrize("mode", ["WEIGHT_PAINT", "VERTEX_PAINT"])
-@pytest.mark.parametrize("kinds", [("DECIMATE",), ("SUBSURF", "BEVEL")])
-def test_what_blender_leaves_out_while_painting(kinds, mode, route):
-    obj, _armature = scenes.make_arm(bones=3)
-    for kind in kinds:
-        modifier = obj.modifiers.new(kind, kind)
-        if kind == "DECIMATE":
-            modifier.ratio = 0.5
-        obj.modifiers.move(len(obj.modifiers) - 1, len(obj.modifiers) - 2)
-    bpy.ops.object.mode_set(mode=mode)
-    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    expected_after = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
-    assert expected.shape != expected_after.shape, "nothing is tested"
-    scenes.add_sinew(obj, "dq")
-    bpy.ops.object.mode_set(mode=mode)
-    before = session.state_of(obj).shown.number
-    got = scenes.shapes(obj, FRAMES)
-    assert not properties.of(obj).error
-    # While weights are painted the Armature modifier is on, too, before Sinew's.
-    assert mode == "WEIGHT_PAINT" or routes.taken(obj, before) == route
-    assert session.state_of(obj).shown.number > before
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    got = scenes.shapes(obj, FRAMES)
-    assert scenes.worst(got, expected_after) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-@pytest.mark.parametrize("event", ["shown", "shown and changed"])
-def test_an_object_that_gets_sinew_while_it_is_hidden(event, monkeypatch):
-    """What is in front is evaluated for the first time when it is shown."""
-    made = []
-    make = upstream_proxy._make
-    monkeypatch.setattr(upstream_proxy, "_make", lambda obj, shares: made.append(obj) or make(obj, shares))
-    obj = arm_with("DECIMATE", ratio=0.5)
-    obj.hide_viewport = True
-    bpy.context.scene.frame_set(8)
-    scenes.add_sinew(obj, "lbs")
-    bpy.context.view_layer.update()
-    obj.hide_viewport = False
-    if event == "shown and changed":
-        obj.modifiers["Front"].ratio = 0.7
-    bpy.context.view_layer.update()
-    shown = scenes.final_points(obj)
-    properties.of(obj).enabled = False
-    bpy.context.view_layer.update()
-    np.testing.assert_allclose(shown, scenes.final_points(obj), atol=1e-5)
-    # What Blender found, the number of faces, changes nothing in front.
-    assert len(made) == (1 if event == "shown" else 2)
 
 
 def test_a_proxy_at_the_address_of_a_deleted_object(route):
@@ -235,15 +140,6 @@ def test_a_simulation_behind_a_parent_that_deforms(kind):
         scenes.add_sinew(obj, "lbs")
         assert properties.has_sinew(obj)
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def test_a_simulation_in_front_is_refused_with_a_sentence():
-    arm_with("CLOTH")
-    bpy.context.view_layer.update()
-    before = whole_file.content()
-    with pytest.raises(RuntimeError, match="Front in front of Armature is a simulation"):
-        bpy.ops.sinew.add()
-    whole_file.assert_same(before)
 
 
 def test_one_view_layer_has_it_for_its_position_alone():

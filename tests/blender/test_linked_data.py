@@ -9,10 +9,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.attach import attach, properties, property_groups, stack
+from sinew_addon.attach import attach, properties, stack
 from sinew_addon.core.errors import SinewError
-from sinew_addon.core.scale_rule import BLENDER_3
-from sinew_addon.deform import session
 
 FRAMES = [1, 4, 11]
 
@@ -119,22 +117,6 @@ def test_a_saved_override_works_without_sinew(tmp_path):
     ]
 
 
-def test_settings_are_copied_whole():
-    obj, _armature = scenes.make_arm()
-    other, _armature = scenes.make_arm(name="Other")
-    scenes.add_sinew(obj, "qv")
-    settings = properties.of(obj)
-    settings.leave_small = False
-    settings.scale_rule = BLENDER_3.name
-    property_groups.copy(settings, properties.of(other))
-    copied = properties.of(other)
-    assert [s.name for s in copied.replaced_modifiers] == [s.name for s in settings.replaced_modifiers]
-    for name in ("method", "leave_small", "scale_rule", "enabled"):
-        assert getattr(copied, name) == getattr(settings, name)
-    for name in ("situation", "hidden_render", "modifier_uid"):
-        assert getattr(copied.stack, name) == getattr(settings.stack, name)
-
-
 def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
     save_library(tmp_path, skinned=True, front=False)
     link(tmp_path, override=True)
@@ -153,23 +135,3 @@ def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
     )
     assert (settings.delta_mush.iterations, settings.delta_mush.enabled) == (9, True)
     assert_shapes(expected)
-
-
-def test_remove_from_a_duplicate_after_the_original_is_deleted():
-    """While Sinew is off, its modifier still refers to the other's point buffer. Blender 5.2 counts the
-    buffer as used after that modifier is removed."""
-    obj, _armature = scenes.make_arm()
-    other = scenes.copied(obj, linked=True)
-    other.modifiers.clear()
-    scenes.add_sinew(obj, "dq")
-    assert properties.of(obj).storage.point_buffer is not None
-    properties.of(obj).enabled = False
-    copy = scenes.copied(obj, linked=True)
-    bpy.context.view_layer.update()
-    bpy.data.objects.remove(obj)
-    bpy.context.view_layer.update()
-    attach.remove(copy)
-    session.forget()
-    session.refresh(bpy.context)
-    assert not [each.name for each in bpy.data.objects if properties.is_helper(each)]
-    assert not [each.name for each in bpy.data.meshes if "Sinew" in each.name]

@@ -71,24 +71,6 @@ def test_two_modifiers_have_the_same_shape(monkeypatch, set_up, is_safe):
     assert session.state_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
 
 
-def test_painting_choosing_and_switching_off_are_seen():
-    obj, _armature = scenes.make_arm()
-    paint(obj)
-    linear, preserved = (scenes.modifier_shapes(obj, [11], preserve)[0] for preserve in (False, True))
-    mixed(obj)
-    bpy.context.scene.frame_set(11)
-    before = scenes.final_points(obj)
-    obj.vertex_groups[GROUP].add(range(len(obj.data.vertices)), 1.0, "REPLACE")
-    assert scenes.worst(scenes.final_points(obj), preserved) < 1e-5
-    obj.vertex_groups.new(name="none of it")
-    properties.of(obj).mix.group = "none of it"
-    assert scenes.worst(scenes.final_points(obj), linear) < 1e-5
-    properties.of(obj).mix.group = GROUP
-    assert scenes.worst(scenes.final_points(obj), before) > 1e-3
-    properties.of(obj).mix.method = "OFF"
-    assert scenes.worst(scenes.final_points(obj), linear) < 1e-5
-
-
 def test_the_second_method_can_be_keyed():
     obj, _armature = scenes.make_arm()
     paint(obj)

@@ -108,35 +108,6 @@ def test_group_renamed_by_a_handler(arm, neighbour, rendered_points, event, is_f
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
-def test_names_swapped_by_a_handler(arm, neighbour, rendered_points):
-    other = scenes.copied(arm)
-    other.vertex_groups["bone.1"].add(range(80, 200), 0.2, "REPLACE")
-    expected = np.array([scenes.shapes(each, [10])[0] for each in (arm, other)])
-    tolerance = scenes.TOLERANCE * scenes.diagonal(arm)
-    assert scenes.worst(*expected) > 0.1
-    bpy.context.scene.frame_set(6)
-    names = arm.name, other.name
-
-    def act() -> None:
-        arm.name, other.name, arm.name = "swapped", names[0], names[1]
-
-    neighbour("frame_change_pre", act)
-    seen = []
-    monitor = bpy.app.handlers.frame_change_post
-    monitor.insert(0, lambda *_args: seen.extend(map(scenes.final_points, (arm, other))))
-    try:
-        bpy.context.scene.frame_set(10)
-    finally:
-        monitor.pop(0)
-    assert safe_mode.is_on() or scenes.worst(np.array(seen), expected) <= tolerance
-    shown = np.array([scenes.final_points(each) for each in (arm, other)])
-    assert scenes.worst(shown, expected) <= tolerance
-    bpy.context.scene.frame_set(6)
-    arm.name, other.name, arm.name = "swapped", *names
-    bpy.context.scene.frame_set(10)
-    assert scenes.worst(rendered_points(arm), expected[0]) <= tolerance
-
-
 def alone(_obj: bpy.types.Object) -> None:
     pass
 
@@ -243,23 +214,6 @@ def test_a_handlers_edit_of_an_edited_mesh_is_in_the_next_event(arm, neighbour, 
     assert_equals_modifier(arm)
 
 
-@pytest.mark.parametrize("frame", [1, 6])
-@pytest.mark.parametrize("enabled", [True, False])
-def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame, capfd):
-    """Also at rest, where an applied modifier leaves the same shape."""
-    expected = scenes.shapes(arm, FRAMES)
-    bpy.context.scene.frame_set(frame)
-    properties.of(arm).enabled = enabled
-    arm.modifiers.remove(stack.sinew_modifier(arm))
-    bpy.context.view_layer.update()
-    assert not properties.has_sinew(arm)
-    arm.modifiers["Armature"].use_deform_preserve_volume = True
-    got = scenes.shapes(arm, FRAMES)
-    assert [modifier.type for modifier in arm.modifiers] == ["ARMATURE"]
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
-    assert "nvalid driver" not in "".join(capfd.readouterr())
-
-
 @pytest.mark.parametrize("gone", ["applied", "deleted"])
 def test_another_armature_modifier_in_the_place_of_one_that_is_gone(arm, gone):
     armature = arm.modifiers["Armature"].object
@@ -280,21 +234,6 @@ def test_another_armature_modifier_in_the_place_of_one_that_is_gone(arm, gone):
     assert scenes.worst(scenes.final_points(arm), expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
     attach.remove(arm)
     assert [modifier.name for modifier in arm.modifiers] == ["Another"]
-
-
-def test_a_node_group_removed_behind_sinews_handler(arm, neighbour):
-    removed = []
-
-    def remove() -> None:
-        if not removed:
-            removed.append(bpy.data.node_groups.remove(stack.sinew_modifier(arm).node_group))
-
-    neighbour("frame_change_post", remove)
-    bpy.context.scene.frame_set(7)
-    assert removed
-    bpy.context.scene.frame_set(8)
-    bpy.context.scene.frame_set(9)
-    assert_equals_modifier(arm)
 
 
 def test_a_node_group_removed_at_every_frame_is_said(arm, neighbour):
@@ -384,21 +323,6 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
     assert scenes.worst(got[2:], expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
-@pytest.mark.parametrize("how", ["forced", "environment"])
-def test_in_safe_mode_nothing_runs_within_the_evaluation(monkeypatch, how):
-    if how == "forced":
-        monkeypatch.setattr(safe_mode, "_forced", True)
-    else:
-        monkeypatch.setenv(safe_mode.VARIABLE, "1")
-    obj, _armature = scenes.make_arm()
-    asked = []
-    monkeypatch.setattr(in_depsgraph, "deform", lambda *arguments: asked.append(arguments))
-    scenes.add_sinew(obj, "dq")
-    assert_equals_modifier(obj)
-    assert asked == []
-    assert session.state_of(obj).plan.reason == "Safe mode"
-
-
 def test_suspended_by_two_threads_at_once():
     """As by a window and its render's thread: the second one waits, and at the end nothing is suspended."""
     order, entered = [], threading.Event()
@@ -420,35 +344,6 @@ def test_suspended_by_two_threads_at_once():
     assert order == ["this", "other"]
     with updates_suspended() as may_react:
         assert may_react
-
-
-@pytest.mark.parametrize("is_animated", [False, True])
-def test_tools_for_weights_see_the_bones_that_deform(arm, is_animated):
-    """Normalize All leaves groups without such a bone unchanged, but only while an Armature modifier is
-    on."""
-    modifier = arm.modifiers["Armature"]
-    if is_animated:
-        scenes.key(modifier, "show_viewport", ((1, False), (4, True)))
-        bpy.context.scene.frame_set(6)
-    mask = arm.vertex_groups.new(name="mask")
-    mask.add(range(252), 0.3, "REPLACE")
-    scenes.enter(arm, "WEIGHT_PAINT")
-    bpy.context.view_layer.update()
-    shown, plan = scenes.final_points(arm), session.state_of(arm).plan
-    assert (plan.state is State.BUILT_IN) == ("animated" in plan.reason) == is_animated
-    arm.vertex_groups.active_index = 0
-    bpy.ops.object.vertex_group_normalize_all(group_select_mode="BONE_DEFORM", lock_active=False)
-    assert {round(mask.weight(vertex), 6) for vertex in range(252)} == {0.3}
-    bpy.context.view_layer.update()
-    # The tube's weights are normalised already.
-    assert scenes.worst(scenes.final_points(arm), shown) <= 1e-5
-    bpy.ops.object.mode_set(mode="OBJECT")
-    bpy.context.view_layer.update()
-    assert [m.name for m in scenes.modifiers(arm)] == ["Armature", "Sinew"]
-    assert not is_animated or session.state_of(arm).plan.state is State.AFTER_UPDATE
-    assert_equals_modifier(arm)
-    attach.remove(arm)
-    assert is_animated or (modifier.show_viewport and modifier.show_render)
 
 
 def test_keys_that_two_objects_share_go_with_the_last(route):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import scenes
 import sinew
+from conftest import look_until_done
 from program import run_sinew
 from sinew_addon.attach import attach, properties, stored_vertex_data
 from sinew_addon.attach.subscribers import subscribers
@@ -85,27 +86,10 @@ def gate(monkeypatch, tmp_path):
     monkeypatch.setattr(precomputations, "_made", type(precomputations._made)())
     yield gate
     gate.open()
-    precomputations.cancel_all()
-    precomputations.waits = True
-    precomputations.stopped.clear()
-
-
-@pytest.fixture
-def in_window():
-    """As in an interactive session: nothing waits."""
-    precomputations.waits = False
 
 
 def forget_made() -> None:
     precomputations._made.clear()
-
-
-def look_until_done() -> None:
-    for _ in range(200):
-        if precompute_watch.check() is None:
-            return
-        time.sleep(0.01)
-    raise AssertionError("it goes on and on")
 
 
 def shapes_by_modifier(preserve_volume: bool) -> np.ndarray:

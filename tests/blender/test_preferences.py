@@ -10,7 +10,7 @@ import scenes
 from sinew_addon.attach import properties
 from sinew_addon.core import precompute
 from sinew_addon.core.precompute import precomputations
-from sinew_addon.deform import precomputing, session
+from sinew_addon.deform import precomputing, safe_mode, session
 from sinew_addon.io import addon_preferences, units
 
 
@@ -61,10 +61,14 @@ def test_numbers_of_methods_go_to_the_chosen_folder(preferences, selected, tmp_p
     assert precomputations.cache is None
 
 
-def test_safe_mode_takes_effect_at_once(preferences, selected):
+def test_safe_mode_takes_effect_at_once(preferences, selected, monkeypatch):
     scenes.add_sinew(selected, "dq")
     assert session.state_of(selected).plan.is_in_depsgraph
     preferences.safe_mode = True
     assert session.state_of(selected).plan.after_update
+    assert session.state_of(selected).plan.reason == "Safe mode"
     preferences.safe_mode = False
     assert session.state_of(selected).plan.is_in_depsgraph
+    monkeypatch.setenv(safe_mode.VARIABLE, "1")
+    session.refresh(bpy.context)
+    assert session.state_of(selected).plan.after_update

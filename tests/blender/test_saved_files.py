@@ -116,16 +116,6 @@ def test_no_warning_of_a_missing_sinew_where_it_is_installed(tmp_path):
     assert warnings_of(appended) == []
 
 
-def test_a_group_that_was_taken_apart_is_saved(tmp_path):
-    obj, _armature = scenes.skinned_arm("dq")
-    group = stack.sinew_modifier(obj).node_group
-    output = next(node for node in group.nodes if node.type == "GROUP_OUTPUT")
-    group.links.remove(output.inputs["Geometry"].links[0])
-    save(tmp_path / "saved.blend")
-    # Sinew goes on.
-    assert stack.sinew_modifier(obj).show_viewport
-
-
 def _unknown_method(obj):
     """As a newer Sinew would store it."""
     if bpy.app.version >= (5, 0):
@@ -276,7 +266,7 @@ def test_saved_in_a_mode_of_the_modifier(tmp_path, mode):
     assert scenes.worst(shapes, expected) <= 1e-6
 
 
-@pytest.mark.parametrize("what", ["small", "throws", "off"])
+@pytest.mark.parametrize("what", ["small", "off"])
 def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
     small, armature = scenes.make_arm(name="A First")
     obj, _armature = scenes.make_arm()
@@ -286,19 +276,10 @@ def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
     monkeypatch.setattr(small_meshes, "is_used", False)
     properties.of(small).enabled = what != "off"
     scenes.add_sinew(obj, "dq")
-    prepare = apply_plan.apply_saved
-
-    def throw(each: bpy.types.Object) -> bool:
-        if each == small and what == "throws":
-            raise RuntimeError("disk on fire")
-        return prepare(each)
-
-    monkeypatch.setattr(apply_plan, "apply_saved", throw)
     save(tmp_path / "saved.blend")
     shapes, _facts = played_without_sinew(tmp_path / "saved.blend")
     assert np.array_equal(shapes, expected)
-    if what != "throws":
-        assert small.modifiers["Armature"].object == armature
+    assert small.modifiers["Armature"].object == armature
 
 
 @pytest.mark.parametrize("is_in_front", [False, True])

@@ -42,6 +42,11 @@ CASES = {
     "a heat map of a shared mesh": "duplicate Arm; add Arm; frame 6; heat Arm; update; frame 7; "
     "heat Arm 0.9",
     "appended": "append; frame 2; frame 11",
+    "a duplicate that is off, its original deleted": "duplicate Arm; add Arm dq; enabled Arm; duplicate Arm; "
+    "delete_object Arm; remove 'object 2'; remove_all",
+    "centres of a mesh that changes": "add Arm 0.9 cor; frame 8; move_vertices Arm; frame 9",
+    "centres under shape keys": "add_shape_key Arm; key_shape_key Arm 1 11; add Arm 0.9 cor; frame 3; "
+    "frame 9",
     "topology": "add Arm; frame 6; edit_mesh Arm subdivide; frame 11; edit_mesh Arm delete; frame 6",
     "weights": "add Arm; frame 11; weights Arm upper; frame 6; weights Arm lower; weights Arm hand 0.1; "
     "update",
@@ -71,6 +76,8 @@ CASES = {
     "leave_mode; frame 6",
     "undo in edit mode of a shared armature": "duplicate_armature Rig; another_armature Arm 'object 1'; "
     "add Arm; frame 11; edit_bones Rig new 0.3 0.9; undo; update; leave_mode; frame 6",
+    "bones are edited twice": "add Arm; edit_bones Rig delete hand 0.9 0.9; groups Arm new; leave_mode; "
+    "frame 6",
     # Shape keys
     "a shape key edited, added and removed": "add_shape_key Arm; add Arm; frame 6; shape_key_points Arm; "
     "add_shape_key Arm; frame 11; delete_shape_key Arm 0.9 'key 1'; frame 6; delete_shape_key Arm 0.1",
@@ -113,8 +120,14 @@ CASES = {
     "copied modifiers with keys": "key_visibility Arm 2 9 0.0; add Arm dq; frame 6; copy_modifiers Arm Box; "
     "remove Box; frame 11",
     "copied modifiers with a mix": "add Arm; stages Arm 1; copy_modifiers Arm Box; frame 6; frame 11",
+    "decimated while its weights are painted": "add_modifier Arm DECIMATE; add Arm dq; frame 8; "
+    "paint_weights Arm smooth 0.9; frame 6; leave_mode; frame 8",
+    "normalised while it is painted": "add Arm; groups Arm new; paint_weights Arm normalize_all 0 0.9; "
+    "frame 6; leave_mode; frame 8",
     "absolute keys in weight paint": "key_visibility Arm 1 5 1.0; add_shape_key Arm; add Arm dq; "
     "sculpt_mode Arm 0.9; absolute_shape_keys Arm; paint_weights Arm smooth 0.9; leave_mode; frame 6",
+    "saved with its nodes taken apart": "add Arm dq; frame 6; ~delete_points Arm links; save; frame 8; "
+    "frame 9",
     # Keys of visibility
     "deleted keys, on": "key_visibility Arm 1 5 0.0; frame 11; add Arm; frame 4; clear_animation Arm; "
     "frame 6",
@@ -163,6 +176,11 @@ CASES = {
     "move_modifier Arm 'Solidify 1' Armature; update; move_modifier Arm 'Solidify 1' Armature; frame 11",
     "a multi modifier chained while off": "armature_options Arm multi; add Arm; enabled Arm; "
     "add_modifier Arm ARMATURE 'Other Rig'; frame 6; enabled Arm; frame 11",
+    "moved and renamed before a frame": "add_modifier Arm ARMATURE 'Other Rig' 0.9; "
+    "add_modifier Arm CAST 0.9; add Arm; frame 4; ~move_modifier Arm 'Cast 2' Armature; "
+    "~rename_modifier Arm Armature; frame 6; frame 11",
+    "one that needs the mesh itself meanwhile": "add Arm dq; frame 6; needs_original_mesh Arm MULTIRES; "
+    "frame 8; needs_original_mesh Arm SOFT_BODY; frame 9",
     # In front of the Armature modifier
     "shape keys before one in front": "add_shape_key Arm; key_shape_key Arm 1 11; add_modifier Arm SUBSURF; "
     "add Arm; frame 6; method Arm dq; frame 11",
@@ -224,6 +242,10 @@ CASES = {
     "a limit on a mesh that moves": "key_object Arm 2 9; add Arm dq; stages Arm 3; frame 3; frame 9; frame 6",
     "a limit on a shape key": "add_shape_key Arm; key_shape_key Arm 1 11; add Arm dq; stages Arm 3; frame 3; "
     "frame 9",
+    "smoothed where it is edited": "add Arm; stages Arm 6; frame 9; weights Arm lower; move_vertices Arm; "
+    "edit_mesh Arm delete; frame 6; save_and_load; duplicate Arm 0.9; frame 8; remove 'object 1'; remove_all",
+    "mixed where it is painted": "add Arm; stages Arm 1; frame 9; weights Arm lower; "
+    "groups Arm rename lower; frame 6; save_and_load; stages Arm 0.9; frame 8",
     # Renamed, removed, undone
     "envelopes of a moving shape key": "armature_options Arm envelopes; add_shape_key Arm; "
     "key_shape_key Arm 1 11; add Arm; frame 6; frame 11",
@@ -273,6 +295,7 @@ ON_BOTH_ROUTES = (
     *("deleted keys where the modifier is on", "keys while Sinew is on", "without size, in a parent"),
     *("weights after a method", "vertices after off and on", "weights after a heat map"),
     *("a scene that redo brings back", "a view layer that first shows it", "applied"),
+    "normalised while it is painted",
 )
 WAYS = (("evaluation", False), ("evaluation", True), ("update", False))
 # In the first tier, the newest Blender runs all of them by one way, each other one every second of them.

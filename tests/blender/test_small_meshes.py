@@ -141,40 +141,6 @@ def test_larger_ones_are_taken_up(arm, monkeypatch):
     assert deformer(obj) == "sinew"
 
 
-def test_a_flag_changed_between_frames(arm):
-    obj, _armature = arm
-    expected = scenes.shapes(obj, FRAMES)
-    obj.modifiers["Armature"].use_deform_preserve_volume = True
-    got = scenes.shapes(obj, FRAMES)
-    assert scenes.worst(got, expected) <= 1e-5 * scenes.diagonal(obj)
-    assert deformer(obj) == "sinew"
-
-
-def test_a_method_keyed_between_frames(arm):
-    obj, _armature = arm
-    settings = properties.of(obj)
-    settings.method = "qv"
-    expected = scenes.shapes(obj, FRAMES)
-    settings.method = "lbs"
-    assert deformer(obj) == "blender"
-    settings.keyframe_insert("method", frame=1)
-    settings["method"] = properties.METHODS["qv"].number
-    settings.keyframe_insert("method", frame=6)
-    settings.method = "lbs"
-    assert scenes.worst(scenes.shapes(obj, FRAMES)[1:], expected[1:]) <= 1e-5 * scenes.diagonal(obj)
-
-
-@pytest.mark.parametrize(("method", "who"), [("lbs", "blender"), ("dq", "sinew")])
-def test_a_file_saved_and_opened(method, who, tmp_path):
-    """It has Preserve Volume for dq, which is not the artist's choice."""
-    obj, _armature = scenes.skinned_arm(method)
-    assert deformer(obj) == who
-    expected = scenes.shapes(obj, FRAMES)
-    obj = scenes.reopened(tmp_path / "arm.blend")
-    assert deformer(obj) == who
-    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-
-
 def test_on_and_off_and_removed(tmp_path):
     obj, _armature = scenes.make_arm()
     obj.modifiers[0].show_expanded = False
