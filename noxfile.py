@@ -259,14 +259,17 @@ def job(name: str, *requires: str) -> Callable[[Callable[[nox.Session], None]], 
     return add
 
 
+# Of 3x3 matrices, which the oracles take the logarithms of, threads make four times the work.
+ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+
+
 def pytest(
     session: nox.Session, name: str, folder: str, marks: str = "", env: dict[str, str] | None = None
 ) -> None:
     marks = " and ".join(filter(None, [marks, "" if IS_ALL or session.posargs else "not slow"]))
     line = f"{LIMIT}{python_in(name)} -X faulthandler -m pytest -p no:cacheprovider --durations=25"
     words = [*line.split(), "--durations-min=4", "-m", marks, folder, *session.posargs]
-    # Of 3x3 matrices, which the oracles take the logarithms of, threads make four times the work.
-    env = {"OPENBLAS_NUM_THREADS": "1"} | (env or {})
+    env = ONE_BLAS_THREAD | (env or {})
     # With options such as -k, a suite may have no test to run.
     session.run(*words, success_codes=[0, 5] if session.posargs else [0], env=env)
 
@@ -365,6 +368,7 @@ def in_blender(words: list[str], program: str) -> int:
     parser.add_argument("--blender", choices=BLENDERS, default=EVERYDAY)
     chosen, others = parser.parse_known_args(words)
     set_up(f"bpy-{chosen.blender}")
+    os.environ |= ONE_BLAS_THREAD
     return call(python_in(f"bpy-{chosen.blender}"), program, *others)
 
 
