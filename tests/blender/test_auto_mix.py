@@ -263,32 +263,6 @@ def test_methods_with_parameters(method, second):
     assert np.ptp(painted[0]) > 0.3
 
 
-def test_stopped_it_leaves_all_as_it_was():
-    obj = jointed("lbs")
-    bpy.context.scene.frame_set(7)
-    before = scenes.final_points(obj)
-    steps = auto_mix.AutoMix(bpy.context.scene, [obj], "SCENE", SMOOTHING).steps()
-    taken = [next(steps) for _step in range(5)]
-    assert taken == sorted(taken)
-    steps.close()
-    assert bpy.context.scene.frame_current == 7
-    assert len(obj.vertex_groups) == 3
-    assert properties.of(obj).mix.method == "OFF"
-    assert scenes.worst(scenes.final_points(obj), before) == 0.0
-
-
-def test_one_undo_takes_all_of_it_back():
-    obj = jointed("lbs")
-    name = obj.name
-    bpy.ops.ed.undo_push(message="Before")
-    assert bpy.ops.sinew.auto_mix("EXEC_DEFAULT", True) == {"FINISHED"}
-    assert "Mix" in obj.vertex_groups
-    bpy.ops.ed.undo()
-    obj = bpy.data.objects[name]
-    assert (properties.of(obj).mix.method, properties.of(obj).mix.group) == ("OFF", "")
-    assert len(obj.vertex_groups) == 3
-
-
 def test_a_linked_mesh_is_named_and_the_others_are_done(tmp_path):
     jointed("lbs")
     path = tmp_path / "there.blend"

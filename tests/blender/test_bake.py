@@ -208,22 +208,6 @@ def test_the_armature_modifier_stays_for_the_way_back(arm, tmp_path):
     assert not [group for group in bpy.data.node_groups if group.name.startswith("Sinew")]
 
 
-def test_stopped_anywhere_nothing_is_left(arm, tmp_path):
-    obj, _path = arm
-    scenes.add_sinew(obj, METHOD)
-    for kind in ("mdd", "pc2"):
-        target = tmp_path / "out" / "arm.blend"
-        objects = len(bpy.data.objects)
-        started = bake.start([obj], kind, FRAMES, target, overwrite=False)
-        steps = started.sample()
-        for _ in range(4):
-            next(steps)
-        steps.close()
-        assert not [p for p in (tmp_path / "out").rglob("*")]
-        assert (len(bpy.data.objects), bpy.context.scene.frame_current) == (objects, 1)
-        assert properties.has_sinew(obj)
-
-
 @pytest.fixture
 def small_disk(tmp_path):
     with program.disk(tmp_path / "small", "size=64k") as folder:

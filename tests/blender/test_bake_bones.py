@@ -20,7 +20,7 @@ from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake
 from sinew_addon.features.heat import bake_error, measures
-from sinew_addon.io import actions, files
+from sinew_addon.io import actions
 from test_bake import FRAMES, read_elsewhere, world_shapes
 
 METHOD = "dq"
@@ -276,56 +276,6 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     edited.to_mesh(obj.data)
     edited.free()
     assert bake_error.scale_of(settings, [obj]).high <= 0.5 * most
-
-
-@pytest.mark.parametrize(
-    ("name", "frames", "motion"), [("CesiumMan.glb", (0, 24, 48), "keys"), ("Fox.glb", (0, 41, 82), "pose")]
-)
-@pytest.mark.slow
-@pytest.mark.once
-def test_other_rigs_play_elsewhere_to_the_stated_error(real_rig, tmp_path, name, frames, motion):
-    path = real_rig(name)
-    files.open_file(path)
-    scene = bpy.context.scene
-    assert (scene.frame_start, scene.frame_end) == (frames[0], frames[-1])
-    (obj,) = (o for o in scene.objects if o.type == "MESH" and o.vertex_groups)
-    scenes.add_sinew(obj, METHOD)
-    expected = world_shapes([obj], frames)[0]
-    options = ("--step", frames[1], "--motion", motion, "--json", "--out", tmp_path / "out")
-    said = json.loads(run_sinew("bake", path, "--method", METHOD, "--to", "bones", *options).stdout)
-    assert said[0]["frames"] == len(frames)
-    (report,) = said[0]["bones"]
-    played = read_elsewhere(tmp_path / "out" / f"{path.stem}.blend", frames, tmp_path)[obj.name]
-    assert_states(report, played, expected)
-    assert report["after"]["rms"] < 0.4 * report["before"]["rms"]
-
-
-FBX = """
-import sys, bpy
-path, fbx = sys.argv[1:]
-bpy.ops.wm.open_mainfile(filepath=path)
-assert not hasattr(bpy.types.Object, "sinew")
-bpy.ops.export_scene.fbx(filepath=fbx, bake_anim_simplify_factor=0.0, add_leaf_bones=False)
-bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-bpy.ops.import_scene.fbx(filepath=fbx)
-rig = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
-played = rig.animation_data
-played.action = next(action for action in bpy.data.actions if "Helpers" in action.name)
-if hasattr(played, "action_slot"):
-    played.action_slot = played.action.slots[0]
-bpy.ops.wm.save_as_mainfile(filepath=fbx + ".blend")
-"""
-
-
-def test_fbx_plays_to_the_stated_error_once_it_is_imported(arm, tmp_path):
-    obj, path = arm
-    scenes.add_sinew(obj, METHOD)
-    expected = world_shapes([obj], FRAMES)[0]
-    file, (report,) = baked(path, tmp_path / "out")
-    fbx = tmp_path / "arm.fbx"
-    checked(without_sinew.run(FBX, file, fbx), 0)
-    played = read_elsewhere(f"{fbx}.blend", FRAMES, tmp_path)["Arm"]
-    assert_states(report, played, expected)
 
 
 @pytest.mark.parametrize("of", ["two modifiers", "in front", "linked"])

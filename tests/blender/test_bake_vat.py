@@ -157,16 +157,6 @@ def test_the_command_writes_it(character, tmp_path):
     run_sinew(*words, "--overwrite")
 
 
-def test_it_is_stopped_without_a_trace(character, tmp_path):
-    before, path = content(), tmp_path / "arm.glb"
-    started = bake.start([character[0]], "vat", FRAMES, path, overwrite=False)
-    shares = started.sample()
-    next(shares)
-    shares.close()
-    assert_same(before)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_what_can_not_be_a_texture_is_said(character, tmp_path, monkeypatch):
     obj, _eye = character
     addon_utils.disable("io_scene_gltf2")

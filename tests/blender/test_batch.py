@@ -25,7 +25,7 @@ import psutil
 import pytest
 import scenes
 import whole_file
-from program import ENVIRONMENT, needs_interrupts, run_sinew
+from program import ENVIRONMENT, run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.blender_process import BlenderProcess, Limits
 from sinew_addon.io import files
@@ -313,53 +313,6 @@ def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
             blender.end()
         counts.append(len(own))
     assert counts[1] < counts[0]
-
-
-@pytest.mark.slow
-@newest_only
-@needs_interrupts
-def test_ctrl_c_stops_cleanly(tmp_path):
-    folder = tmp_path / "in"
-    make_rigs(folder, 4)
-    scenes.write_slow_file(folder / "z endless.blend", 500, 100_000_000)
-    process = start_sinew("reskin", folder, "--method", "dq", "--out", tmp_path / "out", *FAST, "--jobs", 2)
-    lines = [process.stderr.readline() for _ in range(4)]
-    assert all("1 mesh" in line for line in lines), lines
-    blenders = [wait_for_work(process)]
-    process.send_signal(signal.SIGINT)
-    _output, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "4 of 5 files are done; --resume does the others" in errors
-    assert "Traceback" not in errors
-    assert not any(blender.is_running() for blender in blenders)
-    assert unfinished_in(tmp_path / "out") == []
-    assert len(journal_of(tmp_path / "out")) == 4
-
-
-@pytest.mark.slow
-def test_full_disk(tmp_path):
-    """Simulated by a limit on the size of files: a write fails halfway with an error."""
-    resource = pytest.importorskip("resource", reason="this system has no such limit")
-    paths = make_rigs(tmp_path / "in", 3)
-    out = tmp_path / "out"
-    arguments = ("reskin", tmp_path / "in", "--method", "dq", "--out", out, *FAST)
-
-    def limited(size: int) -> str:
-        process = start_sinew(
-            *arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-        )
-        _output, errors = process.communicate(timeout=120)
-        assert process.returncode == 1, errors
-        assert "Traceback" not in errors, errors
-        assert list(out.glob("*.blend")) == []
-        assert unfinished_in(out) == []
-        return errors
-
-    assert limited(8000).count("can not be written") == 3
-    (out / "sinew-journal.jsonl").unlink()
-    assert "sinew-journal.jsonl: can not be written" in limited(100)
-    run_sinew(*arguments, "--resume")
-    assert [driven_points(out / path.name)["Arm method"] for path in paths] == ["dq"] * 3
 
 
 def test_links_are_kept_and_reported(tmp_path):

@@ -198,20 +198,6 @@ def test_the_operator_blends_and_undo_takes_it_back():
     assert len(bpy.data.actions) == 2
 
 
-@pytest.mark.parametrize("steps", [1, 40, 90])
-def test_stopped_nothing_has_changed(steps):
-    armature, chosen, _pair = make_walks()
-    actions.play(armature, chosen[0], actions.slot_for(chosen[0], armature))
-    before = set(bpy.data.actions.keys())
-    running = blend_actions.make(armature, chosen, (1, 1), Settings())
-    shares = [next(running) for _step in range(steps)]
-    assert shares == sorted(shares)
-    assert 0.0 < shares[-1] < 1.0
-    running.close()
-    assert set(bpy.data.actions.keys()) == before
-    assert armature.animation_data.action == chosen[0]
-
-
 # --- Clips from files
 
 

@@ -81,20 +81,6 @@ def test_keys_of_its_strength_are_followed():
     assert_limited(obj, before)
 
 
-def test_a_masked_modifier_leaves_its_vertices_alone():
-    obj, _armature = scenes.make_arm(bones=3)
-    group = obj.vertex_groups.new(name="mask")
-    group.add([v.index for v in obj.data.vertices if v.co.x > 1.5], 1.0, "REPLACE")
-    obj.modifiers["Armature"].vertex_group = "mask"
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(11)
-    before = scenes.final_points(obj)
-    limit(obj)
-    found, still = scenes.final_points(obj), scenes.rest_points(obj)[:, 0] <= 1.5
-    np.testing.assert_array_equal(found[still], scenes.rest_points(obj)[still])
-    assert np.abs(found - before).max() > 0.005
-
-
 def test_bendy_bones_are_limited_along_their_curve():
     obj, armature = scenes.make_arm(bones=2)
     armature.data.bones[0].bbone_segments = 4

@@ -10,8 +10,7 @@ import pytest
 import scenes
 from sinew_addon.attach import properties
 from sinew_addon.deform import session, small_meshes
-from sinew_addon.ui import character, main_panel, operators, state_text
-from sinew_addon.ui.sidebar import names_text, shortened
+from sinew_addon.ui import character, operators, state_text
 
 
 @pytest.fixture
@@ -215,19 +214,6 @@ def test_a_mesh_of_another_armature_is_left_alone(armature):
     assert other not in operators.targets(bpy.context)
 
 
-def test_undo_is_one_step(armature):
-    bpy.ops.ed.undo_push(message="made")
-    bpy.ops.sinew.add(method="dq")
-    bpy.ops.ed.undo_push(message="added")
-    shared().method = "qv"
-    bpy.ops.ed.undo_push(message="method")
-    assert methods() == ["qv"] * 5
-    bpy.ops.ed.undo()
-    assert methods() == ["dq"] * 5
-    bpy.ops.ed.undo()
-    assert not any(properties.has_sinew(obj) for obj in meshes())
-
-
 def test_what_is_at_work_is_said_above_the_modifiers(armature, monkeypatch):
     monkeypatch.setattr(small_meshes, "is_used", True)
     body = bpy.data.objects["Body"]
@@ -247,16 +233,3 @@ def test_what_is_at_work_is_said_above_the_modifiers(armature, monkeypatch):
     bpy.context.view_layer.update()
     assert "its Armature modifier was deleted" in state_text.sentence_of(body)
     assert state_text.icon_of(body) == "ERROR"
-
-
-def test_long_names_lose_their_middle():
-    assert shortened("Body") == "Body"
-    assert shortened("Character_Body_Geometry_low.003", 16) == "Characte\u2026low.003"
-    assert len(shortened("x" * 63)) == 24
-    assert names_text(["A", "B", "C", "D", "E"]) == "A, B, C and 2 more"
-
-
-def test_stages_that_are_too_many_for_the_panels_header_are_counted():
-    assert main_panel.stages_text(["mix", "delta_mush"], 16) == "Mix, Delta Mush"
-    assert main_panel.stages_text(["mix", "bulge_limit", "delta_mush"], 16) == "3 stages"
-    assert main_panel.stages_text(["delta_mush"], 4) == "1 stage"

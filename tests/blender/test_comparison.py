@@ -84,25 +84,9 @@ def shapes_of_methods(obj: bpy.types.Object, frames: list[int]) -> dict[str, np.
     return found
 
 
-def assert_compared(obj: bpy.types.Object, frames: list[int]) -> None:
-    expected = shapes_of_methods(obj, frames)
-    before = scenes.shapes(obj, frames)
-    compare(obj)
-    assert list(copies(obj)) == METHODS
-    assert_copies_show(obj, frames, expected)
-    assert np.array_equal(scenes.shapes(obj, frames), before)
-
-
 def assert_ends_without_trace(before: dict[str, object]) -> None:
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
     whole_file.assert_same(before)
-
-
-def test_a_real_character(real_rig):
-    files.open_file(real_rig("human.blend"))
-    obj = bpy.data.objects["Human"]
-    bpy.context.scene.frame_set(1)
-    assert_compared(obj, [1, 16, 30])
 
 
 def plain(_obj: bpy.types.Object, _armature: bpy.types.Object) -> None:

@@ -9,8 +9,6 @@ import pytest
 import scenes
 from sinew_addon.attach import properties
 from sinew_addon.core import engines
-from sinew_addon.core.influences import Influences
-from sinew_addon.deform import characters
 from sinew_addon.io import armature_io
 
 FRAME = 8
@@ -123,34 +121,3 @@ def test_shear_is_lost_as_exporters_lose_it():
     assert np.abs(found - pose).max() > 0.1
     unsheared = np.tile(np.identity(4, np.float32), (3, 1, 1))
     assert armature_io.decomposed(unsheared, parents) is unsheared
-
-
-def test_lighter_ones_are_dropped_and_rounding_keeps_the_sum():
-    influences = Influences(
-        np.array([0, 4, 5, 5], np.int32),
-        np.array([3, 1, 2, 0, 7], np.int32),
-        np.array([0.0009, 1.0, 0.5, 0.5, 1e-6], np.float32),
-    )
-    found = engines.imported(influences, engines.ENGINES["unity"], 4)
-    assert found.offsets.tolist() == [0, 3, 4, 4]
-    # Of equal weights the first comes first.
-    assert found.bones.tolist() == [1, 2, 0, 7]
-    np.testing.assert_allclose(found.weights, [0.5, 0.25, 0.25, 1.0], atol=1e-7)
-    for name, levels in (("unreal", 255), ("godot", 65535)):
-        found = engines.imported(influences, engines.ENGINES[name], 4)
-        whole = found.weights.astype(np.float64) * levels
-        np.testing.assert_allclose(whole, np.round(whole), atol=1e-2)
-        np.testing.assert_allclose(np.add.reduceat(found.weights, [0, found.offsets[1]]), 1.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", engines.ENGINES)
-def test_normals_points_and_lists_know_it(name):
-    assert name in characters.method_names()
-    obj, _armature = make_crowded()
-    for polygon in obj.data.polygons:
-        polygon.use_smooth = True
-    scenes.add_sinew(obj, name)
-    properties.of(obj).normals = "SKINNED"
-    bpy.context.scene.frame_set(FRAME)
-    assert np.isfinite(scenes.final_points(obj)).all()
-    assert scenes.states_of(obj)[0][1].plan.viewport.value == "Sinew"

@@ -383,25 +383,6 @@ def vectors_of(attribute: bpy.types.FloatVectorAttribute) -> np.ndarray:
     return values
 
 
-def test_the_memory_of_an_attribute_is_its_meshs_alone():
-    """A copy of a mesh shares the mesh's memory until one of them is written."""
-    obj, _armature = scenes.make_arm()
-    mesh = obj.data
-    for name, kind, domain in (
-        ("Points", "FLOAT_VECTOR", "POINT"),
-        ("Numbers", "FLOAT", "POINT"),
-        ("Corners", "FLOAT_VECTOR", "CORNER"),
-    ):
-        mesh.attributes.new(name, kind, domain)
-    copy = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    points = mesh_io.vectors_in(copy, "Points")
-    points[:] = np.arange(points.size).reshape(-1, 3)
-    assert np.array_equal(vectors_of(copy.attributes["Points"]), points)
-    assert not vectors_of(mesh.attributes["Points"]).any()
-    for name in ("Numbers", "Corners", "none of that name"):
-        assert mesh_io.vectors_in(copy, name) is None
-
-
 def test_a_frame_writes_into_the_evaluated_mesh_alone():
     """Not into the mesh itself, of which it is a copy; state_of() returns the same shape."""
     obj, _armature = scenes.skinned_arm("dq")

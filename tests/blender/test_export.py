@@ -334,35 +334,6 @@ def test_parameters_and_stages_are_named(tmp_path):
     }
 
 
-def test_command(tmp_path, capfd):
-    """As in docs/engines.md: exported, read by the program there, compared with `sinew points`."""
-    obj = make_character()
-    name = obj.name
-    world = np.array(obj.matrix_world)
-    file, glb = tmp_path / "arm.blend", tmp_path / "arm.glb"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
-    fps = bpy.context.scene.render.fps
-    assert cli.main(["export", str(file), "--method", "cor", "--out", str(glb)]) == 0
-    assert f"{name}: cor" in capfd.readouterr().err
-    times = ",".join(str(frame / fps) for frame in FRAMES)
-    reader = [
-        sys.executable,
-        str(REPOSITORY / "shaders" / "read_glb.py"),
-        str(glb),
-        str(tmp_path / "read.npz"),
-    ]
-    subprocess.run([*reader, "--times", times], check=True, timeout=60)
-    points = tmp_path / "points.npz"
-    frames = ",".join(map(str, FRAMES))
-    assert cli.main(["points", str(file), "--method", "cor", "--frames", frames, "--out", str(points)]) == 0
-    expected = np.load(points)[name] @ world[:3, :3].T + world[:3, 3]
-    got = np.load(tmp_path / "read.npz")[name]
-    # The command does not write indices of vertices: uses the nearest ones at rest.
-    nearest = np.linalg.norm(got[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
-    assert set(nearest) == set(range(expected.shape[1]))
-    assert scenes.worst(got, expected[:, nearest]) <= 1e-5 * np.linalg.norm(np.ptp(expected[0], axis=0))
-
-
 @pytest.mark.slow
 def test_the_example_of_the_documentation(tmp_path, monkeypatch, capfd):
     text = (REPOSITORY / "docs" / "engines.md").read_text(encoding="utf-8")

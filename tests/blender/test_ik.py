@@ -14,7 +14,6 @@ from mathutils import Matrix, Vector
 from sinew_addon import cli
 from sinew_addon.core.errors import SinewError
 from sinew_addon.features.action_copy import action_copy
-from sinew_addon.features.ik import ik_bake
 from sinew_addon.io import files, ik_io
 
 FRAMES = range(1, 25)
@@ -195,26 +194,6 @@ def test_influence_lies_between():
     before = tails(arm, "arm.1")
     bake()
     np.testing.assert_allclose(tails(arm, "arm.1"), before, atol=5e-3)
-
-
-def test_stopped_it_leaves_all_as_it_was():
-    arm = make_arm(3)
-    arm.pose.bones["arm.0"].rotation_quaternion = (0.9, 0.1, 0.0, 0.2)
-    arm.pose.bones["base"].keyframe_insert("location", frame=1)
-    action = arm.animation_data.action
-    constraint = constrain(arm, "arm.2", make_empty("Target", near()), chain_count=3)
-    before, count = poses(arm, ["arm.0", "arm.2"]), len(bpy.data.actions)
-    found = []
-    running = ik_bake.steps(arm, ik_io.read_trees(arm), list(FRAMES), "dls", found)
-    for _step in range(5):
-        next(running)
-    running.close()
-    assert not constraint.mute
-    assert arm.animation_data.action == action
-    assert not action_copy.is_on(arm)
-    assert len(bpy.data.actions) == count
-    assert found == []
-    np.testing.assert_allclose(poses(arm, ["arm.0", "arm.2"]), before, atol=1e-6)
 
 
 def test_a_second_bake_keeps_what_was_there_first():

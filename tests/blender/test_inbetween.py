@@ -303,22 +303,6 @@ def test_undo_and_redo():
     assert not bpy.ops.sinew.original_action.poll()
 
 
-def test_stopped_it_leaves_all_as_it_was():
-    armature = make_rig()
-    key_random_poses(armature)
-    action, before, blender = armature.animation_data.action, state(armature), film(armature)
-    found = []
-    running = inbetween_bake.steps(armature, inbetween_bake.Settings("sclerp"), found)
-    next(running)
-    running.close()
-    assert armature.animation_data.action == action
-    assert len(bpy.data.actions) == 1
-    assert found == []
-    assert not action_copy.is_on(armature)
-    assert state(armature) == before
-    assert np.array_equal(film(armature), blender)
-
-
 def test_some_bones():
     armature = make_rig(("QUATERNION", "XYZ"))
     key_random_poses(armature, interpolation="BEZIER")

@@ -12,7 +12,6 @@ import sinew
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
 from sinew_addon.core.engines import METHODS
-from sinew_addon.deform import session
 from test_sdef import make_model
 
 FRAME = 9
@@ -67,14 +66,6 @@ def test_the_menu_has_the_groups_of_the_list():
     assert properties.of(obj).mix.method == properties.OFF
 
 
-def test_setting_one_deforms_by_it(route):
-    obj = skinned_model()
-    found = shape_of_each(obj)
-    motions = session.state_of(obj).shown.frames[0]
-    assert motions.parameters == {"sdef.interpolation": "nlerp"}
-    assert scenes.worst(scenes.final_points(obj), found["nlerp"]) == 0.0
-
-
 def test_keys_and_drivers_set_it(route):
     obj = skinned_model()
     found = shape_of_each(obj)
@@ -101,19 +92,6 @@ def test_it_is_mixed_in_with_its_parameters(route):
         bpy.context.view_layer.update()
         tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
         assert scenes.worst(scenes.final_points(obj), found[choice]) <= tolerance
-
-
-def test_files_and_copies_carry_it(tmp_path):
-    obj = skinned_model()
-    found = shape_of_each(obj)
-    obj.sinew.sdef.interpolation = "slerp"
-    copy = scenes.copied(obj, linked=True)
-    bpy.context.view_layer.update()
-    session.refresh(bpy.context)
-    assert scenes.worst(scenes.final_points(copy), found["slerp"]) == 0.0
-    obj = scenes.reopened(tmp_path / "model.blend")
-    assert obj.sinew.sdef.interpolation == "slerp"
-    assert scenes.worst(scenes.final_points(obj), found["slerp"]) == 0.0
 
 
 def test_a_comparison_has_it():

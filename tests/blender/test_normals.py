@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 import sinew
-from sinew_addon.io import files, mesh_io
+from sinew_addon.io import mesh_io
 
 # In each component.
 NEAR = 1e-4
@@ -197,49 +197,3 @@ def test_faces_that_cancel_and_sizes_at_the_limits():
     for scale in (1.0, 1e-8, 2e-9, 1e-10, 1e-18, 1e8):
         give_points(folded, flat * scale)
         assert_as_blender(folded)
-
-
-def characters(path) -> list[bpy.types.Object]:
-    files.open_file(path)
-    return [
-        obj
-        for obj in bpy.data.objects
-        if obj.type == "MESH" and any(modifier.type == "ARMATURE" for modifier in obj.modifiers)
-    ]
-
-
-def shapes_of(obj: bpy.types.Object) -> list[np.ndarray]:
-    """At rest, posed, and moved at random."""
-    rng = np.random.default_rng(2)
-    rest = mesh_io.read_points(obj.data)
-    posed = []
-    armature = next(m.object for m in obj.modifiers if m.type == "ARMATURE")
-    for bone in armature.pose.bones:
-        bone.rotation_mode = "XYZ"
-        bone.rotation_euler = rng.normal(0, 0.4, 3)
-    armature.animation_data_clear()
-    for modifier in obj.modifiers:
-        modifier.show_viewport = modifier.type == "ARMATURE"
-    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    if len(evaluated.data.vertices) == len(rest):
-        posed.append(mesh_io.read_points(evaluated.data))
-    size = np.ptp(rest, axis=0).max()
-    return [rest, *posed, *(rest + rng.normal(0, share * size, rest.shape) for share in (1e-6, 1e-3, 0.1))]
-
-
-@pytest.mark.parametrize("name", ["human.blend", "CesiumMan.glb", "Fox.glb"])
-def test_real_rigs(real_rig, name):
-    found = characters(real_rig(name))
-    assert found
-    for obj in found:
-        shapes = shapes_of(obj)
-        assert len(shapes) == 5
-        for is_custom in (False, True) if bpy.app.version >= (4, 5) else (False,):
-            mesh = make_mesh(shapes[0], [list(face.vertices) for face in obj.data.polygons])
-            if is_custom:
-                tilt(mesh, 0.2)
-            for share in ((0, 0), (0.05, 0.02)):
-                mark(mesh, *share)
-                for points in shapes:
-                    give_points(mesh, points)
-                    assert_as_blender(mesh)

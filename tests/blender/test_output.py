@@ -21,7 +21,7 @@ import scenes
 from program import RUN, checked, disk, run_sinew, start_sinew, with_sinew
 from sinew_addon import cli
 from sinew_addon.core import output
-from sinew_addon.core.errors import SinewError, WrongUse
+from sinew_addon.core.errors import SinewError
 from sinew_addon.core.names import as_file_name
 
 oldest_and_newest = pytest.mark.skipif(
@@ -365,12 +365,6 @@ def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
     picture.unlink()
     run_sinew(*command)
     run_sinew(*command)
-
-
-@pytest.mark.once
-def test_the_wrong_ending():
-    with pytest.raises(WrongUse, match=r"expected a name ending in \.npz"):
-        output.file_to_write("points.npy", (".npz",))
 
 
 @pytest.mark.once

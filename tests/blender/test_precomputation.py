@@ -113,14 +113,6 @@ def plan_of(obj: bpy.types.Object):
     return session.state_of(obj).plan
 
 
-def test_a_script_has_it_at_once(gate):
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "cor")
-    assert plan_of(obj).state is State.IN_DEPSGRAPH
-    assert gate.count == 1
-    assert not gate.gives_way
-
-
 @pytest.mark.parametrize("preserve_volume", [False, True])
 def test_the_modifiers_shape_until_it_is_found(gate, route, preserve_volume):
     expected, by_modifier = shape_by_cor(), shapes_by_modifier(preserve_volume)

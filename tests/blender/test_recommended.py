@@ -117,29 +117,6 @@ def test_without_an_action_poses_are_measured_and_the_file_stays(monkeypatch):
     assert choice.method != "lbs"
 
 
-def test_stopped_it_leaves_all_as_it_was():
-    obj, _armature = arm(150.0, axis=1)
-    bpy.context.scene.frame_set(4)
-    before = content()
-    steps = recommend.search(bpy.context.scene, [obj])
-    for _step in range(15):
-        next(steps)
-    steps.close()
-    assert_same(before)
-
-
-def test_one_undo_step_takes_it_back():
-    obj, _armature = arm(150.0, axis=1, sides=16, rings=41)
-    properties.of(obj).delta_mush.enabled = True
-    bpy.ops.ed.undo_push(message="before")
-    bpy.ops.sinew.recommend()
-    bpy.ops.ed.undo_push(message="Recommended")
-    assert stages_on(bpy.data.objects["Arm"]) == ["twist_spread"]
-    bpy.ops.ed.undo()
-    assert stages_on(bpy.data.objects["Arm"]) == ["delta_mush"]
-    assert properties.of(bpy.data.objects["Arm"]).method == "lbs"
-
-
 def test_add_takes_it_as_a_choice():
     obj, armature = scenes.make_arm(sides=16, rings=41)
     bpy.ops.sinew.add(method="RECOMMENDED")

@@ -233,14 +233,6 @@ def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
     assert set(obj.data.attributes.keys()) == before
 
 
-def test_without_the_modifier_that_deforms_it_sinew_goes(arm):
-    obj, _armature = arm
-    obj.modifiers.remove(obj.modifiers["Armature"])
-    bpy.context.view_layer.update()
-    assert not obj.modifiers
-    assert not properties.has_sinew(obj)
-
-
 def test_numbers_are_those_of_sinew(arm):
     obj, _armature = arm
     measured = []

@@ -216,15 +216,3 @@ def test_points_and_job_files_take_it(arm, stage, tmp_path):
     copy = bpy.data.objects["Arm"]
     assert scenes.worst(scenes.shapes(copy, FRAMES), shapes) <= 1e-6
     assert properties.of(copy).method == "dq"
-
-
-@pytest.mark.slow
-def test_pictures_differ_where_it_does(arm, stage, tmp_path):
-    """--against renders with the settings of the golden pictures, unless others are given."""
-    _obj, path = arm
-    render = ("render", path, "--method", "dq", "--frames", "11", "--size", 128)
-    run_sinew(*render, *options(stage), "--out", tmp_path / "golden")
-    again = ("--against", tmp_path / "golden", "--out")
-    run_sinew("render", path, "--frames", "11", *again, tmp_path / "same")
-    off = "mix=off" if stage == "mix" else "delta_mush=off"
-    run_sinew("render", path, "--set", off, *again, tmp_path / "other", status=1)

@@ -77,28 +77,6 @@ def test_nothing_is_used_before_it_is_recommended():
         bpy.ops.sinew.use_recommended()
 
 
-def test_it_leaves_all_as_it_was():
-    obj, armature = scenes.skinned_arm("lbs")
-    bpy.context.scene.frame_set(4)
-    scenes.bend(armature, 33.0)
-    bpy.context.view_layer.update()
-    before = scenes.final_points(obj)
-    bpy.ops.sinew.suggest(over="ACTION")
-    assert bpy.context.scene.frame_current == 4
-    np.testing.assert_allclose(scenes.final_points(obj), before, atol=1e-6)
-
-
-def test_stopped_it_leaves_all_as_it_was():
-    obj, _armature = scenes.skinned_arm("lbs")
-    bpy.context.scene.frame_set(7)
-    steps = suggest.scan(bpy.context.scene, [obj], "SCENE")
-    shares = [next(steps) for _step in range(20)]
-    assert shares == sorted(shares)
-    steps.close()
-    assert bpy.context.scene.frame_current == 7
-    assert not suggest.suggestions
-
-
 def test_what_is_off_is_named():
     obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).enabled = False

@@ -107,17 +107,6 @@ def test_bones_have_an_amount_and_a_curve_that_can_be_keyed(route):
     assert routes.taken(obj, 0) == route
 
 
-def test_scaled_bones(route):
-    obj, armature = arm("dq")
-    armature.pose.bones["bone.1"].scale = (1.5, 1.0, 0.7)
-    twist(armature, 100.0)
-    before = scenes.final_points(obj)
-    spread(obj)
-    found = scenes.final_points(obj)
-    assert scenes.worst(found, before) > 0.05
-    assert_spread(obj, before)
-
-
 def test_where_scale_is_ignored_it_is_here_too(route):
     obj, armature = arm("dq")
     twist(armature, 100.0, bend=110.0)

@@ -10,7 +10,6 @@ import scenes
 from sinew_addon.core.comparison import peaks
 from sinew_addon.core.metrics import METRICS
 from sinew_addon.features.heat import heat_map, heat_panel, live, measures, worst_frames
-from sinew_addon.io import pose_io
 from sinew_addon.ui import stepped
 
 
@@ -46,39 +45,6 @@ def test_finds_the_peaks_worst_first(quantity):
         measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
         assert measured.summary().__dict__ | {"bulge_worst": measured.summary().bulge_worst}
         assert measured.entry(METRICS[quantity].worst) == pytest.approx(value, rel=1e-6)
-
-
-def test_leaves_frame_pose_and_file_as_they_were(tmp_path):
-    obj, armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
-    scene = bpy.context.scene
-    scene.frame_set(7, subframe=0.25)
-    # Posed by hand, in addition to its keys.
-    scenes.bend(armature, 33.0)
-    bpy.context.view_layer.update()
-    before, points = pose_io.read_channels(armature.pose.bones), scenes.final_points(obj)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
-    dirty = bpy.data.is_dirty  # 4.2 without a window calls even a newly saved file dirty
-    bpy.ops.sinew.worst_frames(over="ACTION")
-    assert (scene.frame_current, scene.frame_subframe) == (7, 0.25)
-    np.testing.assert_array_equal(pose_io.read_channels(armature.pose.bones), before)
-    assert scenes.worst(scenes.final_points(obj), points) < 1e-6
-    assert bpy.data.is_dirty == dirty
-
-
-def test_stopped_it_leaves_all_as_it_was():
-    obj, _armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
-    scene = bpy.context.scene
-    scene.frame_set(12)
-    worst_frames.scans.clear()
-    steps = worst_frames.scan(scene, [obj], "stretch", "blender", "SCENE")
-    shares = [next(steps) for _ in range(6)]
-    assert shares == sorted(shares)
-    assert scene.frame_current == 6
-    steps.close()
-    assert scene.frame_current == 12
-    assert not worst_frames.scans
 
 
 def test_ranges_are_the_scenes_the_previews_or_the_actions():

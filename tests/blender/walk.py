@@ -288,11 +288,7 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
             is_ahead = at + 1 < len(steps) and step.operation not in SAVED
             if is_ahead:
                 sinew.send(**request_of(steps[at + 1]))
-            blender.send(
-                **request_of(step),
-                claims_before=claims,
-                claims_after=ours["claims"],
-            )
+            blender.send(**request_of(step), claims_before=claims, claims_after=ours["claims"])
             theirs = blender.receive()
             claims = ours["claims"]
             outcome.said.append(ours["said"])

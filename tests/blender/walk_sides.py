@@ -105,11 +105,7 @@ def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
 
 
 # Operators that repair weights, by finding: those that both sides can run.
-MENDS = {
-    "no_weights": ("fill",),
-    "small_sums": ("normalize", "fill"),
-    "many_influences": ("limit",),
-}
+MENDS = {"no_weights": ("fill",), "small_sums": ("normalize", "fill"), "many_influences": ("limit",)}
 
 
 def world_points(obj: bpy.types.Object) -> np.ndarray:

@@ -8,19 +8,7 @@ import numpy as np
 import window
 from bpy_extras import view3d_utils
 from mathutils import Vector
-from window_hand import (
-    Run,
-    Steps,
-    choose,
-    click,
-    execute,
-    hero,
-    playing,
-    press,
-    rig,
-    step,
-    wait,
-)
+from window_hand import Run, Steps, choose, click, execute, hero, playing, press, rig, step, wait
 from window_scene import shown_points
 
 

@@ -6,17 +6,7 @@ from __future__ import annotations
 import bpy
 import window
 import window_scene
-from window_hand import (
-    FOLDER,
-    Run,
-    Steps,
-    choose,
-    hero,
-    rig,
-    set_frame,
-    step,
-    wait,
-)
+from window_hand import FOLDER, Run, Steps, choose, hero, rig, set_frame, step, wait
 from window_scene import blender_points, shown_points, worst
 
 

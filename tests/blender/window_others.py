@@ -10,19 +10,7 @@ import addon_utils
 import bpy
 import window
 import window_scene
-from window_hand import (
-    FOLDER,
-    PATIENCE,
-    Run,
-    Steps,
-    click,
-    fresh,
-    playing,
-    press,
-    set_frame,
-    step,
-    wait,
-)
+from window_hand import FOLDER, PATIENCE, Run, Steps, click, fresh, playing, press, set_frame, step, wait
 from window_scene import blender_points, shown_points, worst
 
 

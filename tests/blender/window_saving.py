@@ -8,20 +8,7 @@ from pathlib import Path
 
 import bpy
 import window
-from window_hand import (
-    FOLDER,
-    PATIENCE,
-    Run,
-    Steps,
-    click,
-    hero,
-    playing,
-    push,
-    rig,
-    set_frame,
-    step,
-    wait,
-)
+from window_hand import FOLDER, PATIENCE, Run, Steps, click, hero, playing, push, rig, set_frame, step, wait
 from window_scene import pose
 
 

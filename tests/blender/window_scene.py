@@ -90,10 +90,7 @@ def shown_points(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.nd
 
 
 def blender_points(
-    obj: bpy.types.Object,
-    armature: bpy.types.Object,
-    method: str,
-    depsgraph: bpy.types.Depsgraph,
+    obj: bpy.types.Object, armature: bpy.types.Object, method: str, depsgraph: bpy.types.Depsgraph
 ) -> np.ndarray:
     """float64 [vertices, 3]: the mesh deformed by the formula of an Armature modifier, with Preserve
     Volume if the method is dq; without scaled bones."""

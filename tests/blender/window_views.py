@@ -7,20 +7,7 @@ from collections.abc import Callable
 
 import bpy
 import window
-from window_hand import (
-    SECOND,
-    Run,
-    Steps,
-    choose,
-    click,
-    hero,
-    playing,
-    press,
-    push,
-    rig,
-    step,
-    wait,
-)
+from window_hand import SECOND, Run, Steps, choose, click, hero, playing, press, push, rig, step, wait
 from window_scene import pose
 
 
