@@ -193,10 +193,7 @@ def arm(tmp_path):
     spread = np.linspace(0.0, 1.0, 2 * len(uv.data), dtype=np.float32)
     uv.data.foreach_set("uv", spread)
     obj.data.materials.append(bpy.data.materials.new("Skin"))
-    path = tmp_path / "in" / "arm.blend"
-    path.parent.mkdir()
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return obj, path
+    return obj, scenes.save(tmp_path / "in" / "arm.blend")
 
 
 @pytest.fixture

@@ -161,8 +161,7 @@ def random_rotation(rng: np.random.Generator) -> Matrix:
 
 def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
     rng = numbers(seed, "bones")
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(armature)
+    armature = scenes.added("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     bones = armature.data.edit_bones
@@ -225,8 +224,7 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
     if has(seed, "seams", features, share=0.2):
         faces, origins = split_at_seams(numbers(seed, "seams"), faces, count)
     mesh.from_pydata([*points.tolist(), *points[origins].tolist()], [], faces)
-    obj = bpy.data.objects.new("Mesh", mesh)
-    bpy.context.scene.collection.objects.link(obj)
+    obj = scenes.added("Mesh", mesh)
     groups = [obj.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
     messy = has(seed, "messy weights", features)
     if messy:
@@ -417,8 +415,7 @@ def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> No
     if kind == "CAST":
         modifier.factor = rng.uniform(-0.5, 0.8)
     elif kind == "LATTICE":
-        lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
-        bpy.context.scene.collection.objects.link(lattice)
+        lattice = scenes.added("Lattice", bpy.data.lattices.new("Lattice"))
         lattice.scale = rng.uniform(2.0, 4.0, 3)
         for point in lattice.data.points:
             point.co_deform += Vector(rng.normal(0, 0.1, 3))
@@ -909,7 +906,7 @@ def run(first: int, count: int, keep: Path, wanted: Sequence[str] = routes.ROUTE
             features = shrink(seed, wanted)
             make_rig(seed, features)
             keep.mkdir(parents=True, exist_ok=True)
-            bpy.ops.wm.save_as_mainfile(filepath=str(keep / f"seed-{seed}.blend"))
+            scenes.save(keep / f"seed-{seed}.blend")
             needed = sorted(f for f in features if has(seed, f, features) or f == "mirror")
             errors = {f"{route} {method}": error for (route, method), error in outcome.errors.items()}
             why = outcome.reason or "another shape"

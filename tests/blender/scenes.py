@@ -27,8 +27,7 @@ def make_arm(
     Returns the mesh object and the armature object.
     """
     length = float(bones)
-    armature = bpy.data.objects.new(f"{name} Rig", bpy.data.armatures.new(f"{name} Rig"))
-    bpy.context.scene.collection.objects.link(armature)
+    armature = added(f"{name} Rig", bpy.data.armatures.new(f"{name} Rig"))
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     parent = None
@@ -52,8 +51,7 @@ def make_arm(
     faces += [tuple(range(sides))[::-1], tuple(range((rings - 1) * sides, rings * sides))]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, [], faces)
-    obj = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(obj)
+    obj = added(name, mesh)
     for index in range(bones):
         group = obj.vertex_groups.new(name=f"bone.{index}")
         for vertex, point in enumerate(points):
@@ -180,11 +178,24 @@ def copied(obj: bpy.types.Object, name: str = "", linked: bool = False) -> bpy.t
     return copy
 
 
-def reopened(path: Path | str, name: str = "Arm") -> bpy.types.Object:
-    """The object of this name, after the file was saved there and opened again."""
+def added(name: str, data: bpy.types.ID | None) -> bpy.types.Object:
+    """A new object in the scene."""
+    obj = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def save(path: Path) -> Path:
+    """Saves the open file there, in a folder that may be new."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    return bpy.data.objects[name]
+    return path
+
+
+def reopened(path: Path, name: str = "Arm") -> bpy.types.Object | None:
+    """The object of this name, after the file was saved there and opened again."""
+    bpy.ops.wm.open_mainfile(filepath=str(save(path)))
+    return bpy.data.objects.get(name)
 
 
 def enter(obj: bpy.types.Object, mode: str) -> None:

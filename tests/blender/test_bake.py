@@ -78,7 +78,7 @@ def shown(obj, frames, method=METHOD):
 
 def assert_plays_elsewhere(obj, path, tmp_path, kind, frames=FRAMES, method=METHOD):
     """float32 [frames, vertices, 3]: its shapes by Sinew, which a bake of its file has, too."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     expected, before, out = shown(obj, frames, method), path.read_bytes(), tmp_path / "out"
     run_sinew(
         "bake", path, "--method", method, "--to", kind, "--frames", f"{frames[0]}-{frames[-1]}", "--out", out
@@ -103,7 +103,7 @@ def test_each_mesh_as_the_file_has_it(arm, tmp_path):
     obj, path = arm
     scenes.make_arm(name="Plain")
     expected = shown(obj, FRAMES, "qv")
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     command = ("bake", path, "--to", "mdd", "--frames", "1-11", "--out", tmp_path / "out")
     said = run_sinew(*command, status=1)
     assert "Plain is not deformed by Sinew; choose a method by --method" in said.stderr
@@ -164,7 +164,7 @@ def test_a_number_of_vertices_that_changes_is_refused(arm, tmp_path, kind):
     weld.merge_threshold = 0.2
     weld.keyframe_insert("merge_threshold", frame=5)
     obj.modifiers.move(1, 0)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     out = tmp_path / "out"
     refused = run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", out, status=1)
     assert "one number, bake to alembic or usd" in refused.stderr
@@ -195,7 +195,7 @@ def test_the_armature_modifier_stays_for_the_way_back(arm, tmp_path):
     """What is hidden stays hidden."""
     obj, path = arm
     obj.hide_viewport = obj.hide_render = True
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", tmp_path / "out")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "arm.blend"))
     obj = bpy.data.objects["Arm"]
@@ -270,7 +270,7 @@ def test_names_of_objects_and_files(arm, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(path))
     for name in names:
         scenes.make_arm(sides=6, rings=11, name=name)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     out = tmp_path / "out"
     options = ("--method", METHOD, "--to", "pc2", "--frames", "1,11", "--out", out)
     run_sinew("bake", path, *options)
@@ -333,7 +333,7 @@ def test_several_moving_objects(arm, tmp_path, kind, stretched):
     if stretched:
         scene.render.frame_map_new = 200
     scene.frame_start, scene.frame_end = 3, 9
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     frames = [3, 4, 6, 9]
     for obj in (first, second):
         scenes.add_sinew(obj, METHOD)
@@ -358,13 +358,12 @@ def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
         mesh = bpy.data.meshes.new(name)
         points = np.random.default_rng(len(hung)).normal(size=(60, 3))
         mesh.from_pydata(points.tolist(), [], np.arange(60).reshape(15, 4).tolist())
-        hung[name] = bpy.data.objects.new(name, mesh)
-        bpy.context.scene.collection.objects.link(hung[name])
+        hung[name] = scenes.added(name, mesh)
         hung[name].parent = hung["hat"] if name == "feather" else armature
         if name not in ("feather", "beside"):
             hung[name].parent_type, hung[name].parent_bone = "BONE", armature.data.bones[-1].name
     hung["hidden"].hide_set(True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     frames = [1, 5, 11]
     scenes.add_sinew(obj, METHOD)
     expected = world_shapes([hung["hat"], hung["feather"]], frames)
@@ -389,7 +388,7 @@ def test_frames_before_zero(arm, tmp_path, kind):
     ):
         for key in curve.keyframe_points:
             key.co_ui.x -= 11.0
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", "-5--1", "--out", tmp_path / "out")
     if kind == "usd":
         assert "Blender exports no frames before 0" in run_sinew(*command, status=1).stderr
@@ -417,10 +416,9 @@ def test_a_library_override_whose_library_keys_visibility(arm, tmp_path, kind):
     obj, path = arm
     for flag in ("show_viewport", "show_render"):
         obj.keyframe_insert(f'modifiers["Armature"].{flag}', frame=1)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    shot = path.with_name("shot.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    shot = scenes.save(path.with_name("shot.blend"))
     with bpy.data.libraries.load(str(path), link=True, relative=True) as (_, to):
         to.objects = ["Arm", "Arm Rig"]
     for linked in list(to.objects):
@@ -462,7 +460,7 @@ def test_what_is_in_another_scene_is_named(arm, tmp_path):
     for each in (away, rig):
         bpy.context.scene.collection.objects.unlink(each)
         other.collection.objects.link(each)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     out = tmp_path / "out"
     result = run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", out, status=1)
     assert "left as it was: Away is not in the scene Scene" in result.stderr

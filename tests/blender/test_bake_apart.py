@@ -148,7 +148,7 @@ def test_simulations_keep_their_caches_on_disk(arm, tmp_path, links, monkeypatch
     cloth = obj.modifiers.new("Cloth", "CLOTH")
     cloth.point_cache.frame_end = 11
     cloth.point_cache.use_disk_cache = True
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     with bpy.context.temp_override(
         scene=bpy.context.scene, active_object=obj, object=obj, point_cache=cloth.point_cache
     ):
@@ -158,7 +158,7 @@ def test_simulations_keep_their_caches_on_disk(arm, tmp_path, links, monkeypatch
     cached = below(path.parent)
     assert [name for name in cached if name.endswith(".bphys")]
     bpy.context.scene.gravity = (0.0, 0.0, 40.0)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     out = tmp_path / "out"
     assert bake_to(out, "alembic", apart=True) == {"FINISHED"}
     assert below(path.parent) == cached

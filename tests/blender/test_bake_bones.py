@@ -108,7 +108,7 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
         rig.scale, rig.rotation_euler = (2.0, 2.0, 2.0), (0.3, 0.2, 0.1)
         bone = rig.pose.bones["bone.1"]
         scenes.key(bone, "scale", ((1, (1.0, 1.0, 1.0)), (11, (1.2, 1.5, 1.3))))
-        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        scenes.save(path)
     scenes.add_sinew(obj, method)
     expected = world_shapes([obj], FRAMES)[0]
     file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", "--helpers", "3", method=method)
@@ -126,7 +126,7 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
     for each in (file, keyed):
         bpy.ops.wm.open_mainfile(filepath=str(each))
         pose_anew(bpy.data.objects["Arm Rig"])
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+        scenes.save(tmp_path / "other.blend")
         played = read_elsewhere(tmp_path / "other.blend", FRAMES, tmp_path)["Arm"]
         found[each] = rms_and_worst(played, expected)[0]
     assert found[file] < share * linear
@@ -151,7 +151,7 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     bone = rig.pose.bones["bone.0"]
     scenes.key(bone, "scale", ((1, (1.0, 1.0, 1.0)), (11, (1.2, 1.5, 1.3))))
     bpy.context.scene.render.frame_map_new = 200
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     for each in (obj, sleeve):
         scenes.add_sinew(each, METHOD)
     expected = world_shapes([obj, sleeve], FRAMES)
@@ -287,7 +287,7 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
     elif of == "in front":
         scenes.put_in_front(obj, "MIRROR", "Mirror")
     else:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        scenes.save(path)
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         with bpy.data.libraries.load(str(path), link=True) as (_, to):
             to.objects = ["Arm", "Arm Rig"]

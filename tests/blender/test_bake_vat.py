@@ -143,7 +143,7 @@ def test_an_engine_has_the_shapes(character, tmp_path, monkeypatch, axes, kind, 
 
 def test_the_command_writes_it(character, tmp_path):
     path, out = tmp_path / "arm.blend", tmp_path / "out"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     words = "bake", path, "--to", "vat", "--frames", "1-11", "--step", 2, "--texels", "png", "--out", out
     before = path.read_bytes()
     run_sinew(*words)

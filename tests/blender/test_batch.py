@@ -44,7 +44,7 @@ def make_rig(path: Path, degrees: float = 100.0) -> Path:
     _obj, armature = scenes.make_arm(sides=6, rings=5)
     scenes.key_pose(armature, degrees)
     path.parent.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False, compress=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
     return path
 
 
@@ -141,8 +141,7 @@ def test_settings_for_files_and_objects(tmp_path):
         bpy.context.scene.collection.children.link(props)
         hat, _ = scenes.make_arm(sides=6, rings=5, name="Hat")
         props.objects.link(hat)
-        (tmp_path / "in" / "sub").mkdir(parents=True, exist_ok=True)
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in" / "sub" / f"{name}.blend"))
+        scenes.save(tmp_path / "in" / "sub" / f"{name}.blend")
     (tmp_path / "job.toml").write_text(
         """
         inputs = ["in/**/*.blend"]
@@ -321,16 +320,14 @@ def test_links_are_kept_and_reported(tmp_path):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scenes.make_arm(sides=6, rings=5, name="Local")
     hero = tmp_path / "library" / "hero.blend"
-    shot = tmp_path / "shots" / "shot.blend"
-    shot.parent.mkdir()
-    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    shot = scenes.save(tmp_path / "shots" / "shot.blend")
     for library, relative in ((hero, True), (tmp_path / "library" / "gone.blend", False)):
         if not library.exists():
             shutil.copy(hero, library)
         with bpy.data.libraries.load(str(library), link=True, relative=relative) as (_, to):
             to.objects = ["Arm"]
         bpy.context.scene.collection.objects.link(to.objects[0])
-    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    scenes.save(shot)
     (tmp_path / "library" / "gone.blend").unlink()
 
     out = tmp_path / "out" / "deep"
@@ -357,8 +354,7 @@ def test_libraries_of_libraries_are_found(tmp_path):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         if path != middle:
             scenes.make_arm(sides=6, rings=5)
-        path.parent.mkdir(parents=True)
-        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        scenes.save(path)
         content = bpy.data.collections.new(path.stem)
         bpy.context.scene.collection.children.link(content)
         if library is None:
@@ -369,7 +365,7 @@ def test_libraries_of_libraries_are_found(tmp_path):
             instance = bpy.data.objects.new("Instance", None)
             instance.instance_type, instance.instance_collection = "COLLECTION", to.collections[0]
             content.objects.link(instance)
-        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        scenes.save(path)
     out = tmp_path / "out"
     run_sinew("reskin", shot, "--method", "dq", "--out", out, *FAST, status=1)
     assert report_of(out)["shot.blend"]["notes"] == []
@@ -567,7 +563,7 @@ def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_cube_add()
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "broken" / "no armature.blend"))
+    scenes.save(folder / "broken" / "no armature.blend")
     broken["broken/no armature.blend"] = "no mesh is deformed by an armature"
 
     # An armature in a missing library, with its absolute path.
@@ -577,7 +573,7 @@ def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
     with bpy.data.libraries.load(str(library), link=True) as (_, to):
         to.objects = ["Arm Rig"]
     obj.modifiers["Armature"].object = to.objects[0]
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "broken" / "armature is gone.blend"))
+    scenes.save(folder / "broken" / "armature is gone.blend")
     library.unlink()
     broken["broken/armature is gone.blend"] = "no mesh is deformed by an armature"
 

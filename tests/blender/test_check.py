@@ -32,23 +32,17 @@ def printed_lines(*arguments: object, status: int = 0) -> list[str]:
     return run_sinew("check", *arguments, status=status).stdout.splitlines()
 
 
-def save(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 def empty() -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
 
 def test_files_that_are_well(tmp_path):
     scenes.make_arm()
-    save(tmp_path / "in" / "plain.blend")
+    scenes.save(tmp_path / "in" / "plain.blend")
     _obj, _armature = scenes.skinned_arm("dq", name="Other")
     hidden, _armature = scenes.skinned_arm("qv", name="Hidden")
     hidden.hide_viewport = hidden.hide_render = True
-    save(tmp_path / "in" / "deep" / "skinned.blend")
+    scenes.save(tmp_path / "in" / "deep" / "skinned.blend")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*.blend")}
     reports = check(tmp_path / "in")
     assert reports["plain.blend"]["needs_sinew"] is False
@@ -65,7 +59,7 @@ def test_files_that_are_well(tmp_path):
 def test_what_is_switched_off_needs_no_sinew(tmp_path):
     obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).enabled = False
-    report = check(save(tmp_path / "off.blend"))["off.blend"]
+    report = check(scenes.save(tmp_path / "off.blend"))["off.blend"]
     assert (report["needs_sinew"], report["notes"]) == (
         False,
         ["Arm is switched off: its Armature modifier deforms it"],
@@ -96,7 +90,7 @@ def without_settings(obj, armature):
 def test_what_sinew_can_not_drive(harm, tmp_path):
     obj, armature = scenes.skinned_arm("dq")
     wanted = harm(obj, armature)
-    report = check(save(tmp_path / "a.blend"), status=1)["a.blend"]
+    report = check(scenes.save(tmp_path / "a.blend"), status=1)["a.blend"]
     assert any(wanted in problem for problem in report["problems"]), report
     assert all(problem.startswith("Arm") for problem in report["problems"])
 
@@ -106,9 +100,9 @@ def test_an_armature_modifier_that_was_left_off(tmp_path):
     obj, _armature = scenes.skinned_arm("dq")
     attach.remove(obj)
     modifier = obj.modifiers["Armature"]
-    assert "ok" in run_sinew("check", save(tmp_path / "a.blend")).stdout
+    assert "ok" in run_sinew("check", scenes.save(tmp_path / "a.blend")).stdout
     modifier.object, modifier.show_viewport, modifier.show_render = None, False, False
-    (problem,) = check(save(tmp_path / "b.blend"), status=1)["b.blend"]["problems"]
+    (problem,) = check(scenes.save(tmp_path / "b.blend"), status=1)["b.blend"]["problems"]
     assert "Armature is switched off and has no armature" in problem
 
 
@@ -121,19 +115,21 @@ def test_what_is_hidden_in_another_scene(tmp_path):
     bpy.context.scene.collection.objects.unlink(obj)
     bpy.context.scene.collection.objects.unlink(armature)
     obj.hide_viewport = True
-    assert check(save(tmp_path / "a.blend"))["a.blend"]["meshes"] == [{"object": "Arm", "method": "dq"}]
+    assert check(scenes.save(tmp_path / "a.blend"))["a.blend"]["meshes"] == [
+        {"object": "Arm", "method": "dq"}
+    ]
 
 
 def test_linked_without_an_override(tmp_path):
     _obj, _armature = scenes.skinned_arm("dq")
-    library = save(tmp_path / "hero.blend")
+    library = scenes.save(tmp_path / "hero.blend")
     scenes.link(library, "Arm", "Arm Rig")
-    (problem,) = check(save(tmp_path / "shot.blend"), status=1)["shot.blend"]["problems"]
+    (problem,) = check(scenes.save(tmp_path / "shot.blend"), status=1)["shot.blend"]["problems"]
     assert "Arm is linked from another file" in problem
     assert "library override" in problem
     for linked in (bpy.data.objects["Arm"], bpy.data.objects["Arm Rig"]):
         linked.override_create(remap_local_usages=True)
-    report = check(save(tmp_path / "override.blend"))["override.blend"]
+    report = check(scenes.save(tmp_path / "override.blend"))["override.blend"]
     assert report["meshes"] == [{"object": "Arm", "method": "dq"}]
     library.unlink()
     report = check(tmp_path / "override.blend", status=1)["override.blend"]
@@ -142,10 +138,10 @@ def test_linked_without_an_override(tmp_path):
 
 def test_what_can_not_be_read_does_not_stop_the_others(tmp_path):
     scenes.make_arm()
-    save(tmp_path / "a.blend")
+    scenes.save(tmp_path / "a.blend")
     (tmp_path / "b.blend").write_bytes(b"BLENDER and then nothing")
     (tmp_path / "c.blend").mkdir()
-    save(tmp_path / "d.blend")
+    scenes.save(tmp_path / "d.blend")
     paths = [tmp_path / f"{name}.blend" for name in ("a", "b", "d", "none")]
     reports = check(*paths, status=1)
     assert printed_lines(*paths, status=1) == [line_of(report) for report in reports.values()]
@@ -167,14 +163,14 @@ def test_a_file_that_takes_too_long(tmp_path):
 @pytest.fixture
 def skinned(tmp_path):
     _obj, _armature = scenes.skinned_arm("dq")
-    return save(tmp_path / "skinned.blend")
+    return scenes.save(tmp_path / "skinned.blend")
 
 
 @pytest.fixture
 def plain(tmp_path):
     empty()
     scenes.make_arm()
-    return save(tmp_path / "plain.blend")
+    return scenes.save(tmp_path / "plain.blend")
 
 
 def script(path: Path, text: str) -> Path:

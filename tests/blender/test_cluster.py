@@ -98,9 +98,7 @@ def addresses(processes: list[subprocess.Popen]) -> set[str]:
 @pytest.fixture
 def rig(tmp_path):
     scenes.make_arm()
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
+    return scenes.save(tmp_path / "arm.blend")
 
 
 def arguments(rig: Path, out: Path, scheduler: str) -> tuple:

@@ -26,8 +26,7 @@ def arm_file(tmp_path):
     """A saved arm of linear weights: file, and the modifier's shapes [2, vertices, 3] at frames 6 and 11."""
     obj, _armature = scenes.make_arm()
     expected = scenes.modifier_shapes(obj, [6, 11], preserve_volume=True)
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "arm.blend")
     return path, expected
 
 
@@ -105,10 +104,9 @@ def test_info(arm_file):
 
 def test_info_names_what_is_left_to_blender(tmp_path):
     _obj, armature = scenes.make_arm()
-    lattice = bpy.data.objects.new("Cage", bpy.data.lattices.new("Cage"))
-    bpy.context.scene.collection.objects.link(lattice)
+    lattice = scenes.added("Cage", bpy.data.lattices.new("Cage"))
     lattice.modifiers.new("Armature", "ARMATURE").object = armature
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "cage.blend"))
+    scenes.save(tmp_path / "cage.blend")
     assert (
         "left to their Armature modifiers: Cage (Lattice)"
         in run_sinew("info", tmp_path / "cage.blend").stdout
@@ -124,7 +122,7 @@ def test_info_warns(tmp_path):
     obj.vertex_groups.new(name="nobody")
     for group in obj.vertex_groups:
         group.remove([0, 1, 2])
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "faulty.blend"))
+    scenes.save(tmp_path / "faulty.blend")
     report = json.loads(run_sinew("info", tmp_path / "faulty.blend", "--json").stdout)
     warnings = " ".join(report[0]["meshes"][0]["warnings"])
     assert "3 of 252 vertices have no weights" in warnings
@@ -201,7 +199,7 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
     (tmp_path / "empty.blend").touch()
     (tmp_path / "none").mkdir()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "nothing.blend"))
+    scenes.save(tmp_path / "nothing.blend")
     out, one = tmp_path / "points.npz", ("--method", "dq", "--frames", "1")
     cases = [
         (["points", tmp_path / "no.blend", *one, "--out", out], "no such file"),
@@ -265,7 +263,7 @@ def test_points_override_a_keyed_method(tmp_path):
     expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)
     scenes.add_sinew(obj, "lbs")
     obj.keyframe_insert("sinew.method", frame=1)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "keyed.blend"))
+    scenes.save(tmp_path / "keyed.blend")
     out = tmp_path / "points.npz"
     run_sinew("points", tmp_path / "keyed.blend", "--method", "dq", "--frames", "11", "--out", out)
     with np.load(out) as points:
@@ -295,8 +293,7 @@ def keyed_file(tmp_path):
         expected.append(bones_of(armature, frames))
         action_copy.restore(armature)
     assert np.abs(expected[0] - blender).max() > 0.01
-    path = tmp_path / "keyed.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "keyed.blend")
     return path, expected
 
 

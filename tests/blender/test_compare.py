@@ -20,11 +20,6 @@ from sinew_addon.attach import properties
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="drawn with the newest Blender only")
 
 
-def save(path):
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 def test_recommended_is_one_of_the_methods(tmp_path):
     """Its numbers are those of what it chooses, and every other method has the file's own stages."""
     obj, armature = scenes.make_arm(sides=16, rings=41)
@@ -34,7 +29,10 @@ def test_recommended_is_one_of_the_methods(tmp_path):
     scenes.key(bone, "rotation_euler", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 2.6, 0.0))))
     scenes.add_sinew(obj, "lbs")
     properties.of(obj).delta_mush.enabled = True
-    path, options = save(tmp_path / "arm.blend"), ("--frames", "11", "--pictures", 0, "--out", tmp_path)
+    path, options = (
+        scenes.save(tmp_path / "arm.blend"),
+        ("--frames", "11", "--pictures", 0, "--out", tmp_path),
+    )
 
     def summaries(methods, *words):
         done = run_sinew("compare", path, "--methods", methods, *options, *words)
@@ -49,7 +47,7 @@ def test_recommended_is_one_of_the_methods(tmp_path):
     alone, _done = summaries(method, "--set", "twist_spread=on", "--set", "delta_mush=off")
     assert found["recommended"] == alone[method]
     scenes.key(properties.of(obj).delta_mush, "factor", ((1, 0.0), (11, 1.0)))
-    save(path)
+    scenes.save(path)
     done = run_sinew("compare", path, "--methods", "recommended", *options, status=1)
     assert "delta_mush.factor is keyed" in done.stderr
 
@@ -66,7 +64,7 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
     dual = scenes.modifier_shapes(obj, frames, preserve_volume=True)
     rest, triangles = scenes.rest_points(obj), scenes.triangles_of(obj)
     obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
-    path = save(tmp_path / "arm.blend")
+    path = scenes.save(tmp_path / "arm.blend")
     options = ("--methods", "blender,lbs,dq", "--frames", "1,6,11", "--pictures", 0)
     run_sinew("compare", path, *options, "--out", tmp_path)
     found = json.loads((tmp_path / "arm" / "metrics.json").read_text(encoding="utf-8"))
@@ -109,7 +107,7 @@ def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     bpy.context.scene.frame_set(11)
     counts = [len(scenes.final_points(obj)) for obj in (first, second)]
     assert counts[0] > 2 * counts[1]
-    path = save(tmp_path / "two.blend")
+    path = scenes.save(tmp_path / "two.blend")
     options = ("--methods", "lbs,dq", "--frames", "1,11", "--pictures", 0)
     run_sinew("compare", path, *options, "--out", tmp_path)
     found = json.loads((tmp_path / "two" / "metrics.json").read_text(encoding="utf-8"))
@@ -130,7 +128,7 @@ def test_close_ups_are_of_one_character(tmp_path):
     scenes.make_arm()
     second, rig = scenes.make_arm(name="Far")
     rig.location = second.location = (0.0, 50.0, 0.0)
-    path = save(tmp_path / "two.blend")
+    path = scenes.save(tmp_path / "two.blend")
     run_sinew(
         *("compare", path, "--methods", "lbs", "--frames", "11", "--pictures", 1, "--size", 64),
         *("--engine", "cycles", "--out", tmp_path),
@@ -147,7 +145,7 @@ def test_planted_faults_are_found(tmp_path):
     obj.vertex_groups.new(name="nobody").add([9], 1.0, "REPLACE")
     for bone in armature.data.bones:
         obj.vertex_groups.new(name=f"old {bone.name}")
-    path = save(tmp_path / "faulty.blend")
+    path = scenes.save(tmp_path / "faulty.blend")
     run_sinew("compare", path, "--frames", "1-2", "--pictures", 0, "--influences", 2, "--out", tmp_path)
     found = json.loads((tmp_path / "faulty" / "metrics.json").read_text(encoding="utf-8"))["findings"]["Arm"]
     assert {finding["name"]: finding["vertices"] for finding in found} == {
@@ -199,7 +197,7 @@ def test_a_page_holds_its_pictures(tmp_path):
 
 def test_golden_pictures(tmp_path):
     _obj, armature = scenes.make_arm()
-    path = save(tmp_path / "arm.blend")
+    path = scenes.save(tmp_path / "arm.blend")
     run_sinew(
         "render", path, "--method", "dq", "--frames", "1,11", "--size", 128, "--out", tmp_path / "golden"
     )
@@ -218,7 +216,7 @@ def test_golden_pictures(tmp_path):
     for frame, scale in ((1, 1.0), (11, 3.0)):
         armature.pose.bones[1].scale = (scale, scale, scale)
         armature.pose.bones[1].keyframe_insert("scale", frame=frame)
-    save(path)
+    scenes.save(path)
     result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
     assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
     assert "1 of 2 pictures within" in result.stdout

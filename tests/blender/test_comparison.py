@@ -219,10 +219,10 @@ def test_save_and_reopen(tmp_path, set_up, skinned):
         scenes.add_sinew(obj, "qv")
     expected = shapes_of_methods(obj, [1, 6, 11])
     bpy.context.scene.frame_set(4)
-    original = test_restore.save(tmp_path / "before.blend")
+    original = scenes.save(tmp_path / "before.blend")
     compare(obj)
     bpy.ops.sinew.flip_comparison()
-    compared = test_restore.save(tmp_path / "compared.blend")
+    compared = scenes.save(tmp_path / "compared.blend")
     assert properties.of(copies(obj)["dq"]).error == ""
     files.open_file(original)
     before = whole_file.content()
@@ -232,7 +232,7 @@ def test_save_and_reopen(tmp_path, set_up, skinned):
     assert_copies_show(bpy.data.objects["Arm"], [1, 6, 11], expected)
     bpy.context.scene.frame_set(4)
     bpy.ops.sinew.end_comparison()
-    test_restore.save(tmp_path / "ended.blend")
+    scenes.save(tmp_path / "ended.blend")
     files.open_file(tmp_path / "ended.blend")
     whole_file.assert_same(before)
 
@@ -347,7 +347,7 @@ def test_the_original_is_deleted(tmp_path, skinned):
     obj, _armature = scenes.make_arm()
     if skinned:
         scenes.add_sinew(obj, "dq")
-    path = test_restore.save(tmp_path / "arm.blend")
+    path = scenes.save(tmp_path / "arm.blend")
 
     def opened() -> bpy.types.Object:
         files.open_file(path)
@@ -512,7 +512,7 @@ def test_a_linked_character(tmp_path):
     """Without an override Sinew can not deform it; its copies are local."""
     obj, _armature = scenes.make_arm()
     expected = shapes_of_methods(obj, [1, 11])
-    test_restore.save(tmp_path / "library.blend")
+    scenes.save(tmp_path / "library.blend")
     obj, _armature = scenes.link(tmp_path / "library.blend", "Arm", "Arm Rig")
     before = whole_file.content()
     compare(obj)
@@ -530,7 +530,7 @@ def test_without_sinew_the_file_opens(tmp_path):
     bpy.context.scene.frame_set(11)
     compare(obj, {"lbs", "dq"})
     shown = {copy.name: scenes.final_points(copy) for copy in copies(obj).values()}
-    path = test_restore.save(tmp_path / "compared.blend")
+    path = scenes.save(tmp_path / "compared.blend")
     sinew_addon.unregister()
     try:
         files.open_file(path)
@@ -547,7 +547,7 @@ def test_commands_leave_copies_out(tmp_path):
     """Also if they show every collection to take pictures."""
     obj, _armature = scenes.make_arm()
     compare(obj, {"qv", "dq"})
-    path = test_restore.save(tmp_path / "compared.blend")
+    path = scenes.save(tmp_path / "compared.blend")
     files.open_file(path)
     assert [o.name for o in characters.deformed_meshes(bpy.context.scene)] == ["Arm"]
     assert not state().collection.hide_render
@@ -562,7 +562,7 @@ def test_commands_leave_copies_out(tmp_path):
 def test_restore_ends_a_comparison(tmp_path):
     obj, _armature = scenes.skinned_arm("dq")
     compare(obj, {"qv"})
-    path = test_restore.save(tmp_path / "input" / "compared.blend")
+    path = scenes.save(tmp_path / "input" / "compared.blend")
     run_sinew("restore", path, "--out", tmp_path / "restored")
     files.open_file(tmp_path / "restored" / "compared.blend")
     assert [o.name for o in bpy.data.objects if o.type == "MESH"] == ["Arm"]

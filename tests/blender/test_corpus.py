@@ -20,12 +20,12 @@ def folder(tmp_path: Path) -> Path:
     scenes.make_arm(sides=6, rings=9)
     below = tmp_path / "files" / "below"
     below.mkdir(parents=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(below / "arm.blend"))
+    scenes.save(below / "arm.blend")
     (below / "broken.glb").write_bytes(b"glTF and nothing else")
     (below / "notes.txt").write_text("no scene")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_cube_add()
-    bpy.ops.wm.save_as_mainfile(filepath=str(below / "cube.blend"))
+    scenes.save(below / "cube.blend")
     return below.parent
 
 

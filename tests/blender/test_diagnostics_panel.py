@@ -231,7 +231,7 @@ def test_with_modifiers_in_front_the_edited_mesh_is_checked():
 def test_a_check_touches_nothing(tmp_path):
     obj, _armature = faulty_arm()
     bpy.context.scene.frame_set(5)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    scenes.save(tmp_path / "arm.blend")
     dirty = bpy.data.is_dirty  # 4.2 without a window calls even a newly saved file dirty
     bpy.ops.sinew.check_frames(over="SCENE")
     assert bpy.data.is_dirty == dirty

@@ -116,8 +116,7 @@ def test_an_unchanged_object_is_not_written(monkeypatch):
 def test_hooks_behind_take_a_vertex_group(has_group):
     obj, _armature = scenes.make_arm()
     hook, vertices = obj.modifiers.new("Hook", "HOOK"), [1, 3, 6, 30]
-    hook.object = bpy.data.objects.new("Hand", None)
-    bpy.context.scene.collection.objects.link(hook.object)
+    hook.object = scenes.added("Hand", None)
     if has_group:
         obj.vertex_groups.new(name="hooked").add(vertices, 1.0, "REPLACE")
         hook.vertex_group = "hooked"

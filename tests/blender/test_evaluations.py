@@ -274,8 +274,7 @@ def task(path: Path) -> dict:
 @pytest.mark.usefixtures("counting")
 def test_a_batch_evaluates_a_file_once_more_than_blender_opens_and_saves_it(tmp_path):
     scenes.make_arm()
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "arm.blend")
 
     def open_and_save() -> None:
         files.open_file(path, load_ui=True)
@@ -302,8 +301,7 @@ def weights_read(monkeypatch) -> list[str]:
 
 def test_saving_reads_no_weights_again_and_a_batch_reads_them_once(tmp_path, weights_read):
     obj, _armature = scenes.make_arm()
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "arm.blend")
     scenes.add_sinew(obj, "dq")
     assert weights_read == ["Arm"]
     live = str(path.with_name("live.blend"))
@@ -333,8 +331,7 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
     child.parent, child.parent_type = armature, "ARMATURE"
     _skinned, _ = scenes.skinned_arm("lbs", name="Driven")
     bpy.context.scene.frame_set(7)
-    path = tmp_path / "all.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "all.blend")
     names = ["Arm", "Front", "Child", "Driven"]
     for name in names:
         scenes.add_sinew(bpy.data.objects[name], "dq")

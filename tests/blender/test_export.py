@@ -252,7 +252,7 @@ def test_after_an_export_that_nobody_ended(tmp_path):
     assert "_SINEW_CENTRE" not in obj.data.attributes
     for react in (
         lambda: bpy.context.scene.frame_set(4),
-        lambda: bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend")),
+        lambda: scenes.save(tmp_path / "a.blend"),
     ):
         export.begin(found, [], {"gltf_attributes": True, "gltf_yup": True})
         assert "_SINEW_CENTRE" in obj.data.attributes
@@ -272,7 +272,7 @@ def test_custom_properties_stay(tmp_path):
     use(obj, "cor")
     obj.data["tailor"] = "Ann"
     # Saved files store centres in the mesh.
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    scenes.save(tmp_path / "a.blend")
     mesh = write(tmp_path / "a.glb", export_extras=True).header["meshes"][0]
     content = {"version": 1, "method": "cor", "parameters": {"cor.signs": "blender"}}
     assert mesh["extensions"] == {"SINEW_skinning": content}
@@ -351,8 +351,7 @@ def test_the_example_of_the_documentation(tmp_path, monkeypatch, capfd):
 
 def test_command_errors(tmp_path, capfd):
     make_character()
-    file = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    file = scenes.save(tmp_path / "arm.blend")
     assert cli.main(["export", str(file), "--out", str(tmp_path / "a.glb")]) == 1
     assert "no mesh has Sinew; choose a method by --method" in capfd.readouterr().err
     assert cli.main(["export", str(file), "--method", "magic", "--out", str(tmp_path / "a.glb")]) == 2

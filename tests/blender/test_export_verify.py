@@ -41,7 +41,7 @@ def scene(empty_file, tmp_path):
 def exported(tmp_path, *options, method="lbs", ending=".glb", status=0):
     """What is said of the only mesh."""
     file, out = tmp_path / "arm.blend", tmp_path / f"arm{ending}"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    scenes.save(file)
     given = ("--method", method, "--verify", "--json", "--out", out, *options)
     said = json.loads(run_sinew("export", file, *given, status=status).stdout)
     assert said["errors"] == []
@@ -146,7 +146,7 @@ def test_other_actions_of_fbx(scene, tmp_path):
 def test_without_weights(scene, tmp_path):
     obj, _rig = scene
     obj.vertex_groups.clear()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    scenes.save(tmp_path / "arm.blend")
     words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--verify", "--out", tmp_path / "arm.glb")
     assert "without a skin, as no vertex has a weight" in run_sinew(*words, status=1).stderr
 
@@ -158,8 +158,7 @@ def make_human():
     points = [bone.head_local + corner for bone in rig.data.bones for corner in 0.1 * Matrix.Identity(3)]
     mesh = bpy.data.meshes.new("Human")
     mesh.from_pydata(points, [], np.arange(len(points)).reshape(-1, 3).tolist())
-    obj = bpy.data.objects.new("Human", mesh)
-    bpy.context.scene.collection.objects.link(obj)
+    obj = scenes.added("Human", mesh)
     obj.parent = rig
     obj.modifiers.new("Armature", "ARMATURE").object = rig
     for number, bone in enumerate(rig.data.bones):
@@ -182,7 +181,7 @@ def test_vrm(empty_file, tmp_path, version):
     words = ("export", file, "--method", "lbs", "--out", out, "--verify", "--json")
     if find_spec("io_scene_vrm") is None:
         scenes.make_arm()
-        bpy.ops.wm.save_as_mainfile(filepath=str(file))
+        scenes.save(file)
         assert "the add-on VRM Format, which is not installed" in run_sinew(*words, status=1).stderr
         assert not out.exists()
         pytest.skip("the VRM add-on is not installed: pip install bpy-vrm-format")
@@ -191,7 +190,7 @@ def test_vrm(empty_file, tmp_path, version):
         obj, rig = make_human()
         scenes.key_shape(obj)
         rig.data.vrm_addon_extension.spec_version = version
-        bpy.ops.wm.save_as_mainfile(filepath=str(file))
+        scenes.save(file)
     finally:
         # Blender would wait for it at the end of Python.
         addon_utils.disable("io_scene_vrm", default_set=True)
@@ -226,7 +225,7 @@ def test_the_panels_export_that_is_stopped_leaves_nothing(scene, tmp_path):
     obj, _rig = scene
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_end = 3000
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    scenes.save(tmp_path / "arm.blend")
     before = sorted(tmp_path.iterdir())
     task = {"command": "write", "objects": [obj.name], "options": {"verify": True}}
     shares = bake_apart.follow(task, tmp_path / "arm.glb")
@@ -309,7 +308,7 @@ def test_the_limit_of_the_user(scene, tmp_path):
 
 def test_sentences(scene, tmp_path):
     file, out = tmp_path / "arm.blend", tmp_path / "a.glb"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    scenes.save(file)
     command = ("export", file, "--method", "dq", "--out", out, "--frames", "1,6,11")
     first, second, *others = run_sinew(*command, "--verify").stdout.splitlines()
     assert first.startswith("Arm: the file plays 0.")

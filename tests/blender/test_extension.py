@@ -98,7 +98,7 @@ def test_installs_and_works_in_the_same_session(source, package, bare_site, tmp_
         package = (tmp_path / "repository/index.json").as_uri()
     obj, _armature = scenes.make_arm()
     expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)[0]
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    scenes.save(tmp_path / "arm.blend")
     user = tmp_path / "user"
     points = tmp_path / "points.npy"
     result = subprocess.run(
@@ -314,7 +314,7 @@ def test_an_older_library_is_named_in_one_sentence(change, sentence):
 def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tmp_path):
     _obj, _armature = scenes.skinned_arm("qv")
     before, after = tmp_path / "before.blend", tmp_path / "after.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(before))
+    scenes.save(before)
     subprocess.run([sys.executable, "-c", WITHOUT_LIBRARY, before, after], check=True, timeout=60)
     bpy.ops.wm.open_mainfile(filepath=str(after))
     assert bpy.data.objects["Arm"].sinew.method == "qv"

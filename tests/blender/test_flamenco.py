@@ -56,9 +56,7 @@ def save_arm(path: Path) -> Path:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     _obj, armature = scenes.make_arm(sides=6, rings=5)
     scenes.key_pose(armature, 80.0)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
+    return scenes.save(path)
 
 
 def run_task(task: dict, variables: dict[str, list[str]]) -> subprocess.CompletedProcess:

@@ -39,11 +39,6 @@ def skinned(**options: object) -> bpy.types.Object:
     return obj
 
 
-def saved(path: Path) -> Path:
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 @pytest.fixture(scope="module")
 def of_human() -> set[tuple[str, str]]:
     """What is found in human.blend as it is."""
@@ -138,7 +133,7 @@ def _result(steps: Generator[float, None, flex.Result], shares: list[float] | No
 
 def test_the_command_says_what_is_wrong_where_and_what_mends_it(tmp_path):
     skinned()
-    good = saved(tmp_path / "good.blend")
+    good = scenes.save(tmp_path / "good.blend")
     table = tmp_path / "table.toml"
     table.write_text('[joints]\nother = ["twist 170"]\n')
     limits = tmp_path / "limits.toml"
@@ -179,7 +174,7 @@ def test_the_command_says_what_is_wrong_where_and_what_mends_it(tmp_path):
 def test_a_file_is_judged_by_its_own_method(tmp_path):
     obj = skinned()
     scenes.add_sinew(obj, "dq")
-    path = saved(tmp_path / "dq.blend")
+    path = scenes.save(tmp_path / "dq.blend")
     table = tmp_path / "table.toml"
     table.write_text('[joints]\nother = ["twist 170"]\n[limits]\nstretch = 99\n')
     found = json.loads(run_sinew("flex", path, "--poses", table, "--methods", "lbs", "--json").stdout)
@@ -204,7 +199,7 @@ def test_wrong_use(tmp_path):
 @pytest.mark.slow
 def test_the_fixture_fails_a_test_with_what_is_wrong(tmp_path):
     skinned()
-    good = saved(tmp_path / "good.blend")
+    good = scenes.save(tmp_path / "good.blend")
     table = tmp_path / "table.toml"
     table.write_text('[joints]\nother = ["twist 170"]\n')
     (tmp_path / "conftest.py").write_text('pytest_plugins = ["sinew_addon.commands.pytest_flex"]\n')
@@ -246,7 +241,7 @@ def test_a_file_that_never_ends_fails_alone(tmp_path):
     scenes.write_slow_file(tmp_path / "endless.blend", 500, 100_000_000)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     skinned()
-    good = saved(tmp_path / "good.blend")
+    good = scenes.save(tmp_path / "good.blend")
     result = run_sinew("flex", tmp_path / "endless.blend", good, "--timeout", 20, "--json", status=1)
     first, second = json.loads(result.stdout)
     assert "no end after 20 s" in first["error"]

@@ -260,8 +260,7 @@ def test_an_input_that_names_the_object_later_is_noticed():
 
 def give_lattice(modifier):
     """A modifier that moves its points in every frame."""
-    lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
-    bpy.context.scene.collection.objects.link(lattice)
+    lattice = scenes.added("Lattice", bpy.data.lattices.new("Lattice"))
     lattice.scale = (4.0, 4.0, 4.0)
     lattice.data.points[0].co_deform.x -= 0.4
     for frame, height in ((1, 0.0), (11, 0.5)):

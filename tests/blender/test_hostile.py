@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 
-import bpy
 import pytest
 import scenes
 from program import run_sinew, start_sinew
@@ -19,10 +18,7 @@ pytestmark = pytest.mark.once
 @pytest.fixture
 def arm_file(tmp_path):
     scenes.make_arm(sides=6, rings=5)
-    path = tmp_path / "in" / "arm.blend"
-    path.parent.mkdir()
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
+    return scenes.save(tmp_path / "in" / "arm.blend")
 
 
 def test_names_are_no_html(tmp_path):
@@ -30,8 +26,7 @@ def test_names_are_no_html(tmp_path):
     obj.name, armature.name = SCRIPT, f"{SCRIPT} Rig"
     armature.animation_data.action.name = SCRIPT
     obj.vertex_groups.new(name=SCRIPT).add([1], 1.0, "REPLACE")
-    file = tmp_path / "a'\"&<b>.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    file = scenes.save(tmp_path / "a'\"&<b>.blend")
     run_sinew("compare", file, "--frames", "1,6", "--pictures", "0", "--out", tmp_path / "pages")
     run_sinew("reskin", file, "--method", "dq", "--no-pictures", "--out", tmp_path / "out")
     for page in ((tmp_path / "pages").glob("*.html"), (tmp_path / "out").glob("*.html")):
@@ -45,8 +40,7 @@ def test_names_do_not_steer_a_terminal(tmp_path):
     pty = pytest.importorskip("pty", reason="no terminals here")
     obj, _armature = scenes.make_arm(sides=6, rings=5)
     obj.name = "\x1b]0;owned\x07\x1b[2J"
-    file = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    file = scenes.save(tmp_path / "arm.blend")
     for command in (("info", file), ("check", file), ("points", file, "--method", "blender", "--frames", "1",
                     "--out", tmp_path / "o.npz")):  # fmt: skip
         ours, theirs = pty.openpty()

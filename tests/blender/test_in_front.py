@@ -34,8 +34,7 @@ def deforming_parent(obj, armature):
 def lattice_in_front(obj, _armature):
     """Next to Blender's edge cases: a lattice that moves the mesh, and a mask that mixes the two inputs."""
     modifier = scenes.put_in_front(obj, "LATTICE", "Lattice")
-    modifier.object = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
-    bpy.context.scene.collection.objects.link(modifier.object)
+    modifier.object = scenes.added("Lattice", bpy.data.lattices.new("Lattice"))
     modifier.object.scale = (5.0, 1.0, 1.0)
     modifier.object.data.points[0].co_deform.y += 0.5
     obj.modifiers["Armature"].vertex_group = obj.vertex_groups.new(name="mask").name
@@ -76,8 +75,7 @@ def test_mirrored_groups_take_the_other_side():
 
 def test_a_lattice_in_front_follows_both_objects():
     obj = arm_with("LATTICE")
-    lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
-    bpy.context.scene.collection.objects.link(lattice)
+    lattice = scenes.added("Lattice", bpy.data.lattices.new("Lattice"))
     lattice.scale = (4.0, 4.0, 4.0)
     lattice.data.points[0].co_deform.x -= 0.4
     obj.modifiers["Front"].object = lattice
@@ -151,8 +149,7 @@ def test_one_view_layer_has_it_for_its_position_alone():
     bpy.context.scene.collection.children.link(collection)
     bpy.context.scene.collection.objects.unlink(obj)
     collection.objects.link(obj)
-    follower = bpy.data.objects.new("Follower", None)
-    bpy.context.scene.collection.objects.link(follower)
+    follower = scenes.added("Follower", None)
     follower.constraints.new("COPY_TRANSFORMS").target = obj
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(8)

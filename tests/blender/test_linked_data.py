@@ -28,7 +28,7 @@ def save_library(folder: Path, skinned: bool, front: bool) -> np.ndarray:
         collection.objects.link(each)
     if skinned:
         scenes.add_sinew(obj, "dq")
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    scenes.save(folder / "library.blend")
     return expected
 
 
@@ -73,7 +73,7 @@ def test_linked_meshes(tmp_path, override, skinned, front):
     scenes.add_sinew(character(), "dq")
     assert_shapes(expected)
     assert not properties.of(character()).error
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    scenes.save(tmp_path / "shot.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     assert properties.has_sinew(character())
     assert_shapes(expected)
@@ -81,7 +81,7 @@ def test_linked_meshes(tmp_path, override, skinned, front):
         with pytest.raises(SinewError, match="from its library"):
             attach.remove(character())
         properties.of(character()).enabled = False
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+        scenes.save(tmp_path / "shot.blend")
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
         assert not properties.of(character()).enabled
         assert len(attach.replaced_modifiers(character())) == 1
@@ -125,7 +125,7 @@ def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
     settings.delta_mush.iterations, settings.delta_mush.enabled = 9, True
     settings.sdef.interpolation = "slerp"
     expected = scenes.shapes(character(), FRAMES)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    scenes.save(tmp_path / "shot.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     settings = properties.of(character())
     assert (settings.mix.method, settings.mix.group, settings.sdef.interpolation) == (

@@ -59,8 +59,7 @@ def shape_key(obj, armature):
 
 
 def constraint_of_an_object(obj, armature):
-    empty = bpy.data.objects.new("Empty", None)
-    bpy.context.scene.collection.objects.link(empty)
+    empty = scenes.added("Empty", None)
     made = empty.constraints.new("COPY_LOCATION")
     made.target, made.subtarget = obj, GROUP
 

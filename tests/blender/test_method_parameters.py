@@ -113,8 +113,7 @@ def test_commands_take_it_by_its_full_name(tmp_path):
     (name,) = next(row["parameters"] for row in listed if row["name"] == "sdef")
     assert name == "sdef.interpolation"
     obj, _armature = make_model()
-    path = tmp_path / "model.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "model.blend")
     scenes.add_sinew(obj, "sdef")
     bpy.context.scene.frame_set(FRAME)
     found = shape_of_each(obj)

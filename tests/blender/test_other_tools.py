@@ -364,8 +364,7 @@ def cats(obj: bpy.types.Object, _folder: Path) -> Seen:
 
 
 def join(obj: bpy.types.Object, _folder: Path) -> Seen:
-    other = bpy.data.objects.new("Other", obj.data.copy())
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.added("Other", obj.data.copy())
     other.location.y = 3.0
     make_active(obj)
     other.select_set(True)
@@ -508,8 +507,7 @@ def test_it_is_said_before(tmp_path):
     obj.modifiers.new("Behind", "SUBSURF")
     assert other_tools.notes(obj) == []
     obj.modifiers.remove(obj.modifiers["Behind"])
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "arm.blend")
     notes = preflight.check({"source": str(path)}, lambda *_stage: None)["notes"]
     assert notes == [f"Arm: {FBX}", other_tools.APPLYING]
     obj = make(with_multires, has_sinew=True)

@@ -63,14 +63,13 @@ def inputs(tmp_path_factory):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     _obj, armature = scenes.make_arm()
     armature.animation_data.action.name = "Bend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "arm.blend"))
+    scenes.save(folder / "arm.blend")
     run_sinew(
         "reskin", folder / "arm.blend", "--method", "dq", "--frames", "none", "--out", folder / "skinned"
     )
-    target = bpy.data.objects.new("Target", None)
-    bpy.context.collection.objects.link(target)
+    target = scenes.added("Target", None)
     armature.pose.bones[-1].constraints.new("IK").target = target
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "reaching.blend"))
+    scenes.save(folder / "reaching.blend")
     return {
         "FILE": folder / "arm.blend",
         "RESKINNED": folder / "skinned" / "arm.blend",
@@ -290,7 +289,7 @@ def test_names_of_objects_stay_in_the_archive(tmp_path):
         obj.name = name
         assert obj.name == name
     file, out = tmp_path / "names.blend", tmp_path / "deep" / "below" / "points.npz"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    scenes.save(file)
     done = run_sinew("points", file, "--method", "dq", "--frames", "1", "--out", out)
     assert "\x1b" not in done.stderr
     with np.load(out) as arrays:
@@ -314,16 +313,14 @@ def test_names_can_be_had_back():
 def test_two_objects_of_one_name(tmp_path):
     """A linked one and one of the file's own: each has its array."""
     scenes.make_arm(sides=6, rings=5, name="Arm")
-    library = tmp_path / "library.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    library = scenes.save(tmp_path / "library.blend")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scenes.make_arm(sides=8, rings=5, name="Arm")
     with bpy.data.libraries.load(str(library), link=True) as (_there, here):
         here.objects = ["Arm", "Arm Rig"]
     for obj in here.objects:
         bpy.context.scene.collection.objects.link(obj)
-    shot = tmp_path / "shot.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    shot = scenes.save(tmp_path / "shot.blend")
     out = tmp_path / "points.npz"
     run_sinew("points", shot, "--method", "blender", "--frames", "1,6", "--out", out)
     with np.load(out) as arrays:

@@ -507,8 +507,7 @@ def test_data_of_a_mesh_without_weights_is_not_damaged(caplog):
 
 def test_reskin_puts_it_into_the_file(gate, tmp_path):
     scenes.make_arm(bones=3)
-    path = tmp_path / "plain.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "plain.blend")
     run_sinew("reskin", path, "--method", "cor", "--frames", "none", "--out", tmp_path / "out")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "plain.blend"))
     obj = bpy.data.objects["Arm"]

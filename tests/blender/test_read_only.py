@@ -42,8 +42,7 @@ def _simulate(folder):
 
 def _add_fluid(folder):
     """Off, as Mantaflow can abort a Blender that ends with a domain."""
-    domain = bpy.data.objects.new("fluid", bpy.data.meshes.new("fluid"))
-    bpy.context.scene.collection.objects.link(domain)
+    domain = scenes.added("fluid", bpy.data.meshes.new("fluid"))
     fluid = domain.modifiers.new("fluid", "FLUID")
     fluid.show_viewport = fluid.show_render = False
     fluid.fluid_type = "DOMAIN"
@@ -89,8 +88,7 @@ def written(tmp_path_factory):
     arm, _armature = scenes.make_arm(sides=6, rings=5)
     scene = bpy.context.scene
     scene.frame_end = 4
-    file = folder / "sim.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    file = scenes.save(folder / "sim.blend")
     _simulate(folder)
     _add_fluid(folder)
     _add_file_outputs(folder)
@@ -99,7 +97,7 @@ def written(tmp_path_factory):
     scene.render.engine, scene.cycles.samples = "CYCLES", 1
     scene.render.resolution_x = scene.render.resolution_y = 64
     scenes.enter(arm, "EDIT")
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    scenes.save(file)
     (folder / "sim.blend1").unlink()
     return file, _content(folder)
 
@@ -162,8 +160,7 @@ def test_commands_leave_modes(which, mode, tmp_path):
     expected = scenes.final_points(arm)
     bpy.context.view_layer.objects.active = arm if which == "arm" else armature
     bpy.ops.object.mode_set(mode=mode)
-    file = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    file = scenes.save(tmp_path / "arm.blend")
     assert len(files.open_file(file)) == (mode != "POSE")
     assert all(obj.mode in ("OBJECT", "POSE") for obj in bpy.data.objects)
     (mesh,) = characters.deformed_meshes(bpy.context.scene)

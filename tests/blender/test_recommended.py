@@ -141,8 +141,7 @@ def test_limits_are_read_as_armatures_have_them():
 @pytest.mark.parametrize("command", ["points", "bake"])
 def test_commands_take_the_preset(command, tmp_path):
     obj, _armature = arm(150.0, axis=1, sides=16, rings=41)
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "arm.blend")
     if command == "points":
         options = ("--frames", "11", "--out", tmp_path / "arm.npz")
     else:
@@ -158,8 +157,7 @@ def test_commands_take_the_preset(command, tmp_path):
 
 def test_a_batch_stores_what_it_chose_and_set_overrides_it(tmp_path):
     arm(150.0, axis=1, sides=16, rings=41)
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    path = scenes.save(tmp_path / "arm.blend")
     options = ("--preset", "recommended", "--set", "twist_spread.amount=0.5", "--frames", "none")
     run_sinew("reskin", path, "--out", tmp_path / "out", *options, "--no-pictures")
     settings = stored_in(tmp_path / "out" / "arm.blend")

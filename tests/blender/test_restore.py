@@ -18,12 +18,6 @@ from sinew_addon.io import files
 FRAMES = [1, 6, 11]
 
 
-def save(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
-    return path
-
-
 def content(path: Path) -> dict[str, object]:
     files.open_file(path, load_ui=True)
     # Reading an attribute with a single value makes Blender 5.2 expand it.
@@ -81,7 +75,7 @@ def full_scene(folder: Path) -> Path:
     # Posed by hand, in addition to its keys: nothing may change the frame before saving.
     armature.pose.bones[0].rotation_quaternion = (math.cos(0.2), 0.0, math.sin(0.2), 0.0)
     bpy.context.scene.frame_current = 4
-    path = save(folder / "full.blend")
+    path = scenes.save(folder / "full.blend")
     library = folder / "library" / "props.blend"
     library.parent.mkdir()
     shutil.copy(path, library)
@@ -91,7 +85,7 @@ def full_scene(folder: Path) -> Path:
     hero = to.objects[0]
     bpy.context.scene.collection.objects.link(hero)
     hero.override_create(remap_local_usages=True).name = "Override"
-    return save(path)
+    return scenes.save(path)
 
 
 def add_what_takes_helpers() -> None:
@@ -138,7 +132,7 @@ def test_everything_comes_back(tmp_path):
     paths = [full_scene(tmp_path / "input")]
     for sample in (REPOSITORY / "blend_files" / name for name in ("tentacle.blend", "wrist.blend")):
         files.open_file(sample, load_ui=True)
-        paths.append(save(tmp_path / "input" / sample.name))
+        paths.append(scenes.save(tmp_path / "input" / sample.name))
     bytes_before = [path.read_bytes() for path in paths]
     run_sinew("reskin", *paths, "--method", "dq", "--out", tmp_path / "reskinned", "--no-pictures")
     run_sinew("restore", tmp_path / "reskinned", "--out", tmp_path / "restored")
@@ -152,7 +146,7 @@ def test_everything_comes_back(tmp_path):
 
 def test_what_sinew_is_not_on_is_a_sentence(tmp_path):
     scenes.make_arm()
-    path = save(tmp_path / "plain.blend")
+    path = scenes.save(tmp_path / "plain.blend")
     result = run_sinew("restore", path, "--out", tmp_path / "out", status=1)
     assert "no mesh is deformed by Sinew" in result.stderr
     assert not (tmp_path / "out" / "plain.blend").exists()

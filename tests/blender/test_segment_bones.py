@@ -222,7 +222,7 @@ def test_bakes_of_what_is_not_exact_come_nearer(bendy):
 def test_the_command_exports_plain_bones(bendy, tmp_path, capfd, method):
     obj = bendy(curved=True)
     file, glb = tmp_path / "arm.blend", tmp_path / "arm.glb"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    scenes.save(file)
     rest = world_rest(obj)
     if method == "cor":
         scenes.add_sinew(obj, "cor")

@@ -18,8 +18,7 @@ DEGREES = 60.0, 120.0, 170.0
 def make_tentacle() -> tuple[bpy.types.Object, bpy.types.Object, np.ndarray]:
     """Returns a tube, its armature of bones that are one long, and its weights [vertices, bones]."""
     data = bpy.data.armatures.new("Tentacle")
-    armature = bpy.data.objects.new("Tentacle", data)
-    bpy.context.scene.collection.objects.link(armature)
+    armature = scenes.added("Tentacle", data)
     scenes.enter(armature, "EDIT")
     above = None
     for number in range(BONES):
@@ -36,8 +35,7 @@ def make_tentacle() -> tuple[bpy.types.Object, bpy.types.Object, np.ndarray]:
     faces = (first + 12 * np.arange(len(heights) - 1)[:, None, None]).reshape(-1, 4)
     mesh = bpy.data.meshes.new("Tube")
     mesh.from_pydata(points.tolist(), [], faces.tolist())
-    obj = bpy.data.objects.new("Tube", mesh)
-    bpy.context.scene.collection.objects.link(obj)
+    obj = scenes.added("Tube", mesh)
     distance = np.abs(height[:, None] - np.arange(BONES) - 0.5) / 2
     weights = np.where(distance < 1, (1 - distance**2) ** 2, 0)
     weights /= weights.sum(axis=1, keepdims=True)

@@ -162,8 +162,7 @@ def add_keyed_mesh():
     """Another mesh of the scene, which its shape keys change in every frame."""
     mesh = bpy.data.meshes.new("Keyed")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
-    obj = bpy.data.objects.new("Keyed", mesh)
-    bpy.context.scene.collection.objects.link(obj)
+    obj = scenes.added("Keyed", mesh)
     scenes.key_shape(obj)
 
 
@@ -194,7 +193,7 @@ def test_what_a_script_appends_between_two_frames_is_deformed(arm, tmp_path, bes
     obj, _armature = arm
     properties.of(obj).method = "qv"
     of_qv = scenes.shapes(obj, FRAMES)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    scenes.save(tmp_path / "arm.blend")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     if beside != "nothing":
         other, _rig = scenes.skinned_arm(name="Other")
@@ -251,7 +250,7 @@ def test_numbers_are_those_of_sinew(arm):
 def test_baked(arm, tmp_path, kind):
     obj, _armature = arm
     expected = scenes.shapes(obj, FRAMES)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    scenes.save(tmp_path / "arm.blend")
     assert bpy.ops.sinew.bake(kind=kind, frames="1-11") == {"FINISHED"}
     assert not properties.has_sinew(obj)
     assert not any(m.show_viewport for m in obj.modifiers if m.type == "ARMATURE")

@@ -61,9 +61,7 @@ def arm(tmp_path):
     group = obj.vertex_groups.new(name=GROUP)
     for vertex in obj.data.vertices:
         group.add([vertex.index], float(np.clip(vertex.co.x - 0.5, 0.0, 1.0)), "REPLACE")
-    path = tmp_path / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return obj, path
+    return obj, scenes.save(tmp_path / "arm.blend")
 
 
 @pytest.fixture(params=STAGES)

@@ -24,6 +24,7 @@ from sinew_addon.features.ik import ik_bake
 from sinew_addon.features.inbetween import inbetween_bake
 from sinew_addon.features.suggest import recommend, suggest
 from sinew_addon.io import actions, ik_io
+from sinew_addon.ui import stepped
 from whole_file import assert_same, content
 
 Steps = Iterator[float]
@@ -42,7 +43,12 @@ def inverse_kinematics(_folder: Path) -> Steps:
     target = test_ik.make_empty("Target", test_ik.near())
     test_ik.constrain(arm, "arm.2", target, chain_count=3)
     bpy.context.view_layer.update()
-    return ik_bake.steps(arm, ik_io.read_trees(arm), list(test_ik.FRAMES), "dls", [])
+
+    def steps() -> Steps:
+        with stepped.kept_frame(bpy.context.scene, [arm]):
+            yield from ik_bake.steps(arm, ik_io.read_trees(arm), list(test_ik.FRAMES), "dls", [])
+
+    return steps()
 
 
 def blend(_folder: Path) -> Steps:
@@ -83,7 +89,9 @@ MEASURING = (recommendation, suggestion, search_of_worst_frames)
 OTHERS = (inbetweens, inverse_kinematics, blend, mix)
 
 
-@pytest.mark.parametrize("start", [*OTHERS, *MEASURING, "mdd", "pc2", "vat"], ids=str)
+@pytest.mark.parametrize(
+    "start", [*OTHERS, *MEASURING, "mdd", "pc2", "vat"], ids=lambda each: getattr(each, "__name__", each)
+)
 @pytest.mark.parametrize("count", [1, 5])
 def test_stopped_it_leaves_all_as_it_was(start, count, tmp_path):
     steps = bake_to(start, tmp_path) if isinstance(start, str) else start(tmp_path)

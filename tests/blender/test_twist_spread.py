@@ -120,8 +120,7 @@ def test_where_scale_is_ignored_it_is_here_too(route):
 
 
 def test_bones_are_found_by_names_and_chains():
-    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(armature)
+    armature = scenes.added("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     made = {}

@@ -57,8 +57,7 @@ def _by_envelopes(obj):
 
 
 def _shared(obj):
-    other = bpy.data.objects.new("Other", obj.data)
-    bpy.context.scene.collection.objects.link(other)
+    scenes.added("Other", obj.data)
 
 
 CHARACTERS = {

@@ -34,12 +34,6 @@ def make_character(bones=3):
     return obj
 
 
-def save(folder):
-    path = folder / "arm.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 def write_page(path, *options):
     page = path.with_suffix(".html")
     run_sinew("compare", path, *options, "--viewer", page)
@@ -73,7 +67,7 @@ def test_the_data_is_what_points_computes(tmp_path, bones):
         obj.parent.data.bones[1].bbone_segments = 4
     if bones == "vanishing":
         scenes.key(obj.parent.pose.bones[1], "scale", [(6, (0.5, 1.0, 0.0)), (11, (0.0, 0.0, 0.0))])
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "blender,lbs,dq,cor", "--frames", "1,6,11")
     for method in ("lbs", "dq", "cor"):
         assert_has_points(page, points_of(path, method), method, obj)
@@ -87,7 +81,7 @@ def test_the_painted_mix_is_that_of_the_file(tmp_path):
     for vertex, share in enumerate((heights - heights.min()) / np.ptp(heights)):
         group.add([vertex], float(share), "REPLACE")
     obj.sinew.mix.method, obj.sinew.mix.group = "cor", GROUP
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "lbs,dq", "--frames", "1,6,11")
     header, _meshes = read_page.read(page)
     assert header["methods"] == {"lbs": "Linear Blend", "dq": "Dual Quaternion", "mix": "Painted Mix"}
@@ -128,7 +122,7 @@ def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
     settings.twist_spread.amount, settings.bulge_limit.strength = 0.9, 0.8
     settings.bulge_limit.group, settings.bulge_limit.form = GROUP, form
     settings.dq.signs = "hierarchy"
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "blender,lbs,dq,cor", "--frames", "1,6,11")
     header, (arrays,) = read_page.read(page)
     assert header["parts"][0]["stages"] == ["Twist Spread", "Limit Bulge"]
@@ -136,7 +130,7 @@ def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
     assert len(np.unique(arrays["palettes"][2, :, 6, 2])) == 3
     assert_has_points(page, points_of(path, "dq"), "mix", obj)
     settings.mix.method = "OFF"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.save(path)
     for method in ("lbs", "dq", "cor"):
         expected = points_of(path, method)
         assert_has_points(page, expected, method, obj)
@@ -151,7 +145,7 @@ def test_recommended_is_a_method_with_its_stages(tmp_path):
     bone = obj.parent.pose.bones[1]
     bone.rotation_mode = "XYZ"
     scenes.key(bone, "rotation_euler", [(1, (0.0, 0.0, 0.0)), (11, (0.0, np.radians(150.0), 0.0))])
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "blender,recommended", "--frames", "1,6,11")
     run_sinew("points", path, "--preset", "recommended", "--frames", "1,6,11", "--out", tmp_path / "own.npz")
     header, _meshes = read_page.read(page)
@@ -165,7 +159,7 @@ def test_turns_that_euler_angles_tell(tmp_path, angle):
     obj = make_limb(angle, "XYZ")
     obj.sinew.mix.method, obj.sinew.twist_spread.enabled = "OFF", True
     obj.sinew.cor.signs = "hierarchy"
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "dq,cor", "--frames", "1,6,11")
     palettes = read_page.read(page)[1][0]["palettes"]
     assert palettes[:, :, 7, 3].any() or abs(angle) <= 180.0
@@ -176,7 +170,7 @@ def test_turns_that_euler_angles_tell(tmp_path, angle):
 def test_a_modifier_in_front_gives_the_mesh(tmp_path):
     obj = make_character()
     scenes.put_in_front(obj)
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     expected = points_of(path, "dq")
     assert expected.shape[1] > len(obj.data.vertices)
     assert_has_points(write_page(path, "--methods", "dq", "--frames", "1,6,11"), expected, "dq", obj)
@@ -189,7 +183,7 @@ def test_shape_keys_move_it(tmp_path):
     keys = obj.data.shape_keys.key_blocks
     for vertex in range(100):
         keys["Key"].data[vertex].co = keys["Basis"].data[vertex].co
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "lbs,dq,cor", "--frames", "1,6,11")
     _header, (arrays,) = read_page.read(page)
     assert arrays["moving"].tolist() == list(range(100, len(arrays["rest"])))
@@ -200,7 +194,7 @@ def test_shape_keys_move_it(tmp_path):
 def test_a_mesh_that_moves_against_its_armature_is_said(tmp_path):
     obj = make_character()
     scenes.key(obj, "location", [(1, (0.1, 0.0, 0.05)), (11, (0.1, 0.5, 0.05))])
-    page = write_page(save(tmp_path), "--methods", "dq", "--frames", "1,6,11")
+    page = write_page(scenes.save(tmp_path / "arm.blend"), "--methods", "dq", "--frames", "1,6,11")
     assert any("moves against its armature" in note for note in read_page.read(page)[0]["notes"])
 
 
@@ -209,7 +203,7 @@ def test_what_hangs_on_bones_goes_with_them(tmp_path):
     bpy.ops.mesh.primitive_cube_add(size=0.2)
     eye = bpy.context.object
     eye.parent, eye.parent_type, eye.parent_bone = obj.parent, "BONE", "bone.2"
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     worlds = []
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
@@ -230,7 +224,7 @@ def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     obj.sinew.delta_mush.enabled = True
     second, _armature = scenes.make_arm(name="Masked</script>")
     scenes.modifiers(second)[0].vertex_group = "bone.1"
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "lbs,qv,dq", "--frames", "1,6,11")
     text = page.read_text(encoding="utf-8")
     assert not re.search(r"(src|href)\s*=|url\(|@import|https?://", text)
@@ -250,7 +244,7 @@ def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
 
 def test_a_page_alone_needs_no_folder_and_has_one_file(tmp_path):
     make_character()
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--frames", "1")
     assert list(read_page.read(page)[0]["methods"]) == ["lbs", "dq", "cor"]
     assert sorted(each.name for each in tmp_path.iterdir()) == ["arm.blend", "arm.html"]
@@ -268,7 +262,7 @@ def test_a_page_alone_needs_no_folder_and_has_one_file(tmp_path):
 def test_a_comparison_is_saved_as_a_page(tmp_path):
     """Sinew is on the copies alone. The scene stays at its frame, with a pose that differs from its keys."""
     obj = make_character()
-    path = save(tmp_path)
+    path = scenes.save(tmp_path / "arm.blend")
     expected = {method: points_of(path, method) for method in ("lbs", "cor")}
     assert not bpy.ops.sinew.save_comparison.poll()
     assert bpy.ops.sinew.compare(methods={"lbs", "cor", "log"}) == {"FINISHED"}
