@@ -115,9 +115,8 @@ def test_what_is_hidden_in_another_scene(tmp_path):
     bpy.context.scene.collection.objects.unlink(obj)
     bpy.context.scene.collection.objects.unlink(armature)
     obj.hide_viewport = True
-    assert check(scenes.save(tmp_path / "a.blend"))["a.blend"]["meshes"] == [
-        {"object": "Arm", "method": "dq"}
-    ]
+    report = check(scenes.save(tmp_path / "a.blend"))["a.blend"]
+    assert report["meshes"] == [{"object": "Arm", "method": "dq"}]
 
 
 def test_linked_without_an_override(tmp_path):

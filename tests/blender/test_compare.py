@@ -29,10 +29,8 @@ def test_recommended_is_one_of_the_methods(tmp_path):
     scenes.key(bone, "rotation_euler", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 2.6, 0.0))))
     scenes.add_sinew(obj, "lbs")
     properties.of(obj).delta_mush.enabled = True
-    path, options = (
-        scenes.save(tmp_path / "arm.blend"),
-        ("--frames", "11", "--pictures", 0, "--out", tmp_path),
-    )
+    path = scenes.save(tmp_path / "arm.blend")
+    options = ("--frames", "11", "--pictures", 0, "--out", tmp_path)
 
     def summaries(methods, *words):
         done = run_sinew("compare", path, "--methods", methods, *options, *words)

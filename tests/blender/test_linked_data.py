@@ -73,16 +73,14 @@ def test_linked_meshes(tmp_path, override, skinned, front):
     scenes.add_sinew(character(), "dq")
     assert_shapes(expected)
     assert not properties.of(character()).error
-    scenes.save(tmp_path / "shot.blend")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    scenes.reopened(tmp_path / "shot.blend")
     assert properties.has_sinew(character())
     assert_shapes(expected)
     if skinned and override:
         with pytest.raises(SinewError, match="from its library"):
             attach.remove(character())
         properties.of(character()).enabled = False
-        scenes.save(tmp_path / "shot.blend")
-        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+        scenes.reopened(tmp_path / "shot.blend")
         assert not properties.of(character()).enabled
         assert len(attach.replaced_modifiers(character())) == 1
     else:
@@ -125,8 +123,7 @@ def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
     settings.delta_mush.iterations, settings.delta_mush.enabled = 9, True
     settings.sdef.interpolation = "slerp"
     expected = scenes.shapes(character(), FRAMES)
-    scenes.save(tmp_path / "shot.blend")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    scenes.reopened(tmp_path / "shot.blend")
     settings = properties.of(character())
     assert (settings.mix.method, settings.mix.group, settings.sdef.interpolation) == (
         "lbs",

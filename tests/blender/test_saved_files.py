@@ -301,8 +301,7 @@ def test_a_keyed_pose_that_differs_is_not_lost_by_opening(tmp_path):
     obj, armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(11)
     armature.pose.bones[1].rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
-    save(tmp_path / "saved.blend")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    scenes.reopened(tmp_path / "saved.blend")
     bpy.context.view_layer.update()
     obj = bpy.data.objects["Arm"]
     shown = scenes.final_points(obj)
