@@ -81,30 +81,6 @@ def test_the_same_as_in_this_blender(arm, tmp_path, kind):
     assert len(here[names.pop()]) == len(FRAMES)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("when", ["starting", "exporting"])
-def test_stopped_nothing_is_left(arm, tmp_path, kind, when):
-    obj, path = arm
-    scenes.add_sinew(obj, METHOD)
-    image = bpy.data.images.new("Dots", 4, 4)
-    image.pack()
-    material = obj.data.materials[0]
-    material.use_nodes = True
-    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
-    before = shape_of_scene(), path.read_bytes(), below(path.parent)
-    started = bake.start([obj], kind, list(range(1, 2000)), path.with_suffix(EXPORTS[kind]), overwrite=False)
-    shares = bake_apart.sample(started)
-    next(shares)
-    (child,) = program.own_children()
-    if when == "exporting":
-        assert next(share for share in shares if share > 0.0) < 1.0
-        assert len(below(path.parent)) > len(before[2])
-    shares.close()
-    assert not child.is_running()
-    assert (shape_of_scene(), path.read_bytes(), below(path.parent)) == before
-
-
 def test_one_that_crashes_is_told(arm, tmp_path):
     obj, path = arm
     scenes.add_sinew(obj, METHOD)

@@ -8,13 +8,10 @@ import json
 import bmesh
 import bpy
 import numpy as np
-import other_gltf
 import pytest
 import read_glb
 import scenes
 from program import checked, run_sinew, without_sinew
-from pygltflib import GLTF2
-from scipy.spatial import cKDTree
 from sinew_addon.attach import point_store
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
@@ -191,38 +188,6 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     assert worst <= 1.001 * report["after"]["worst"] + 1e-5 * report["diagonal"]
     assert rms <= 1.2 * report["after"]["rms"]
     assert scenes.worst(played[0], played[-1]) > 0.5
-
-
-@pytest.mark.once
-def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
-    """For a glTF of human.blend: equals a Blender without Sinew, and Sinew's shape up to the reported
-    error."""
-    path, frames = real_rig("human.blend"), (1, 16, 31, 46)
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects["Human"]
-    scenes.add_sinew(obj, METHOD)
-    expected = world_shapes([obj], frames)[0]
-    rest = np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
-    out, options = tmp_path / "out", ("--frames", ",".join(map(str, frames)), "--helpers", "8", "--json")
-    said = run_sinew("bake", path, "--method", METHOD, "--to", "bones", *options, "--out", out).stdout
-    (report,) = json.loads(said)[0]["bones"]
-    glb = tmp_path / "human.glb"
-    checked(without_sinew.run(EXPORT, out / path.name, glb), 0)
-    rate = bpy.context.scene.render.fps
-    (name,) = (each.name for each in GLTF2().load(str(glb)).animations if each.name.endswith("Helpers"))
-    read_rest, played = other_gltf.points_at(glb, np.array(frames) / rate, name)
-    # Vertices are split at seams.
-    distances, vertices = cKDTree(rest).query(read_rest)
-    assert distances.max() <= 1e-6
-    assert set(vertices) == set(range(len(rest)))
-    blender = read_elsewhere(out / path.name, frames, tmp_path)["Human"]
-    assert scenes.worst(played, blender[:, vertices]) <= 1e-5 * report["diagonal"]
-    distances = np.linalg.norm(played - expected[:, vertices], axis=2)
-    # Each vertex once.
-    once = np.unique(vertices, return_index=True)[1]
-    assert np.isclose(distances.max(), report["after"]["worst"], rtol=0.01)
-    assert np.isclose(np.sqrt(np.square(distances[:, once]).mean()), report["after"]["rms"], rtol=0.01)
-    assert report["after"]["rms"] < 0.7 * report["before"]["rms"]
 
 
 @pytest.mark.parametrize("motion", ["keys", "pose"])

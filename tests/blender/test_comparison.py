@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-import test_restore
 import whole_file
 from program import run_sinew
 from sinew_addon.attach import attach, properties
@@ -182,93 +181,6 @@ def test_rigs(set_up, skinned):
     assert_ends_without_trace(before)
 
 
-def test_a_full_scene_is_as_it_was(tmp_path):
-    """One comparison after the other, each with another kind of rig, then the end of the last one."""
-    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
-    files.open_file(test_restore.full_scene(tmp_path), load_ui=True)
-    scene = bpy.context.scene
-    characters = [
-        obj
-        for obj in bpy.context.view_layer.objects
-        if obj.type == "MESH" and attach.armature_of(obj) is not None and obj.visible_get()
-    ]
-    assert len(characters) >= 7
-    scene.frame_set(3)
-    chosen = (list(bpy.context.selected_objects), bpy.context.view_layer.objects.active)
-    before = whole_file.content()
-    for obj in characters:
-        compare(obj)
-        scene.frame_set(8)
-        assert list(copies(obj)) == METHODS
-        assert not any(properties.of(copy).error for copy in copies(obj).values())
-    scene.frame_set(3)
-    for obj in bpy.context.view_layer.objects:
-        obj.select_set(obj in chosen[0])
-    bpy.context.view_layer.objects.active = chosen[1]
-    assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
-    changed = whole_file.differences(before, whole_file.content())
-    # A copy of an override that is made local adds a session user to the reference.
-    assert [line for line in changed if not line.startswith("objects[Bare [props.blend]]")] == []
-
-
-@pytest.mark.parametrize(("set_up", "skinned"), [(plain, False), (mirrored_in_front, True)])
-def test_save_and_reopen(tmp_path, set_up, skinned):
-    obj, armature = scenes.make_arm()
-    set_up(obj, armature)
-    if skinned:
-        scenes.add_sinew(obj, "qv")
-    expected = shapes_of_methods(obj, [1, 6, 11])
-    bpy.context.scene.frame_set(4)
-    original = scenes.save(tmp_path / "before.blend")
-    compare(obj)
-    bpy.ops.sinew.flip_comparison()
-    compared = scenes.save(tmp_path / "compared.blend")
-    assert properties.of(copies(obj)["dq"]).error == ""
-    files.open_file(original)
-    before = whole_file.content()
-    files.open_file(compared)
-    assert state().arrangement == comparison_state.ONE_OF_TWO
-    state().arrangement = comparison_state.SIDE_BY_SIDE
-    assert_copies_show(bpy.data.objects["Arm"], [1, 6, 11], expected)
-    bpy.context.scene.frame_set(4)
-    bpy.ops.sinew.end_comparison()
-    scenes.save(tmp_path / "ended.blend")
-    files.open_file(tmp_path / "ended.blend")
-    whole_file.assert_same(before)
-
-
-def test_undo_and_redo():
-    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
-    obj, _armature = scenes.make_arm()
-    expected = shapes_of_methods(obj, [6])
-    bpy.context.scene.frame_set(6)
-    bpy.ops.ed.undo_push(message="start")
-    bpy.ops.ed.undo_push(message="nothing")
-    # Changes that undo itself makes.
-    bpy.ops.ed.undo()
-    obj = bpy.data.objects["Arm"]
-    before = whole_file.content()
-    compare(obj, {"lbs", "dq"})
-    bpy.ops.ed.undo_push(message="compare")
-    compare(obj, {"qv"})
-    bpy.ops.ed.undo_push(message="other methods")
-    bpy.ops.sinew.end_comparison()
-    bpy.ops.ed.undo_push(message="end")
-    bpy.ops.ed.undo()
-    assert list(copies(bpy.data.objects["Arm"])) == ["qv"]
-    bpy.ops.ed.undo()
-    obj = bpy.data.objects["Arm"]
-    assert list(copies(obj)) == ["lbs", "dq"]
-    assert_copies_show(obj, [6], expected)
-    bpy.ops.ed.undo()
-    assert state() is None
-    whole_file.assert_same(before)
-    bpy.ops.ed.redo()
-    obj = bpy.data.objects["Arm"]
-    assert_copies_show(obj, [6], expected)
-    assert_ends_without_trace(before)
-
-
 def test_other_methods_replace_the_copies():
     obj, _armature = scenes.make_arm()
     before = whole_file.content()
@@ -311,10 +223,16 @@ def test_copies_that_the_artist_deletes_renames_and_moves(set_up):
     bpy.context.scene.collection.objects.link(dq)
     state().collection.objects.unlink(dq)
     state().collection.name = "Mine"
+    lamp = bpy.data.objects.new("Lamp", None)
+    state().collection.objects.link(lamp)
     bpy.context.scene.frame_set(11)
     assert comparison_state.methods_of(state()) == [m for m in METHODS if m not in ("lbs", "dq")]
     bpy.context.scene.frame_set(1)
-    assert_ends_without_trace(before)
+    assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
+    # What the artist put into the collection stays in the scene.
+    assert list(lamp.users_collection) == [bpy.context.scene.collection]
+    bpy.data.objects.remove(lamp)
+    whole_file.assert_same(before)
 
 
 @pytest.mark.parametrize("copies_too", [False, True], ids=["collection", "copies"])
@@ -331,15 +249,6 @@ def test_the_comparison_after_its_collection_was_deleted(copies_too):
     bpy.context.scene.frame_set(1)
     assert comparison_labels.labels(bpy.context) == []
     assert_ends_without_trace(before)
-
-
-def test_what_the_artist_put_into_the_collection_stays():
-    obj, _armature = scenes.make_arm()
-    compare(obj)
-    lamp = bpy.data.objects.new("Lamp", None)
-    state().collection.objects.link(lamp)
-    bpy.ops.sinew.end_comparison()
-    assert list(lamp.users_collection) == [bpy.context.scene.collection]
 
 
 @pytest.mark.parametrize("skinned", [False, True], ids=["plain", "skinned"])
@@ -438,8 +347,10 @@ def test_overlay_and_flip():
     compare(obj, {"lbs", "qv", "dq"})
     lbs, qv, dq = (copies(obj)[name] for name in ("lbs", "qv", "dq"))
     state().arrangement = comparison_state.OVERLAID
-    assert all(copy.visible_get() for copy in (lbs, qv, dq))
+    assert state().collection.hide_render
     for copy in (lbs, qv, dq):
+        assert copy.visible_get()
+        assert copy.hide_select
         assert scenes.worst(without_offset(copy, 1), scenes.final_points(obj)) <= scenes.TOLERANCE * 2
     bpy.ops.sinew.flip_comparison()
     assert [copy.visible_get() for copy in (lbs, qv, dq)] == [True, False, False]
@@ -473,13 +384,6 @@ def test_labels_stand_over_the_characters():
         points = characters.world_points([shown])
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         assert np.allclose(place, (*middle[:2], points[:, 2].max()), atol=1e-4)
-
-
-def test_the_copies_are_not_rendered_unless_asked_for():
-    obj, _armature = scenes.make_arm()
-    compare(obj, {"dq"})
-    assert state().collection.hide_render
-    assert all(copy.hide_select for copy in copies(obj).values())
 
 
 def test_simulations_stay_with_the_original():

@@ -83,18 +83,6 @@ def test_rigs_of_the_pictures_pass(name):
     assert planted.found(planted.verdict()) == set()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["RobotExpressive.blend", "godot_player.glb", "kenney_character.fbx", "raylib_robot.glb"]
-)
-def test_rigs_of_others_pass(real_rig, name):
-    path = real_rig("../corpus") / name
-    if not path.exists():
-        pytest.skip(f"there is no {name}")
-    Rig.open(path, {})
-    assert planted.found(planted.verdict()) == set()
-
-
 def test_nothing_is_changed():
     obj = skinned()
     scenes.add_sinew(obj, "cor")
@@ -234,15 +222,3 @@ def test_wrong(sinew_flex):
     for name, said in (("bad", "Radius: "), ("absent", "no such file"), ("wrong", "expected one of")):
         assert f"test_{name}" in done.stdout
         assert said in done.stdout
-
-
-@pytest.mark.slow
-def test_a_file_that_never_ends_fails_alone(tmp_path):
-    scenes.write_slow_file(tmp_path / "endless.blend", 500, 100_000_000)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    skinned()
-    good = scenes.save(tmp_path / "good.blend")
-    result = run_sinew("flex", tmp_path / "endless.blend", good, "--timeout", 20, "--json", status=1)
-    first, second = json.loads(result.stdout)
-    assert "no end after 20 s" in first["error"]
-    assert second["passed"]

@@ -21,7 +21,6 @@ from test_batch import (
     start_sinew,
     wait_for_work,
 )
-from test_cluster import cluster
 
 NOTHING_BENT = '[joints]\nother = ["twist 1"]\n'
 
@@ -120,18 +119,3 @@ def test_a_crash_is_one_row_and_ctrl_c_loses_nothing(tmp_path):
     assert f"Blender crashed ({how}) while opening it; tried 2 times" in output
     assert output.count("2 of 2 joints pass") == 2
     assert "no end after 3 s" in flex(*words[1:], "--resume", "--timeout", 3, status=1)[0]["error"]
-
-
-@pytest.mark.slow
-@newest_only
-def test_a_cluster_finds_the_same(tmp_path):
-    paths = make_rigs(tmp_path / "in", 3)
-    (tmp_path / "in" / "bad.blend").write_text("nothing")
-    table = tmp_path / "table.toml"
-    table.write_text("[limits]\npivot = 0.0\n")
-    words = tmp_path / "in", "--thresholds", table
-    with cluster(tmp_path, "127.0.0.1", {}) as (address, _processes):
-        found = flex(*words, "--scheduler", address, "--out", tmp_path / "out", status=1)
-        assert flex(*words, "--scheduler", address, "--out", tmp_path / "out", "--resume", status=1) == found
-    assert len(done_in(tmp_path / "out")) == len(paths) + 2
-    assert found == flex(*words, status=1)

@@ -55,55 +55,30 @@ def test_random_weights_are_read_as_they_are_stored(seed):
     assert (np.diff(read.groups)[np.diff(vertex_of) == 0] < 0).any(), "in the order of the groups"
 
 
-def test_more_groups_than_a_deformer_resolves_at_once():
+def test_meshes_of_all_kinds():
+    """More groups than a deformer resolves at once, none, one that is gone; loose vertices, shape keys and
+    layers; in edit mode; evaluated."""
     obj = a_grid(4)
+    assert not read_alike(obj.data).counts.any()
     weigh_at_random(obj, 50, 1)
     assert read_alike(obj.data).counts.max() > 32
-
-
-def test_without_groups_or_vertices():
-    obj = a_grid(3)
-    assert not read_alike(obj.data).counts.any()
-    obj.vertex_groups.new(name="empty")
-    assert not read_alike(obj.data).counts.any()
-    assert len(read_alike(bpy.data.meshes.new("nothing")).counts) == 0
-
-
-def test_groups_that_are_gone_leave_no_trace():
-    obj = a_grid(6)
-    weigh_at_random(obj, 5, 2)
     obj.vertex_groups.remove(obj.vertex_groups[1])
-    assert read_alike(obj.data).groups.max() == 3
-
-
-def test_evaluated_mesh():
-    obj = a_grid(6)
-    weigh_at_random(obj, 5, 3)
-    obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    obj.modifiers.new("Mirror", "MIRROR")
-    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    assert len(read_alike(evaluated).counts) > len(obj.data.vertices)
-
-
-def test_shape_keys_loose_vertices_and_layers_change_nothing():
-    obj = a_grid(6)
-    weigh_at_random(obj, 5, 4)
+    assert read_alike(obj.data).groups.max() == 48
     obj.data.vertices.add(3)
     obj.shape_key_add(name="Basis")
     obj.shape_key_add(name="Key").value = 1.0
     obj.data.uv_layers.new(name="second")
-    obj.data.attributes.new("colour", "FLOAT_COLOR", "CORNER")
     obj.data.attributes.new("number", "INT", "POINT")
-    assert (read_alike(obj.data).counts[-3:] == 0).all()
-
-
-def test_mesh_in_edit_mode_is_read_as_it_was():
-    obj = a_grid(6)
-    weigh_at_random(obj, 5, 5)
     before = read_alike(obj.data)
+    assert (before.counts[-3:] == 0).all()
     bpy.ops.object.mode_set(mode="EDIT")
     assert read_alike(obj.data).equals(before)
     bpy.ops.object.mode_set(mode="OBJECT")
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    obj.modifiers.new("Mirror", "MIRROR")
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert len(read_alike(evaluated).counts) > len(obj.data.vertices)
+    assert len(read_alike(bpy.data.meshes.new("nothing")).counts) == 0
 
 
 @pytest.mark.parametrize("levels", [1, 3])

@@ -14,15 +14,13 @@ import numpy as np
 import pytest
 import routes
 import scenes
-from conftest import IS_NEWEST, halved
+from conftest import halved
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.icons import Deformer
 from sinew_addon.ui import state_text
 
 VIEWS = ("viewport", "render")
 CLICKS = tuple(product(("Sinew", "Armature"), VIEWS))
-# What they mean is Sinew's own; what Blender does with them shows with two.
-IN_A_ROW = 3 if IS_NEWEST else 2
 SINEW, ARMATURE, NOTHING = Deformer.SINEW, Deformer.ARMATURE, Deformer.NOTHING
 
 
@@ -101,25 +99,6 @@ class Character:
         assert all(words[rule.deformer(view)] in said for view in VIEWS)
         if rendered_points is not None:
             assert self.deformer(rendered_points(self.obj)) is rule.deformer("render")
-
-
-def test_every_order_of_clicks(rendered_points):
-    character, drawn, seen = Character(), set(), set()
-    for clicks in product(CLICKS, repeat=IN_A_ROW):
-        rule = Rule()
-        for number, click in enumerate(clicks):
-            character.click(*click)
-            rule.click(*click)
-            if clicks[: number + 1] not in seen:
-                seen.add(clicks[: number + 1])
-                # Each state after each click is drawn once.
-                state = (*rule.hidden.values(), *rule.armature.values(), click)
-                character.check(rule, None if state in drawn else rendered_points)
-                drawn.add(state)
-        attach.remove(character.obj)
-        assert character.icons() == {"Armature": (True, True)}
-        scenes.add_sinew(character.obj, "dq")
-    assert len(seen) == sum(len(CLICKS) ** count for count in range(1, IN_A_ROW + 1))
 
 
 def _in_front(obj: bpy.types.Object) -> None:

@@ -278,31 +278,6 @@ def test_half_a_turn_between_keys_is_told():
     assert np.isfinite(film(armature)).all()
 
 
-def test_undo_and_redo():
-    armature = make_rig()
-    key_random_poses(armature)
-    blender, before = film(armature), state(armature)
-    go_to(6)
-    bpy.ops.ed.undo_push(message="made")
-    assert bpy.ops.sinew.bake_inbetweens(method="sclerp") == {"FINISHED"}
-    played = film(armature)
-    go_to(6)
-    bpy.ops.ed.undo_push(message="baked")
-    bpy.ops.ed.undo()
-    armature = bpy.data.objects["Rig"]
-    assert not action_copy.is_on(armature)
-    assert state(armature) == before
-    assert np.array_equal(film(armature), blender)
-    bpy.ops.ed.redo()
-    armature = bpy.data.objects["Rig"]
-    assert action_copy.is_on(armature)
-    assert np.array_equal(film(armature), played)
-    assert bpy.ops.sinew.original_action() == {"FINISHED"}
-    assert state(armature) == before
-    assert np.array_equal(film(armature), blender)
-    assert not bpy.ops.sinew.original_action.poll()
-
-
 def test_some_bones():
     armature = make_rig(("QUATERNION", "XYZ"))
     key_random_poses(armature, interpolation="BEZIER")

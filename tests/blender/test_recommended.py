@@ -138,21 +138,15 @@ def test_limits_are_read_as_armatures_have_them():
     assert np.isnan([limits["bone.1"][2], limits["bone.0"][0]]).all()
 
 
-@pytest.mark.parametrize("command", ["points", "bake"])
-def test_commands_take_the_preset(command, tmp_path):
+def test_commands_take_the_preset(tmp_path):
     obj, _armature = arm(150.0, axis=1, sides=16, rings=41)
     path = scenes.save(tmp_path / "arm.blend")
-    if command == "points":
-        options = ("--frames", "11", "--out", tmp_path / "arm.npz")
-    else:
-        options = ("--to", "shape-keys", "--frames", "11", "--out", tmp_path / "baked")
-    result = run_sinew(command, path, "--preset", "recommended", *options)
-    assert "Twist Spread" in result.stderr
-    if command == "points":
-        bpy.ops.sinew.recommend()
-        bpy.context.scene.frame_set(11)
-        with np.load(tmp_path / "arm.npz") as points:
-            np.testing.assert_allclose(points["Arm"][0], scenes.final_points(obj), atol=1e-6)
+    options = ("--frames", "11", "--out", tmp_path / "arm.npz")
+    assert "Twist Spread" in run_sinew("points", path, "--preset", "recommended", *options).stderr
+    bpy.ops.sinew.recommend()
+    bpy.context.scene.frame_set(11)
+    with np.load(tmp_path / "arm.npz") as points:
+        np.testing.assert_allclose(points["Arm"][0], scenes.final_points(obj), atol=1e-6)
 
 
 def test_a_batch_stores_what_it_chose_and_set_overrides_it(tmp_path):

@@ -60,6 +60,13 @@ CASES = {
     "without size, by methods of Sinew's": "add Arm 0.9 qv; no_size Arm 1 6 1 11; method Arm 0.9 cor; "
     "no_size Arm 0 5 1 11; method Arm 0.9 ddm; no_size Rig 1 5 1 11; method Arm 0.9 dib; "
     "no_size Rig 0 5 1 11",
+    # Comparisons
+    "a comparison undone": "+add Arm dq; +frame 6; +compare Arm 2 lbs dq; undo; redo; frame 8; undo; "
+    "frame 4; redo; end_comparison; remove_all",
+    "a comparison saved": "add Arm dq; compare Arm 2 lbs dq; save_and_load; frame 6; end_comparison; "
+    "save_and_load; frame 9; remove_all",
+    "a comparison saved of what changes in front": "add_modifier Arm SUBSURF; add Arm; compare Arm 2 lbs dq; "
+    "save_and_load; frame 6; end_comparison; remove_all",
     # Armatures
     "a deleted armature": "add Arm; add Leg; delete_armature Rig; frame 6; says Arm 'armature was deleted'; "
     "frame 11; remove Arm; frame 6",

@@ -212,15 +212,6 @@ def test_the_mark_that_somebody_applied_is_made_again(rendered):
     assert node_group.IN_STACK not in obj.data.attributes
 
 
-@pytest.mark.parametrize(("name", "value"), [("normals", properties.SKINNED_NORMALS), ("heat", True)])
-def test_also_where_sinew_gives_normals_or_shows_a_heat_map(rendered, name, value):
-    obj, _armature = scenes.make_arm()
-    expected = rendered(obj)
-    scenes.add_sinew(obj, "lbs")
-    setattr(properties.of(obj), name, value)
-    _assert_same(rendered(obj), expected)
-
-
 def test_the_artists_own_attribute_of_that_name_stays(rendered):
     obj, _armature = scenes.make_arm()
     obj.data.attributes.new("rest_position", "FLOAT_VECTOR", "POINT").data[5].vector = (1, 2, 3)

@@ -59,32 +59,6 @@ def _make_keys_absolute():
     assert properties.of(arm).storage.upstream_proxy is not None
 
 
-def test_undo_of_sculpt_mode():
-    """There Preserve Volume is set for dq; whichever step Blender goes to, the artist's own value is
-    restored."""
-    obj, _armature = scenes.make_arm()
-    modifier = obj.modifiers["Armature"]
-    scenes.add_sinew(obj, "dq")
-    bpy.context.scene.frame_set(8)
-    expected = scenes.final_points(obj)
-    bpy.ops.ed.undo_push(message="before")
-    for mode in ("SCULPT", "OBJECT", "SCULPT"):
-        bpy.ops.object.mode_set("EXEC_DEFAULT", True, mode=mode)
-        bpy.context.view_layer.update()
-    assert modifier.use_deform_preserve_volume
-    for step in (*[bpy.ops.ed.undo] * 3, *[bpy.ops.ed.redo] * 3, *[bpy.ops.ed.undo] * 2):
-        step()
-        bpy.context.view_layer.update()
-        obj = bpy.data.objects["Arm"]
-        is_sculpted = obj.mode == "SCULPT"
-        assert obj.modifiers["Armature"].use_deform_preserve_volume == is_sculpted
-        assert properties.of(obj).before.has_nearest_volume == is_sculpted
-        assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
-    bpy.ops.object.mode_set(mode="OBJECT")
-    bpy.context.view_layer.update()
-    assert not obj.modifiers["Armature"].use_deform_preserve_volume
-
-
 @pytest.mark.parametrize("name", ["Sinew", "Skin"])
 @pytest.mark.parametrize("change", [_link_data, _make_keys_absolute])
 @pytest.mark.parametrize("route", routes.ROUTES)
