@@ -45,7 +45,7 @@ LONG_TERM = {
     *("test_inbetween", "test_lesson", "test_mask_groups", "test_mending", "test_method_parameters"),
     *("test_mix", "test_precomputation"),
     *("test_preferences", "test_recommended", "test_scale_rule", "test_sdef", "test_small_meshes"),
-    *("test_suggest", "test_translations", "test_twist_spread", "test_worst_frames"),
+    *("test_stopped", "test_suggest", "test_translations", "test_twist_spread", "test_worst_frames"),
 }
 # Run a second time with Sinew's default for small meshes, except for tests marked by_sinew.
 BOTH_WAYS = {"test_changes", "test_editing", "test_in_front", "test_several_views"}
