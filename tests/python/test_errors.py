@@ -8,14 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sinew
-from rigs import LINEAR
-from sinew import ik, interpolate, spline
+from calls import BINDING, CALLS, CHAIN, ENDS, FACES, HALF, KEYS, MORE, POINTS, SHEET, SKIN, bones
+from sinew import ik, interpolate
 
 NAN, INF = np.float32("nan"), np.float32("inf")
-
-
-def bones(count=2):
-    return np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))
+MOMENTS = [0, 0, 1, *[0] * 9]
 
 
 def spoilt(array, index, value):
@@ -24,129 +21,11 @@ def spoilt(array, index, value):
     return array
 
 
-# --- Calls, with arguments that they accept, of which each row below spoils one
-
-# Two vertices on two bones.
-SKIN = {
-    "rest_points": np.float32([[0, 0, 0], [1, 1, 1]]),
-    "influence_offsets": np.int32([0, 1, 3]),
-    "influence_bones": np.int32([0, 0, 1]),
-    "influence_weights": np.float32([1, 0.5, 0.5]),
-}
-BINDING = sinew.Binding(**SKIN, vertex_data=LINEAR)
-POINTS = SKIN["rest_points"]
-ENDS = np.zeros((2, 3)), np.ones((2, 3))
-TWISTS = [[0, 0, 1, 0], [1, 0, 1, 1]]
-POSE = {"points": POINTS, "bone_transforms": bones()}
-# Two triangles.
-SHEET = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-FACES = {
-    "face_offsets": [0, 3, 6],
-    "corner_vertices": [0, 1, 2, 0, 2, 3],
-    "edges": [[0, 1], [1, 2], [2, 0], [2, 3], [3, 0]],
-}
-MOMENTS = [0, 0, 1, *[0] * 9]
-KEYS = np.tile([1.0, 0, 0, 0, 0, 0, 0, 0], (5, 1))
-SPLINE = {"keys": KEYS, "times": np.arange(5.0), "at": 0.5}
-CHAIN = {"rest": [[1, 0, 0, 0, 0, 0, 0]], "tips": [[0, 1, 0]], "goals": [[1, 0, 0, 0, 0, 1, 0]]}
-
-
-def solver(**more):
-    return ik.Solver(**{"parents": [-1], "effectors": [ik.Effector(0)]} | more)
-
-
-def solve(**given):
-    return solver(effectors=[ik.Effector(0, has_pole="poles" in given)]).solve(**given)
-
-
-def unchanged(make, method, probe):
-    """Calls a method of an object that afterwards gives what it gave before."""
-
-    def call(**given):
-        one = make()
-        before = probe(one)
-        try:
-            getattr(one, method)(**given)
-        finally:
-            np.testing.assert_array_equal(probe(one), before)
-
-    return call
-
-
-CALLS = {
-    "Binding": (sinew.Binding, SKIN),
-    "Deformer": (sinew.Deformer, {**SKIN, "method": "dq", "rest_bones": bones()}),
-    "mix": (lambda mix: sinew.Deformer(BINDING, "lbs", mix=mix), {"mix": None}),
-    "set_rest_points": (
-        unchanged(lambda: sinew.Deformer(BINDING), "set_rest_points", lambda it: it.deform(bones())),
-        {"rest_points": POINTS},
-    ),
-    "deform": (lambda **given: sinew.Deformer(BINDING, "sdef").deform(**given), {"bone_transforms": bones()}),
-    "BulgeLimit": (lambda **given: sinew.BulgeLimit(BINDING, **given), {"heads": ENDS[0], "tails": ENDS[1]}),
-    "limit": (lambda **given: sinew.BulgeLimit(BINDING, *ENDS).apply(**given), POSE),
-    "TwistSpread": (
-        lambda **given: sinew.TwistSpread(BINDING, **given),
-        {"twists": TWISTS, "heads": ENDS[0], "tails": ENDS[1], "rest_bones": bones()},
-    ),
-    "spread": (lambda **given: sinew.TwistSpread(BINDING, TWISTS, *ENDS, bones()).apply(**given), POSE),
-    "DeltaMush": (lambda **given: sinew.DeltaMush(**given), {"rest_points": SHEET, **FACES}),
-    "bind": (
-        unchanged(lambda: sinew.DeltaMush(SHEET, **FACES), "bind", lambda it: it.apply(SHEET[::-1])),
-        {"rest_points": SHEET},
-    ),
-    "mush": (lambda **given: sinew.DeltaMush(SHEET, **FACES).apply(**given), {"points": SHEET}),
-    "Normals": (sinew.Normals, {"vertex_count": 4, **FACES}),
-    "compute": (lambda **given: sinew.Normals(4, **FACES).compute(**given), {"points": SHEET}),
-    "SkinnedNormals": (lambda **given: sinew.SkinnedNormals(BINDING, **given), {"normals": POINTS}),
-    "deform_skinned": (
-        lambda **given: sinew.SkinnedNormals(BINDING, POINTS).deform(**given)[1],
-        {"bone_transforms": bones()},
-    ),
-    "deform_normals": (lambda **given: sinew.SkinnedNormals(BINDING, POINTS).deform_normals(**given), POSE),
-    "centres": (
-        lambda **given: sinew.centres_of_rotation(**given).result(),
-        {**SKIN, "triangles": [[0, 1, 0]]},
-    ),
-    "moments": (
-        lambda **given: sinew.direct_delta_mush(**SKIN, triangles=[[0, 1, 0]], **given).result(),
-        {"radius": 1.0},
-    ),
-    "vertex data": (lambda **given: sinew.Deformer(**SKIN, **given), {"vertex_data": {"cor": POINTS}}),
-    "Skeleton": (sinew.Skeleton, {"parents": [-1, 0]}),
-    "root_relative": (
-        lambda transforms: sinew.Skeleton([-1, 0]).root_relative(transforms),
-        {"transforms": bones()},
-    ),
-    "update_branch": (
-        lambda bone: sinew.Skeleton([-1, 0]).update_branch(bones(), bones(), bone),
-        {"bone": 1},
-    ),
-    "catmull_rom": (spline.catmull_rom, SPLINE),
-    "catmull_rom_vector": (spline.catmull_rom_vector, SPLINE),
-    "hermite": (spline.hermite, {"tangents": KEYS[:, :3], **SPLINE, "keys": KEYS[:, :3]}),
-    "between": (interpolate.between, {"a": KEYS, "b": KEYS, "t": 0.5}),
-    "blend": (interpolate.blend, {"transforms": KEYS, "weights": np.ones(5)}),
-    "keyframes": (
-        lambda keyframes: sinew.Skeleton([-1]).spline(keyframes, [0], 0.5),
-        {"keyframes": KEYS[None, :1]},
-    ),
-    "inverse": (sinew.dual_quat.inverse, {"a": KEYS}),
-    "inverse of a matrix": (sinew.affine.inverse, {"a": np.eye(4)}),
-    "divide": (sinew.dual.divide, {"a": [1.0, 2], "b": [1.0, 2]}),
-    "sqrt": (sinew.dual.sqrt, {"a": [1.0, 2]}),
-    "log": (sinew.dual.log, {"a": [1.0, 2]}),
-    "Solver": (solver, {}),
-    "solve": (solve, CHAIN),
-    "rigid": (sinew.fit.rigid, {"source": POINTS, "target": POINTS}),
-    "hand_eye": (sinew.fit.hand_eye, {"a": KEYS, "b": KEYS}),
-    "average": (sinew.fit.average, {"poses": KEYS}),
-}
-
-
 @pytest.mark.parametrize("name", CALLS)
 def test_what_the_rows_spoil_is_accepted(name):
     call, good = CALLS[name]
     call(**good)
+    call(**good | MORE.get(name, {}))
 
 
 F32_POINTS, OFFSETS = "float32 [n, 3]", "int32 [vertices + 1]"
@@ -154,7 +33,6 @@ BONES, WEIGHTS = "int32 [influences]", "float32 [influences]"
 AFFINES = "float32 [n, 4, 4] or [n, 3, 4]"
 FINITE_WEIGHTS = "finite values, 0 or more"
 METHOD = "one of " + ", ".join(method.name for method in sinew.methods())
-HALF = np.float32([0.5, 0.5])
 MIX, MIX_WEIGHTS = "None or (method, weights)", "weights float32 [vertices]"
 OUT = "writable C-contiguous float32 [2, 3]"
 INVERSES = "float64 [2, 4, 4], one for each of bone_transforms"
@@ -168,6 +46,7 @@ SLERP = "of sdef.interpolation one of nlerp, slerp"
 INTS = f"list of {np.dtype(int)}"
 READ_ONLY = np.zeros((2, 3), np.float32)
 READ_ONLY.setflags(write=False)
+UNALIGNED = np.frombuffer(bytearray(25), np.float32, 6, 1).reshape(2, 3)
 
 SKINS = [
     ("rest_points", POINTS.astype(np.complex64), F32_POINTS, "complex64 [2, 3]"),
@@ -179,9 +58,12 @@ SKINS = [
     ("rest_points", [[0, 0, 0], [1, 1]], F32_POINTS, "list"),
     ("rest_points", np.zeros((2, 3), object), F32_POINTS, "object [2, 3]"),
     ("rest_points", None, F32_POINTS, "NoneType"),
+    # Repeated without memory of their own: refused before memory is allocated.
+    ("rest_points", np.broadcast_to(POINTS[:1], (2**58, 3)), f"{F32_POINTS}, at most 2147483647", None),
     ("rest_points", spoilt(POINTS, (1, 2), NAN), FINITE, "NaN or infinity at vertex 1"),
     ("rest_points", spoilt(POINTS, (0, 0), -INF), FINITE, "NaN or infinity at vertex 0"),
     ("influence_offsets", np.float32([0, 1, 3]), OFFSETS, "float32 [3]"),
+    ("influence_offsets", np.broadcast_to(1, (2**31 + 1,)), f"{OFFSETS}, at most 2147483648", None),
     ("influence_offsets", np.int32([[0, 1, 3]]), OFFSETS, "int32 [1, 3]"),
     ("influence_offsets", np.int64([0, 1, 2**31]), "numbers that int32 holds", "2147483648"),
     ("influence_offsets", np.int32([0, 3]), "3 values (vertices + 1)", "2"),
@@ -195,8 +77,11 @@ SKINS = [
     ("influence_bones", np.uint64([0, 0, 2**64 - 1]), "numbers that int32 holds", "18446744073709551615"),
     ("influence_bones", np.int32([[0, 0, 1]]), BONES, "int32 [1, 3]"),
     ("influence_bones", [0, 0, 2**70], BONES, "list"),
+    ("influence_bones", np.broadcast_to(1, (2**31,)), f"{BONES}, at most 2147483647", None),
+    ("influence_bones", [0, 0, 1 << 20], "indices of bones below 1048576", "1048576 at influence 2"),
     ("influence_bones", np.int32([0, -1, 1]), "indices of bones, 0 or more", "-1 at influence 1"),
     ("influence_weights", np.float32([[1, 0.5, 0.5]]), WEIGHTS, "float32 [1, 3]"),
+    ("influence_weights", np.broadcast_to(0.5, (2**40,)), f"{WEIGHTS}, at most 2147483647", None),
     ("influence_weights", {1, 0.5}, WEIGHTS, "set"),
     ("influence_weights", np.float32([1, 1]), "one for each of the 3 influence_bones", "2"),
     ("influence_weights", np.float32([1, -0.5, 1]), FINITE_WEIGHTS, "-0.500000 at influence 1"),
@@ -223,6 +108,7 @@ ROWS = [
     ("mix", "mix", ("dq", HALF[:1]), "a weight for each of the 2 vertices", "1"),
     ("mix", "mix", ("dq", np.float32([0, NAN])), "weights from 0 to 1", "NaN at vertex 1"),
     ("set_rest_points", "rest_points", np.zeros((3, 3), np.float32), "2 points", "3"),
+    ("set_rest_points", "rest_points", np.broadcast_to(POINTS[:1], (2**31, 3)), None, None),
     ("set_rest_points", "rest_points", np.zeros((2, 2), np.float32), F32_POINTS, "float32 [2, 2]"),
     ("set_rest_points", "rest_points", [[0, 0, 0], [0, INF, 0]], FINITE, "NaN or infinity at vertex 1"),
     ("deform", "bone_transforms", bones(1), "at least 2 bones", "1"),
@@ -234,6 +120,7 @@ ROWS = [
     ("deform", "out", np.zeros((2, 3), np.float64), OUT, "float64 [2, 3]"),
     ("deform", "out", np.zeros((2, 3), np.float32, order="F"), OUT, "one that is not C-contiguous"),
     ("deform", "out", np.zeros((4, 3), np.float32)[::2], OUT, "one that is not C-contiguous"),
+    ("deform", "out", UNALIGNED, OUT, "one that is not aligned"),
     ("deform", "out", READ_ONLY, OUT, "a read-only array"),
     ("deform", "out", [[0, 0, 0], [0, 0, 0]], OUT, f"{INTS} [2, 3]"),
     ("deform", "bones_from_model", np.eye(3, dtype=np.float32), AFFINE, "float32 [3, 3]"),
@@ -325,9 +212,9 @@ ROWS = [
     ("catmull_rom", "at", np.nan, FINITE, "NaN or infinity at index 0"),
     ("catmull_rom", "method", "cubic", "one of " + ", ".join(interpolate.METHODS), "'cubic'"),
     ("catmull_rom_vector", "keys", KEYS[:, :5], LAYOUTS.replace("bones", "keys"), "float64 [5, 5]"),
-    ("hermite", "tangents", KEYS[:2, :3], "", ""),
-    ("hermite", "times", [0, 1], "", ""),
-    ("hermite", "keys", KEYS[:, :7], "", ""),
+    ("hermite", "tangents", KEYS[:2, :3], None, None),
+    ("hermite", "times", [0, 1], None, None),
+    ("hermite", "keys", KEYS[:, :7], None, None),
     ("between", "b", KEYS[:3], "leading axes that broadcast with [5]", "[3]"),
     ("between", "b", 1j * KEYS, "float32 or float64 [.., 8]", "complex128 [5, 8]"),
     ("between", "t", "x", "a number or float64 [..]", "str"),
@@ -335,35 +222,35 @@ ROWS = [
     ("blend", "weights", np.ones(3), "float64 [.., 5], one for each transform", "float64 [3]"),
     ("blend", "transforms", KEYS[:0], "at least one transform", "none"),
     ("blend", "signs", "shortest", "one of heaviest, running_sum, as_given", "'shortest'"),
-    ("keyframes", "keyframes", KEYS[None], "one key or more of 1 bones", "float64 [1, 5, 8]"),
-    ("inverse", "a", [*KEYS.tolist(), [1]], "float32 or float64 [.., 8]", "list"),
-    ("inverse", "a", KEYS.astype("M8[s]"), "float32 or float64 [.., 8]", "datetime64[s] [5, 8]"),
-    ("inverse of a matrix", "a", np.zeros((4, 4)), INVERTIBLE, "one of determinant 0"),
-    ("divide", "b", [0, 1], "", ""),
-    ("sqrt", "a", [0, 1], "", ""),
-    ("log", "a", [-1, 1], "", ""),
-    ("Solver", "effectors", [], "", ""),
-    ("Solver", "effectors", [ik.Effector(1)], "", ""),
-    ("Solver", "effectors", [ik.Effector(0, has_pole=np.zeros(2))], "", ""),
-    ("Solver", "effectors", np.array({}, dtype=object), "", ""),
-    ("Solver", "parents", [0], "", ""),
-    ("Solver", "limits", np.zeros((2, 3)), "", ""),
-    ("Solver", "limits", np.full((1, 3, 2), np.nan), "", ""),
-    ("Solver", "stiffness", [[1, 0, 0]], "", ""),
-    ("solve", "rest", np.tile(CHAIN["rest"], (2, 1)), "", ""),
-    ("solve", "goals", CHAIN["goals"][0], "", ""),
-    ("solve", "tips", [[0, np.inf, 0]], "", ""),
-    ("solve", "method", "fabrik", "", ""),
-    ("solve", "iterations", -1, "", ""),
-    ("solve", "poles", None, "", ""),
-    ("rigid", "target", SHEET, "", ""),
-    ("rigid", "source", POINTS * NAN, "", ""),
-    ("rigid", "weights", np.ones(3), "", ""),
-    ("rigid", "weights", -np.ones(2), "", ""),
-    ("hand_eye", "b", KEYS[:3], "", ""),
-    ("hand_eye", "a", KEYS[:, :3], "", ""),
-    ("average", "poses", KEYS[:0], "", ""),
-    ("average", "weights", np.ones(3), "", ""),
+    ("keyframes", "keyframes", KEYS[None], "one key or more of 2 bones", "float64 [1, 5, 8]"),
+    ("dual_quat.inverse", "a", [*KEYS.tolist(), [1]], "float32 or float64 [.., 8]", "list"),
+    ("dual_quat.inverse", "a", KEYS.astype("M8[s]"), "float32 or float64 [.., 8]", "datetime64[s] [5, 8]"),
+    ("affine.inverse", "a", np.zeros((4, 4)), INVERTIBLE, "one of determinant 0"),
+    ("dual.divide", "b", [0, 1], None, None),
+    ("dual.sqrt", "a", [0, 1], None, None),
+    ("dual.log", "a", [-1, 1], None, None),
+    ("Solver", "effectors", [], None, None),
+    ("Solver", "effectors", [ik.Effector(1)], None, None),
+    ("Solver", "effectors", [ik.Effector(0, has_pole=np.zeros(2))], None, None),
+    ("Solver", "effectors", np.array({}, dtype=object), None, None),
+    ("Solver", "parents", [0], None, None),
+    ("Solver", "limits", np.zeros((2, 3)), None, None),
+    ("Solver", "limits", np.full((1, 3, 2), np.nan), None, None),
+    ("Solver", "stiffness", [[1, 0, 0]], None, None),
+    ("solve", "rest", np.tile(CHAIN["rest"], (2, 1)), None, None),
+    ("solve", "goals", CHAIN["goals"][0], None, None),
+    ("solve", "tips", [[0, np.inf, 0]], None, None),
+    ("solve", "method", "fabrik", None, None),
+    ("solve", "iterations", -1, None, None),
+    ("solve", "poles", None, None, None),
+    ("rigid", "target", SHEET, None, None),
+    ("rigid", "source", POINTS * NAN, None, None),
+    ("rigid", "weights", np.ones(3), None, None),
+    ("rigid", "weights", -np.ones(2), None, None),
+    ("hand_eye", "b", KEYS[:3], None, None),
+    ("hand_eye", "a", KEYS[:, :3], None, None),
+    ("average", "poses", KEYS[:0], None, None),
+    ("average", "weights", np.ones(3), None, None),
 ]
 if "ddm" in {method.name for method in sinew.methods()}:
     ROWS += [("moments", "radius", radius, "a number of 0 or more", "") for radius in (-1.0, np.nan, np.inf)]
@@ -408,7 +295,7 @@ def test_each_call_with_threads_is_among_these():
 
 @pytest.mark.parametrize(("name", "argument", "value", "wanted", "got"), ROWS)
 def test_an_error_says_what_is_wrong(name, argument, value, wanted, got):
-    """An empty text stands for any. Several arguments become one: "heads as segments"."""
+    """None stands for any text. Several arguments become one: "heads as segments"."""
     call, good = CALLS[name]
     given_as, _, named = argument.partition(" as ")
     start = f"{named or given_as}: expected "

@@ -65,9 +65,6 @@ def test_signs_along_a_spline_go_from_key_to_key(method):
     close(matrix(middle, name)[:3, :3], Rotation.from_rotvec(turns[1].as_rotvec() * 1.5).as_matrix())
 
 
-PARENTS = np.int32([-1, 0, 1, 1])
-
-
 # Smith 2013, Figure 3.3: an arm of two bones of length 1, both rotated by 90 degrees between the keyframes.
 @pytest.mark.parametrize("method", ["matrix_polar", "qv_nlerp", "qv_slerp", "dlb", "sclerp"])
 def test_interpolating_after_combining_tears_the_elbow(method):
@@ -102,3 +99,9 @@ def test_skeletons_take_many_times_in_one_call(method):
     several, are_defined = skeleton.spline(keys, [0, 1, 2], [0.5, 1.5], method)
     np.testing.assert_array_equal(several[1], skeleton.spline(keys, [0, 1, 2], 1.5, method)[0])
     assert are_defined.shape == (2,)
+
+
+def test_empty_skeleton_works():
+    skeleton = sinew.Skeleton(np.empty(0, np.int32))
+    assert skeleton.bone_count == 0
+    assert skeleton.root_relative(np.empty((0, 4, 4), np.float32)).shape == (0, 4, 4)
