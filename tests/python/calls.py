@@ -175,13 +175,21 @@ MORE = {
     "TwistSpread": {"parents": [-1, 0], "bones_from_model": POSED[1], "weights": HALF, "mix": HALF},
     "spread": {
         **{"out": OPTIONS["out"], "threads": 2, "amount": 0.5, "amounts": HALF, "curves": HALF},
-        **{"channels": np.column_stack([KEYS[:2, :4], KEYS[:2, 5:]]), "blend": "rotations", "mix_blend": "linear"},
+        **{
+            "channels": np.column_stack([KEYS[:2, :4], KEYS[:2, 5:]]),
+            "blend": "rotations",
+            "mix_blend": "linear",
+        },
     },
     "angles": {"channels": np.column_stack([KEYS[:2, :4], KEYS[:2, 5:]])},
     "DeltaMush": BOUND,
     "bind": BOUND,
     "mush": {"out": np.zeros((4, 3), np.float32), "scale": 0.5, "threads": 2},
-    "Normals": {"sharp_edges": [0, 1, 0, 0, 1], "sharp_faces": [1, 0], "custom_normals": np.ones((6, 2), np.int16)},
+    "Normals": {
+        "sharp_edges": [0, 1, 0, 0, 1],
+        "sharp_faces": [1, 0],
+        "custom_normals": np.ones((6, 2), np.int16),
+    },
     "compute": {"domain": "vertex", "out": np.zeros((4, 3), np.float32), "threads": 2},
     "SkinnedNormals": {"tangents": POINTS, "vertices": [1, 0], "method": "dq", "mix": ("lbs", HALF)},
     "deform_skinned": OF_POSE,
@@ -213,7 +221,12 @@ LAYOUTS = {"affine": POSED[1], "quat_vec": sinew.dual_quat.to_quat_vec(KEYS[1]),
 # Of a module, or of an argument.
 SAMPLES = {
     **LAYOUTS,
-    **{"quat": KEYS[1, :4], "dual": np.array([1.0, 2.0]), "rotation": POSED[1, :3, :3], "twist": KEYS[1, 1:7]},
+    **{
+        "quat": KEYS[1, :4],
+        "dual": np.array([1.0, 2.0]),
+        "rotation": POSED[1, :3, :3],
+        "twist": KEYS[1, 1:7],
+    },
     **dict.fromkeys(("posed_from_rest", "rest_bone"), POSED[1]),
     **dict.fromkeys(("angle", "exponent", "t"), 0.5),
     **dict.fromkeys(

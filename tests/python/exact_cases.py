@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import sinew
-from exact import Motion, dual_part, exact, matrix, product, rotate, rounded, unit
+from exact import Motion, dual_part, exact, matrix, of_dual, product, rotate, rounded, unit
 
 COUNT = 2000
 FLOATS = (np.float64, np.float32)
@@ -46,6 +46,34 @@ def in_layout(motion, name):
     result[..., :3, 3] = rounded(motion.t)
     result[..., 3, 3] = 1.0
     return result
+
+
+def motion_of(array, name):
+    """The exact motions of quaternion-vector pairs or dual quaternions, with rotations of unit length."""
+    numbers = exact(array)
+    return Motion(unit(numbers[:4]), numbers[4:]) if name == "quat_vec" else of_dual(numbers[:4], numbers[4:])
+
+
+def of_each(array, count):
+    """[COUNT, count, ..]"""
+    return array.reshape(COUNT, count, *array.shape[1:])
+
+
+def shares(weights):
+    """Weights [n, k] as numbers [k, n] of sum 1."""
+    number = exact(weights)
+    return number / number.sum(axis=0)
+
+
+def nearest_rotations(arrays):
+    """float64 [n, 4, 4] with the nearest rotations, the largest singular values, and the gap to the next
+    nearest rotations."""
+    u, s, vt = np.linalg.svd(arrays[:, :3, :3])
+    sign = np.linalg.det(u @ vt)
+    u[:, :, 2] *= sign[:, None]
+    result = arrays.copy()
+    result[:, :3, :3] = u @ vt
+    return result, s[:, 0], s[:, 1] + sign * s[:, 2]
 
 
 # --- Families, arranged so that each family of rotations is combined with each of translations.

@@ -6,7 +6,6 @@ import functools
 
 import exact as e
 import numpy as np
-import sinew
 from exact import Motion, exact, rounded
 from exact_cases import (
     COUNT,
@@ -18,15 +17,14 @@ from exact_cases import (
     cases_of,
     directions,
     in_layout,
+    motion_of,
     motions,
+    of_each,
     quaternions,
+    shares,
 )
 
 POINTS, POSES = 5, 3
-
-
-def of_each(array, count):
-    return array.reshape(COUNT, count, *array.shape[1:])
 
 
 @functools.cache
@@ -52,8 +50,7 @@ def moments():
     """The exact middles [3, COUNT] of both, and the weighted sum of target source^T about them, scaled to
     size 1."""
     source, target, weights = point_cases()
-    part = e.number(weights.T)
-    part = part / part.sum(axis=0)
+    part = shares(weights)
     p, q = exact(source), exact(target)
     middles = [(points * part.T[None]).sum(axis=2) for points in (p, q)]
     p, q = p - middles[0][:, :, None], q - middles[1][:, :, None]
@@ -78,7 +75,7 @@ def rigid(_name, function):
         fit = function(*(a.astype(dtype) for a in (source, target, weights)))
         # For a mirror image the gap is a difference, of which rounding may leave nothing.
         assert fit.is_defined[gap > 1e-3].all()
-        motion = exact_motion(fit.transforms, "quat_vec")
+        motion = motion_of(fit.transforms, "quat_vec")
         rotation = e.matrix(motion.q)
         aligned = e.matmul(np.swapaxes(rotation, 0, 1), covariance)
         skew = np.array(
@@ -99,33 +96,13 @@ def rigid(_name, function):
 
 def agree_error(fit, motion, dtype, far):
     source, target, weights = point_cases()
-    part = e.number(weights.T)
-    part = part / part.sum(axis=0)
+    part = shares(weights)
     square = e.number(np.zeros(COUNT))
     for k in range(POINTS):
         off = e.rotate(motion.q, exact(source[:, k])) + motion.t - exact(target[:, k])
         square = square + part[k] * e.dot(off, off)
     want = e.sqrt(square).astype(np.float64)
     agree(fit.error, want, moments()[3] * (1 + far) * 4)
-
-
-def exact_motion(array, name):
-    """The exact motion of a result, with a rotation of unit length."""
-    array = np.asarray(array, np.float64)
-    if name == "affine":
-        q = sinew.affine.to_quat_vec(array)[:, :4]
-        # Allows rounding only: that the matrix is a rotation is checked here.
-        np.testing.assert_allclose(
-            np.moveaxis(e.matrix(e.unit(exact(q))).astype(np.float64), -1, 0),
-            array[:, :3, :3],
-            rtol=0,
-            atol=4e-7,
-        )
-        return Motion(e.unit(exact(q)), exact(array[:, :3, 3]))
-    numbers = exact(array)
-    if name == "quat_vec":
-        return Motion(e.unit(numbers[:4]), numbers[4:])
-    return e.of_dual(numbers[:4], numbers[4:])
 
 
 # --- Hand and eye
@@ -196,14 +173,13 @@ def weighted_logarithms(mean, poses, part):
 
 def average(_name, function):
     poses, weights = pose_cases()
-    part = e.number(weights.T)
-    part = part / part.sum(axis=0)
+    part = shares(weights)
     size = of_each(poses.size, POSES).max(axis=1)
     first = function(of_each(poses.dual_quat, POSES), weights)
-    residual = weighted_logarithms(exact_motion(first.transforms, "dual_quat"), poses.exact, part)
+    residual = weighted_logarithms(motion_of(first.transforms, "dual_quat"), poses.exact, part)
     agree(residual[0], np.zeros((COUNT, 3)), 1.0)
     agree(residual[1], np.zeros((COUNT, 3)), size)
-    means = cases_of(exact_motion(first.transforms, "dual_quat"))
+    means = cases_of(motion_of(first.transforms, "dual_quat"))
     for name in LAYOUTS:
         for dtype in FLOATS:
             found = function(of_each(poses.of(name, dtype), POSES), weights.astype(dtype))
@@ -229,10 +205,7 @@ def robust_average(function):
     found = function(given, robust=True)
     assert found.is_defined.all()
     assert not found.kept[:, near:].any()
-    part = e.number(found.kept.T)
-    residual = weighted_logarithms(
-        exact_motion(found.transforms, "dual_quat"), poses, part / part.sum(axis=0)
-    )
+    residual = weighted_logarithms(motion_of(found.transforms, "dual_quat"), poses, shares(found.kept))
     # The iteration ends when a step is below 1e-13.
     agree(residual[0], np.zeros((COUNT, 3)), 1.0, 1024)
     agree(residual[1], np.zeros((COUNT, 3)), 4.0, 1024)

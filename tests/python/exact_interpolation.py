@@ -16,12 +16,15 @@ from exact_cases import (
     agree_motions,
     angles,
     cases_of,
-    exact_matrix,
     in_layout,
     largest,
+    motion_of,
     motions,
+    nearest_rotations,
+    of_each,
     points,
     quaternions,
+    shares,
     step_of,
     translations,
 )
@@ -53,24 +56,6 @@ def array_of(numbers, name):
     return array.reshape(*array.shape[:-1], 4, 4) if name == "affine" else array
 
 
-def nearest_rotations(arrays):
-    """float64 [n, 4, 4] with the nearest rotations, and the gap to the next nearest ones."""
-    u, s, vt = np.linalg.svd(arrays[:, :3, :3])
-    sign = np.linalg.det(u @ vt)
-    u[:, :, 2] *= sign[:, None]
-    result = arrays.copy()
-    result[:, :3, :3] = u @ vt
-    return result, s[:, 1] + sign * s[:, 2]
-
-
-def motion_of(array, name):
-    """The exact motion of unit quaternions in float64."""
-    numbers = exact(array)
-    if name == "quat_vec":
-        return Motion(numbers[:4], numbers[4:])
-    return e.of_dual(numbers[:4], numbers[4:])
-
-
 # --- Weighted sums
 
 
@@ -84,7 +69,7 @@ def linear_blend(arrays, weights, method):
     if method == "matrix_linear":
         return array_of(total, name), ones
     if method == "matrix_polar":
-        result, gap = nearest_rotations(array_of(total, name))
+        result, _size, gap = nearest_rotations(array_of(total, name))
         return result, 1 / np.maximum(gap, 1e-12)
     size = e.length(total[:4])
     cancels = 1 / size.astype(np.float64)
@@ -93,43 +78,12 @@ def linear_blend(arrays, weights, method):
     return in_layout(e.of_dual(total[:4], total[4:]), name), cancels
 
 
-def logarithms(arrays):
-    """(angular, linear), numbers [3, ..], of float64 affine [.., 4, 4], and |w| of the rotation."""
-    flat = arrays.reshape(-1, 4, 4)
-    quaternion = sinew_free_quaternions(flat[:, :3, :3])
-    angular, linear = e.to_twist(Motion(e.unit(quaternion), exact(flat[:, :3, 3])))
-    shape = (3, *arrays.shape[:-2])
-    return (
-        angular.reshape(shape),
-        linear.reshape(shape),
-        np.abs(quaternion[0].astype(np.float64)).reshape(shape[1:]),
-    )
-
-
-def sinew_free_quaternions(rotations):
-    """Numbers [4, n] of float64 [n, 3, 3]: the longest column of 4 q q^T, which a rotation matrix
-    determines."""
-    m = exact_matrix(rotations)
-    (a, b, c), (d, f, g), (h, i, j) = m
-    square = np.array(
-        [
-            [1 + a + f + j, i - g, c - h, d - b],
-            [i - g, 1 + a - f - j, b + d, c + h],
-            [c - h, b + d, 1 - a + f - j, g + i],
-            [d - b, c + h, g + i, 1 - a - f + j],
-        ],
-        dtype=object,
-    )
-    diagonal = np.array([square[k, k] for k in range(4)], dtype=object)
-    longest = np.argmax(diagonal, axis=0)
-    return e.unit(square[:, longest, np.arange(len(rotations))])
-
-
-def log_blend(arrays, weights):
-    """float64 [n, 4, 4], and how near to 180 degrees from the identity a matrix is."""
-    angular, linear, w = logarithms(arrays)
+def log_blend(motions, shape, weights):
+    """float64 [n, 4, 4] of motions [n, k] with weights [k, n], and how near to 180 degrees from the identity
+    a rotation is."""
+    angular, linear = (twist.reshape(3, *shape) for twist in e.to_twist(motions))
     motion = e.from_twist((angular * weights.T[None]).sum(axis=2), (linear * weights.T[None]).sum(axis=2))
-    return in_layout(motion, "affine"), w.min(axis=1)
+    return in_layout(motion, "affine"), np.abs(motions.q[0].astype(np.float64)).reshape(shape).min(axis=1)
 
 
 def agree_blend(got, name, want, size, cancels, where):
@@ -166,12 +120,14 @@ def between_wanted(method):
     inner = (t != 0) & (t != 1)
     weights = np.stack([e.number(1.0) - e.number(t), e.number(t)])
     if method.startswith("matrix"):
-        ends = np.stack([a.affine, b.affine], axis=1)
         if method == "matrix_log":
-            want, w = log_blend(ends, weights)
+            ends = Motion(
+                *(np.stack(pair, axis=2).reshape(len(pair[0]), -1) for pair in zip(a.exact, b.exact))
+            )
+            want, w = log_blend(ends, (COUNT, 2), weights)
             # A matrix of weight 1 is the result, whichever logarithm it has.
             return want, size, ones * 4, _defined(np.where(inner, w, 1.0))
-        want, cancels = linear_blend(ends, weights, method)
+        want, cancels = linear_blend(np.stack([a.affine, b.affine], axis=1), weights, method)
         linear = method == "matrix_linear"
         # The library's gap is twice the sum of the smaller singular values.
         return want, size, cancels, _defined(ones if linear else 2 / cancels)
@@ -249,15 +205,6 @@ def blend_cases(width):
     return cases, weights * 10.0 ** rng.uniform(-3, 3, (COUNT, 1))
 
 
-def of_each(array):
-    return array.reshape(COUNT, MANY, *array.shape[1:])
-
-
-def shares(weights):
-    number = e.number(weights.T)
-    return number / number.sum(axis=0)
-
-
 def signs_by_rule(quaternions, weights, rule):
     """Signs [n, k], and how far the choice is from a tie, in float64."""
     signs, margin = np.ones(weights.shape), np.ones(len(weights))
@@ -288,7 +235,7 @@ def blend_of_sums(method):
     def check(_name, function):
         name = LAYOUT_OF[method]
         cases, weights = blend_cases(np.pi)
-        arrays, part = of_each(getattr(cases, name)), shares(weights)
+        arrays, part = of_each(getattr(cases, name), MANY), shares(weights)
         size = largest(sizes(arrays, name)) * np.abs(part).sum(axis=0).astype(np.float64)
         # Matrices have no sign.
         for rule in RULES if name != "affine" else RULES[:1]:
@@ -314,8 +261,8 @@ def with_signs(arrays, signs, name):
 
 def blend_of_logarithms(_name, function):
     cases, weights = blend_cases(0.7)
-    arrays, part = of_each(cases.affine), shares(weights)
-    want, w = log_blend(arrays, part)
+    arrays, part = of_each(cases.affine, MANY), shares(weights)
+    want, w = log_blend(cases.exact, (COUNT, MANY), part)
     size = largest(cases.size.reshape(COUNT, MANY)) * np.abs(part).sum(axis=0).astype(np.float64)
     for dtype in FLOATS:
         got = function(arrays.astype(dtype), weights.astype(dtype), "matrix_log")
@@ -331,14 +278,15 @@ def blend_of_screws(method):
         name = LAYOUT_OF[method]
         cases, weights = blend_cases(0.7)
         part = shares(weights)
-        arrays = of_each(getattr(cases, name))
+        arrays = of_each(getattr(cases, name), MANY)
         size = largest(cases.size.reshape(COUNT, MANY)) * np.abs(part).sum(axis=0).astype(np.float64)
         one_side = with_signs(arrays, signs_by_rule(arrays[..., :4], weights, "heaviest")[0], name)
         means = function(arrays, weights, method).transforms
         if method == "dib":
             np.testing.assert_array_equal(means, function(arrays, weights, "sclerp").transforms)
         else:
-            agree_mean(means, name, cases.exact, part, size)
+            indices = np.arange(COUNT * MANY).reshape(COUNT, MANY)
+            assert agree_mean(means, name, cases.exact, indices, part, size) < np.pi / 2
         for dtype in FLOATS:
             for rule, given in zip(RULES, (arrays, arrays, one_side), strict=True):
                 got = function(given.astype(dtype), weights.astype(dtype), method, rule)
@@ -348,29 +296,24 @@ def blend_of_screws(method):
     return check
 
 
-def agree_mean(got, name, motions_exact, part, size):
-    """Asserts that the weighted logarithms from `got` [n, ..] to the MANY motions of each sum to 0."""
-    dtype = got.dtype
-    mean = motion_of(got.astype(np.float64), name)
-    unit_error = np.abs(np.linalg.norm(got[:, :4].astype(np.float64), axis=1) - 1)
-    assert unit_error.max() < 8 * step_of(dtype)
-    repeated = np.repeat(np.arange(COUNT), MANY)
-    mean_of_each = Motion(e.unit(mean.q), mean.t).take(repeated)
-    if name == "dual_quat":
-        angular, linear = e.to_twist(e.compose(e.inverse(mean_of_each), motions_exact))
-        left = residual(linear, part)
-        agree(left.astype(dtype), np.zeros((COUNT, 3)), size)
-    else:
-        step = e.product(e.conjugate(mean_of_each.q), motions_exact.q)
-        angular = e.rotation_vector(step)
-        want = rounded((motions_exact.t.reshape(3, COUNT, MANY) * part.T[None]).sum(axis=2))
-        agree(got[:, 4:], want, size)
-    assert np.linalg.norm(rounded(angular), axis=1).max() < np.pi / 2
-    agree(residual(angular, part).astype(dtype), np.zeros((COUNT, 3)), 1.0)
-
-
-def residual(vectors, part):
-    return rounded((vectors.reshape(3, COUNT, MANY) * part.T[None]).sum(axis=2))
+def agree_mean(got, name, motions, indices, weights, size):
+    """Asserts that the weighted logarithms, weights [k, n], from `got` [n, ..] to the motions with these
+    indices [n, k] sum to 0."""
+    dtype, mean, largest_angle = got.dtype, motion_of(got, name), 0.0
+    assert np.abs(np.linalg.norm(got[:, :4].astype(np.float64), axis=1) - 1).max() < 8 * step_of(dtype)
+    sums = [e.number(np.zeros((3, COUNT))), e.number(np.zeros((3, COUNT)))]
+    for k, weight in enumerate(weights):
+        motion = motions.take(indices[:, k])
+        if name == "dual_quat":
+            angular, linear = e.to_twist(e.compose(e.inverse(mean), motion))
+        else:
+            angular = e.rotation_vector(e.product(e.conjugate(mean.q), motion.q))
+            linear = motion.t - mean.t
+        sums = sums[0] + weight * angular, sums[1] + weight * linear
+        largest_angle = max(largest_angle, np.linalg.norm(rounded(angular), axis=1).max())
+    agree(rounded(sums[0]).astype(dtype), np.zeros((COUNT, 3)), 1.0)
+    agree(rounded(sums[1]).astype(dtype), np.zeros((COUNT, 3)), size)
+    return largest_angle
 
 
 # --- Splines
@@ -415,22 +358,27 @@ def spline_terms():
     return indices, weights
 
 
+def interval(times, at):
+    """Key, next key, the elapsed part of the interval and its length, numbers; the same key twice outside."""
+    last = len(times) - 1
+    key = max((k for k in range(last + 1) if times[k] <= at), default=0)
+    if at < times[0] or key == last:
+        return key, key, e.number(0.0), e.number(0.0)
+    start, end, at = (e.number(float(time)) for time in (times[key], times[key + 1], at))
+    return key, key + 1, (at - start) / (end - start), end - start
+
+
 def curve_weights(times, at):
     one, none = e.number(1.0), e.number(0.0)
     last = len(times) - 1
-    if at < times[0]:
-        return (0, 0, 0, 0), (none, one, none, none)
-    key = max(k for k in range(last + 1) if times[k] <= at)
-    if key == last:
-        return (last,) * 4, (none, one, none, none)
+    key, after, u, whole = interval(times, at)
+    if key == after:
+        return (key,) * 4, (none, one, none, none)
     before = key - 1 if key > 0 and times[key - 1] < times[key] else key
     beyond = key + 2 if key + 1 < last and times[key + 1] < times[key + 2] else key + 1
-    # Cardinal functions: the curve with 1 at one key and 0 at the others.
-    weights = []
     exact_times = [e.number(float(time)) for time in times]
-    whole = exact_times[key + 1] - exact_times[key]
-    u = (e.number(float(at)) - exact_times[key]) / whole
 
+    # Cardinal functions: the curve with 1 at one key and 0 at the others.
     def curve(ones):
         def value(k):
             return one if k == ones else none
@@ -464,12 +412,12 @@ def on_one_side(arrays, name):
 def spline_wanted(method):
     """float64 [COUNT, ..], sizes, and what errors of rotations are relative to."""
     name = LAYOUT_OF[method]
-    cases, _times, _at = spline_cases()
+    cases = spline_cases()[0]
     indices, weights = spline_terms()
     arrays = on_one_side(getattr(cases, name)[indices], name)
     size = largest(cases.size[indices])
     if method == "matrix_log":
-        want, _w = log_blend(arrays, weights)
+        want, _w = log_blend(cases.exact.take(indices.ravel()), indices.shape, weights)
         return want, size * 4, np.full(COUNT, 4.0)
     if method in ("qv_slerp", "sclerp", "dib"):
         return None, size, np.ones(COUNT)
@@ -489,39 +437,22 @@ def agree_spline(got, is_defined, method):
     elif method == "dib":
         np.testing.assert_array_equal(got, of_curves("sclerp", np.float64)[0])
     else:
-        cases, _times, _at = spline_cases()
-        agree_spline_mean(got, name, cases.exact, *spline_terms(), size)
+        cases = spline_cases()[0]
+        agree_mean(got, name, cases.exact, *spline_terms(), size)
 
 
-def agree_spline_mean(got, name, keys, indices, weights, size):
-    mean = motion_of(got.astype(np.float64), name)
-    mean = Motion(e.unit(mean.q), mean.t)
-    dtype = got.dtype
-    angular_sum, linear_sum = e.number(np.zeros((3, COUNT))), e.number(np.zeros((3, COUNT)))
-    for k in range(4):
-        key = keys.take(indices[:, k])
-        if name == "dual_quat":
-            angular, linear = e.to_twist(e.compose(e.inverse(mean), key))
-        else:
-            angular = e.rotation_vector(e.product(e.conjugate(mean.q), key.q))
-            linear = key.t - mean.t
-        angular_sum = angular_sum + weights[k] * angular
-        linear_sum = linear_sum + weights[k] * linear
-    agree(rounded(angular_sum).astype(dtype), np.zeros((COUNT, 3)), 1.0)
-    agree(rounded(linear_sum).astype(dtype), np.zeros((COUNT, 3)), size)
+def by_curve(function, dtype, *keyed, method=()):
+    """(transforms, is_defined) for every case, curve after curve, of arrays [CURVES * KEYS, ..]."""
+    _cases, times, at = spline_cases()
+    keyed = [array.reshape(CURVES, KEYS, *array.shape[1:]) for array in (*keyed, times.ravel())]
+    found = [function(*(array[c].astype(dtype) for array in (*keyed, at)), *method) for c in range(CURVES)]
+    return tuple(np.concatenate(part) for part in zip(*found, strict=True))
 
 
 @functools.cache
 def of_curves(method, dtype):
-    """(transforms, is_defined) for every case, curve after curve."""
-    cases, times, at = spline_cases()
-    keys = cases.of(LAYOUT_OF[method], dtype)
-    keys = keys.reshape(CURVES, KEYS, *keys.shape[1:])
-    found = [
-        sinew.spline.catmull_rom(keys[c], times[c].astype(dtype), at[c].astype(dtype), method)
-        for c in range(CURVES)
-    ]
-    return tuple(np.concatenate(part) for part in zip(*found, strict=True))
+    keys = getattr(spline_cases()[0], LAYOUT_OF[method])
+    return by_curve(sinew.spline.catmull_rom, dtype, keys, method=(method,))
 
 
 def catmull_rom(method):
@@ -535,7 +466,7 @@ def catmull_rom(method):
 @functools.cache
 def vector_wanted(name):
     """float64 [COUNT, ..]: blended components, also of points."""
-    cases, _times, _at = spline_cases()
+    cases = spline_cases()[0]
     indices, weights = spline_terms()
     if name == "points":
         arrays = points(105)[indices]
@@ -546,52 +477,26 @@ def vector_wanted(name):
 
 
 def catmull_rom_vector(_name, function):
-    cases, times, at = spline_cases()
     for name in (*LAYOUTS, "points"):
-        keys = points(105)[: CURVES * KEYS] if name == "points" else getattr(cases, name)
-        keys = keys.reshape(CURVES, KEYS, *keys.shape[1:])
+        keys = points(105)[: CURVES * KEYS] if name == "points" else getattr(spline_cases()[0], name)
         want, size = vector_wanted(name)
         for dtype in FLOATS:
-            found = [
-                function(keys[c].astype(dtype), times[c].astype(dtype), at[c].astype(dtype))
-                for c in range(CURVES)
-            ]
-            assert all(one.is_defined.all() for one in found)
-            got = np.concatenate([one.transforms for one in found])
+            got, is_defined = by_curve(function, dtype, keys)
+            assert is_defined.all()
             if name == "points":
                 agree(got, want, size)
             else:
                 agree_motions(got, name, want, size, signed=True)
 
 
-def interval(times, at):
-    """For each time: key, next key, and the elapsed part; the same key twice outside."""
-    last = len(times) - 1
-    found = []
-    for moment in at:
-        inside = [k for k in range(last + 1) if times[k] <= moment]
-        if not inside or inside[-1] == last:
-            key = inside[-1] if inside else 0
-            found.append((key, key, 0.0, 0.0))
-            continue
-        key = inside[-1]
-        found.append((key, key + 1, times[key], times[key + 1]))
-    return found
-
-
 @functools.cache
 def hermite_terms():
     """Indices [COUNT, 2], the part of the interval and its length, numbers [COUNT]."""
     _cases, times, at = spline_cases()
-    ends, part, span = np.zeros((COUNT, 2), int), e.number(np.zeros(COUNT)), e.number(np.zeros(COUNT))
-    for curve in range(CURVES):
-        for moment, (key, onto, start, stop) in enumerate(interval(times[curve], at[curve])):
-            case = curve * TIMES + moment
-            ends[case] = curve * KEYS + key, curve * KEYS + onto
-            span[case] = e.number(stop) - e.number(start)
-            if key != onto:
-                part[case] = (e.number(float(at[curve, moment])) - e.number(start)) / span[case]
-    return ends, part, span
+    found = [interval(times[curve], moment) for curve in range(CURVES) for moment in at[curve]]
+    keys, after, part, span = (np.array(column) for column in zip(*found, strict=True))
+    first = np.repeat(np.arange(CURVES) * KEYS, TIMES)
+    return np.stack([first + keys, first + after], axis=1), part, span
 
 
 def hermite(_name, function):
@@ -600,7 +505,6 @@ def hermite(_name, function):
 
 
 def _hermite_of_points(function):
-    _cases, times, at = spline_cases()
     ends, u, span = hermite_terms()
     keys, tangents = points(105)[: CURVES * KEYS], points(106)[: CURVES * KEYS]
     p, q = exact(keys[ends[:, 0]]), exact(keys[ends[:, 1]])
@@ -614,27 +518,13 @@ def _hermite_of_points(function):
     )
     size = largest(keys[ends]) + largest(tangents[ends]) * span.astype(np.float64)
     for dtype in FLOATS:
-        agree(_of_curves(function, keys, tangents, times, at, dtype), want, size)
-
-
-def _of_curves(function, keys, tangents, times, at, dtype):
-    found = []
-    for c in range(CURVES):
-        of = slice(c * KEYS, (c + 1) * KEYS)
-        found.append(
-            function(
-                keys[of].astype(dtype),
-                tangents[of].astype(dtype),
-                times[c].astype(dtype),
-                at[c].astype(dtype),
-            )
-        )
-    assert all(one.is_defined.all() for one in found)
-    return np.concatenate([one.transforms for one in found])
+        got, is_defined = by_curve(function, dtype, keys, tangents)
+        assert is_defined.all()
+        agree(got, want, size)
 
 
 def _hermite_of_motions(function):
-    cases, times, at = spline_cases()
+    cases = spline_cases()[0]
     ends, u, span = hermite_terms()
     rng = np.random.default_rng(107)
     count = CURVES * KEYS
@@ -660,7 +550,8 @@ def _hermite_of_motions(function):
     want = in_layout(points_of_curve[0], "dual_quat")
     size = largest(cases.size[ends]) + largest(tangents[ends][..., 3:]) * span.astype(np.float64)
     for dtype in FLOATS:
-        got = _of_curves(function, cases.dual_quat, tangents, times, at, dtype)
+        got, is_defined = by_curve(function, dtype, cases.dual_quat, tangents)
+        assert is_defined.all()
         agree_motions(got, "dual_quat", want, size)
 
 
@@ -706,34 +597,21 @@ def of_groups(cases, name, dtype):
     return array.reshape(GROUPS, BONES, *array.shape[1:])
 
 
-def root_relative(_name, _function):
-    for name in LAYOUTS:
-        motion, size = relative_wanted(False)
-        want = in_layout(motion, name)
-        for dtype in FLOATS:
-            bones, roots = of_groups(motions(109), name, dtype), motions(110).of(name, dtype)
-            got = [sinew.Skeleton(skeletons()[g]).root_relative(bones[g], roots[g]) for g in range(GROUPS)]
-            agree_motions(np.concatenate(got), name, want, size, signed=True)
-
-
-def update_branch(_name, _function):
-    for name in LAYOUTS:
-        motion, size = relative_wanted(True)
-        want = in_layout(motion, name)
-        for dtype in FLOATS:
-            bones, roots = of_groups(motions(109), name, dtype), motions(110).of(name, dtype)
-            changed = bones.copy()
-            changed[:, 2] = of_groups(motions(111), name, dtype)[:, 2]
-            got = []
-            for g in range(GROUPS):
-                skeleton = sinew.Skeleton(skeletons()[g])
-                before = skeleton.root_relative(bones[g], roots[g])
-                got.append(skeleton.update_branch(before, changed[g], 2, roots[g]))
-                below = [2]
-                below += [b for b in range(3, BONES) if _is_below(skeletons()[g], b)]
-                others = np.setdiff1d(np.arange(BONES), below)
-                np.testing.assert_array_equal(got[-1][others], before[others])
-            agree_motions(np.concatenate(got), name, want, size, signed=True)
+def root_relative_and_update_branch(_name, _function):
+    for name, dtype in itertools.product(LAYOUTS, FLOATS):
+        bones, roots = of_groups(motions(109), name, dtype), motions(110).of(name, dtype)
+        changed = bones.copy()
+        changed[:, 2] = of_groups(motions(111), name, dtype)[:, 2]
+        before, after = [], []
+        for g, parents in enumerate(skeletons()):
+            skeleton = sinew.Skeleton(parents)
+            before.append(skeleton.root_relative(bones[g], roots[g]))
+            after.append(skeleton.update_branch(before[-1], changed[g], 2, roots[g]))
+            others = [b for b in range(BONES) if not _is_below(parents, b)]
+            np.testing.assert_array_equal(after[-1][others], before[-1][others])
+        for has_changed, got in enumerate((before, after)):
+            motion, size = relative_wanted(bool(has_changed))
+            agree_motions(np.concatenate(got), name, in_layout(motion, name), size, signed=True)
 
 
 def _is_below(parents, bone):
@@ -792,8 +670,8 @@ CHECKS = {
     **{f"spline.catmull_rom.{method}": catmull_rom(method) for method in LAYOUT_OF},
     "spline.catmull_rom_vector": catmull_rom_vector,
     "spline.hermite": hermite,
-    "Skeleton.root_relative": root_relative,
-    "Skeleton.update_branch": update_branch,
+    "Skeleton.root_relative": root_relative_and_update_branch,
+    "Skeleton.update_branch": root_relative_and_update_branch,
     "Skeleton.interpolate": skeleton_interpolate,
     "Skeleton.spline": skeleton_spline,
     "Skeleton.spline_vector": skeleton_spline,

@@ -19,6 +19,7 @@ from exact_cases import (
     in_layout,
     linear_maps,
     motions,
+    nearest_rotations,
     pairs,
     points,
     step_of,
@@ -250,7 +251,7 @@ def inverse_of_any(function):
 def normalized(name, function):
     rng = np.random.default_rng(7)
     if name == "affine":
-        nearest_rotations(function)
+        affine_normalized(function)
         return
     cases = motions(7)
     by = 10.0 ** rng.uniform(-15, 15, COUNT)
@@ -272,19 +273,14 @@ def normalized(name, function):
         )
 
 
-def nearest_rotations(function):
+def affine_normalized(function):
     """By scipy, with singular values in float64: as exact as their differences allow, and the library
     must be as well."""
     maps = linear_maps(7)
-    u, s, vt = np.linalg.svd(maps[:, :3, :3])
-    sign = np.linalg.det(u @ vt)
-    u[:, :, 2] *= sign[:, None]
-    gap = s[:, 1] + sign * s[:, 2]
-    want = maps.copy()
-    want[:, :3, :3] = u @ vt
+    want, size, gap = nearest_rotations(maps)
     for dtype in FLOATS:
         got = function(maps.astype(dtype))
-        agree_motions(got, "affine", want, lengths(maps[:, :3, 3]), rotation=s[:, 0] / gap)
+        agree_motions(got, "affine", want, lengths(maps[:, :3, 3]), rotation=size / gap)
 
 
 # --- Motions and points

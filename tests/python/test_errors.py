@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sinew
-from calls import BINDING, CALLS, CHAIN, ENDS, FACES, HALF, KEYS, MORE, POINTS, SHEET, SKIN, bones
+from calls import BINDING, CALLS, CHAIN, ENDS, FACES, HALF, KEYS, MORE, POINTS, SHEET, bones
 from sinew import ik, interpolate
 
 NAN, INF = np.float32("nan"), np.float32("inf")

@@ -106,7 +106,7 @@ def spoilt(rng, array):
     """With another shape, type or number."""
     how = rng.integers(6)
     if how == 0 and array.ndim:
-        return array[..., 0] if array.shape[-1] else array.reshape(array.shape[:-1] + (0, 1))
+        return array[..., 0] if array.shape[-1] else array.reshape((*array.shape[:-1], 0, 1))
     if how == 1:
         return np.repeat(array[..., None], rng.integers(4), axis=-1)
     if how == 2:
@@ -205,14 +205,18 @@ def form_of(rng, name, array):
 def plain_of(good, given):
     """The same as contiguous arrays: float64 if not all of the call's arrays are smaller; without `out`."""
     plain = {name: value for name, value in given.items() if name != "out"}
-    arrays = {n: np.asarray(v) for n, v in plain.items() if as_array(good[n]) is not None and not np.isscalar(v)}
+    arrays = {
+        n: np.asarray(v) for n, v in plain.items() if as_array(good[n]) is not None and not np.isscalar(v)
+    }
     arrays = {name: array for name, array in arrays.items() if array.dtype.kind in "iufb"}
     wide = any(a.dtype.itemsize > (4 if a.dtype.kind == "f" else 2) for a in arrays.values())
     for name, array in arrays.items():
         if array.shape[-2:] == (3, 4) and as_array(good[name]).shape[-2:] == (4, 4):
             array = np.insert(array, 3, [0, 0, 0, 1], axis=-2)
         is_integer = array.dtype.kind in "iub" and as_array(good[name]).dtype.kind == "i"
-        plain[name] = np.array(array, np.int64 if is_integer else np.float64 if wide else np.float32, order="C")
+        plain[name] = np.array(
+            array, np.int64 if is_integer else np.float64 if wide else np.float32, order="C"
+        )
     return plain
 
 
