@@ -122,7 +122,10 @@ def between_wanted(method):
     if method.startswith("matrix"):
         if method == "matrix_log":
             ends = Motion(
-                *(np.stack(pair, axis=2).reshape(len(pair[0]), -1) for pair in zip(a.exact, b.exact))
+                *(
+                    np.stack(pair, axis=2).reshape(len(pair[0]), -1)
+                    for pair in zip(a.exact, b.exact, strict=True)
+                )
             )
             want, w = log_blend(ends, (COUNT, 2), weights)
             # A matrix of weight 1 is the result, whichever logarithm it has.
