@@ -37,8 +37,8 @@ NATIVE: dict[str, list[str | Path]] = {
 # Tests of the checkout, its documents and its tools, which do not depend on the platform: ./dev test runs
 # them.
 CHECKOUT_TESTS = (
-    *("test_documented", "test_layering", "test_locks", "test_platforms", "test_release"),
-    *("test_sbom", "test_site", "test_snippets", "test_stub", "test_wheel", "test_workflows"),
+    *("test_documented", "test_hosting", "test_layering", "test_packages", "test_release"),
+    *("test_site", "test_snippets", "test_stub"),
 )
 # Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands, batches
 # with kills.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Protects the kernels of sdef on each instruction set, its definition against that of mmd_tools, and
-// parameters of methods.
+// Protects the kernels of sdef on each instruction set, and parameters of methods. tests/python/test_sdef.py
+// compares with the formula of mmd_tools.
 #include "sinew/methods/sdef/sdef.h"
 
 #include <cmath>
@@ -13,7 +13,6 @@ namespace sinew {
 namespace {
 
 using test::deformed;
-using test::distance;
 using test::in_double;
 using test::kTolerance;
 using test::largest_error;
@@ -60,32 +59,6 @@ TEST_P(EveryTarget, kernel_agrees_with_the_definition) {
                     << scaled;
             }
         }
-    }
-}
-
-// mmd_tools: R(v - C) + w0 M0 cr0 + w1 M1 cr1 with matrices of whole motions.
-TEST(Sdef, definition_is_that_of_mmd_tools) {
-    Random random(10);
-    for (int i = 0; i < 50; ++i) {
-        const QuatVec<double> motions[] = {random.motion(2.0), random.motion(2.0)};
-        const std::vector<Sdef::Bone<double>> bones{{motions[0], {}, false}, {motions[1], {}, false}};
-        const Vec3<double> rest = random.vector(1.0);
-        const Vec3<double> c = random.vector(1.0);
-        const Vec3<double> r[] = {random.vector(1.0), random.vector(1.0)};
-        const double weight = random.uniform(0.0, 1.0);
-        const std::vector<Influence<double>> influences{{0, 1.0 - weight}, {1, weight}};
-        const double spheres[] = {c.x, c.y, c.z, r[0].x, r[0].y, r[0].z, r[1].x, r[1].y, r[1].z, 1.0};
-        Quat<double> other = motions[1].rotation;
-        if (glm::dot(motions[0].rotation, other) < 0.0) other = -other;
-        const Quat<double> q = glm::normalize(motions[0].rotation * (1.0 - weight) + other * weight);
-        const Vec3<double> mean = (1.0 - weight) * r[0] + weight * r[1];
-        Vec3<double> expected = to_mat3(q) * (rest - c);
-        for (std::size_t k = 0; k < 2; ++k) {
-            const Vec3<double> moved_end = c + r[k] - mean;
-            expected += influences[k].weight * transform_point(to_affine(motions[k]), 0.5 * (c + moved_end));
-        }
-        const auto points = Sdef::deform_vertex<double>(bones, influences, rest, spheres);
-        EXPECT_LT(distance(points, expected), 1e-13);
     }
 }
 

@@ -3,20 +3,7 @@
 
 import numpy as np
 import sinew
-from hypothesis import HealthCheck, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
-
-# One profile for all properties: the same cases on every machine and in every run.
-settings.register_profile(
-    "sinew",
-    derandomize=True,
-    deadline=None,
-    max_examples=60,
-    database=None,
-    suppress_health_check=[HealthCheck.too_slow],
-)
-settings.load_profile("sinew")
 
 LAYOUTS = {"affine": sinew.affine, "quat_vec": sinew.quat_vec, "dual_quat": sinew.dual_quat}
 
@@ -67,18 +54,3 @@ def matrix(array, name):
     else:
         result = RigidTransform.from_dual_quat(flat, scalar_first=True).as_matrix()
     return result.reshape(*array.shape[:-1], 4, 4)
-
-
-def numbers(extent):
-    return st.floats(-extent, extent, allow_subnormal=False)
-
-
-@st.composite
-def rigid_motions(draw, angle=np.pi):
-    """A RigidTransform by up to `angle`."""
-    axis = np.array([draw(numbers(1.0)) for _ in range(3)])
-    length = np.linalg.norm(axis)
-    axis = axis / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
-    translation = np.array([draw(numbers(3.0)) for _ in range(3)])
-    radians = draw(st.floats(0.0, angle, allow_subnormal=False))
-    return RigidTransform.from_components(translation, Rotation.from_rotvec(radians * axis))

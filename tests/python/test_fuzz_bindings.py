@@ -49,7 +49,7 @@ GARBAGE = [
 DTYPES = ["f4", "f8", "f2", "i4", "i8", "u1", "u8", "?", ">f4", ">i4", ">f8"]
 NUMBERS = [0, 1, -1, 0.5, 2, 3, 7, 1e-30, 1e20, 3e38, 1e300, np.nan, np.inf, -np.inf, 2**31, 1e-45]
 INTEGERS = [-1, 0, 1, 5, 2**20 - 1, 2**20, 2**31 - 1, 2**31, 2**32, 2**62, -(2**31)]
-LEADS = [(1,), (2,), (3,), (0,), (2, 1), (1, 3)]
+LEADS = [(), (1,), (2,), (3,), (0,), (2, 1), (1, 3)]
 
 
 class Arraylike:
@@ -102,6 +102,11 @@ FORMS = {
 }
 
 
+def led(rng, array):
+    """Repeated, with leading axes."""
+    return np.broadcast_to(array, (*LEADS[rng.integers(len(LEADS))], *array.shape)).copy()
+
+
 def spoilt(rng, array):
     """With another shape, type or number."""
     how = rng.integers(6)
@@ -110,7 +115,7 @@ def spoilt(rng, array):
     if how == 1:
         return np.repeat(array[..., None], rng.integers(4), axis=-1)
     if how == 2:
-        return np.broadcast_to(array, (*LEADS[rng.integers(len(LEADS))], *array.shape)).copy()
+        return led(rng, array)
     if how == 3 and array.ndim and array.size:
         return array.take(range(rng.integers(10)), axis=rng.integers(array.ndim), mode="wrap")
     if how == 4 and array.size:
@@ -133,6 +138,9 @@ def drawn(rng, name):
     good = dict(needed)
     if needed.keys() >= SKIN.keys():
         good |= skin(rng)
+    if "." in name:
+        # Of transforms, one or many.
+        good = {each: value if as_array(value) is None else led(rng, value) for each, value in good.items()}
     if needed.keys() >= FACES.keys() and rng.integers(2):
         return good | sheet(rng, good)
     return good | {each: value for each, value in more.items() if rng.integers(2)}

@@ -62,58 +62,21 @@ def test_agrees_with_the_reference(blend, scaled, most, turns):
         "curves": rng.uniform(-1.0, 1.0, len(twists)).astype(np.float32),
         "channels": None if turns is None else true_channels(rig, twists, turns),
         "blend": blend,
+        "mix_blend": "linear" if blend == "rotations" else "rotations",
     }
+    mix = None if turns is None else rng.uniform(-0.5, 1.5, 300).astype(np.float32)
     mask = np.linspace(-0.5, 1.5, 300).astype(np.float32)
     points = posed(rig, blend)
-    spread = sinew.TwistSpread(sinew.Binding(*rig.mesh), twists, *ends, parents=parents, weights=mask)
+    binding = sinew.Binding(*rig.mesh)
+    spread = sinew.TwistSpread(binding, twists, *ends, parents=parents, weights=mask, mix=mix)
     got = spread.apply(points, rig.transforms, **values)
     expected, margins = twist_spread_reference.spread(
-        points, *rig.mesh, twists, *ends, rig.transforms, parents=parents, mask=mask, **values
+        points, *rig.mesh, twists, *ends, rig.transforms, parents=parents, mask=mask, mix=mix, **values
     )
     assert (np.abs(expected - points).max(axis=1) > 0.01).mean() > 0.2
     decided = margins > 0.01
     assert decided.mean() > 0.5
     np.testing.assert_allclose(got[decided], expected[decided], atol=30 * TOLERANCE)
-
-
-@pytest.mark.parametrize("blends", [("linear", "rotations"), ("rotations", "linear"), ("logarithms",) * 2])
-def test_a_mix_gets_of_each_its_share(blends):
-    rig = random_rig(3, vertices=300, most_influences=4)
-    twists, *ends = chain(rig)
-    mix = np.random.default_rng(4).uniform(-0.5, 1.5, 300).astype(np.float32)
-    values = {"blend": blends[0], "mix_blend": blends[1]}
-    points = rig.deform("dq")
-    got = sinew.TwistSpread(sinew.Binding(*rig.mesh), twists, *ends, mix=mix).apply(
-        points, rig.transforms, **values
-    )
-    expected, margins = twist_spread_reference.spread(
-        points, *rig.mesh, twists, *ends, rig.transforms, mix=mix, **values
-    )
-    np.testing.assert_allclose(got[margins > 0.01], expected[margins > 0.01], atol=30 * TOLERANCE)
-
-
-def test_with_linear_blending_it_is_exact():
-    """The matrix M of a twisted bone becomes M R for each vertex."""
-    rig = random_rig(5, vertices=100, most_influences=4, scaled=True)
-    twists, heads, tails, rest_bones = chain(rig)
-    spread = sinew.TwistSpread(sinew.Binding(*rig.mesh), twists, heads, tails, rest_bones)
-    got = spread.apply(rig.deform("lbs"), rig.transforms)
-    angles = spread.angles(rig.transforms)
-    for vertex, rest in enumerate(rig.rest_points.astype(np.float64)):
-        span = slice(rig.offsets[vertex], rig.offsets[vertex + 1])
-        weights = rig.weights[span].astype(np.float64) / rig.weights[span].sum(dtype=np.float64)
-        total = np.zeros(3)
-        for bone, weight in zip(rig.bones[span], weights, strict=True):
-            matrix = rig.transforms[bone].astype(np.float64)
-            for number in np.flatnonzero(twists[:, 0] == bone):
-                along = tails[number].astype(float) - heads[number]
-                e = np.clip((rest - heads[number]) @ along / (along @ along), 0.0, 1.0)
-                degrees = np.degrees(angles[number] * (e - twists[number, 3]))
-                joint = translation(rest_bones[bone, :3, 3].astype(float))
-                twist = joint @ about(rest_bones[bone, :3, 1], degrees) @ np.linalg.inv(joint)
-                matrix = matrix @ twist
-            total += weight * transform(matrix, rest)
-        np.testing.assert_allclose(got[vertex], total, atol=30 * TOLERANCE)
 
 
 @every_blend
