@@ -37,10 +37,7 @@ def wanted(of):
 
     def check(name, function):
         arguments, motion, size, rotation = of()
-        want = in_layout(motion, name)
-        for dtype in FLOATS:
-            got = function(*(argument.astype(dtype) for argument in arguments))
-            agree_motions(got, name, want, size, rotation=rotation)
+        agree_all_motions(name, function, arguments, in_layout(motion, name), size, rotation=rotation)
 
     return check
 
@@ -53,6 +50,12 @@ def agree_all(function, arguments, want, size, **options):
     """In each type of numbers."""
     for dtype in FLOATS:
         agree(function(*(argument.astype(dtype) for argument in arguments)), want, size, **options)
+
+
+def agree_all_motions(name, function, arguments, want, size, **options):
+    for dtype in FLOATS:
+        got = function(*(argument.astype(dtype) for argument in arguments))
+        agree_motions(got, name, want, size, **options)
 
 
 def values(of):
@@ -129,9 +132,7 @@ def identity(name, function):
 def from_rotation_matrix(name, function):
     cases = motions(2)
     still = cases_of(Motion(cases.exact.q, cases.exact.t * 0))
-    for dtype in FLOATS:
-        got = function(cases.affine[:, :3, :3].astype(dtype))
-        agree_motions(got, name, getattr(still, name), 0.0)
+    agree_all_motions(name, function, (cases.affine[:, :3, :3],), getattr(still, name), 0.0)
     if name == "affine":
         maps = linear_maps(2)
         np.testing.assert_array_equal(function(maps[:, :3, :3])[:, :3, :3], maps[:, :3, :3])
@@ -218,8 +219,7 @@ def moments(twist):
 def to_layout(other):
     def check(name, function):
         cases = motions(5)
-        for dtype in FLOATS:
-            agree_motions(function(cases.of(name, dtype)), other, getattr(cases, other), cases.size)
+        agree_all_motions(other, function, (getattr(cases, name),), getattr(cases, other), cases.size)
 
     return check
 
@@ -227,8 +227,7 @@ def to_layout(other):
 def inverse(name, function):
     cases = motions(6)
     want = in_layout(e.inverse(cases.exact), name)
-    for dtype in FLOATS:
-        agree_motions(function(cases.of(name, dtype)), name, want, cases.size, signed=True)
+    agree_all_motions(name, function, (getattr(cases, name),), want, cases.size, signed=True)
     if name == "affine":
         inverse_of_any(function)
 
@@ -256,9 +255,8 @@ def normalized(name, function):
     cases = motions(7)
     by = 10.0 ** rng.uniform(-15, 15, COUNT)
     if name == "quat_vec":
-        for dtype in FLOATS:
-            got = function((cases.quat_vec * np.where(np.arange(7) < 4, by[:, None], 1.0)).astype(dtype))
-            agree_motions(got, name, cases.quat_vec, cases.size, signed=True)
+        given = cases.quat_vec * np.where(np.arange(7) < 4, by[:, None], 1.0)
+        agree_all_motions(name, function, (given,), cases.quat_vec, cases.size, signed=True)
         return
     # Includes dual quaternions that are not a multiple of a transform: with a component of `dual` along
     # `real`.
@@ -267,10 +265,7 @@ def normalized(name, function):
         :, None
     ]
     want = in_layout(e.of_dual(exact(given[:, :4]), exact(given[:, 4:])), name)
-    for dtype in FLOATS:
-        agree_motions(
-            function(given.astype(dtype)), name, want, cases.size + np.abs(along[:, 0]), signed=True
-        )
+    agree_all_motions(name, function, (given,), want, cases.size + np.abs(along[:, 0]), signed=True)
 
 
 def affine_normalized(function):
@@ -278,9 +273,7 @@ def affine_normalized(function):
     must be as well."""
     maps = linear_maps(7)
     want, size, gap = nearest_rotations(maps)
-    for dtype in FLOATS:
-        got = function(maps.astype(dtype))
-        agree_motions(got, "affine", want, lengths(maps[:, :3, 3]), rotation=size / gap)
+    agree_all_motions("affine", function, (maps,), want, lengths(maps[:, :3, 3]), rotation=size / gap)
 
 
 # --- Motions and points
@@ -289,9 +282,8 @@ def affine_normalized(function):
 def compose(name, function):
     a, b = motions(8), motions(9)
     want = in_layout(e.compose(a.exact, b.exact), name)
-    for dtype in FLOATS:
-        got = function(a.of(name, dtype), b.of(name, dtype))
-        agree_motions(got, name, want, a.size + b.size, signed=True)
+    given = getattr(a, name), getattr(b, name)
+    agree_all_motions(name, function, given, want, a.size + b.size, signed=True)
     if name == "affine":
         first, second = linear_maps(8), linear_maps(9)
         linear = e.matmul(exact_matrix(first[:, :3, :3]), exact_matrix(second[:, :3, :3]))
@@ -312,8 +304,7 @@ def exact_apply(maps, vectors):
 def transform_point(name, function):
     cases, p = motions(10), points(10)
     want = rounded(e.times(e.matrix(cases.exact.q), exact(p)) + cases.exact.t)
-    for dtype in FLOATS:
-        agree(function(cases.of(name, dtype), p.astype(dtype)), want, cases.size + lengths(p))
+    agree_all(function, (getattr(cases, name), p), want, cases.size + lengths(p))
     if name == "affine":
         maps = linear_maps(10)
         want = exact_apply(maps, p)
@@ -324,8 +315,7 @@ def transform_point(name, function):
 def transform_vector(name, function):
     cases, v = motions(11), points(11)
     want = rounded(e.times(e.matrix(cases.exact.q), exact(v)))
-    for dtype in FLOATS:
-        agree(function(cases.of(name, dtype), v.astype(dtype)), want, lengths(v))
+    agree_all(function, (getattr(cases, name), v), want, lengths(v))
     if name == "affine":
         maps = linear_maps(11)
         want = rounded(e.times(exact_matrix(maps[:, :3, :3]), exact(v)))
@@ -335,8 +325,7 @@ def transform_vector(name, function):
 def transform_normal(name, function):
     cases, n = motions(12), points(12)
     want = rounded(e.times(e.matrix(cases.exact.q), e.unit(exact(n))))
-    for dtype in FLOATS:
-        agree(function(cases.of(name, dtype), n.astype(dtype)), want, 1.0)
+    agree_all(function, (getattr(cases, name), n), want, 1.0)
     if name == "affine":
         maps = linear_maps(12)
         inverted = e.inverse_matrix(exact_matrix(maps[:, :3, :3]))
@@ -433,8 +422,7 @@ def dual_exp(_name, function):
     want = in_layout(motion, "dual_quat")
     zero = np.zeros(COUNT)
     given = np.column_stack([zero, twist[:, :3] / 2, zero, twist[:, 3:] / 2])
-    for dtype in FLOATS:
-        agree_motions(function(given.astype(dtype)), "dual_quat", want, size, rotation=rotation)
+    agree_all_motions("dual_quat", function, (given,), want, size, rotation=rotation)
 
 
 def power(_name, function):
@@ -584,6 +572,11 @@ def dual_numbers(seed, low=-10.0, high=10.0):
     return np.column_stack([real, rng.normal(size=COUNT) * 10.0 ** rng.uniform(-10, 10, COUNT)])
 
 
+def agree_parts(function, given, want, sizes):
+    for part, size in enumerate(sizes):
+        agree_all(lambda *numbers, part=part: function(*numbers)[:, part], given, want[:, part], size)
+
+
 def dual(of, size, seed=30, signed=True):
     """`of`(a) or (a, b) in pairs of numbers. size: what errors of both parts are relative to, float64."""
 
@@ -593,11 +586,7 @@ def dual(of, size, seed=30, signed=True):
             a[::2] *= -1
         given = (a, b)[: of.__code__.co_argcount]
         want = rounded(np.stack(of(*map(exact, given))))
-        real, rest = size(*given)
-        for dtype in FLOATS:
-            got = function(*(number.astype(dtype) for number in given))
-            agree(got[:, 0], want[:, 0], real)
-            agree(got[:, 1], want[:, 1], rest)
+        agree_parts(function, given, want, size(*given))
 
     return check
 
@@ -611,11 +600,7 @@ def near(of, size, low, high):
         real[::5] = 10.0 ** rng.uniform(-12, -2, len(real[::5]))
         a = np.column_stack([real, dual_numbers(30)[:, 1]])
         want = rounded(np.stack(of(exact(a))))
-        first, second = size(a)
-        for dtype in FLOATS:
-            got = function(a.astype(dtype))
-            agree(got[:, 0], want[:, 0], first)
-            agree(got[:, 1], want[:, 1], second)
+        agree_parts(function, (a,), want, size(a))
 
     return check
 
