@@ -15,7 +15,6 @@
 namespace sinew {
 namespace {
 
-using test::distance;
 using test::Mesh;
 using test::Random;
 using test::random_mesh;

@@ -8,7 +8,6 @@
 namespace sinew {
 namespace {
 
-using test::distance;
 using test::Random;
 using test::random_scene;
 using test::same_bits;

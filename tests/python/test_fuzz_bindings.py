@@ -182,6 +182,7 @@ def flat(result):
 def assert_same(result, plain):
     for one, other in zip(flat(result), flat(plain), strict=True):
         np.testing.assert_array_equal(one, other)
+        assert one.dtype == other.dtype
 
 
 def attempt(name, given):
@@ -211,21 +212,23 @@ def form_of(rng, name, array):
 
 
 def plain_of(good, given):
-    """The same as contiguous arrays: float64 if not all of the call's arrays are smaller; without `out`."""
+    """The same as contiguous arrays, without `out`; and their type: float64 if not all of the call's arrays
+    are smaller."""
     plain = {name: value for name, value in given.items() if name != "out"}
+    arrays = {name: np.asarray(value) for name, value in plain.items() if as_array(good[name]) is not None}
+    # Plain numbers do not count.
     arrays = {
-        n: np.asarray(v) for n, v in plain.items() if as_array(good[n]) is not None and not np.isscalar(v)
+        name: array for name, array in arrays.items() if array.ndim or isinstance(plain[name], np.ndarray)
     }
     arrays = {name: array for name, array in arrays.items() if array.dtype.kind in "iufb"}
     wide = any(a.dtype.itemsize > (4 if a.dtype.kind == "f" else 2) for a in arrays.values())
+    kind = np.float64 if wide else np.float32
     for name, array in arrays.items():
         if array.shape[-2:] == (3, 4) and as_array(good[name]).shape[-2:] == (4, 4):
             array = np.insert(array, 3, [0, 0, 0, 1], axis=-2)
         is_integer = array.dtype.kind in "iub" and as_array(good[name]).dtype.kind == "i"
-        plain[name] = np.array(
-            array, np.int64 if is_integer else np.float64 if wide else np.float32, order="C"
-        )
-    return plain
+        plain[name] = np.array(array, np.int64 if is_integer else kind, order="C")
+    return plain, kind
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -247,7 +250,9 @@ def test_any_arguments_give_a_result_or_an_error_that_names_one(name):
                     given[each] = form_of(rng, each, spoilt(rng, array) if each == chosen else array)
         result = attempt(name, given)
         if result is not None:
-            plain = plain_of(good, given)
+            plain, kind = plain_of(good, given)
+            # Transforms have the type that numpy gives all arrays together, but float16.
+            assert "." not in name or flat(result)[0].dtype == kind
             if "threads" in MORE.get(name, {}):
                 plain["threads"] = 1
             assert_same(result, CALLS[name][0](**plain))
