@@ -215,19 +215,20 @@ def plain_of(good, given):
     """The same as contiguous arrays, without `out`; and their type: float64 if not all of the call's arrays
     are smaller."""
     plain = {name: value for name, value in given.items() if name != "out"}
-    arrays = {name: np.asarray(value) for name, value in plain.items() if as_array(good[name]) is not None}
+    could_be = [name for name in plain if as_array(good[name]) is not None or isinstance(good[name], float)]
     # Plain numbers do not count.
-    arrays = {
-        name: array for name, array in arrays.items() if array.ndim or isinstance(plain[name], np.ndarray)
-    }
+    arrays = {name: np.asarray(plain[name]) for name in could_be}
+    arrays = {name: a for name, a in arrays.items() if a.ndim or isinstance(plain[name], np.ndarray)}
     arrays = {name: array for name, array in arrays.items() if array.dtype.kind in "iufb"}
     wide = any(a.dtype.itemsize > (4 if a.dtype.kind == "f" else 2) for a in arrays.values())
     kind = np.float64 if wide else np.float32
     for name, array in arrays.items():
-        if array.shape[-2:] == (3, 4) and as_array(good[name]).shape[-2:] == (4, 4):
-            array = np.insert(array, 3, [0, 0, 0, 1], axis=-2)
-        is_integer = array.dtype.kind in "iub" and as_array(good[name]).dtype.kind == "i"
-        plain[name] = np.array(array, np.int64 if is_integer else kind, order="C")
+        # One that is larger has no memory of its own.
+        if array.size < 2**20:
+            if array.shape[-2:] == (3, 4) and np.shape(good[name])[-2:] == (4, 4):
+                array = np.insert(array, 3, [0, 0, 0, 1], axis=-2)
+            is_integer = array.dtype.kind in "iub" and np.asarray(good[name]).dtype.kind == "i"
+            plain[name] = np.array(array, np.int64 if is_integer else kind, order="C")
     return plain, kind
 
 
