@@ -11,7 +11,6 @@ import shutil
 import socket
 import subprocess
 import sys
-from collections.abc import Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -45,16 +44,10 @@ def free_port() -> int:
 
 
 @contextmanager
-def running(
-    folder: Path,
-    *arguments: str,
-    environment: dict[str, str] | None = None,
-    within: Sequence[str] = (),
-):
-    """within: words before the program's own command, such as those of machines()"""
+def running(folder: Path, *arguments: str, environment: dict[str, str] | None = None):
     with (folder / f"{arguments[0]}.log").open("w") as log:
         process = subprocess.Popen(
-            [*within, sys.executable, "-m", "dask", *arguments],
+            [sys.executable, "-m", "dask", *arguments],
             stdout=log,
             stderr=log,
             cwd=folder,
@@ -68,20 +61,17 @@ def running(
 
 
 @contextmanager
-def cluster(folder: Path, address: str, options: dict[str, list[str]], environment=None):
+def cluster(folder: Path, address: str, environment: dict[str, str] | None = None):
     """Starts the documented lines for an address, with free ports and 127.0.0.1 instead of the farm's
     addresses. Yields the scheduler's address and the processes."""
     port = str(free_port())
     with ExitStack() as stack:
         processes = []
-        for program in ("scheduler", "worker"):
+        for program, more in (("scheduler", ("--port", port)), ("worker", ())):
             line = " ".join(documented(program, address))
             line = line.replace("10.0.0.5", "127.0.0.1").replace("10.0.0.6", "127.0.0.1")
             words = shlex.split(line.replace("8786", port).replace("8787", "0"))
-            if program == "scheduler":
-                words += ["--port", port]
-            words += options.get(program, [])
-            processes.append(stack.enter_context(running(folder, *words, environment=environment)))
+            processes.append(stack.enter_context(running(folder, *words, *more, environment=environment)))
         scheme = "tls" if address.startswith("10.") else "tcp"
         yield f"{scheme}://127.0.0.1:{port}", processes
 
@@ -115,7 +105,7 @@ def assert_done(out: Path) -> None:
 
 @pytest.mark.slow
 def test_as_documented_it_listens_on_this_machine_alone(rig, tmp_path):
-    with cluster(tmp_path, "127.0.0.1", {}) as (address, processes):
+    with cluster(tmp_path, "127.0.0.1") as (address, processes):
         done = run_program(*arguments(rig, tmp_path / "out", address))
         assert "can run programs" not in done.stderr
         # Scheduler, worker, its nanny, and the pages of both.
@@ -164,7 +154,7 @@ def certificates(tmp_path_factory):
 @pytest.mark.slow
 def test_tls_as_documented(rig, tmp_path, certificates):
     with_config = {"DASK_CONFIG": str(certificates)}
-    with cluster(tmp_path, "10.0.0.5", {}, with_config) as (address, processes):
+    with cluster(tmp_path, "10.0.0.5", with_config) as (address, processes):
         done = run_program(*arguments(rig, tmp_path / "out", address), env_more=with_config)
         assert "can run programs" not in done.stderr
         assert addresses(processes) <= {"127.0.0.1", "::1"}
