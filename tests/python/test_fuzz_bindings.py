@@ -232,31 +232,39 @@ def plain_of(good, given):
     return plain, kind
 
 
+def check(name, seed):
+    rng = np.random.default_rng([seed, *name.encode()])
+    good = drawn(rng, name)
+    # None or one may be anything, so that errors do not hide each other.
+    chosen = rng.choice([None, *good])
+    given = {}
+    for each, value in good.items():
+        array = as_array(value)
+        with np.errstate(all="ignore"):
+            if each == chosen and (array is None or rng.integers(3) == 0):
+                given[each] = GARBAGE[rng.integers(len(GARBAGE))]
+            elif array is None:
+                given[each] = value
+            else:
+                given[each] = form_of(rng, each, spoilt(rng, array) if each == chosen else array)
+    result = attempt(name, given)
+    if result is not None:
+        plain, kind = plain_of(good, given)
+        # Transforms have the type that numpy gives all arrays together, but float16.
+        assert "." not in name or flat(result)[0].dtype == kind
+        if "threads" in MORE.get(name, {}):
+            plain["threads"] = 1
+        assert_same(result, CALLS[name][0](**plain))
+
+
 @pytest.mark.parametrize("name", CALLS)
 def test_any_arguments_give_a_result_or_an_error_that_names_one(name):
     for seed in range(max(10, EXAMPLES // len(CALLS))):
-        rng = np.random.default_rng([seed, *name.encode()])
-        good = drawn(rng, name)
-        # None or one may be anything, so that errors do not hide each other.
-        chosen = rng.choice([None, *good])
-        given = {}
-        for each, value in good.items():
-            array = as_array(value)
-            with np.errstate(all="ignore"):
-                if each == chosen and (array is None or rng.integers(3) == 0):
-                    given[each] = GARBAGE[rng.integers(len(GARBAGE))]
-                elif array is None:
-                    given[each] = value
-                else:
-                    given[each] = form_of(rng, each, spoilt(rng, array) if each == chosen else array)
-        result = attempt(name, given)
-        if result is not None:
-            plain, kind = plain_of(good, given)
-            # Transforms have the type that numpy gives all arrays together, but float16.
-            assert "." not in name or flat(result)[0].dtype == kind
-            if "threads" in MORE.get(name, {}):
-                plain["threads"] = 1
-            assert_same(result, CALLS[name][0](**plain))
+        try:
+            check(name, seed)
+        except Exception as error:
+            error.add_note(f"check({name!r}, {seed})")
+            raise
 
 
 def test_functions_without_arguments():
