@@ -16,6 +16,7 @@ from ..core.names import as_file_name
 from ..core.output import folder_to_write, write_text
 from ..core.page import Sheet, page, require_jinja
 from ..core.parameters import PRESETS
+from ..core.steps import result_of
 from .arguments import add_engine, add_files, add_object, add_set, add_viewer, check_viewer, count, pixels
 from .console import Console
 
@@ -143,9 +144,8 @@ def _write_viewer(
     attached = viewer.attached_to(scene, meshes)
     of_each = dict.fromkeys(meshes, ())
     steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out)
-    text = ""
-    for step in console.progress(steps, len(frames) + 1, f"Reading {path.name}"):
-        text = step if isinstance(step, str) else text
+    with console.bar(f"Reading {path.name}", len(frames)) as show:
+        text = result_of(steps, show)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     write_text(args.viewer, text)
@@ -244,8 +244,5 @@ def _measure(
         measured.summaries,
         measured.times,
         measured.own,
-        {
-            part.obj.name: [*part.check_weights(args.influences), *part.pose_check.findings()]
-            for part in subject.parts
-        },
+        {part.obj.name: part.edited.findings(args.influences) for part in subject.parts},
     )

@@ -8,6 +8,7 @@ import sinew
 
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
+from ..core.steps import result_of
 from ..jobs.inputs import plan_jobs
 from .arguments import add_copies
 from .console import Console
@@ -82,9 +83,7 @@ def _solve(outcome: Solved, args: argparse.Namespace, frames: list[int] | None) 
             except SinewError as error:
                 reasons.append(str(error))
                 continue
-            found: list[ik_bake.Baked] = []
-            for _share in ik_bake.steps(armature, trees, wanted, args.method, found):
-                pass
+            found = result_of(ik_bake.steps(armature, trees, wanted, args.method))
         outcome.worst = max([outcome.worst, *(float(each.errors.max()) for each in found)])
         outcome.chains += len(trees)
         outcome.bones += sum(len(tree.bones) for tree in trees)

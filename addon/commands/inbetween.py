@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import sinew
 
 from ..core.errors import SinewError
+from ..core.steps import result_of
 from ..jobs.inputs import plan_jobs
 from .arguments import add_copies, count, one_of
 from .console import Console
@@ -67,16 +68,14 @@ def _inbetween(outcome: Inbetweened, args: argparse.Namespace) -> None:
         raise SinewError(f"{source}: no armature plays an action with keyed bones; nothing written")
     settings = inbetween_bake.Settings(args.method, path, args.step)
     for armature in armatures:
-        found: list[inbetween_bake.Baked] = []
         try:
-            for _share in inbetween_bake.steps(armature, settings, found):
-                pass
+            baked = result_of(inbetween_bake.steps(armature, settings))
         except SinewError as error:
             outcome.left_out.append(str(error))
             continue
         outcome.armatures += 1
-        outcome.bones += found[0].bones
-        outcome.notes += found[0].notes(path)
+        outcome.bones += baked.bones
+        outcome.notes += baked.notes(path)
     if not outcome.armatures:
         raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
     files.save_copy(source, outcome.job.target)

@@ -30,26 +30,29 @@ NO_STAGES: StageValues = MappingProxyType({})
 
 
 @dataclass
-class Frame:
-    """Everything that the shape of one frame depends on.
+class SkinStageFrame:
+    """Everything that the deformation by a skin stage depends on in one frame, but its input.
 
     method            name of a method
     pose              float32 [bones + joints, 4, 4], armature space, as Blender gives it
     bones_from_model  float64 [4, 4], from the mesh's object space to armature space
-    rest_points       float32 [vertices, 3], object space, shape keys applied
     scale_rule        name of a scale rule
     mix               name of the second method, mixed in by the mix weights; empty for none
     parameters        values of parameters of both methods, by their full names
+    model_from_bones  given where a scale is 0: as in Blender, all vertices are then at the origin of armature
+                      space before the bones move them
+    twists            inputs of the stage twist_spread, of the first that takes part; empty where it is off
     turns             float32 [bones, 4], as sinew.Deformer.deform takes them; None: unknown, or not asked for
     """
 
     method: str
     pose: np.ndarray
     bones_from_model: np.ndarray
-    rest_points: np.ndarray
     scale_rule: str = BLENDER_4.name
     mix: str = ""
     parameters: dict[str, Value] = field(default_factory=dict)
+    model_from_bones: np.ndarray | None = None
+    twists: TwistInputs = ()
     turns: np.ndarray | None = None
 
 
@@ -57,7 +60,7 @@ class Frame:
 class _MethodDeformer:
     """A deformer, what it was made for, and its rest points.
 
-    method, mix  as in Frame: reading the deformer's own takes longer
+    method, mix  as in SkinStageFrame: reading the deformer's own takes longer
     kept         from _kept()
     """
 
@@ -73,6 +76,8 @@ class SkinDeformer:
 
     mix_weights  float32 [vertices] from 0 to 1: the share of a frame's second method; None for no share
     vertex_data  the methods' vertex data; None where no method that has any is used
+    last_frame   that was computed last
+    rest_points  float32 [vertices, 3], object space: its input
     """
 
     def __init__(
@@ -92,10 +97,10 @@ class SkinDeformer:
         self._deformers: dict[str, _MethodDeformer] = {}
         # Skinned normals, with the deformer and the rest normals that they were made for.
         self._skinned: tuple[sinew.SkinnedNormals, sinew.Deformer, np.ndarray] | None = None
-        self._last: Frame | None = None
+        self.last_frame: SkinStageFrame | None = None
         # The version of the vertex data in the packed meshes.
         self._data_version = 0
-        self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
+        self._points = self.rest_points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
         # The last frame was written to another array than _points.
         self._points_outdated = False
 
@@ -121,32 +126,38 @@ class SkinDeformer:
         )
 
     @property
-    def last_frame(self) -> Frame | None:
-        """The frame that was computed last."""
-        return self._last
-
-    @property
     def points(self) -> np.ndarray:
         """The shape of the last frame, float32 [vertices, 3], object space."""
-        if self._points_outdated and self._last is not None:
-            self._shape(self._last, self._points)
+        if self._points_outdated and self.last_frame is not None:
+            self._shape(self.last_frame, self._points)
         self._points_outdated = False
         return self._points
 
-    def deform(self, frame: Frame, out: np.ndarray | None = None) -> bool:
+    def deform(self, rest_points: np.ndarray, frame: SkinStageFrame, out: np.ndarray | None = None) -> bool:
         """Computes `points`. Returns False where the frame equals the last one.
 
-        out  float32 [vertices, 3], C-contiguous: always written, instead of `points`, which are then computed
-             when they are read
+        rest_points  float32 [vertices, 3], object space, shape keys applied
+        out          float32 [vertices, 3], C-contiguous: always written, instead of `points`, which are then
+                     computed when they are read
 
         Raises ValueError where `out` has another shape.
         """
-        last = self._last
+        last, known = self.last_frame, self.rest_points
         is_packed_anew = self.vertex_data is not None and self._take_new_data(frame)
-        if out is None and last is not None and _same(last, frame) and not is_packed_anew:
-            return False
+        if out is None and last is not None and are_equal(rest_points, known) and _same(last, frame):
+            if not is_packed_anew:
+                return False
+        elif self.weighting.depends_on_points and (
+            last is None
+            or rest_points is not known
+            or not np.array_equal(frame.bones_from_model, last.bones_from_model)
+        ):
+            # The influences differ from the last frame's.
+            self._deformers.clear()
+            self._packed.clear()
+        self.last_frame, self.rest_points = None, rest_points
         self._shape(frame, self._points if out is None else out)
-        self._last, self._points_outdated = frame, out is not None
+        self.last_frame, self._points_outdated = frame, out is not None
         return True
 
     def write_skinned_normals(
@@ -160,7 +171,7 @@ class SkinDeformer:
         vertices      int32 [n], the vertex of each; None: one normal per vertex
         out           float32 [n, 3], C-contiguous
         """
-        frame = self._last
+        frame = self.last_frame
         if frame is None or frame.scale_rule != BLENDER_4.name:
             return False
         deformer = self._deformers[MOTION].deformer
@@ -181,10 +192,7 @@ class SkinDeformer:
         )
         return True
 
-    def _shape(self, frame: Frame, out: np.ndarray) -> None:
-        if self._weights_changed(frame):
-            self._deformers.clear()
-            self._packed.clear()
+    def _shape(self, frame: SkinStageFrame, out: np.ndarray) -> None:
         weights = self.mix_weights
         if frame.mix and (weights is None or frame.mix == frame.method):
             frame = replace(frame, mix="")
@@ -198,9 +206,9 @@ class SkinDeformer:
         self._shape_with_one_kind(replace(frame, method=frame.mix, mix=""), second, "second motion")
         out += weights[:, None] * (second - out)
 
-    def _shape_with_one_kind(self, frame: Frame, out: np.ndarray, purpose: str) -> None:
+    def _shape_with_one_kind(self, frame: SkinStageFrame, out: np.ndarray, purpose: str) -> None:
         """Writes the shape for methods that take the same kind of bone matrices."""
-        rest_points, bones = frame.rest_points, frame.pose
+        rest_points, bones = self.rest_points, frame.pose
         rest_inverses: np.ndarray | None = self._rest_from_armature
         if frame.scale_rule != BLENDER_4.name:
             motions = frame.pose.astype(np.float64) @ self._rest_from_armature
@@ -211,14 +219,14 @@ class SkinDeformer:
                 rest_points = np.empty_like(self._points)
                 scale = split.scale.astype(np.float32)
                 linear = replace(frame, method=LINEAR, mix="")
-                self._deform("scale", linear, frame.rest_points, scale, None, rest_points)
+                self._deform("scale", linear, self.rest_points, scale, None, rest_points)
                 bones, rest_inverses = split.rigid.astype(np.float32), None
         self._deform(purpose, frame, rest_points, bones, rest_inverses, out)
 
     def _deform(
         self,
         purpose: str,
-        frame: Frame,
+        frame: SkinStageFrame,
         rest_points: np.ndarray,
         bones: np.ndarray,
         rest_inverses: np.ndarray | None,
@@ -242,7 +250,7 @@ class SkinDeformer:
             bound.rest_points = rest_points
         bound.deformer.deform(bones, out=out, rest_inverses=rest_inverses, **self._arguments_of(frame))
 
-    def _arguments_of(self, frame: Frame) -> dict[str, Any]:
+    def _arguments_of(self, frame: SkinStageFrame) -> dict[str, Any]:
         """Returns those that the library takes for points and for normals alike."""
         same_space = is_same_space(frame.bones_from_model)
         along = follows_hierarchy(frame.method, frame.mix, frame.parameters)
@@ -253,7 +261,7 @@ class SkinDeformer:
             "turns": frame.turns,
         }
 
-    def _take_new_data(self, frame: Frame) -> bool:
+    def _take_new_data(self, frame: SkinStageFrame) -> bool:
         """Whether the methods' vertex data has changed; meshes are then packed again."""
         if self.vertex_data is None:
             return False
@@ -267,16 +275,7 @@ class SkinDeformer:
         self._deformers.clear()
         return True
 
-    def _weights_changed(self, frame: Frame) -> bool:
-        """Whether the influences differ from the last frame's: they can depend on the rest points."""
-        last = self._last
-        if last is None or not self.weighting.depends_on_points:
-            return False
-        return frame.rest_points is not last.rest_points or not np.array_equal(
-            frame.bones_from_model, last.bones_from_model
-        )
-
-    def _vertex_data_of(self, frame: Frame) -> dict[str, np.ndarray | None]:
+    def _vertex_data_of(self, frame: SkinStageFrame) -> dict[str, np.ndarray | None]:
         """Returns the data by the name of the method. None for a mesh without data of MikuMikuDance: it is
         blended linearly."""
         names = [name for name in (frame.method, frame.mix) if name and METHODS[name].vertex_floats]
@@ -287,9 +286,9 @@ class SkinDeformer:
         return {name: self.vertex_data.of(name, frame.bones_from_model) for name in names}
 
     def _pack(
-        self, frame: Frame, rest_points: np.ndarray, vertex_data: dict[str, np.ndarray | None]
+        self, frame: SkinStageFrame, rest_points: np.ndarray, vertex_data: dict[str, np.ndarray | None]
     ) -> sinew.Binding:
-        points = frame.rest_points
+        points = self.rest_points
         if self.weighting.depends_on_points:
             points = transformed(points, frame.bones_from_model)
         engine = ENGINES.get(frame.method)
@@ -312,7 +311,7 @@ def _native(method: str) -> str:
     return LINEAR if method in ENGINES else method
 
 
-def _kept(frame: Frame) -> tuple[str, int]:
+def _kept(frame: SkinStageFrame) -> tuple[str, int]:
     """Returns the engine, and how many influences of a vertex it keeps; of nothing where it is none."""
     if frame.method not in ENGINES:
         return "", 0
@@ -324,11 +323,10 @@ def follows_hierarchy(method: str, mix: str, parameters: Mapping[str, Value]) ->
     return any(parameters.get(f"{name}.signs") == "hierarchy" for name in (method, mix))
 
 
-def _same(a: Frame, b: Frame) -> bool:
+def _same(a: SkinStageFrame, b: SkinStageFrame) -> bool:
     return (
         (a.method, a.mix, a.parameters) == (b.method, b.mix, b.parameters)
         and a.scale_rule == b.scale_rule
-        and are_equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
         and are_equal(a.bones_from_model, b.bones_from_model)
         and are_equal(a.turns, b.turns)
@@ -346,27 +344,6 @@ class SkinStage:
     deformer: SkinDeformer
     mask: np.ndarray | None = None
     multi: bool = False
-
-
-@dataclass
-class SkinStageFrame:
-    """Everything that the deformation by a skin stage depends on in one frame: see Frame.
-
-    model_from_bones  given where a scale is 0: as in Blender, all vertices are then at the origin of armature
-                      space before the bones move them
-    twists            inputs of the stage twist_spread, of the first that takes part; empty where it is off
-    turns             as in Frame
-    """
-
-    method: str
-    pose: np.ndarray
-    bones_from_model: np.ndarray
-    scale_rule: str = BLENDER_4.name
-    mix: str = ""
-    parameters: dict[str, Value] = field(default_factory=dict)
-    model_from_bones: np.ndarray | None = None
-    twists: TwistInputs = ()
-    turns: np.ndarray | None = None
 
 
 def _twists(frames: Sequence[SkinStageFrame | None]) -> list[TwistInputs]:
@@ -502,11 +479,7 @@ class SkinStack:
                 before = self._frames[number] if number < len(self._frames) else None
                 changed |= before is None or not are_equal(back, before.model_from_bones)
             is_end = skin_stage.deformer is self._end
-            own = (frame.scale_rule, frame.mix, frame.parameters, frame.turns)
-            changed |= skin_stage.deformer.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start, *own),
-                out if is_end else None,
-            )
+            changed |= skin_stage.deformer.deform(start, frame, out if is_end else None)
             if skin_stage.mask is not None:
                 result = result + skin_stage.mask[:, None] * (skin_stage.deformer.points - result)
             elif not is_end:

@@ -26,12 +26,11 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
         method = properties.METHODS.get(given.method)
         return tip(cls.bl_description if method is None else method.description)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         if self.method not in properties.METHODS:
             names = ", ".join(properties.METHODS)
             raise SinewError(tr("Method {name}: choose one of {names}", name=repr(self.method), names=names))
         character.set_method(context, self.method)
-        return {"FINISHED"}
 
 
 class SINEW_OT_switch(OnSinewObjects, bpy.types.Operator):
@@ -58,7 +57,7 @@ class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
         name="Mesh", description="Empty: the active one", options={"HIDDEN", "SKIP_SAVE"}
     )
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         active = context.active_object
         name = self.name or (active.name if active is not None else "")
         obj = next((o for o in sinew_targets(context) if o.name == name), None)
@@ -71,7 +70,6 @@ class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
         if not settings.is_own and others:
             with session.changing(context):
                 properties.share(others[0], obj)
-        return {"FINISHED"}
 
 
 class SINEW_OT_open_tab(bpy.types.Operator):

@@ -96,7 +96,7 @@ def waits_for_render() -> str:
 
 class Acting:
     """A base class of operators, which Blender knows by the class's name. Subclasses have refusal(context),
-    or run(context), which may raise SinewError, or both."""
+    or run(context), which may raise SinewError, or both. run() returns what execute() does, or nothing."""
 
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
@@ -117,10 +117,13 @@ class Acting:
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            return self.run(context)
+            return self.run(context) or {"FINISHED"}
         except SinewError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.failed(error)
+
+    def failed(self, error: SinewError) -> set[str]:
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
 
 
 class OnSinewObjects(Acting):

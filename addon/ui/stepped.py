@@ -26,8 +26,8 @@ OVER_WHICH = {"name": "Over", "description": "The frames to go through", "items"
 
 
 class Stepped(Acting):
-    """A base class: subclasses have steps(context), which yields the progress, and finish(context), which
-    uses the result. Both may raise SinewError, which is reported.
+    """A base class: subclasses have steps(context), which yields the progress, and run(context), which uses
+    the result. Both may raise SinewError, which is reported.
 
     saying   what it does, in the status bar
     stopped  what Esc reports; closing steps() has to restore everything
@@ -39,17 +39,14 @@ class Stepped(Acting):
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         raise NotImplementedError
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
-        raise NotImplementedError
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         precompute_watch.finish(context)
         try:
             for _share in self.steps(context):
                 pass
         except SinewError as error:
-            return self._failed(error)
-        return self._finished(context)
+            return self.failed(error)
+        return super().execute(context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
@@ -74,12 +71,12 @@ class Stepped(Acting):
         try:
             share = self._advance()
         except SinewError as error:
-            return self._failed(error)
+            return self.failed(error)
         finally:
             if share is None:
                 self._end(context)
         if share is None:
-            return self._finished(context)
+            return super().execute(context)
         context.window_manager.progress_update(share)
         _running[type(self).bl_idname] = share
         redraw()
@@ -98,16 +95,6 @@ class Stepped(Acting):
         while share is not None and time.perf_counter() < until:
             share = next(self._left, None)
         return share
-
-    def _finished(self, context: bpy.types.Context) -> set[str]:
-        try:
-            return self.finish(context)
-        except SinewError as error:
-            return self._failed(error)
-
-    def _failed(self, error: SinewError) -> set[str]:
-        self.report({"ERROR"}, str(error))
-        return {"CANCELLED"}
 
     def _end(self, context: bpy.types.Context) -> None:
         manager = context.window_manager

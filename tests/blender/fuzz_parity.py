@@ -546,7 +546,7 @@ def undecided(obj: bpy.types.Object) -> np.ndarray:
 def undecided_by(deformer: skin_stack.SkinDeformer) -> np.ndarray:
     frame = deformer.last_frame
     space = frame.bones_from_model
-    points = frame.rest_points @ space[:3, :3].T + space[:3, 3]
+    points = deformer.rest_points @ space[:3, :3].T + space[:3, 3]
     influences = deformer.weighting.influences_over_joints(points)
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(deformer.bones.rest.astype(np.float64))
     rest_axes = deformer.bones.rest_axes.astype(np.float64)

@@ -12,6 +12,7 @@ import sinew
 from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import Rotation
 from sinew_addon.core.errors import SinewError
+from sinew_addon.core.steps import result_of
 from sinew_addon.features.action_copy import action_copy
 from sinew_addon.features.inbetween import inbetween_bake, keyed_poses
 from sinew_addon.io import actions
@@ -107,11 +108,9 @@ def film(armature, frames=FRAMES, name: str = "matrix") -> np.ndarray:
 
 
 def bake(armature, method="sclerp", path="straight", **settings) -> inbetween_bake.Baked:
-    found = []
-    for _share in inbetween_bake.steps(armature, inbetween_bake.Settings(method, path, **settings), found):
-        pass
+    baked = result_of(inbetween_bake.steps(armature, inbetween_bake.Settings(method, path, **settings)))
     bpy.context.view_layer.update()
-    return found[0]
+    return baked
 
 
 def restore(armature) -> None:

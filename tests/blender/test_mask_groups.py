@@ -103,7 +103,7 @@ def reported(obj) -> dict[str, list[str]]:
     diagnose.check(bpy.context.scene, [obj], 4)
     found = {finding.name: finding for finding in diagnose.of(obj).findings}
     (part,) = measure.gather(bpy.context.scene, [obj]).parts
-    on_page = {finding.name: finding for finding in part.check_weights(4)}
+    on_page = {finding.name: finding for finding in part.edited.findings(4)}
     return {
         "facts": [
             name for name in (GROUP, "forgotten") for text in facts if "Groups" in text and name in text

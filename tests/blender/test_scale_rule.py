@@ -39,23 +39,23 @@ def posed_arm(scaled: bool) -> bpy.types.Object:
 def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
     deformer = session.state_of(obj).bound.first_deformer
     frame, rest = deformer.last_frame, deformer.bones.rest.astype(np.float64)
-    influences = deformer.weighting.influences(frame.rest_points)
+    influences = deformer.weighting.influences(deformer.rest_points)
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(rest)
     rigid = np.tile(np.eye(4), (len(rest), 1, 1))
     for bone, motion in enumerate(motions):
         head = rest[bone, :3, 3]
         rigid[bone, :3, :3] = reference.rotation_of_bone(motion, rest[bone])
         rigid[bone, :3, 3] = (motion @ np.append(head, 1.0))[:3] - rigid[bone, :3, :3] @ head
-    points = frame.rest_points.astype(np.float64)
+    points = deformer.rest_points.astype(np.float64)
     bound = (influences.offsets, influences.bones, influences.weights)
     # Mesh and armature are in one space; for every rule, vertex data belongs to the mesh at rest.
     triangles = scenes.triangles_of(obj)
     kept = {}
     if method == "cor":
-        kept[method] = sinew.centres_of_rotation(frame.rest_points, *bound, triangles).result()
+        kept[method] = sinew.centres_of_rotation(deformer.rest_points, *bound, triangles).result()
     elif method == "ddm":
         radius = properties.of(obj).ddm.radius
-        kept[method] = sinew.direct_delta_mush(frame.rest_points, *bound, triangles, radius).result()
+        kept[method] = sinew.direct_delta_mush(deformer.rest_points, *bound, triangles, radius).result()
     if rule == "3.x":
         points, _ = reference.deform("lbs", points, *bound, np.linalg.inv(rigid) @ motions)
     motions = motions if rule == "4.0" else rigid

@@ -37,11 +37,10 @@ class SINEW_OT_original_action(operators.Acting, bpy.types.Operator):
         is_any = any(map(action_copy.is_on, operators.armatures(context)))
         return "" if is_any else "Sinew has keyed no copy of this armature's action"
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         for armature in filter(action_copy.is_on, operators.armatures(context)):
             action_copy.restore(armature)
         characters.set_frame(context.scene, context.scene.frame_float)
-        return {"FINISHED"}
 
 
 FEATURE = Feature(

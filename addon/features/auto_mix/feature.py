@@ -43,12 +43,11 @@ class SINEW_OT_auto_mix(OnSinewObjects, OfOneMesh, stepped.Stepped, bpy.types.Op
         self.mixing = auto_mix.AutoMix(context.scene, objects, self.over, self.smoothing)
         yield from self.mixing.steps()
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         for sentence in self.left_out:
             self.report({"WARNING"}, sentence)
         for sentence in self.mixing.write(context):
             self.report({"INFO"}, sentence)
-        return {"FINISHED"}
 
 
 FEATURE = Feature((SINEW_OT_auto_mix,))

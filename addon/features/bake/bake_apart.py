@@ -21,8 +21,14 @@ from .bake_export import SceneExport
 
 def sample(started: SceneExport) -> Generator[float, None, None]:
     """Replaces started.sample(): yields the progress, 0 to 1, several times a second."""
+    task = {
+        "command": "export",
+        "kind": started.kind,
+        "frames": list(started.frames),
+        "objects": [obj.name for obj in started.meshes],
+    }
     with started.whole_or_nothing():
-        yield from follow(_task(started), started.path)
+        yield from follow(task, started.path)
 
 
 def follow(task: dict, path: Path) -> Generator[float, None, dict]:
@@ -67,22 +73,13 @@ def open_copy(task: dict, report: Callable[..., None]) -> list[bpy.types.Object]
 
 
 def export(task: dict, report: Callable[..., None]) -> dict:
-    """Runs in the second Blender: exports the objects of a task of _task(), and reports the progress."""
+    """Runs in the second Blender: exports the objects of a task of sample(), and reports the progress."""
     meshes = open_copy(task, report)
     started = SceneExport(meshes, task["kind"], task["frames"], Path(task["target"]))
     started.report_progress = lambda share: report("exporting it", share=share)
     for share in started.sample():
         started.report_progress(share)
     return {}
-
-
-def _task(started: SceneExport) -> dict:
-    return {
-        "command": "export",
-        "kind": started.kind,
-        "frames": list(started.frames),
-        "objects": [obj.name for obj in started.meshes],
-    }
 
 
 @contextmanager

@@ -122,7 +122,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
         is_apart = self.in_steps and self.kind in EXPORTS
         yield from bake_apart.sample(self.started) if is_apart else self.started.sample()
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         with self.started.whole_or_nothing():
             self.started.publish()
             self.started.place()
@@ -131,7 +131,6 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
             for report in self.started.reports:
                 for sentence in report.sentences(characters.length_unit(context.scene)):
                     self.report({"INFO"}, tr(sentence))
-        return {"FINISHED"}
 
     def _start(self, context: bpy.types.Context) -> bake_state.Started:
         scene = context.scene

@@ -141,7 +141,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
             core.Settings(self.method, self.align, self.root or None, self.root_motion, self.cycles),
         )
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         made = self._made
         blend_actions.play(bpy.data.objects[self._armature], made.action)
         frames = counted(made.frames, "{count} frame", "{count} frames")
@@ -149,7 +149,6 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
         for note in made.notes():
             self.report({"WARNING"}, note)
         context.view_layer.update()
-        return {"FINISHED"}
 
 
 _OF_ACTION = ("name", "weight", "weight_from")

@@ -107,7 +107,7 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
         for choice in self.choices:
             column.prop(choice, "is_shown", text=properties.method_label(choice.name))
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         if self.choices:
             self.methods = {choice.name for choice in self.choices if choice.is_shown}
         methods = [name for name in characters.method_names() if name in self.methods]
@@ -126,7 +126,6 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
             framing.show_all(context, viewport, meshes)
         for problem in problems:
             self.report({"WARNING"}, problem)
-        return {"FINISHED"}
 
 
 def _right_of_view(context: bpy.types.Context) -> np.ndarray:
@@ -172,10 +171,9 @@ class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
     def refusal(cls, context: bpy.types.Context) -> str:
         return "" if comparison.is_on() else "There is no comparison"
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         framing.give_back(context)
         comparison.end(context)
-        return {"FINISHED"}
 
 
 class SINEW_PT_comparison(Sidebar, bpy.types.Panel):

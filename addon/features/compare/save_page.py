@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Saves a comparison as a page that turns."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 
 import bpy
 
@@ -30,7 +30,7 @@ class SINEW_OT_save_comparison(SavesPage, bpy.types.Operator):
         is_any = state is not None and comparison.originals(state)
         return "" if is_any else "Compare methods first"
 
-    def page(self, context: bpy.types.Context, title: str) -> Iterator[float | str]:
+    def page(self, context: bpy.types.Context, title: str) -> Generator[float, None, str]:
         scene = context.scene
         state = comparison_state.of_scene(scene)
         assert state is not None, "refusal() says so"
@@ -47,4 +47,4 @@ class SINEW_OT_save_comparison(SavesPage, bpy.types.Operator):
         frames = stepped.frames_over(scene, armatures, self.over)
         methods = comparison_state.methods_of(state)
         with stepped.kept_frame(scene, armatures):
-            yield from viewer.page(scene, title, of_each, attached, methods, frames)
+            return (yield from viewer.page(scene, title, of_each, attached, methods, frames))

@@ -11,16 +11,16 @@ import numpy as np
 
 from ...attach import attach
 from ...attach.subscribers import subscribers
-from ...core.diagnostics import Finding, PoseCheck, check_weights
+from ...core.diagnostics import Finding
 from ...core.errors import SinewError
 from ...core.influences import GroupWeights
-from ...core.rig import Bones, Weighting
+from ...core.rig import Bones
 from ...core.vectors import rotations_of
-from ...deform import characters, group_uses, session
+from ...deform import characters, session
 from ...io import armature_io, mesh_io
 from ...ui import stepped
 from ...ui.translations import tr
-from ..pages import measure
+from ..pages.measure import Edited
 
 
 @dataclass
@@ -49,60 +49,34 @@ class Check:
 _checks: dict[int, Check] = {}
 
 
-@dataclass
-class _Reading:
-    """A mesh as it is edited, and its poses so far."""
-
-    obj: bpy.types.Object
-    weighting: Weighting
-    weights: GroupWeights
-    points: np.ndarray
-    poses: PoseCheck
-
-    def add_pose(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
-        armature = attach.armature_of(self.obj).evaluated_get(depsgraph)
-        bones = self.weighting.bones
-        pose = armature_io.read_pose(armature, bones).astype(np.float64)
-        # A bone without size rotates nothing.
-        motions = pose[:, :3, :3] @ np.linalg.pinv(bones.rest[:, :3, :3].astype(np.float64))
-        self.poses.add_pose(rotations_of(motions), frame)
-
-
 def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_influences: int) -> None:
     """Checks weights, and the current pose. Raises SinewError that says why an object cannot be checked."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    readings = [_read(obj, depsgraph) for obj in objects]
-    for reading in readings:
-        reading.add_pose(scene.frame_current, depsgraph)
-        poses = tr("pose of frame {frame}", frame=scene.frame_current)
-        _keep(reading, most_influences, poses)
+    meshes = _read(objects)
+    _add_pose(meshes, scene.frame_current)
+    _keep(meshes, most_influences, tr("pose of frame {frame}", frame=scene.frame_current))
 
 
 def check_frames(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_influences: int, over: str
 ) -> Iterator[float]:
     """Checks weights, and the poses of all frames; yields the progress."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    readings = [_read(obj, depsgraph) for obj in objects]
+    meshes = _read(objects)
     armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in objects))
     frames = stepped.frames_over(scene, armatures, over)
     with stepped.kept_frame(scene, armatures):
         for number, frame in enumerate(frames):
             characters.set_frame(scene, frame)
-            depsgraph = bpy.context.evaluated_depsgraph_get()
-            for reading in readings:
-                reading.add_pose(frame, depsgraph)
+            _add_pose(meshes, frame)
             yield (number + 1) / len(frames)
     poses = tr("poses of frames {first} to {last}", first=frames[0], last=frames[-1])
-    for reading in readings:
-        _keep(reading, most_influences, poses, over)
+    _keep(meshes, most_influences, poses, over)
 
 
 def of(obj: bpy.types.Object) -> Check | None:
     """Returns the findings on an object; `stale` is up to date."""
     found = _checks.get(obj.session_uid)
     if found is not None and not found.stale:
-        groups = tuple(group.name for group in obj.vertex_groups)
+        groups = tuple(obj.vertex_groups.keys())
         found.stale = groups != found.groups or obj.data.session_uid != found.mesh
         found.stale = found.stale or (found.suspect and not _weights_equal(obj, found.weights))
         found.suspect = False
@@ -175,32 +149,42 @@ def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.ty
     bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
 
 
-def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> _Reading:
-    armature = attach.armature_of(obj)
-    if armature is None:
-        raise SinewError(f"{obj.name}: no armature deforms it; there are no weights to check")
-    if armature.data.is_editmode:
-        raise SinewError(f"{armature.name} is in edit mode; leave it first")
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
-    weighting, weights, points = measure.read_edited(obj, depsgraph)
-    return _Reading(obj, weighting, weights, points, PoseCheck(weighting.influences_over_joints(points)))
+def _read(objects: Sequence[bpy.types.Object]) -> list[Edited]:
+    found, depsgraph = [], bpy.context.evaluated_depsgraph_get()
+    for obj in objects:
+        armature = attach.armature_of(obj)
+        if armature is None:
+            raise SinewError(f"{obj.name}: no armature deforms it; there are no weights to check")
+        if armature.data.is_editmode:
+            raise SinewError(f"{armature.name} is in edit mode; leave it first")
+        if obj.mode == "EDIT":
+            obj.update_from_editmode()
+        found.append(Edited.read(obj, depsgraph))
+    return found
 
 
-def _keep(reading: _Reading, most_influences: int, frames: str, over: str = "") -> None:
-    obj = reading.obj
-    groups = tuple(group.name for group in obj.vertex_groups)
-    masks = group_uses.used(obj, reading.weighting.bones.groups_without_bone(groups))
-    found = check_weights(reading.weighting, reading.points, reading.weights, groups, most_influences, masks)
-    _checks[obj.session_uid] = Check(
-        [*found, *reading.poses.findings()],
-        frames,
-        obj.data.session_uid,
-        reading.weights,
-        groups,
-        reading.weighting.bones,
-        over,
-    )
+def _add_pose(meshes: Sequence[Edited], frame: float) -> None:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for mesh in meshes:
+        armature, bones = attach.armature_of(mesh.obj).evaluated_get(depsgraph), mesh.weighting.bones
+        pose = armature_io.read_pose(armature, bones).astype(np.float64)
+        # A bone without size rotates nothing.
+        motions = pose[:, :3, :3] @ np.linalg.pinv(bones.rest[:, :3, :3].astype(np.float64))
+        mesh.pose_check.add_pose(rotations_of(motions), frame)
+
+
+def _keep(meshes: Sequence[Edited], most_influences: int, frames: str, over: str = "") -> None:
+    for mesh in meshes:
+        obj = mesh.obj
+        _checks[obj.session_uid] = Check(
+            mesh.findings(most_influences),
+            frames,
+            obj.data.session_uid,
+            mesh.weights,
+            tuple(obj.vertex_groups.keys()),
+            mesh.weighting.bones,
+            over,
+        )
 
 
 def _vertex_count(obj: bpy.types.Object) -> int:
@@ -268,7 +252,4 @@ SUBSCRIPTIONS = (
     (subscribers.stepped, _on_stepped),
     (subscribers.loading, _checks.clear),
 )
-
-
-def forget() -> None:
-    _checks.clear()
+forget = _checks.clear

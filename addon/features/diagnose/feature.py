@@ -27,9 +27,9 @@ class SINEW_OT_check(operators.OnDeformed, bpy.types.Operator):
     bl_description = "Look for faults in the weights, and for what dual quaternions do in the pose of now"
     bl_options = {"REGISTER"}
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         diagnose.check(context.scene, _checkable(context), context.scene.sinew_most_influences)
-        return _report(self, context)
+        _report(self, context)
 
 
 class SINEW_OT_check_frames(operators.OnDeformed, stepped.Stepped, bpy.types.Operator):
@@ -46,15 +46,14 @@ class SINEW_OT_check_frames(operators.OnDeformed, stepped.Stepped, bpy.types.Ope
         scene = context.scene
         return diagnose.check_frames(scene, _checkable(context), scene.sinew_most_influences, self.over)
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
-        return _report(self, context)
+    def run(self, context: bpy.types.Context) -> None:
+        _report(self, context)
 
 
-def _report(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+def _report(operator: bpy.types.Operator, context: bpy.types.Context) -> None:
     kinds = sum(len(diagnose.of(obj).findings) for obj in _checkable(context))
     text = counted(kinds, "{count} kind of fault", "{count} kinds of faults") if kinds else "Nothing found"
     operator.report({"INFO"}, text)
-    return {"FINISHED"}
 
 
 class _OnFinding(operators.Acting):
@@ -75,10 +74,9 @@ class SINEW_OT_select_finding(_OnFinding, bpy.types.Operator):
     bl_description = "Enter edit mode with exactly these vertices selected; hidden ones are shown"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         count = diagnose.select(self.mesh(context), self.finding, context)
         self.report({"INFO"}, counted(count, "Selected {count} vertex", "Selected {count} vertices"))
-        return {"FINISHED"}
 
 
 class SINEW_OT_mend(_OnFinding, bpy.types.Operator):
@@ -100,7 +98,7 @@ class SINEW_OT_mend(_OnFinding, bpy.types.Operator):
         text = tip("{what}; then check again. Locked groups stay as they are")
         return text.format(what=tip(mending.ALL[given.how].description))
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         scene, manager, obj = context.scene, context.window_manager, self.mesh(context)
         most = scene.sinew_most_influences
         manager.progress_begin(0.0, 1.0)
@@ -113,7 +111,6 @@ class SINEW_OT_mend(_OnFinding, bpy.types.Operator):
         left = next((each.count for each in diagnose.of(obj).findings if each.name == self.finding), 0)
         text = tr("Mended {what}. Checked again: {count} left", what=done, count=f"{left:,}")
         self.report({"INFO"}, text)
-        return {"FINISHED"}
 
 
 class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):

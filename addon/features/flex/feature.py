@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import bpy
 import numpy as np
@@ -56,10 +56,9 @@ class SINEW_OT_flex(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         others = [name for name in OTHERS if self.others and {name} != shown]
         self.result = yield from flex.flex(objects, others, Table(), {})
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         results[context.scene.session_uid] = self.result
         self.report({"INFO"}, _headline(self.result))
-        return {"FINISHED"}
 
 
 class _OnFinding(operators.Acting):
@@ -82,7 +81,7 @@ class SINEW_OT_flex_place(_OnFinding, bpy.types.Operator):
     bl_description = "Enter edit mode with the vertex selected where this is worst, in the middle of the view"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         _result, _joint, finding = self.found(context)
         obj = context.scene.objects.get(finding.mesh)
         if obj is None or finding.vertex >= len(obj.data.vertices) or stack.upstream_changes(obj):
@@ -96,7 +95,6 @@ class SINEW_OT_flex_place(_OnFinding, bpy.types.Operator):
                 view = area.spaces.active.region_3d
                 view.view_location = finding.point
                 view.view_distance = min(view.view_distance, NEAR * max(obj.dimensions))
-        return {"FINISHED"}
 
 
 class SINEW_OT_flex_pose(_OnFinding, bpy.types.Operator):
@@ -106,7 +104,7 @@ class SINEW_OT_flex_pose(_OnFinding, bpy.types.Operator):
     )
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         result, joint, finding = self.found(context)
         armature = context.scene.objects.get(joint.armature)
         rotations = result.poses.get((joint.armature, joint.name, finding.pose), {})
@@ -121,7 +119,6 @@ class SINEW_OT_flex_pose(_OnFinding, bpy.types.Operator):
             own.matrix_basis = Matrix.LocRotScale(location, turned, scale)
         if any(not constraint.mute for name in rotations for constraint in bones[name].constraints):
             self.report({"WARNING"}, "Constraints hold these bones: pose their controls instead")
-        return {"FINISHED"}
 
 
 class SINEW_OT_save_flex(SavesPage, bpy.types.Operator):
@@ -138,7 +135,7 @@ class SINEW_OT_save_flex(SavesPage, bpy.types.Operator):
     def refusal(cls, context: bpy.types.Context) -> str:
         return "" if context.scene.session_uid in results else "Bend every joint first"
 
-    def page(self, context: bpy.types.Context, title: str) -> Iterator[float | str]:
+    def page(self, context: bpy.types.Context, title: str) -> Generator[float, None, str]:
         result, found = results[context.scene.session_uid], context.scene.objects
         objects = [found[name] for name in result.own if name in found]
         if len(objects) < len(result.own) or not all(map(properties.has_sinew, objects)):

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from typing import Any
 
 import bpy
@@ -24,8 +24,8 @@ def page(
     objects: Sequence[bpy.types.Object],
     result: flex.Result,
     left_out: Sequence[str] = (),
-) -> Iterator[float | str]:
-    """Yields the progress, at the end the text of the page; nothing is changed.
+) -> Generator[float, None, str]:
+    """Yields the progress, returns the text of the page; nothing is changed.
 
     objects  those that were bent
 

@@ -90,7 +90,7 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         finally:
             remove(unfinished_path(self.path))
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         checks = sorted(map(Check.of_json, self.outcome["checks"]), key=lambda check: -check.share)
         for check in checks:
             for sentence in check.sentences(characters.length_unit(context.scene)):
@@ -99,7 +99,6 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, tr("Wrote {path}", path=self.path))
         results[context.scene.session_uid] = checks
-        return {"FINISHED"}
 
 
 class SINEW_PT_verified(Sidebar, bpy.types.Panel):

@@ -53,7 +53,7 @@ class SINEW_OT_heat_map(operators.Acting, bpy.types.Operator):
             return ""
         return "Select a mesh that Sinew deforms or that was baked to bones, or its armature"
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         settings = measures.of(context.scene)
         quantity = self.quantity or settings.quantity
         if quantity not in measures.QUANTITIES:
@@ -69,7 +69,6 @@ class SINEW_OT_heat_map(operators.Acting, bpy.types.Operator):
                 properties.of(obj).heat = on
             if not on and not properties.has_sinew(obj):
                 properties.clear(obj)
-        return {"FINISHED"}
 
 
 class _Scans(OnSinewObjects, stepped.Stepped):
@@ -89,14 +88,13 @@ class SINEW_OT_worst_frames(_Scans, bpy.types.Operator):
 
     over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         worst = worst_frames.scans[context.scene.session_uid].worst()
         text = tr("worst at {frame}", frame=f"{worst[0][0]:g}") if worst else tr("nothing at any frame")
         scan = worst_frames.scans[context.scene.session_uid]
         measure, count = tr(scan.metric.label), len(scan.frames)
         text = tr("{measure} over {count} frames: {result}", measure=measure, count=count, result=text)
         self.report({"INFO"}, text)
-        return {"FINISHED"}
 
 
 class SINEW_OT_fit_heat_range(_Scans, bpy.types.Operator):
@@ -105,9 +103,8 @@ class SINEW_OT_fit_heat_range(_Scans, bpy.types.Operator):
 
     over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         measures.of(context.scene).fix(worst_frames.scans[context.scene.session_uid].scale)
-        return {"FINISHED"}
 
 
 class SINEW_OT_go_to_frame(bpy.types.Operator):

@@ -17,7 +17,7 @@ from ...attach import attach, corrective_smooth, properties, stage_settings, ups
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, Pose, Shape
 from ...core.rig import Bones
-from ...core.skin_stack import NO_STAGES, SkinStack
+from ...core.skin_stack import SkinStack
 from ...core.stages import StageValues
 from ...core.surface import Surface, joined
 from ...core.twist_spread import NOT_TOLD, TwistInputs
@@ -103,11 +103,8 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
         subject.gauge.set_frame(_frame_of_rig(subject, armatures, subject.rest, frames))
         shape = _in_world([skinned.points for _obj, skinned in pairs], worlds)
         others = [_Other.of(part, other) for part in subject.parts]
-
-        def reference() -> np.ndarray:
-            return _in_world([each.points() for each in others], worlds)
-
-        subject.measured, subject.stamp = subject.gauge.measure(shape, reference), stamp
+        subject.measured = subject.gauge.measure(shape, lambda: _shape_of(others, worlds))
+        subject.stamp = stamp
         subject.under_other = None
     return subject
 
@@ -176,33 +173,17 @@ class Moment:
         methods  of each part: one with the stages that are shown, None for the method that is shown, too, or
                  properties.BLENDER for the Armature modifiers
         """
-        shapes = []
-        for part, method, rest_points, own, shown in zip(
-            self.subject.parts, methods, self.rest_points, self.frames, self.stages, strict=True
-        ):
-            frames, values = own, shown
-            if method == properties.BLENDER:
-                frames, values = pose.of_modifiers(part.obj, own), corrective_smooth.stage_values(part.obj)
-            elif method is not None:
-                frames = _under(part, own, method)
-            shapes.append(_Other(part.skin_stack, rest_points, frames, values).points().copy())
-        return _in_world(shapes, self.worlds)
+        own = zip(self.subject.parts, methods, self.rest_points, self.frames, self.stages, strict=True)
+        return _shape_of([_Other.under(*of_part) for of_part in own], self.worlds)
 
-    def measured(
-        self, method: str, stages: StageValues | None = None, more: StageValues = NO_STAGES
-    ) -> Measured:
+    def measured(self, method: str, stages: StageValues | None = None) -> Measured:
         """Measures the shape under a method and stages; without a mix.
 
         stages  None: those that are shown
-        more    beside these
         """
-        shapes = []
-        for part, rest_points, own, shown in zip(
-            self.subject.parts, self.rest_points, self.frames, self.stages, strict=True
-        ):
-            frames, values = _under(part, own, method), {**(shown if stages is None else stages), **more}
-            shapes.append(_Other(part.skin_stack, rest_points, frames, values).points().copy())
-        return Measured(self.pose, Shape(self.subject.gauge.surface, _in_world(shapes, self.worlds)), None)
+        count = len(self.subject.parts)
+        moment = self if stages is None else replace(self, stages=[stages] * count)
+        return Measured(self.pose, Shape(self.subject.gauge.surface, moment.points([method] * count)), None)
 
 
 def _twists(part: Part, depsgraph: bpy.types.Depsgraph) -> TwistInputs:
@@ -216,7 +197,7 @@ def measured_under(subject: Subject, method: str, depsgraph: bpy.types.Depsgraph
     """Measures the frame of the last call of measure() under another method; distances are to the current
     shape."""
     worlds = [_world(part.obj, depsgraph) for part in subject.parts]
-    shape = _in_world([_Other.of(part, method).points() for part in subject.parts], worlds)
+    shape = _shape_of([_Other.of(part, method) for part in subject.parts], worlds)
     return subject.gauge.measure(shape, subject.measured.shape.points.T)
 
 
@@ -228,14 +209,10 @@ def measured_of_mix(
     second_of  of an object: its second method
     """
     worlds = [_world(part.obj, depsgraph) for part in subject.parts]
-    first, second = (
-        subject.gauge.measure(_in_world([_Other.of_mix(*each).points() for each in chosen], worlds))
-        for chosen in (
-            [(part, "") for part in subject.parts],
-            [(part, second_of(part.obj)) for part in subject.parts],
-        )
-    )
-    return first, second
+    first = [_Other.of_mix(part, "") for part in subject.parts]
+    second = [_Other.of_mix(part, second_of(part.obj)) for part in subject.parts]
+    measure = subject.gauge.measure
+    return measure(_shape_of(first, worlds)), measure(_shape_of(second, worlds))
 
 
 def measured_under_other(subject: Subject, other: str, depsgraph: bpy.types.Depsgraph) -> Measured | None:
@@ -330,13 +307,19 @@ class _Other:
     @classmethod
     def of(cls, part: Part, other: str) -> Self:
         shown = part.skinned.shown
-        if other == properties.BLENDER:
-            frames = pose.of_modifiers(part.obj, shown.frames)
-            stage_values = corrective_smooth.stage_values(part.obj)
-        else:
-            frames = _under(part, shown.frames, other)
-            stage_values = shown.stage_values
-        return cls(part.skin_stack, shown.rest_points, frames, stage_values)
+        return cls.under(part, other, shown.rest_points, shown.frames, shown.stage_values)
+
+    @classmethod
+    def under(
+        cls, part: Part, method: str | None, rest_points: np.ndarray, frames: pose.Frames, stages: StageValues
+    ) -> Self:
+        """method: as of Moment.points()"""
+        if method == properties.BLENDER:
+            frames, stages = pose.of_modifiers(part.obj, frames), corrective_smooth.stage_values(part.obj)
+        elif method is not None:
+            own = stage_settings.method_values(properties.of(part.obj), (method,))
+            frames = [frame and replace(frame, method=method, mix="", parameters=own) for frame in frames]
+        return cls(part.skin_stack, rest_points, frames, stages)
 
     @classmethod
     def of_mix(cls, part: Part, second: str) -> Self:
@@ -360,10 +343,8 @@ class _Other:
         return self.skin_stack.points
 
 
-def _under(part: Part, frames: pose.Frames, method: str) -> pose.Frames:
-    """Returns the same poses under another method, without a mix."""
-    own = stage_settings.method_values(properties.of(part.obj), (method,))
-    return [frame and replace(frame, method=method, mix="", parameters=own) for frame in frames]
+def _shape_of(others: Sequence[_Other], worlds: Sequence[np.ndarray]) -> np.ndarray:
+    return _in_world([each.points() for each in others], worlds)
 
 
 def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:

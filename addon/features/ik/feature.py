@@ -35,12 +35,11 @@ class SINEW_OT_bake_ik(OnArmature, stepped.WithDialog, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         armature = operators.armatures(context)[0]
         frames = stepped.frames_over(context.scene, [armature], self.over)
-        self._found: list[ik_bake.Baked] = []
         with stepped.kept_frame(context.scene, [armature]):
             trees = ik_io.read_trees(armature, selected_bones(armature))
-            yield from ik_bake.steps(armature, trees, frames, self.method, self._found)
+            self._found = yield from ik_bake.steps(armature, trees, frames, self.method)
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         # The baked action applies at the current frame, too.
         characters.set_frame(context.scene, context.scene.frame_float)
         bones = sum(len(each.tree.bones) for each in self._found)
@@ -51,7 +50,6 @@ class SINEW_OT_bake_ik(OnArmature, stepped.WithDialog, bpy.types.Operator):
             share=f"{worst:.2%}",
         )
         self.report({"INFO"}, text)
-        return {"FINISHED"}
 
 
 FEATURE = Feature((SINEW_OT_bake_ik,))

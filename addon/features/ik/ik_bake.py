@@ -2,7 +2,7 @@
 """Bakes Sinew's inverse kinematics to plain keys in a copy of the action, in place of Blender's
 constraints."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -25,12 +25,8 @@ class Baked:
 
 
 def steps(
-    armature: bpy.types.Object,
-    trees: Sequence[core.Tree],
-    frames: Sequence[int],
-    method: core.ik.Method,
-    found: list[Baked],
-) -> Iterator[float]:
+    armature: bpy.types.Object, trees: Sequence[core.Tree], frames: Sequence[int], method: core.ik.Method
+) -> Generator[float, None, list[Baked]]:
     """Bakes trees, those nearest to the root first; yields the progress.
 
     At the end the armature plays a copy of its action with keys of the bones' rotations at every frame, with
@@ -39,20 +35,18 @@ def steps(
     cannot be keyed.
     """
     _check_not_switched(armature, trees)
-    try:
-        with action_copy.playing(armature, "Sinew IK") as muted:
-            for number, tree in enumerate(trees):
-                ik_io.set_muted(armature, tree.constraints, True)
-                muted += tree.constraints
-                posed = []
-                for frame in frames:
-                    characters.set_frame(bpy.context.scene, frame)
-                    posed.append(ik_io.read_posed(armature, tree))
-                    yield (number + len(posed) / len(frames)) / len(trees)
-                found.append(_bake(armature, tree, core.stack(posed), frames, method))
-    except BaseException:
-        found.clear()
-        raise
+    found = []
+    with action_copy.playing(armature, "Sinew IK") as muted:
+        for number, tree in enumerate(trees):
+            ik_io.set_muted(armature, tree.constraints, True)
+            muted += tree.constraints
+            posed = []
+            for frame in frames:
+                characters.set_frame(bpy.context.scene, frame)
+                posed.append(ik_io.read_posed(armature, tree))
+                yield (number + len(posed) / len(frames)) / len(trees)
+            found.append(_bake(armature, tree, core.stack(posed), frames, method))
+    return found
 
 
 def _check_not_switched(armature: bpy.types.Object, trees: Sequence[core.Tree]) -> None:

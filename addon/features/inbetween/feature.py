@@ -48,19 +48,17 @@ class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operato
     )
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
-        self._baked: list[inbetween_bake.Baked] = []
         armature = operators.armatures(context)[0]
         settings = inbetween_bake.Settings(self.method, self.path, self.step, selected_bones(armature))
-        yield from inbetween_bake.steps(armature, settings, self._baked)
+        self._baked = yield from inbetween_bake.steps(armature, settings)
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
-        baked = self._baked[0]
+    def run(self, context: bpy.types.Context) -> None:
+        baked = self._baked
         action = baked.armature.animation_data.action
         self.report({"INFO"}, tr("{count} bones into {action}", count=baked.bones, action=action.name))
         for note in baked.notes(self.path):
             self.report({"WARNING"}, note)
         context.view_layer.update()
-        return {"FINISHED"}
 
 
 FEATURE = Feature((SINEW_OT_bake_inbetweens,))

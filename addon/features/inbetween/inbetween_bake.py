@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keys in-betweens in a copy of the action, which plays without Sinew."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator
 from dataclasses import dataclass, field
 
 import bpy
@@ -45,7 +45,7 @@ class Baked:
         return [*kept, *(f"{bone} {core.TOO_FAR[path]}" for bone in sorted(self.far))]
 
 
-def steps(armature: bpy.types.Object, settings: Settings, found: list[Baked]) -> Iterator[float]:
+def steps(armature: bpy.types.Object, settings: Settings) -> Generator[float, None, Baked]:
     """Has the armature play a copy of its action, in which the bones move by a method between the keyed
     poses, with keys at every `step` frames and linear interpolation; yields the progress.
 
@@ -80,7 +80,7 @@ def steps(armature: bpy.types.Object, settings: Settings, found: list[Baked]) ->
                 if len(own_times):
                     row = group.rows[bone]
                     _write_keys(curve, group, int(bone), own_times, values[:, row, column])
-    found.append(baked)
+    return baked
 
 
 def _times(group: keyed_poses.Group, step: int) -> np.ndarray:

@@ -33,27 +33,49 @@ MOST_BYTES = 256_000_000
 
 
 @dataclass
+class Edited:
+    """A mesh as it is edited, and its poses so far; points in armature space."""
+
+    obj: bpy.types.Object
+    weighting: Weighting
+    weights: GroupWeights
+    rest_points: np.ndarray
+    pose_check: PoseCheck
+
+    @classmethod
+    def read(cls, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Self:
+        armature = attach.armature_of(obj)
+        bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+        weights = mesh_io.read_group_weights(obj.data)
+        points = _in_armature_space(obj, armature, obj.data, depsgraph)
+        weighting = _weighting(obj, obj, weights, bones)
+        return cls(obj, weighting, weights, points, PoseCheck(weighting.influences_over_joints(points)))
+
+    def findings(self, most_influences: int) -> list[Finding]:
+        """The faults of its weights, and those that were found in the poses."""
+        names = [group.name for group in self.obj.vertex_groups]
+        masks = group_uses.used(self.obj, self.weighting.bones.groups_without_bone(names))
+        found = check_weights(self.weighting, self.rest_points, self.weights, names, most_influences, masks)
+        return [*found, *self.pose_check.findings()]
+
+
+@dataclass
 class Part:
     """One of the meshes.
 
-    weighting, weights, rest_points  of the mesh as it is edited; points in armature space
-    vertex_count                     of the mesh that the Armature modifier gets
-    influences                       of that mesh, over bones and joints
+    vertex_count  of the mesh that the Armature modifier gets
+    influences    of that mesh, over bones and joints
     """
 
     obj: bpy.types.Object
     armature: bpy.types.Object
-    weighting: Weighting
-    weights: GroupWeights
-    rest_points: np.ndarray
+    edited: Edited
     vertex_count: int
     influences: Influences
-    pose_check: PoseCheck
 
-    def check_weights(self, most_influences: int) -> list[Finding]:
-        names = [group.name for group in self.obj.vertex_groups]
-        masks = group_uses.used(self.obj, self.weighting.bones.groups_without_bone(names))
-        return check_weights(self.weighting, self.rest_points, self.weights, names, most_influences, masks)
+    @property
+    def bones(self) -> Bones:
+        return self.edited.weighting.bones
 
 
 @dataclass
@@ -116,7 +138,7 @@ def gather(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> Subjec
             depsgraph = bpy.context.evaluated_depsgraph_get()
             parts = [_read_part(obj, depsgraph) for obj in meshes]
             surface = joined([mesh_io.read_surface(obj.evaluated_get(depsgraph).data) for obj in meshes])
-    bone_counts = [len(part.weighting.bones.rest) for part in parts]
+    bone_counts = [len(part.bones.rest) for part in parts]
     influences = influences_of_all([part.influences for part in parts], bone_counts)
     return Subject(scene, parts, Gauge(surface, influences))
 
@@ -232,22 +254,22 @@ def _world_points(subject: Subject, frame: float) -> np.ndarray:
 def _bone_matrices(part: Part) -> np.ndarray:
     """float64 [bones + joints, 4, 4] of the pose, in world space."""
     armature = part.armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    return np.array(armature.matrix_world) @ armature_io.read_pose(armature, part.weighting.bones)
+    return np.array(armature.matrix_world) @ armature_io.read_pose(armature, part.bones)
 
 
 def _frame_of_rig(
     subject: Subject, rest: tuple[np.ndarray, list[np.ndarray]], pose: list[np.ndarray]
 ) -> FrameOfRig:
     points, at_rest = rest
-    bones = [part.weighting.bones for part in subject.parts]
+    bones = [part.bones for part in subject.parts]
     return FrameOfRig.of(points, zip(bones, at_rest, pose, strict=True))
 
 
 def _check_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
     first = 0
     for part in subject.parts:
-        count = len(part.weighting.bones.rest)
-        part.pose_check.add_pose(rig.rotations[:, first : first + count], frame)
+        count = len(part.bones.rest)
+        part.edited.pose_check.add_pose(rig.rotations[:, first : first + count], frame)
         first += count
 
 
@@ -258,30 +280,15 @@ def _show(armature: bpy.types.Object) -> None:
         armature.hide_set(False)
 
 
-def read_edited(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> tuple[Weighting, GroupWeights, np.ndarray]:
-    """Returns, for the mesh as it is edited: its weighting, its groups as stored, its points in armature
-    space."""
-    armature = attach.armature_of(obj)
-    bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-    weights = mesh_io.read_group_weights(obj.data)
-    points = _in_armature_space(obj, armature, obj.data, depsgraph)
-    return _weighting(obj, obj, weights, bones), weights, points
-
-
 def _read_part(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part:
-    armature = attach.armature_of(obj)
-    weighting, weights, points = read_edited(obj, depsgraph)
-    bones = weighting.bones
-    edited = influences = weighting.influences_over_joints(points)
+    armature, edited = attach.armature_of(obj), Edited.read(obj, depsgraph)
+    weighting, points = edited.weighting, edited.rest_points
     shown = obj.evaluated_get(depsgraph)
-    evaluated = shown.data
     if stack.upstream_changes(obj):
-        there = _weighting(obj, shown, mesh_io.read_group_weights(evaluated), bones)
-        influences = there.influences_over_joints(_in_armature_space(obj, armature, evaluated, depsgraph))
-    count = len(evaluated.vertices)
-    return Part(obj, armature, weighting, weights, points, count, influences, PoseCheck(edited))
+        weighting = _weighting(obj, shown, mesh_io.read_group_weights(shown.data), weighting.bones)
+        points = _in_armature_space(obj, armature, shown.data, depsgraph)
+    influences = weighting.influences_over_joints(points)
+    return Part(obj, armature, edited, len(shown.data.vertices), influences)
 
 
 def _weighting(

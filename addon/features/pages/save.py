@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators that save a page that turns have in common."""
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import bpy
@@ -14,7 +14,7 @@ ENDING = ".html"
 
 
 class SavesPage(stepped.WithDialog):
-    """A base class: subclasses have page(context), which yields the progress, at the end the text.
+    """A base class: subclasses have page(context), which yields the progress and returns the text.
 
     usual_name  of the page of a file that was never saved
     """
@@ -30,7 +30,7 @@ class SavesPage(stepped.WithDialog):
         name="Check", description="Warn of a file of that name", default=True, options={"HIDDEN"}
     )
 
-    def page(self, context: bpy.types.Context, title: str) -> Iterator[float | str]:
+    def page(self, context: bpy.types.Context, title: str) -> Generator[float, None, str]:
         raise NotImplementedError
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -52,13 +52,8 @@ class SavesPage(stepped.WithDialog):
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         self._target = file_to_write(bpy.path.abspath(self.filepath), (ENDING,))
-        for step in self.page(context, self._target.stem):
-            if isinstance(step, str):
-                self._text = step
-            else:
-                yield step
+        self._text = yield from self.page(context, self._target.stem)
 
-    def finish(self, _context: bpy.types.Context) -> set[str]:
+    def run(self, _context: bpy.types.Context) -> None:
         write_text(self._target, self._text)
         self.report({"INFO"}, tr("Saved {path}", path=self._target.name))
-        return {"FINISHED"}

@@ -4,7 +4,7 @@
 Meshes are those of Sinew's objects: of the mesh itself or, where Sinew is off there, of a copy of it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import bpy
@@ -157,8 +157,8 @@ def page(
     frames: Sequence[float] | Sequence[Pose],
     left_out: Sequence[str] = (),
     found: Found | None = None,
-) -> Iterator[float | str]:
-    """Yields the progress, at the end the text of the page. Sets frames; restoring is the caller's.
+) -> Generator[float, None, str]:
+    """Yields the progress, returns the text of the page. Sets frames; restoring is the caller's.
 
     meshes    each with the objects that Sinew may deform in its place
     attached  meshes that bones move as they are
@@ -203,7 +203,7 @@ def page(
         viewer.add_frame(frame if pose is None else pose.name)
         yield (number + 1) / len(frames)
     viewer.notes += [note for each in skinned for note in each.notes]
-    yield viewer.page()
+    return viewer.page()
 
 
 def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: Sequence[str]) -> _Skinned:

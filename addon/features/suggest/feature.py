@@ -43,9 +43,8 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         return suggest.scan(context.scene, sinew_targets(context), self.over)
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         self.report({"INFO"}, recommend.choices[context.scene.session_uid].text)
-        return {"FINISHED"}
 
 
 class SINEW_OT_recommend(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
@@ -62,11 +61,10 @@ class SINEW_OT_recommend(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             raise SinewError("All meshes have settings of their own")
         self.choice = yield from recommend.search(context.scene, objects)
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         recommend.choices[context.scene.session_uid] = self.choice
         _use(context, self.choice)
         self.report({"INFO"}, self.choice.text)
-        return {"FINISHED"}
 
 
 class SINEW_OT_use_recommended(OnSinewObjects, bpy.types.Operator):
@@ -74,12 +72,11 @@ class SINEW_OT_use_recommended(OnSinewObjects, bpy.types.Operator):
     bl_description = "Deform all meshes of the character by the recommended method and stages"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         choice = recommend.choices.get(context.scene.session_uid)
         if choice is None:
             raise SinewError("Nothing is recommended yet: click Suggest first")
         _use(context, choice)
-        return {"FINISHED"}
 
 
 class SINEW_OT_suggestions_by(bpy.types.Operator):

@@ -9,7 +9,6 @@ from pathlib import Path
 import bpy
 
 from ...attach import properties
-from ...core import interrupt
 from ...core.flex.limits import Table, read_table
 from ...core.output import write_text
 from ...core.steps import result_of
@@ -47,10 +46,9 @@ def flex(task: dict, report: Callable[..., None]) -> dict:
     steps = bending.flex(meshes, methods, table, own)
     result = result_of(steps, lambda done: report("bending it", share=of_bending * done))
     if page:
-        for step in flex_page.page(scene, path.stem, meshes, result, left_out):
-            if isinstance(step, str):
-                write_text(Path(page), step)
-            else:
-                report("reading it for the page", share=of_bending * (1.0 + step))
-            interrupt.check()
+        steps = flex_page.page(scene, path.stem, meshes, result, left_out)
+        text = result_of(
+            steps, lambda done: report("reading it for the page", share=of_bending * (1.0 + done))
+        )
+        write_text(Path(page), text)
     return {**result.verdict.to_dict(), "left_out": left_out, "notes": notes}
