@@ -5,15 +5,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core import interrupt
 from ..core.bake import FILES, KINDS
-from ..core.errors import SinewError, WrongUse
+from ..core.errors import SinewError, WrongUse, about
 from ..core.frames import parse_frames
 from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
 from ..core.vat import AXES, DEFAULT_VAT, TEXELS, VatOptions
@@ -24,8 +22,6 @@ from .outcome import Outcome, conclude, of_each
 
 if TYPE_CHECKING:
     import bpy
-
-    from ..features.bake.bake_state import Started
 
 SUMMARY = "write what Sinew deforms as shape keys, point caches, Alembic, USD, helper bones or textures"
 HELP = """\
@@ -51,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_copies(parser)
     add_method(parser, "a method of `sinew methods`, for all meshes (default: each as the file has it)")
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
-    parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
+    parser.add_argument(
+        "--frames", type=parse_frames, help="such as 1,12,40-48 (default: the scene's frames)"
+    )
     parser.add_argument("--step", type=count, default=1, metavar="N", help="every Nth of the frames")
     parser.add_argument(
         "--helpers",
@@ -114,12 +112,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
         raise WrongUse(
             "--set goes with --method or --preset; without it meshes are baked as the file has them"
         )
-    frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
     suffix = FILES.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
-    outcomes = of_each(
-        jobs, Baked, lambda outcome: _bake(outcome, args, frames, console), args.overwrite, console
-    )
+    outcomes = of_each(jobs, Baked, lambda outcome: _bake(outcome, args, console), args.overwrite, console)
     if args.json:
         console.say(json.dumps([outcome.as_json() for outcome in outcomes], indent=2, ensure_ascii=False))
         return 1 if any(outcome.failed for outcome in outcomes) else 0
@@ -131,7 +126,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     return conclude(console, outcomes, columns, lambda o: (str(o.meshes), str(o.frames)), "baked")
 
 
-def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, console: Console) -> None:
+def _bake(outcome: Baked, args: argparse.Namespace, console: Console) -> None:
     import bpy
 
     from ..attach import attach
@@ -148,7 +143,7 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
     outcome.left_out += [
         f"{obj.name} is not in the scene {scene.name}" for obj in other_scenes if obj not in meshes
     ]
-    chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
+    chosen = sorted(set(args.frames or range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     # Hidden objects are baked as well, and hidden again in the copy.
     with characters.shown(meshes):
         taken = []
@@ -157,16 +152,13 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
                 taken.append(obj)
             else:
                 outcome.left_out.append(str(error))
-        for sentence in characters.sentences():
-            console.note(f"{source}: {sentence}")
+        console.note_on(source, characters.sentences())
         if not taken:
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
-        try:
-            helpers = HelperOptions(args.helpers or 0, args.error, args.influences, args.motion)
-            vat = VatOptions(args.axes, args.texels)
+        helpers = HelperOptions(args.helpers or 0, args.error, args.influences, args.motion)
+        vat = VatOptions(args.axes, args.texels)
+        with about(source):
             started = bake.start(taken, args.to, chosen, target, args.overwrite, helpers, vat)
-        except SinewError as error:
-            raise SinewError(f"{source}: {error}") from None
         # An exporter writes all frames in one call, which cannot be interrupted and can crash on a full disk:
         # so it runs in a separate process.
         if isinstance(started, bake_export.SceneExport):
@@ -174,7 +166,8 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
         else:
             shares = started.sample()
         with (
-            _whole_or_nothing(started, source),
+            about(source),
+            started.whole_or_nothing(),
             console.bar(f"Baking {source.name}", len(chosen)) as show,
             closing(shares),
         ):
@@ -182,7 +175,7 @@ def _bake(outcome: Baked, args: argparse.Namespace, frames: list[float] | None, 
                 show(share)
                 interrupt.check()
             show(1.0)
-    with _whole_or_nothing(started, source):
+    with about(source), started.whole_or_nothing():
         started.place()
         if args.to in FILES:
             started.publish()
@@ -207,14 +200,3 @@ def _use_method(meshes: list[bpy.types.Object], args: argparse.Namespace) -> lis
         else SinewError(f"{obj.name} is not deformed by Sinew; choose a method by --method")
         for obj in meshes
     ]
-
-
-@contextmanager
-def _whole_or_nothing(started: Started, source: Path) -> Iterator[None]:
-    try:
-        yield
-    except BaseException as error:
-        started.discard()
-        if isinstance(error, SinewError):
-            raise SinewError(f"{source}: {error}") from None
-        raise

@@ -230,14 +230,9 @@ class Workers:
             verbose=console.verbose,
         )
 
-    def run(self, tasks: list[dict], _progress: BatchProgress) -> Outcomes:
+    def run(self, tasks: list[dict], progress: BatchProgress) -> Outcomes:
         if not tasks or (self._inside_blender and not self._apart):
-            from .. import worker
-            from ..prepare import prepare_blender
-
-            if tasks:
-                prepare_blender()
-            return run_here(tasks, lambda task: worker.run(task, lambda _doing: None), self.versions)
+            return self.run_here(tasks, progress)
         if self._args.scheduler is not None:
             try:
                 from ..jobs.dask_cluster import run_in_dask
@@ -245,9 +240,21 @@ class Workers:
                 raise SinewError("--scheduler needs dask: pip install 'sinew-blender[cluster]'") from None
 
             return run_in_dask(tasks, self._limits, self._args.scheduler, self._console.complain)
-        return run_on_this_machine(tasks, self._limits, self._jobs, self.versions)
+        return run_on_this_machine(tasks, self._limits, self._jobs, self._versions)
 
-    def versions(self) -> dict[str, str]:
+    def run_here(self, tasks: list[dict], progress: BatchProgress) -> Outcomes:
+        """In this process, which a crash ends."""
+        from .. import worker
+        from ..prepare import prepare_blender
+
+        def report(_doing: str, share: float = 0.0) -> None:
+            progress.show_share(share)
+
+        if tasks:
+            prepare_blender()
+        return run_here(tasks, lambda task: worker.run(task, report), self._versions)
+
+    def _versions(self) -> dict[str, str]:
         """Of this Python, or of this Blender."""
         if not self._inside_blender:
             return versions()

@@ -14,7 +14,7 @@ from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import folder_to_write, write_text
-from ..core.page import Sheet, page, require_jinja
+from ..core.page import page, require_jinja
 from ..core.parameters import PRESETS
 from ..core.steps import result_of
 from .arguments import add_engine, add_files, add_object, add_set, add_viewer, check_viewer, count, pixels
@@ -46,7 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METHOD",
         help="what distances are measured to (default: %(default)s, the file's Armature modifier)",
     )
-    parser.add_argument("--frames", help="such as 1,12,40-48 (default: the file's frame range)")
+    parser.add_argument(
+        "--frames", type=parse_frames, help="such as 1,12,40-48 (default: the file's frame range)"
+    )
     add_object(parser)
     parser.add_argument(
         "--pictures",
@@ -88,7 +90,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
     check_viewer(args.viewer, len(args.files))
     if args.out is not None:
         require_jinja()
-    frames = parse_frames(args.frames) if args.frames is not None else None
     _check_names(args.files)
     engine = render.chosen_engine(args.engine) if args.pictures and args.out is not None else None
     failed = False
@@ -96,9 +97,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
         try:
             complete = True
             if args.viewer is not None:
-                complete = _write_viewer(path, methods, frames, args, console)
+                complete = _write_viewer(path, methods, args, console)
             if args.out is not None:
-                complete &= _compare(path, methods, frames, engine, args, console)
+                complete &= _compare(path, methods, engine, args, console)
         except SinewError as error:
             console.complain(error)
             complete = False
@@ -114,9 +115,7 @@ def _check_names(files: list[Path]) -> None:
             raise WrongUse(f"{other} and {path} would both be written to {path.stem}.html")
 
 
-def _write_viewer(
-    path: Path, methods: list[str], frames: list[float] | None, args: argparse.Namespace, console: Console
-) -> bool:
+def _write_viewer(path: Path, methods: list[str], args: argparse.Namespace, console: Console) -> bool:
     """Writes the page that turns; returns False where a mesh was left out."""
     import bpy
 
@@ -127,15 +126,14 @@ def _write_viewer(
 
     console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
-    frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
+    frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
     # The painted mix is that of the file.
     own = {obj: properties.of(obj).method for obj in scene.objects if properties.has_sinew(obj)}
     meshes, left_out = characters.deformable_meshes(scene, path, [*methods, viewer.PLAYED], args.object)
     preset = next((name for name in methods if name in PRESETS), None)
     errors = characters.use_methods([(obj, preset or own.get(obj, viewer.PLAYED)) for obj in meshes])
     left_out += [str(error) for error in errors if error is not None]
-    for sentence in characters.sentences() if preset else ():
-        console.note(f"{path}: {sentence}")
+    console.note_on(path, characters.sentences() if preset else ())
     # Its stages follow all methods of the page.
     chosen = [properties.of(obj).method for obj in meshes]
     methods = list(
@@ -154,64 +152,42 @@ def _write_viewer(
 
 
 def _compare(
-    path: Path,
-    methods: list[str],
-    frames: list[float] | None,
-    engine: str | None,
-    args: argparse.Namespace,
-    console: Console,
+    path: Path, methods: list[str], engine: str | None, args: argparse.Namespace, console: Console
 ) -> bool:
-    """Writes one file's page; returns False where a mesh was left out."""
+    """Measures, and draws pictures; writes both, and one file's page. Returns False where a mesh was left
+    out."""
     import bpy
 
     from ..deform import characters
-    from ..features.pages import measure
+    from ..features.pages import illustrate, measure, render
     from ..io import files
 
     console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
-    frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
+    frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
     characters.set_frame(scene, frames[0])
     played = [*methods, args.reference]
     meshes, left_out = characters.deformable_meshes(scene, path, played, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     subject = measure.gather(scene, meshes)
+    folder, sheets = args.out / as_file_name(path.stem), []
     with characters.kept_presets(meshes, played):
-        for sentence in characters.sentences():
-            console.note(f"{path}: {sentence}")
-        comparison, sheets = _illustrated(path, subject, methods, frames, engine, args, console)
+        console.note_on(path, characters.sentences())
+        comparison = _measure(path, subject, methods, frames, args, console)
+        write_text(folder / "metrics.json", comparison.to_json())
+        if engine is not None:
+            studio = render.Studio(scene, subject.meshes, engine, args.size)
+            illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
+            illustrator.plan(args.pictures)
+            count = illustrator.picture_count
+            for _ in console.progress(illustrator.draw(), count, f"Drawing {path.name}"):
+                pass
+            sheets = illustrator.sheets
     target = args.out / f"{path.stem}.html"
     write_text(target, page(comparison, sheets, "; ".join(f"Left out: {reason}" for reason in left_out)))
     console.say(str(target))
     return not left_out
-
-
-def _illustrated(
-    path: Path,
-    subject: Subject,
-    methods: list[str],
-    frames: list[float],
-    engine: str | None,
-    args: argparse.Namespace,
-    console: Console,
-) -> tuple[Comparison, list[Sheet]]:
-    """Measures, and draws pictures; writes both."""
-    from ..features.pages import illustrate, render
-
-    comparison = _measure(path, subject, methods, frames, args, console)
-    folder = args.out / as_file_name(path.stem)
-    write_text(folder / "metrics.json", comparison.to_json())
-    sheets = []
-    if engine is not None:
-        studio = render.Studio(subject.scene, subject.meshes, engine, args.size)
-        illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
-        illustrator.plan(args.pictures)
-        count = illustrator.picture_count
-        for _ in console.progress(illustrator.draw(), count, f"Drawing {path.name}"):
-            pass
-        sheets = illustrator.sheets
-    return comparison, sheets
 
 
 def _measure(

@@ -40,7 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--influences", type=count, default=4, metavar="N", help=".glb: of a vertex, at most (default: 4)"
     )
     parser.add_argument("--verify", action="store_true", help="say how far the file plays from what is seen")
-    parser.add_argument("--frames", help=f"to verify, such as 1,12 (default: {FRAMES} of the scene's)")
+    parser.add_argument(
+        "--frames",
+        type=parse_frames,
+        help=f"to verify, such as 1,12 (default: {FRAMES} of the scene's)",
+    )
     parser.add_argument(
         "--at-most",
         type=percent,
@@ -63,8 +67,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         raise WrongUse("--frames and --at-most go with --verify")
     console.note_on(args.file, files.open_file(args.file))
     meshes = attach.deformed_meshes(list(bpy.context.scene.objects))
-    frames = parse_frames(args.frames) if args.frames is not None else None
-    options = export_file.ExportOptions(args.influences, args.verify, frames)
+    options = export_file.ExportOptions(args.influences, args.verify, args.frames)
     # Blender does not evaluate hidden objects.
     with characters.shown(meshes):
         left_out, skinned = _skinned(args, meshes, console)
@@ -73,8 +76,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for sentence in left_out:
         console.complain(f"{args.file}: {sentence}")
     unit = characters.length_unit(bpy.context.scene)
-    for report in written.bendy:
-        console.note(f"{args.file}: {report.sentence(unit)}")
+    console.note_on(args.file, (report.sentence(unit) for report in written.bendy))
     for name, content in export.written().items() if args.out.suffix.lower() == ".glb" else ():
         mixed = f", mixed with {content['mix']}" if "mix" in content else ""
         console.note(f"{name}: {content['method']}{mixed}")
@@ -104,8 +106,7 @@ def _skinned(
         characters.set_parameters(args.set)
         errors = characters.use_methods([(obj, args.method) for obj in meshes])
         left_out = [str(error) for error in errors if error is not None]
-        for sentence in characters.sentences():
-            console.note(f"{args.file}: {sentence}")
+        console.note_on(args.file, characters.sentences())
     skinned = [obj for obj in meshes if properties.has_sinew(obj) and properties.of(obj).enabled]
     if not skinned:
         reason = left_out[0] if left_out else "no mesh has Sinew; choose a method by --method"

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import replace
 from functools import partial
@@ -19,7 +19,6 @@ from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.scratch import scratch_folder
 from ..jobs.inputs import files_of
 from ..jobs.journal import Journal, content_hash
-from ..jobs.workers import run_here
 from . import batch
 from .arguments import add_json, add_object, add_viewer, check_viewer, methods
 from .console import BatchProgress, Console
@@ -97,7 +96,7 @@ def _run(args: argparse.Namespace, console: Console, tables: Sequence[Path], out
     workers = batch.Workers(args, len(tasks), console, TIMEOUT, apart=True)
     limits = args.jobs, args.scheduler, args.timeout, args.memory
     is_here = len(tasks) == 1 and all(limit is None for limit in limits)
-    run = partial(_run_here, workers.versions) if is_here else workers.run
+    run = workers.run_here if is_here else workers.run
     text_of = partial(json.dumps, indent=2, ensure_ascii=False)
     results: dict[str, dict] = {}
     showing = batch.Showing(partial(_show, console, names), partial(_is_complete, args.viewer), "joints")
@@ -131,20 +130,6 @@ def _names(inputs: Sequence[str], out: Path) -> dict[Path, str]:
             name = str(path) if os.path.isabs(given) else os.path.relpath(path)
             names.setdefault(path, given if path == Path(given).absolute() else name)
     return names
-
-
-def _run_here(
-    versions: Callable[[], dict[str, str]], tasks: list[dict], progress: BatchProgress
-) -> batch.Outcomes:
-    """In this process, which a crash ends."""
-    from .. import worker
-    from ..prepare import prepare_blender
-
-    def report(_doing: str, share: float = 0.0) -> None:
-        progress.show_share(share)
-
-    prepare_blender()
-    return run_here(tasks, lambda task: worker.run(task, report), versions)
 
 
 def _show(

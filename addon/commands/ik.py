@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="only chains with this bone; may be given several times",
     )
     parser.add_argument("--method", choices=sinew.ik.METHODS, default="dls", help="default: dls")
-    parser.add_argument("--frames", metavar="FIRST-LAST", help="default: the scene's frames")
+    parser.add_argument("--frames", type=_range, metavar="FIRST-LAST", help="default: the scene's frames")
 
 
 @dataclass
@@ -44,10 +44,9 @@ class Solved(Outcome):
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    frames = None if args.frames is None else _range(args.frames)
     jobs = plan_jobs(args.inputs, args.out)
     shown = console.progress(jobs, len(jobs), "Solving inverse kinematics")
-    outcomes = of_each(shown, Solved, lambda solved: _solve(solved, args, frames), args.overwrite, console)
+    outcomes = of_each(shown, Solved, lambda solved: _solve(solved, args), args.overwrite, console)
     columns = ("chains", "bones", "farthest tip")
     return conclude(
         console, outcomes, columns, lambda o: (str(o.chains), str(o.bones), f"{o.worst:.1e}"), "solved"
@@ -62,7 +61,7 @@ def _range(text: str) -> list[int]:
     return whole
 
 
-def _solve(outcome: Solved, args: argparse.Namespace, frames: list[int] | None) -> None:
+def _solve(outcome: Solved, args: argparse.Namespace) -> None:
     import bpy
 
     from ..features.ik import ik_bake
@@ -74,7 +73,7 @@ def _solve(outcome: Solved, args: argparse.Namespace, frames: list[int] | None) 
     if not armatures:
         which = "no armature" if args.armature is None else f"no armature called {args.armature!r}"
         raise SinewError(f"{source}: {which}; nothing written")
-    wanted = frames or stepped.frames_over(scene, armatures, "SCENE")
+    wanted = args.frames or stepped.frames_over(scene, armatures, "SCENE")
     reasons = []
     for armature in armatures:
         with stepped.kept_frame(scene, [armature]):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, about
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import file_to_write, write_whole
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     text = "a method of `sinew methods`, or blender for the Armature modifier"
     add_method(parser, text, required=True, read=str)
-    parser.add_argument("--frames", required=True, help="such as 1,12,40-48")
+    parser.add_argument("--frames", required=True, type=parse_frames, help="such as 1,12,40-48")
     add_object(parser)
     parser.add_argument(
         "--out", required=True, type=partial(file_to_write, endings=(".npz",)), metavar="POINTS.npz"
@@ -44,15 +44,13 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..deform import characters
     from ..io import files
 
-    frames = parse_frames(args.frames)
+    frames = args.frames
     if args.method not in PRESETS:
         characters.check_methods([args.method])
     characters.set_parameters(args.set)
     console.note_on(args.file, files.open_file(args.file))
-    try:
+    with about(args.file):
         meshes = characters.deformed_meshes(bpy.context.scene, args.object)
-    except SinewError as error:
-        raise SinewError(f"{args.file}: {error}") from None
 
     failed = False
     taken = []
@@ -63,8 +61,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         else:
             failed = True
             console.complain(f"{args.file}: left out: {reason}")
-    for sentence in characters.sentences():
-        console.note(f"{args.file}: {sentence}")
+    console.note_on(args.file, characters.sentences())
     if not taken:
         raise SinewError(f"{args.file}: no mesh that Sinew can deform")
 

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     text = "a method of `sinew methods`, or blender for the Armature modifier"
     add_method(parser, text, read=str)
-    parser.add_argument("--frames", help="such as 1,12,40-48")
+    parser.add_argument("--frames", type=parse_frames, help="such as 1,12,40-48")
     add_object(parser)
     parser.add_argument("--size", type=pixels, help="pixels of a picture's longer side (default: 640)")
     add_engine(parser, default=None)
@@ -71,9 +71,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             raise WrongUse(f"{args.out}: would replace the golden pictures; choose another --out")
         golden = RenderSettings.read(args.against)
     method = args.method or (golden.method if golden is not None else None)
-    frames = golden.frames if golden is not None else None
-    if args.frames is not None:
-        frames = parse_frames(args.frames)
+    frames = args.frames or (golden.frames if golden is not None else None)
     if method is None or frames is None:
         raise WrongUse("render: --method or --preset, and --frames, are needed where there is no --against")
     if method not in PRESETS:
@@ -145,8 +143,7 @@ def _draw(
         else:
             views = characters.whole_views(meshes, [method], frames)
         studio = render.Studio(scene, meshes, engine, size)
-    for sentence in characters.sentences():
-        console.note(f"{args.file}: {sentence}")
+    console.note_on(args.file, characters.sentences())
     names = [obj.name for obj in meshes]
     settings = RenderSettings(
         args.file.name, method, frames, engine, size, args.own_look, names, views, as_texts(parameters)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...attach import properties, stack, upstream_proxy
 from ...core import helper_bones, pose_helpers, pose_samples
-from ...core.errors import SinewError
+from ...core.errors import SinewError, about
 from ...core.helper_bones import POSE, Errors, HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
 from ...core.segment_bones import SegmentErrors, SegmentReport
@@ -63,8 +63,10 @@ class BoneBake(Started):
                     rig.take()
                 yield _SAMPLING * (number + 1) / len(self.frames)
         for number, rig in enumerate(self._rigs):
-            for share in _naming(rig.meshes, rig.solve()):
-                yield _SAMPLING + (1.0 - _SAMPLING) * (number + share) / len(self._rigs)
+            # The solver does not know the meshes.
+            with about(", ".join(obj.name for obj in rig.meshes)):
+                for share in rig.solve():
+                    yield _SAMPLING + (1.0 - _SAMPLING) * (number + share) / len(self._rigs)
         self.reports = [rig.report for rig in self._rigs]
 
     def place(self) -> None:
@@ -273,16 +275,6 @@ class _Rig:
                 bake_state.use_copy_of_mesh(obj)
             helper_bones_io.write_weights(obj, self._bones, movers, slots[rows], weights[rows])
         return [self._segments.report(self.rig.name, self._unit)]
-
-
-def _naming(
-    meshes: Sequence[bpy.types.Object], steps: Generator[float, None, None]
-) -> Generator[float, None, None]:
-    """The steps; errors name the meshes, which the solver does not know."""
-    try:
-        yield from steps
-    except SinewError as error:
-        raise SinewError(f"{', '.join(obj.name for obj in meshes)}: {error}") from error
 
 
 def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:
