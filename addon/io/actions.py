@@ -10,6 +10,8 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
+from .elements import read
+
 # The first column of each of a bone's channels, as in pose_io.read_channels().
 COLUMNS = {
     "location": 0,
@@ -161,17 +163,11 @@ def unmuted_curves(
 
 def key_times(curves: Sequence[bpy.types.FCurve]) -> np.ndarray:
     """Returns the times at which any of the curves has a key, ascending, float32."""
-    times = [_key_points(curve)[:, 0] for curve in curves]
+    times = [read(curve.keyframe_points, "co", 2)[:, 0] for curve in curves]
     # Keyed poses have keys in all channels, so there is seldom anything to sort.
     if len({array.tobytes() for array in times}) == 1:
         return times[0]
     return np.unique(np.concatenate(times))
-
-
-def _key_points(curve: bpy.types.FCurve) -> np.ndarray:
-    points = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
-    curve.keyframe_points.foreach_get("co", points)
-    return points.reshape(-1, 2)
 
 
 def gains_of_a_round(
@@ -204,9 +200,9 @@ def hold_still(curves: Sequence[bpy.types.FCurve], times: np.ndarray) -> np.ndar
     Constant)."""
     still = np.ones(len(times), dtype=bool)
     for curve in curves:
-        kinds = np.empty(len(curve.keyframe_points), dtype=np.int32)
-        curve.keyframe_points.foreach_get("interpolation", kinds)
-        key = np.searchsorted(_key_points(curve)[:, 0], times, side="right") - 1
+        points = curve.keyframe_points
+        kinds = read(points, "interpolation", kind=np.int32)
+        key = np.searchsorted(read(points, "co", 2)[:, 0], times, side="right") - 1
         still &= (key >= 0) & (kinds[key] == key_value("interpolation", "CONSTANT"))
         if not still.any():
             break
@@ -227,14 +223,11 @@ def write_keys(curve: bpy.types.FCurve, times: Sequence[float], values: np.ndarr
         points.remove(point, fast=True)
     kept = len(points)
     points.add(len(times))
-    kinds = np.empty(len(points), np.int32)
-    keys = np.empty(2 * len(points), np.float32)
-    points.foreach_get("interpolation", kinds)
-    points.foreach_get("co", keys)
+    kinds, keys = read(points, "interpolation", kind=np.int32), read(points, "co", 2)
     kinds[kept:] = key_value("interpolation", "LINEAR")
-    keys[2 * kept :] = np.column_stack([times, values]).ravel()
+    keys[kept:] = np.column_stack([times, values])
     points.foreach_set("interpolation", kinds)
-    points.foreach_set("co", keys)
+    points.foreach_set("co", keys.ravel())
     curve.update()
 
 

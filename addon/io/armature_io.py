@@ -10,6 +10,7 @@ from mathutils import Matrix, Quaternion, Vector
 from ..core.envelopes import Envelopes
 from ..core.rig import Bones
 from ..core.twist_spread import NOT_TOLD, TwistInputs
+from .elements import read
 
 _CURVED = bpy.types.Bone.bl_rna.properties["bbone_mapping_mode"].enum_items["CURVED"].value
 # Of axes of unit length: less is the rounding of poses.
@@ -22,14 +23,7 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     """Returns the rest bones of an evaluated armature object, in the order of its pose, and the joints of
     bendy bones."""
     bones = evaluated_armature.data.bones
-    deform = np.empty(len(bones), dtype=bool)
-    lengths = np.empty(len(bones), dtype=np.float32)
-    segments = np.empty(len(bones), dtype=np.int32)
-    mappings = np.empty(len(bones), dtype=np.int32)
-    bones.foreach_get("use_deform", deform)
-    bones.foreach_get("length", lengths)
-    bones.foreach_get("bbone_segments", segments)
-    bones.foreach_get("bbone_mapping_mode", mappings)
+    segments = read(bones, "bbone_segments", kind=np.int32)
     rest = _read_matrices(bones, "matrix_local")
     first_joints = np.full(len(bones), -1, dtype=np.int32)
     parts, count, complete = [rest], len(bones), True
@@ -45,11 +39,11 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
         count += segments[bone] + 1
     return Bones(
         tuple(bones.keys()),
-        deform,
+        read(bones, "use_deform", kind=bool),
         np.concatenate(parts),
-        lengths,
+        read(bones, "length"),
         segments,
-        mappings == _CURVED,
+        read(bones, "bbone_mapping_mode", kind=np.int32) == _CURVED,
         first_joints,
         _read_envelopes(bones),
         _read_parents(bones),
@@ -103,19 +97,14 @@ def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
 
 
 def _read_envelopes(bones: bpy.types.bpy_prop_collection) -> Envelopes:
-    def read(name: str, width: int = 1, dtype: type = np.float32) -> np.ndarray:
-        flat = np.empty(width * len(bones), dtype=dtype)
-        bones.foreach_get(name, flat)
-        return flat.reshape(-1, width) if width > 1 else flat
-
     return Envelopes(
-        heads=read("head_local", 3),
-        tails=read("tail_local", 3),
-        head_radii=read("head_radius"),
-        tail_radii=read("tail_radius"),
-        distances=read("envelope_distance"),
-        weights=read("envelope_weight"),
-        multiply=read("use_envelope_multiply", dtype=bool),
+        heads=read(bones, "head_local", 3),
+        tails=read(bones, "tail_local", 3),
+        head_radii=read(bones, "head_radius"),
+        tail_radii=read(bones, "tail_radius"),
+        distances=read(bones, "envelope_distance"),
+        weights=read(bones, "envelope_weight"),
+        multiply=read(bones, "use_envelope_multiply", kind=bool),
     )
 
 
@@ -138,11 +127,8 @@ def read_turns(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray
     Euler angles or axis and angle may go beyond half a turn, as sinew.Deformer.deform takes it. None where
     there is none."""
     pose_bones, count = evaluated_armature.pose.bones, len(bones.names)
-    modes = np.empty(count, np.int32)
-    eulers, around_axes = np.empty((count, 3), np.float32), np.empty((count, 4), np.float32)
-    pose_bones.foreach_get("rotation_mode", modes)
-    pose_bones.foreach_get("rotation_euler", eulers.ravel())
-    pose_bones.foreach_get("rotation_axis_angle", around_axes.ravel())
+    modes = read(pose_bones, "rotation_mode", kind=np.int32)
+    eulers, around_axes = read(pose_bones, "rotation_euler", 3), read(pose_bones, "rotation_axis_angle", 4)
     # Three angles of at most a quarter of a turn do not add up to more than half.
     by_euler = (modes > 0) & (np.abs(eulers).max(axis=1) > np.pi / 2)
     by_axis = (modes < 0) & (np.abs(around_axes[:, 0]) > np.pi / 2)
@@ -228,10 +214,8 @@ def _turns_told(bone: bpy.types.PoseBone) -> tuple[float, ...]:
 
 
 def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarray:
-    flat = np.empty(16 * len(bones), dtype=np.float32)
-    bones.foreach_get(name, flat)
     # Blender stores matrices by columns.
-    return flat.reshape(-1, 4, 4).transpose(0, 2, 1)
+    return read(bones, name, 16).reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
 def _read_joints(

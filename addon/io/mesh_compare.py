@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.influences import GroupWeights
 from . import mesh_io
+from .elements import read
 
 _SETTINGS = ("texspace_location", "texspace_size", "use_auto_texspace", "has_custom_normals")
 _KEY_SETTINGS = ("name", "mute", "vertex_group", "slider_min", "slider_max", "interpolation")
@@ -17,7 +18,6 @@ _VALUES = {
     "FLOAT": ("value", 1),
     "INT": ("value", 1),
     "INT8": ("value", 1),
-    "BOOLEAN": ("value", 1),
     "FLOAT_VECTOR": ("vector", 3),
     "FLOAT2": ("vector", 2),
     "FLOAT_COLOR": ("color", 4),
@@ -101,9 +101,7 @@ def _facts(mesh: bpy.types.Mesh) -> Iterator[object]:
 
 
 def _arrays(mesh: bpy.types.Mesh) -> Iterator[np.ndarray]:
-    starts = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", starts)
-    yield starts
+    yield read(mesh.polygons, "loop_start", kind=np.int32)
     for attribute in mesh.attributes:
         yield _values_of(attribute)
     if mesh.has_custom_normals and mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS) is None:
@@ -113,16 +111,12 @@ def _arrays(mesh: bpy.types.Mesh) -> Iterator[np.ndarray]:
 
 
 def _values_of(attribute: bpy.types.Attribute) -> np.ndarray:
-    count = len(attribute.data)
+    if attribute.data_type == "BOOLEAN":
+        return read(attribute.data, "value", kind=bool)
     if attribute.data_type not in _VALUES:
         return np.array([each.value for each in attribute.data])
-    name, size = _VALUES[attribute.data_type]
     is_real = attribute.data_type.startswith(("FLOAT", "QUATERNION", "BYTE_COLOR"))
-    values = np.empty(count * size, dtype=np.float32 if is_real else np.int32)
-    if attribute.data_type == "BOOLEAN":
-        values = np.empty(count, dtype=bool)
-    attribute.data.foreach_get(name, values)
-    return values
+    return read(attribute.data, *_VALUES[attribute.data_type], np.float32 if is_real else np.int32)
 
 
 def write_points(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> None:

@@ -20,6 +20,7 @@ from ..core.shading import Shading
 from ..core.shape_keys import ShapeKeys
 from ..core.stage_mesh import Topology
 from ..core.surface import Surface, coincident_vertices
+from .elements import read
 
 # The attribute with a mesh's vertices: as a whole it is read and written a hundred times as fast as the
 # vertices' "co".
@@ -46,35 +47,26 @@ def attribute_to_write(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute |
 
 def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
     """int32 [corners], the vertex of each."""
-    vertices = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", vertices)
-    return vertices
+    return read(mesh.loops, "vertex_index", kind=np.int32)
 
 
 def corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
     """float32 [corners, 3], object space."""
-    normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
-    mesh.corner_normals.foreach_get("vector", normals.ravel())
-    return normals
+    return read(mesh.corner_normals, "vector", 3)
 
 
 def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
     """Returns vertex positions in object space, float32 [vertices, 3]; a copy."""
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     # In edit mode a mesh has no attributes, and without vertices it may have none.
     attribute = None if mesh.is_editmode else find_attribute(mesh, POSITION)
-    if attribute is not None and len(attribute.data) == len(points):
-        attribute.data.foreach_get("vector", points.ravel())
-    else:
-        mesh.vertices.foreach_get("co", points.ravel())
-    return points
+    if attribute is not None and len(attribute.data) == len(mesh.vertices):
+        return read(attribute.data, "vector", 3)
+    return read(mesh.vertices, "co", 3)
 
 
 def read_key_points(block: bpy.types.ShapeKey) -> np.ndarray:
     """Returns float32 [vertices, 3], as stored."""
-    points = np.empty((len(block.points), 3), dtype=np.float32)
-    block.points.foreach_get("co", points.ravel())
-    return points
+    return read(block.points, "co", 3)
 
 
 def read_sdef_keys(mesh: bpy.types.Mesh) -> np.ndarray | None:
@@ -92,36 +84,26 @@ def read_sdef_keys(mesh: bpy.types.Mesh) -> np.ndarray | None:
 def read_triangles(mesh: bpy.types.Mesh) -> np.ndarray:
     """Returns int32 [triangles, 3]: the vertices of each."""
     mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return triangles
+    return read(mesh.loop_triangles, "vertices", 3, np.int32)
 
 
 def read_surface(mesh: bpy.types.Mesh) -> Surface:
-    triangles = read_triangles(mesh)
-    edges = np.empty((len(mesh.edges), 2), dtype=np.int32)
-    mesh.edges.foreach_get("vertices", edges.ravel())
-    points = read_points(mesh)
-    return Surface(len(mesh.vertices), triangles, edges, coincident_vertices(points))
+    triangles, edges = read_triangles(mesh), read(mesh.edges, "vertices", 2, np.int32)
+    return Surface(len(mesh.vertices), triangles, edges, coincident_vertices(read_points(mesh)))
 
 
 def read_topology(mesh: bpy.types.Mesh) -> Topology:
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    edges = np.empty((len(mesh.edges), 2), dtype=np.int32)
-    offsets = np.empty(len(mesh.polygons) + 1, dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", offsets[:-1])
-    offsets[-1] = len(corners)
     # Reading whole attributes takes a hundredth of the time.
     of_corners, of_edges = (
         None if mesh.is_editmode else find_attribute(mesh, name) for name in (".corner_vert", ".edge_verts")
     )
     if of_corners is not None and of_edges is not None:
-        of_corners.data.foreach_get("value", corners)
-        of_edges.data.foreach_get("value", edges.ravel())
+        corners = read(of_corners.data, "value", kind=np.int32)
+        edges = read(of_edges.data, "value", 2, np.int32)
     else:
-        mesh.loops.foreach_get("vertex_index", corners)
-        mesh.edges.foreach_get("vertices", edges.ravel())
-    return Topology(offsets, corners, edges)
+        corners, edges = corner_vertices(mesh), read(mesh.edges, "vertices", 2, np.int32)
+    starts = read(mesh.polygons, "loop_start", kind=np.int32)
+    return Topology(np.append(starts, np.int32(len(corners))), corners, edges)
 
 
 def read_shading(mesh: bpy.types.Mesh) -> Shading:
@@ -145,15 +127,12 @@ def _read_flags(
     shown_as  the value of the elements' property that means a set flag; read where the mesh has no attributes
     """
     if mesh.is_editmode:
-        flags = np.empty(len(elements), dtype=bool)
-        elements.foreach_get(property_name, flags)
-        flags = flags == shown_as
+        flags = read(elements, property_name, kind=bool) == shown_as
     else:
         attribute = find_attribute(mesh, name)
         if attribute is None or attribute.data_type != "BOOLEAN":
             return None
-        flags = np.empty(len(attribute.data), dtype=bool)
-        attribute.data.foreach_get("value", flags)
+        flags = read(attribute.data, "value", kind=bool)
     return flags if flags.any() and len(flags) == len(elements) else None
 
 
@@ -163,9 +142,7 @@ def _read_custom_normals(mesh: bpy.types.Mesh) -> np.ndarray | None:
     attribute = None if mesh.is_editmode else find_attribute(mesh, CUSTOM_NORMALS)
     if attribute is None or attribute.data_type != "INT16_2D" or attribute.domain != "CORNER":
         return None
-    numbers = np.empty((len(attribute.data), 2), dtype=np.int32)
-    attribute.data.foreach_get("value", numbers.ravel())
-    return numbers.astype(np.int16)
+    return read(attribute.data, "value", 2, np.int32).astype(np.int16)
 
 
 def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> None:
@@ -277,11 +254,8 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
 def read_key_values(evaluated_keys: bpy.types.Key) -> np.ndarray:
     """Returns float32 [keys]: the value of each shape key at this evaluation; 0 where it is muted."""
     blocks = evaluated_keys.key_blocks
-    values = np.empty(len(blocks), dtype=np.float32)
-    muted = np.empty(len(blocks), dtype=bool)
-    blocks.foreach_get("value", values)
-    blocks.foreach_get("mute", muted)
-    values[muted] = 0.0
+    values = read(blocks, "value")
+    values[read(blocks, "mute", kind=bool)] = 0.0
     return values
 
 

@@ -7,6 +7,7 @@ import sinew
 from mathutils import Euler, Quaternion
 
 from ..core.inbetween import Poses
+from .elements import read
 
 CHANNELS = 10
 
@@ -23,8 +24,7 @@ def read_channels(bones: bpy.types.bpy_prop_collection) -> np.ndarray:
     scale 3."""
     channels = np.zeros((len(bones), CHANNELS), dtype=np.float32)
     for name, columns, rows in _channel_blocks(bones):
-        width = columns.stop - columns.start
-        channels[rows, columns] = _read_channel(bones, name, width)[rows]
+        channels[rows, columns] = read(bones, name, columns.stop - columns.start)[rows]
     return channels
 
 
@@ -32,7 +32,7 @@ def write_channels(bones: bpy.types.bpy_prop_collection, channels: np.ndarray) -
     """Sets what differs from `channels`, as from read_channels(). Returns whether anything did."""
     changed = False
     for name, columns, rows in _channel_blocks(bones):
-        values = _read_channel(bones, name, columns.stop - columns.start)
+        values = read(bones, name, columns.stop - columns.start)
         if not np.array_equal(values[rows], channels[rows, columns]):
             values[rows] = channels[rows, columns]
             bones.foreach_set(name, values.ravel())
@@ -51,12 +51,6 @@ def _channel_blocks(
         width = 3 if name == "rotation_euler" else 4
         blocks.append((str(name), slice(3, 3 + width), rotations == name))
     return blocks
-
-
-def _read_channel(bones: bpy.types.bpy_prop_collection, name: str, width: int) -> np.ndarray:
-    flat = np.empty(width * len(bones), dtype=np.float32)
-    bones.foreach_get(name, flat)
-    return flat.reshape(-1, width)
 
 
 def poses_of(channels: np.ndarray, modes: np.ndarray) -> Poses:

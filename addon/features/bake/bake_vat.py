@@ -19,6 +19,7 @@ from ...core.output import remove, unfinished_path, writing
 from ...core.vectors import transformed
 from ...deform import characters
 from ...io import files, mesh_io
+from ...io.elements import read
 from . import bake_state
 from .bake_export import carried_by, selected
 from .bake_state import Started
@@ -184,11 +185,10 @@ class VatBake(Started):
 
 def _vertex_normals(mesh: bpy.types.Mesh) -> np.ndarray:
     """float [vertices, 3]: one for each vertex, also at a sharp edge."""
+    if not mesh.has_custom_normals:
+        return read(mesh.vertex_normals, "vector", 3)
     normals = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
-    if mesh.has_custom_normals:
-        np.add.at(normals, mesh_io.corner_vertices(mesh), mesh_io.corner_normals(mesh))
-    else:
-        mesh.vertex_normals.foreach_get("vector", normals.ravel())
+    np.add.at(normals, mesh_io.corner_vertices(mesh), mesh_io.corner_normals(mesh))
     return normals
 
 

@@ -14,6 +14,7 @@ from ...core.errors import SinewError
 from ...deform import pose, session
 from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
+from ...io.elements import read
 
 # The bone's smallest rotation, in radians: below it, the key would be all or nothing.
 LEAST_TURN = 0.05
@@ -56,9 +57,7 @@ def add(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, bone: bpy.types.P
         obj.shape_key_add(name="Basis", from_mix=False)
     method = properties.METHODS[properties.of(obj).method].label
     key = obj.shape_key_add(name=f"{method} {bpy.context.scene.frame_current}", from_mix=False)
-    points = np.empty((len(found), 3), dtype=np.float32)
-    key.data.foreach_get("co", points.ravel())
-    key.data.foreach_set("co", (points + found).astype(np.float32).ravel())
+    key.data.foreach_set("co", (read(key.data, "co", 3) + found).astype(np.float32).ravel())
     key.mute, key.value = True, 1.0
     if bone is not None and turns is not None:
         _drive(key, bone, *turns)

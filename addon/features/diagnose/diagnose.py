@@ -18,6 +18,7 @@ from ...core.rig import Bones
 from ...core.vectors import rotations_of
 from ...deform import characters, session
 from ...io import armature_io, mesh_io
+from ...io.elements import read
 from ...ui import stepped
 from ...ui.translations import tr
 from ..pages.measure import Edited
@@ -130,10 +131,8 @@ def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.ty
     mesh = obj.data
     chosen = np.zeros(len(mesh.vertices), dtype=bool)
     chosen[vertices] = True
-    hidden = np.empty(len(mesh.vertices), dtype=bool)
-    mesh.vertices.foreach_get("hide", hidden)
     # Hidden vertices cannot be selected.
-    mesh.vertices.foreach_set("hide", hidden & ~chosen)
+    mesh.vertices.foreach_set("hide", read(mesh.vertices, "hide", kind=bool) & ~chosen)
     # Not through the context: Blender 4.2 would keep the scene with the context, and crash without it.
     context.scene.tool_settings.mesh_select_mode = (True, False, False)
     bpy.ops.object.mode_set(mode="EDIT")
