@@ -67,8 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..features.blend import blend_actions
-    from ..io import files
+    from ..io import actions, files
 
     if args.out.resolve() == args.file.resolve():
         raise WrongUse(f"{args.out}: would replace the file itself; choose another name")
@@ -78,7 +77,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     armature = _armature(args)
     made = _make(args, armature, _actions(args, armature), console)
     console.note_on(args.file, made.notes())
-    blend_actions.play(armature, made.action)
+    actions.play(armature, made.action)
     files.save_copy(args.file, args.out)
     root = f", carried by {made.blend.root}" if made.blend.root is not None else ""
     kind = "a cycle" if made.blend.is_cyclic else "no cycle"

@@ -18,7 +18,7 @@ import numpy as np
 import sinew
 
 from .rig import Bones
-from .twists import LOWER, OWN_TWIST, UPPER
+from .twists import LOWER, OWN_TWIST, UPPER, words_of
 
 Limits = Mapping[str, np.ndarray]
 """By the name of a bone: float [3, 2], least and most rotation about each of its axes, in radians; NaN where
@@ -167,7 +167,7 @@ def roles(bones: Bones) -> list[str]:
 def sides(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     """Returns int [bones], 1 for left, -1 for right, 0 for neither; and int [bones], the bone that has the
     same name but for its side, -1 for none."""
-    words = [_words(name) for name in names]
+    words = [words_of(name) for name in names]
     side = np.array([_side_of(word) for word in words], int).reshape(-1)
     mirror = np.full(len(words), -1)
     # Some exporters number all bones.
@@ -227,7 +227,7 @@ class _Battery:
         self._axes, self._heads = rest[:, :3, :3], rest[:, :3, 3]
         self._along = self._axes[:, :, 1]
         self._joints = [int(bone) for bone in np.flatnonzero(moving) if bones.carriers[bone] >= 0]
-        self._words = [_words(name) for name in bones.names]
+        self._words = [words_of(name) for name in bones.names]
 
     def poses(self) -> list[Pose]:
         limited = [bone for bone in self._joints if self._bones.names[bone] in self._limits]
@@ -428,10 +428,6 @@ class _Battery:
             return _unit(bent), math.atan2(np.linalg.norm(bent), self._along[above] @ along)
         axis = np.cross(along, _unit(toward))
         return (_unit(axis) if np.linalg.norm(axis) > 0.1 else None), 0.0
-
-
-def _words(name: str) -> str:
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
 def _side_of(word: str) -> int:

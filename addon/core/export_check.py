@@ -4,7 +4,7 @@ skin has in Blender, and what all of them together do not explain is the rest.""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -101,8 +101,7 @@ class Distance:
     mean: float
 
     @classmethod
-    def of(cls, pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> Distance:
-        found = [np.linalg.norm(a - b, axis=1) for a, b in pairs]
+    def of(cls, found: Sequence[np.ndarray]) -> Distance:
         together = np.concatenate(found) if found else np.zeros(0)
         return cls(float(together.max(initial=0.0)), float(together.mean()) if len(together) else 0.0)
 
@@ -280,7 +279,9 @@ class Comparison:
             own, rest = self._rows(moment.influences), moment.rest[at]
             motions = np.where(moment.damaged[:, None, None] > 0.0, moment.bound, self._motions(moment))
             pairs["sampling"].append((blended(*own, motions, rest), blended(*own, moment.bound, rest)))
-        found = {name: Distance.of(own) for name, own in pairs.items()}
+        found = {
+            name: Distance.of([np.linalg.norm(a - b, axis=1) for a, b in own]) for name, own in pairs.items()
+        }
         points = seen.frames[0].seen
         diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
         rounding = EXPLAINED * max(diagonal, 0.1 * float(np.abs(points).max(initial=0.0)))
@@ -302,8 +303,7 @@ class Comparison:
             shown = _unit(moment.normals[corners[rows]].astype(np.float64))
             sines = np.linalg.norm(np.cross(skinned, shown), axis=1)
             found.append(np.degrees(np.arctan2(sines, (skinned * shown).sum(axis=1))))
-        angles = np.concatenate(found)
-        return Distance(float(angles.max(initial=0.0)), float(angles.mean())) if len(angles) else None
+        return Distance.of(found) if rows.any() else None
 
     def _corners(self, normals: np.ndarray) -> np.ndarray:
         """int [file's vertices]: the corner that each was split from, by its normal; -1 for none."""

@@ -319,13 +319,12 @@ class Skin:
         rotations = rotations.astype(np.float32)
         blended = np.zeros((4, self.surface.vertex_count), dtype=np.float32)
         blended[0] = 1.0
-        if len(self.weighted):
-            bones, weights = self.influences.bones, self.influences.weights
-            heaviest = np.repeat(self.heaviest, self.influences.counts[self.weighted])
-            terms = rotations.take(bones, axis=1)
-            # All are brought into the hemisphere of the heaviest: a sum of two then never cancels.
-            terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
-            blended[:, self.weighted] = np.add.reduceat(terms, self.starts, axis=1)
+        bones, weights = self.influences.bones, self.influences.weights
+        heaviest = np.repeat(self.heaviest, self.influences.counts[self.weighted])
+        terms = rotations.take(bones, axis=1)
+        # All are brought into the hemisphere of the heaviest: a sum of two then never cancels.
+        terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
+        blended[:, self.weighted] = np.add.reduceat(terms, self.starts, axis=1)
         return blended
 
     def by_weights(self, of_limbs: np.ndarray) -> np.ndarray:
@@ -481,7 +480,7 @@ class Measured:
     def __init__(self, pose: Pose, shape: Shape, other: np.ndarray | Callable[[], np.ndarray] | None) -> None:
         """other: [vertices, 3], or a function that returns it: the shape that distances are measured to."""
         self.rest, self.shape = pose.rest, shape
-        self._pose, self._other = pose, other
+        self.pose, self._other = pose, other
 
     @cached_property
     def distance(self) -> np.ndarray:
@@ -496,7 +495,7 @@ class Measured:
     def bulge(self) -> np.ndarray:
         """float64 [vertices]: how much farther each is from its bone's axis than at rest, in the unit of the
         points; 0 without weights."""
-        bulge, pose = np.zeros(self.shape.surface.vertex_count), self._pose
+        bulge, pose = np.zeros(self.shape.surface.vertex_count), self.pose
         skin = pose.skin
         bulge[skin.weighted] = skin.distances_from_axes(self.shape.points, pose.frame.posed_axes)
         bulge[skin.weighted] -= pose.rest_distances
@@ -505,24 +504,24 @@ class Measured:
     @cached_property
     def flipped(self) -> np.ndarray:
         """bool [triangles]: those that are inside out against the bones that move them."""
-        return dots(self.shape.normals, self._pose.rotated_normals) < 0.0
+        return dots(self.shape.normals, self.pose.rotated_normals) < 0.0
 
     @cached_property
     def _limb_changes(self) -> np.ndarray:
         """float64 [limbs]: the volume that each loses or gains."""
-        return np.abs(self._pose.skin.limbs.volumes(self.shape.points) - self._pose.rest_limbs)
+        return np.abs(self.pose.skin.limbs.volumes(self.shape.points) - self.pose.rest_limbs)
 
     @cached_property
     def limb_change(self) -> float:
         """The volume that limbs lose or gain, as a part of all; NaN where they have none at rest."""
-        whole = float(np.abs(self._pose.rest_limbs).sum())
+        whole = float(np.abs(self.pose.rest_limbs).sum())
         return float(self._limb_changes.sum()) / whole if whole > 0.0 else float("nan")
 
     @cached_property
     def limb_losses(self) -> np.ndarray:
         """float64 [vertices]: the volume that the limbs around each lose or gain, as a part of their own, at
         most 1."""
-        skin, at_rest = self._pose.skin, self._pose.rest_limbs
+        skin, at_rest = self.pose.skin, self.pose.rest_limbs
         change = self._limb_changes
         # Flat parts have hardly any.
         own = np.maximum(np.abs(at_rest), LEAST_LIMB * np.abs(at_rest).sum())
@@ -532,7 +531,7 @@ class Measured:
     def rest_distances(self) -> np.ndarray:
         """float64 [vertices]: how far each is from the axis of its heaviest bone at rest; 0 without one."""
         distances = np.zeros(self.shape.surface.vertex_count)
-        distances[self._pose.skin.weighted] = self._pose.rest_distances
+        distances[self.pose.skin.weighted] = self.pose.rest_distances
         return distances
 
     @cached_property
@@ -549,10 +548,6 @@ class Measured:
         """Returns one entry of the summary, or `bulge_worst`, without computing the others."""
         return self._ENTRIES[name](self)
 
-    @property
-    def pose(self) -> Pose:
-        return self._pose
-
     def by_limb(self) -> dict[str, np.ndarray]:
         """Returns measures of what is bent, float64 [bones], each of the part of the mesh that follows a bone
         most; NaN for a bone that has nothing bent:
@@ -563,7 +558,7 @@ class Measured:
         bulge    above zero, RMS
         pinch    by how much the narrowest ring of its joints is narrower than NARROW of its width at rest
         """
-        pose, rest, surface = self._pose, self.rest, self.shape.surface
+        pose, rest, surface = self.pose, self.rest, self.shape.surface
         count, bones = pose.bone_count, pose.skin.limb_of_vertices
         bent = np.flatnonzero(pose.is_bent & (bones >= 0))
         ends = surface.ends[:, pose.bent_edges]
@@ -650,9 +645,8 @@ class Measured:
         around = self.shape.surface.edges_around
         longest, shortest = np.ones((2, self.shape.surface.vertex_count))
         stretch = self.stretch.take(around.edges)
-        if len(stretch):
-            longest[around.vertices] = np.maximum.reduceat(stretch, around.starts)
-            shortest[around.vertices] = np.minimum.reduceat(stretch, around.starts)
+        longest[around.vertices] = np.maximum.reduceat(stretch, around.starts)
+        shortest[around.vertices] = np.minimum.reduceat(stretch, around.starts)
         longest, shortest = np.maximum(longest, 1.0), np.minimum(shortest, 1.0)
         return np.where(longest * shortest >= 1.0, longest, shortest)
 
@@ -681,8 +675,6 @@ def _by_axis(points: np.ndarray) -> np.ndarray:
 
 def _heaviest_bones(influences: Influences, weighted: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """int [weighted]: the bone with the largest weight of each vertex, the first of equals."""
-    if len(weighted) == 0:
-        return np.empty(0, dtype=np.int64)
     largest = np.repeat(np.maximum.reduceat(influences.weights, starts), influences.counts[weighted])
     indices = np.where(influences.weights == largest, np.arange(len(largest)), len(largest))
     return influences.bones[np.minimum.reduceat(indices, starts)].astype(np.int64)

@@ -29,6 +29,11 @@ NEAR = 0.25
 STRAIGHT = np.cos(np.radians(45.0))
 
 
+def words_of(name: str) -> str:
+    """Returns a bone's name in lower case, its words divided."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
 @dataclass(frozen=True)
 class Twists:
     """
@@ -165,7 +170,7 @@ class TwistFinder:
 
     def _role(self, bone: int) -> str:
         """UPPER, LOWER or NEITHER by its name, or empty."""
-        name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._names[bone]).lower()
+        name = words_of(self._names[bone])
         if re.search(OWN_TWIST, name) or re.match(MADE, name):
             return NEITHER
         for role in (LOWER, UPPER):

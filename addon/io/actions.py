@@ -101,8 +101,9 @@ def new_curve(curves: bpy.types.bpy_prop_collection, path: str, index: int, grou
     return curves.new(path, index=index, **({name: group} if name is not None else {}))
 
 
-def play(obj: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.bpy_struct | None) -> None:
-    """Has `obj` play the action; the previous action stays in the file."""
+def play(obj: bpy.types.Object, action: bpy.types.Action) -> None:
+    """Has `obj` play the action, by the slot of slot_for(); the previous action stays in the file."""
+    slot = slot_for(action, obj)
     animation = obj.animation_data or obj.animation_data_create()
     before = animation.action
     if before is not None and before != action and before.is_editable:

@@ -37,7 +37,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
         # Drawn while the panel is closed, too: finding all meshes takes long in a large scene.
         has_sinew = operators.has_sinew_targets(context)
         layout, meshes = self.layout, character.known_meshes(context) if has_sinew else []
-        room = characters(context) - len(self.bl_label) - (BUTTONS if has_sinew else MARGIN)
+        room = characters() - len(self.bl_label) - (BUTTONS if has_sinew else MARGIN)
         layout.label(text=_title(context, meshes, max(room, 8)), translate=False)
         if has_sinew:
             SINEW_PT_method_presets.draw_panel_header(layout)
@@ -47,23 +47,26 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
         layout = self.layout
         meshes = operators.targets(context)
         for other in attach.not_meshes(context.selected_objects):
-            text = tr("{name} stays with its Armature modifier: Sinew deforms meshes only", name=other.name)
-            draw_text(layout, context, text, icon="INFO")
+            draw_text(
+                layout,
+                "{name} stays with its Armature modifier: Sinew deforms meshes only",
+                icon="INFO",
+                name=other.name,
+            )
         if not meshes:
-            draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
+            draw_text(layout, "Select a mesh that an armature deforms, or the armature", icon="INFO")
             if not context.selected_objects:
                 layout.operator("sinew.open_lesson", icon="HELP")
             return
         waits = operators.waits_for_render()
         if waits:
-            text = tr("{wait}: until then nothing can be changed", wait=tr(waits))
-            draw_text(layout, context, text, icon="INFO")
+            draw_text(layout, "{wait}: until then nothing can be changed", icon="INFO", wait=tr(waits))
             if not context.scene.render.use_lock_interface:
                 text = "Lock Interface, in the menu Render, keeps Blender from reading what a render changes"
-                draw_text(layout, context, text, icon="INFO")
+                draw_text(layout, text, icon="INFO")
         column = layout.column()
         column.enabled = not waits
-        _draw_add(column, context, meshes)
+        _draw_add(column, meshes)
         skinned = character.find_meshes(context)
         lead = character.lead(context)
         if lead is not None:
@@ -81,7 +84,7 @@ def _title(context: bpy.types.Context, meshes: list[bpy.types.Object], room: int
     return longer if len(meshes) > 1 and len(longer) <= room else shortened(text, room)
 
 
-def _draw_add(layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]) -> None:
+def _draw_add(layout: bpy.types.UILayout, meshes: list[bpy.types.Object]) -> None:
     count = sum(not properties.has_sinew(obj) for obj in meshes)
     if not count:
         return
@@ -93,7 +96,7 @@ def _draw_add(layout: bpy.types.UILayout, context: bpy.types.Context, meshes: li
     row.operator_menu_enum("sinew.add", "method", text="", icon="DOWNARROW_HLT")
     for obj in meshes:
         for sentence in () if properties.has_sinew(obj) else other_tools.warnings(obj):
-            draw_text(layout, context, sentence, icon="ERROR")
+            draw_text(layout, sentence, icon="ERROR")
 
 
 def _draw_character(
@@ -123,8 +126,12 @@ def _draw_character(
     methods = {tr(properties.method_label(settings.method)) for settings in followers}
     if len(methods) > 1:
         names = ", ".join(sorted(methods))
-        text = tr("The meshes differ: {names}. A method that you choose goes to all", names=names)
-        draw_text(column, context, text, icon="INFO")
+        draw_text(
+            column,
+            "The meshes differ: {names}. A method that you choose goes to all",
+            icon="INFO",
+            names=names,
+        )
     state_text.draw_character(layout, context, meshes)
     precomputing.draw(layout, [(obj, session.state_of(obj)) for obj in meshes if properties.of(obj).enabled])
 
@@ -144,7 +151,7 @@ class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
         lead = character.lead(context)
         names = [] if lead is None else stage_settings.names_on(properties.of(lead))
         if names:
-            room = characters(context) - len(tr(self.bl_label)) - MARGIN
+            room = characters() - len(tr(self.bl_label)) - MARGIN
             self.layout.label(text=stages_text(names, room), translate=False)
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -156,7 +163,7 @@ class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
         layout = self.layout
         layout.enabled = not operators.waits_for_render()
         layout.active = properties.of(lead).enabled
-        draw_stages(layout, context, settings, lead)
+        draw_stages(layout, settings, lead)
 
 
 CLASSES = (SINEW_MT_character, SINEW_PT_main, SINEW_PT_stages)

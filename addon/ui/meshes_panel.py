@@ -34,7 +34,7 @@ class SINEW_UL_meshes(bpy.types.UIList):
         _active_property: str,
     ) -> None:
         row = layout.row(align=True)
-        name = shortened(obj.name, characters(context) // 2)
+        name = shortened(obj.name, characters() // 2)
         if not properties.has_sinew(obj):
             row.label(text=name, icon="OUTLINER_OB_MESH", translate=False)
             row.operator("sinew.add", text="Add", emboss=False).name = obj.name
@@ -67,28 +67,27 @@ class SINEW_PT_meshes(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if obj is None:
             return
         if properties.has_sinew(obj):
-            _draw_details(layout, context, obj, is_alone=len(meshes) == 1)
+            _draw_details(layout, obj, is_alone=len(meshes) == 1)
         else:
-            text = tr("{name}: without Sinew, its Armature modifier deforms it", name=obj.name)
-            draw_text(layout, context, text, icon="INFO")
+            draw_text(
+                layout, "{name}: without Sinew, its Armature modifier deforms it", icon="INFO", name=obj.name
+            )
 
 
-def _draw_details(
-    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, is_alone: bool
-) -> None:
+def _draw_details(layout: bpy.types.UILayout, obj: bpy.types.Object, is_alone: bool) -> None:
     settings = properties.of(obj)
     if not is_alone:
         row = layout.row(align=True)
         row.operator("sinew.own_settings", depress=settings.is_own).name = obj.name
         row.prop(settings, "enabled", text=state_text.switch_text([obj]), toggle=True)
         row.operator("sinew.remove", text="", icon="X").name = obj.name
-        state_text.draw_mesh(layout, context, obj)
+        state_text.draw_mesh(layout, obj)
     column = layout.column()
     column.active = settings.enabled
     if settings.is_own and not is_alone:
         draw_method(column, settings)
         draw_parameters(column, settings, obj)
-        draw_stages(column, context, settings, obj, only=obj.name)
+        draw_stages(column, settings, obj, only=obj.name)
     _draw_further_modifiers(column, settings)
     _draw_facts(column, obj)
 

@@ -25,9 +25,9 @@ def _draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
     row.prop(settings, "enabled", text=state_text.switch_text([obj]), toggle=True)
     row.operator("sinew.open_tab", text="", icon="MENU_PANEL")
     is_refused = session.plan_of(obj).state is State.REFUSED
-    draw_text(box, context, state_text.sentence_of(obj), alert=is_refused)
+    draw_text(box, state_text.sentence_of(obj), alert=is_refused)
     if settings.replaces_modifiers:
-        draw_text(box, context, other_tools.APPLYING, icon="INFO")
+        draw_text(box, other_tools.APPLYING, icon="INFO")
 
 
 FEATURE = Feature(

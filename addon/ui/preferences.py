@@ -55,22 +55,22 @@ class SinewPreferences(bpy.types.AddonPreferences):
         layout.use_property_split = True
         layout.prop(self, "first_method")
         layout.prop(self, "cache_folder")
-        _draw_variable(layout, context, precomputing.VARIABLE)
+        _draw_variable(layout, precomputing.VARIABLE)
         layout.prop(self, "safe_mode")
-        _draw_variable(layout, context, safe_mode.VARIABLE)
+        _draw_variable(layout, safe_mode.VARIABLE)
         layout.prop(
             context.scene.render, "use_lock_interface", text="Lock Interface in Renders of This Scene"
         )
         menus.draw_shortcuts(self.layout, context)
 
 
-def _draw_variable(layout: bpy.types.UILayout, context: bpy.types.Context, name: str) -> None:
+def _draw_variable(layout: bpy.types.UILayout, name: str) -> None:
     """Draws a note where an environment variable overrides the setting."""
     if os.environ.get(name) is not None:
         text = tr(
             "The environment variable {name} decides: it is {value}", name=name, value=repr(os.environ[name])
         )
-        draw_text(layout, context, text, icon="INFO")
+        draw_text(layout, text, icon="INFO")
 
 
 CLASSES = (SinewPreferences,)

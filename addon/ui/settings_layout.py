@@ -48,23 +48,19 @@ def draw_parameters(
 
 
 def draw_stages(
-    layout: bpy.types.UILayout,
-    context: bpy.types.Context,
-    settings: bpy.types.PropertyGroup,
-    obj: bpy.types.Object,
-    only: str = "",
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object, only: str = ""
 ) -> None:
     """Draws the stages, the signs, the scale rule, and who computes normals.
 
     only  the name of the mesh that buttons act on; empty for the character
     """
-    _draw_mix(layout, context, settings, obj, only)
+    _draw_mix(layout, settings, obj, only)
     for stage in stage_settings.STAGES.values():
         if stage.name != "mix":
             _draw_stage(layout, settings, obj, stage, only)
             if stage.name == "twist_spread" and settings.twist_spread.enabled:
-                _draw_twists(layout, context, obj)
-    _draw_take_over(layout, context, obj, only)
+                _draw_twists(layout, obj)
+    _draw_take_over(layout, obj, only)
     draw_parameters(layout, settings, obj, signs=True)
     named(layout, "Scale").prop(settings, "scale_rule", text="")
     if normals.ARE_SUPPORTED:
@@ -74,18 +70,14 @@ def draw_stages(
 
 
 def _draw_mix(
-    layout: bpy.types.UILayout,
-    context: bpy.types.Context,
-    settings: bpy.types.PropertyGroup,
-    obj: bpy.types.Object,
-    only: str,
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object, only: str
 ) -> None:
     mix = settings.mix
     named(layout, "Mix").prop(mix, "method", text="")
     if mix.method != properties.OFF:
         named(layout, "By").prop_search(mix, "group", obj, "vertex_groups", text="")
         if not mix.group:
-            draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
+            draw_text(layout, "Choose the vertex group that says where it takes over", icon="INFO")
         _draw_make_group(layout, settings, obj, "mix", only)
     if not stepped.draw_progress(layout, "sinew.auto_mix"):
         layout.operator_menu_enum("sinew.auto_mix", "over", text="Auto-Mix").name = only
@@ -141,7 +133,7 @@ def _draw_parameter(
         layout.prop(group, parameter.id)
 
 
-def _draw_twists(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+def _draw_twists(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """Draws the bones that share a twist, with their own settings, and why others do not."""
     state, armature = session.state_of(obj), properties.of(obj).armature
     if state is None or armature is None:
@@ -163,20 +155,18 @@ def _draw_twists(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bp
         row.prop(bone, "sinew_twist_amount", text="")
         row.prop(bone, "sinew_twist_curve", text="")
     if not twists.bones:
-        draw_text(layout, context, "No bone was found whose twist can be spread", icon="INFO")
+        draw_text(layout, "No bone was found whose twist can be spread", icon="INFO")
     for sentence in twists.left_out[:MOST_LEFT_OUT]:
-        draw_text(layout, context, sentence, icon="INFO")
+        draw_text(layout, sentence, icon="INFO")
 
 
-def _draw_take_over(
-    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, only: str
-) -> None:
+def _draw_take_over(layout: bpy.types.UILayout, obj: bpy.types.Object, only: str) -> None:
     """For the mesh, or for any of the character's."""
-    meshes = [obj] if only else operators.sinew_targets(context)
+    meshes = [obj] if only else operators.sinew_targets(bpy.context)
     if any(operators.can_take_over(mesh) for mesh in meshes):
         layout.operator("sinew.take_over_smooth", icon="MOD_SMOOTH").name = only
         return
     for mesh in meshes:
         modifier = corrective_smooth.candidate(mesh)
         if modifier is not None and properties.of(mesh).enabled:
-            draw_text(layout, context, corrective_smooth.why_not(mesh, modifier), icon="INFO")
+            draw_text(layout, corrective_smooth.why_not(mesh, modifier), icon="INFO")

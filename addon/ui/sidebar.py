@@ -24,8 +24,8 @@ class Sidebar:
 class SINEW_PT_unavailable(Sidebar, bpy.types.Panel):
     bl_label = "Sinew"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        draw_text(self.layout, context, native.load_error() or "Restart Blender to use Sinew", icon="ERROR")
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_text(self.layout, native.load_error() or "Restart Blender to use Sinew", icon="ERROR")
 
 
 def redraw() -> None:
@@ -37,8 +37,9 @@ def redraw() -> None:
                     region.tag_redraw()
 
 
-def characters(context: bpy.types.Context) -> int:
-    """The number of characters that fit the region's width."""
+def characters() -> int:
+    """The number of characters that fit the width of the region that is drawn."""
+    context = bpy.context
     return int(context.region.width / context.preferences.system.ui_scale * CHARACTERS_PER_PIXEL)
 
 
@@ -58,19 +59,18 @@ def names_text(names: Sequence[str], most: int = 3) -> str:
 
 
 def draw_text(
-    layout: bpy.types.UILayout,
-    context: bpy.types.Context,
-    text: str,
-    icon: str = "NONE",
-    alert: bool = False,
+    layout: bpy.types.UILayout, text: str, icon: str = "NONE", alert: bool = False, **values: object
 ) -> None:
-    """Draws text in the user's language, wrapped into as many labels as the sidebar's width needs."""
-    width = max(20, characters(context) - (4 if icon != "NONE" else 0))
+    """Draws text in the user's language, wrapped into as many labels as the sidebar's width needs.
+
+    values  as tr() takes them
+    """
+    width = max(20, characters() - (4 if icon != "NONE" else 0))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
     # A name may be longer than a line; wrapped, it would look like two.
-    text = " ".join(shortened(word, width) for word in tr(text).split())
+    text = " ".join(shortened(word, width) for word in tr(text, **values).split())
     for number, line in enumerate(textwrap.wrap(text, width, break_on_hyphens=False)):
         shown = icon if number == 0 or icon == "NONE" else "BLANK1"
         column.label(text=line, icon=shown, translate=False)

@@ -98,13 +98,13 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
     return [*found, *(sentence for sentence in other_tools.warnings(obj) if sentence not in found)]
 
 
-def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+def draw_in_mode(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """For modes whose tools work through the Armature modifier: draws whether its shape is Sinew's, and the
     switch that makes it so if the artist has changed it."""
     if session.plan_of(obj).state is not State.EDITING or obj.mode not in ARMATURE_MODIFIER_MODES:
         return
     sentence, modifiers = shape_in_mode(obj)
-    draw_text(layout, context, sentence, icon="INFO")
+    draw_text(layout, sentence, icon="INFO")
     for modifier in modifiers:
         row = layout.row()
         row.prop(modifier, "use_deform_preserve_volume")
@@ -130,19 +130,18 @@ def shape_in_mode(obj: bpy.types.Object) -> tuple[str, list[bpy.types.ArmatureMo
     return tr("The shape is the same: {method}", method=method), []
 
 
-def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+def draw_mesh(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """Draws everything about one mesh."""
     plan = session.plan_of(obj)
     if plan.state is State.REFUSED:
-        draw_text(layout, context, plan.reason, icon="ERROR", alert=True)
+        draw_text(layout, plan.reason, icon="ERROR", alert=True)
     for sentence in (*reasons_of(obj), *attach.notes(obj), *other_tools.notes(obj)):
-        draw_text(layout, context, sentence, icon="INFO")
-    draw_in_mode(layout, context, obj)
+        draw_text(layout, sentence, icon="INFO")
+    draw_in_mode(layout, obj)
     if plan.normals_reason:
-        text = tr("Blender computes normals: {reason}", reason=tr(plan.normals_reason))
-        draw_text(layout, context, text, icon="INFO")
+        draw_text(layout, "Blender computes normals: {reason}", icon="INFO", reason=tr(plan.normals_reason))
     for sentence in problems_of(obj):
-        draw_text(layout, context, sentence, icon="ERROR")
+        draw_text(layout, sentence, icon="ERROR")
 
 
 def draw_character(
@@ -151,12 +150,12 @@ def draw_character(
     """Draws everything for one mesh; for several their errors, and which of them have more to read in the
     list."""
     if len(meshes) == 1:
-        draw_mesh(layout, context, meshes[0])
+        draw_mesh(layout, meshes[0])
         return
     plans = {obj: session.plan_of(obj) for obj in meshes}
     for plan in plans.values():
         if plan.state is State.REFUSED:
-            draw_text(layout, context, plan.reason, icon="ERROR", alert=True)
+            draw_text(layout, plan.reason, icon="ERROR", alert=True)
     by_reason: dict[str, list[str]] = {}
     for obj, plan in plans.items():
         is_off = plan.state in (State.OFF, State.REFUSED)
@@ -167,10 +166,9 @@ def draw_character(
         who = names_text(names, most=2)
         if len(names) == len(meshes):
             who = tr("All {count} meshes", count=len(meshes))
-        draw_text(layout, context, f"{who}: {tr(reason)}", icon="INFO")
+        draw_text(layout, f"{who}: {tr(reason)}", icon="INFO")
     if context.active_object in meshes:
-        draw_in_mode(layout, context, context.active_object)
+        draw_in_mode(layout, context.active_object)
     warned = [obj.name for obj in meshes if problems_of(obj)]
     if warned:
-        text = tr("{names}: warnings, see Meshes", names=names_text(warned))
-        draw_text(layout, context, text, icon="ERROR")
+        draw_text(layout, "{names}: warnings, see Meshes", icon="ERROR", names=names_text(warned))

@@ -92,7 +92,7 @@ def film(armature, frames):
 
 
 def played(armature, action, frames):
-    actions.play(armature, action, actions.slot_for(action, armature))
+    actions.play(armature, action)
     return film(armature, frames)
 
 
@@ -177,7 +177,7 @@ def rows(chosen, weights=(1.0, 1.0), first=(1.0, 1.0)):
 
 def test_the_operator_blends_and_undo_takes_it_back():
     armature, chosen, _pair = make_walks()
-    actions.play(armature, chosen[0], actions.slot_for(chosen[0], armature))
+    actions.play(armature, chosen[0])
     with pytest.raises(RuntimeError, match="choose two actions or more"):
         bpy.ops.sinew.blend_actions(actions=rows(chosen, (1.0, 0.0)))
     gone = {"name": "GONE", "weight": 1.0, "weight_from": 1.0}

@@ -148,11 +148,11 @@ class SINEW_PT_bake(Sidebar, OfSkinned, bpy.types.Panel):
     bl_label = "Bake and Export"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")
         layout.operator("sinew.export", text="Export\u2026", icon="EXPORT")
-        draw_text(layout, context, "A bake into this file takes Sinew off", icon="INFO")
+        draw_text(layout, "A bake into this file takes Sinew off", icon="INFO")
         layout.operator("sinew.corrective_key", icon="SHAPEKEY_DATA")
 
 

@@ -9,7 +9,7 @@ import bpy
 from ...core.errors import SinewError
 from ...core.motion import blend as core
 from ...core.steps import as_part
-from ...io import actions, clips, spaces
+from ...io import clips, spaces
 
 # Share of the progress: reading curves takes as long as writing keys.
 READING = 0.5
@@ -72,8 +72,3 @@ def make(
     steps = clips.write(armature, blend.clip(name), name, first, keyed)
     made = yield from as_part(steps, READING, 1.0 - READING)
     return Made(made, blend)
-
-
-def play(armature: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Has the armature play the new action; the previous one stays in the file."""
-    actions.play(armature, action, actions.slot_for(action, armature))

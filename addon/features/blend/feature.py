@@ -8,7 +8,7 @@ import bpy
 from ...attach.feature import Feature
 from ...core.errors import SinewError
 from ...core.motion import blend as core
-from ...io import clips
+from ...io import actions, clips
 from ...ui import operators, stepped
 from ...ui.sidebar import draw_text
 from ...ui.translations import counted, tr
@@ -113,7 +113,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
                 column.prop(each, "weight_from", text=tr("{name}, at First", name=each.name), translate=False)
             column.prop(each, "weight", text=each.name, translate=False)
         if len(self.actions) < 2:
-            draw_text(layout, context, "Blender has no two actions of this armature", icon="INFO")
+            draw_text(layout, "Blender has no two actions of this armature", icon="INFO")
         for name in ("changes", "method", "align", "cycles", "root_motion"):
             layout.prop(self, name)
         if self.root_motion == core.TRAVEL or self.align:
@@ -143,7 +143,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         made = self._made
-        blend_actions.play(bpy.data.objects[self._armature], made.action)
+        actions.play(bpy.data.objects[self._armature], made.action)
         frames = counted(made.frames, "{count} frame", "{count} frames")
         self.report({"INFO"}, tr("Made {name}: {frames}", name=made.action.name, frames=frames))
         for note in made.notes():

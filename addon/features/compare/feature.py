@@ -101,7 +101,7 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
             choice.name, choice.is_shown = name, name in self.methods
         return context.window_manager.invoke_props_dialog(self)
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, _context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
         column.label(text="Show a copy under each of these")
         for choice in self.choices:
@@ -187,7 +187,7 @@ class SINEW_PT_comparison(Sidebar, bpy.types.Panel):
         layout = self.layout
         state = comparison_state.of_scene(context.scene)
         if state is None:
-            draw_text(layout, context, "Another scene shows a comparison", icon="INFO")
+            draw_text(layout, "Another scene shows a comparison", icon="INFO")
             layout.operator("sinew.end_comparison", icon="X")
             return
         _draw_arrangement(layout, context, state)
@@ -205,7 +205,7 @@ def _draw_arrangement(
 ) -> None:
     methods = comparison_state.methods_of(state)
     if not methods:
-        draw_text(layout, context, "The copies were deleted", icon="INFO")
+        draw_text(layout, "The copies were deleted", icon="INFO")
         return
     layout.row(align=True).prop(state, "arrangement", expand=True)
     layout.prop(state, "spacing")
@@ -217,7 +217,7 @@ def _draw_arrangement(
         column.prop(state, "second", text="")
         (shown,) = comparison_state.shown_methods(state)
         layout.operator("sinew.flip_comparison", text="Flip", icon="UV_SYNC_SELECT")
-        draw_text(layout, context, tr("Shown: {method}", method=tr(properties.method_label(shown))))
+        draw_text(layout, "Shown: {method}", method=tr(properties.method_label(shown)))
 
 
 FEATURE = Feature(

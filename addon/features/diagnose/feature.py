@@ -132,42 +132,37 @@ class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
         clean = [obj.name for obj, found in known if not (found.findings or found.stale)]
         for obj, found in known:
             if len(known) == 1 or obj.name not in clean:
-                _draw_check(layout.box(), context, obj, found)
+                _draw_check(layout.box(), obj, found)
         if clean and len(known) > 1:
-            text = tr("Nothing found: {names}", names=names_text(clean))
-            draw_text(layout, context, text, icon="CHECKMARK")
+            draw_text(layout, "Nothing found: {names}", icon="CHECKMARK", names=names_text(clean))
 
 
-def _draw_check(
-    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, found: diagnose.Check
-) -> None:
-    name = shortened(obj.name, characters(context) - 8)
+def _draw_check(layout: bpy.types.UILayout, obj: bpy.types.Object, found: diagnose.Check) -> None:
+    name = shortened(obj.name, characters() - 8)
     layout.label(text=name, icon="OUTLINER_OB_MESH", translate=False)
     if found.stale:
         text = "Weights, groups or bones have changed since: press Check again"
-        draw_text(layout, context, text, icon="FILE_REFRESH", alert=True)
+        draw_text(layout, text, icon="FILE_REFRESH", alert=True)
     column = layout.column()
     column.active = not found.stale
     for finding in found.findings:
-        _draw_finding(column, context, obj, finding)
+        _draw_finding(column, obj, finding)
     if not found.findings:
         column.label(text="Nothing found", icon="CHECKMARK")
-    draw_text(column, context, tr("Checked: weights, {poses}", poses=found.frames))
+    draw_text(column, "Checked: weights, {poses}", poses=found.frames)
     upstream = [modifier.name for modifier in stack.upstream_changes(obj)]
     if upstream:
         names = ", ".join(upstream)
         what = "What {names} in front makes of the mesh is not checked: it has no vertices to select"
         text = tr(what, names=names)
-        draw_text(column, context, text, icon="INFO")
+        draw_text(column, text, icon="INFO")
 
 
-def _draw_finding(
-    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, finding: Finding
-) -> None:
-    draw_text(layout, context, f"{tr(finding.title)}: {finding.count:,}", icon="ERROR")
+def _draw_finding(layout: bpy.types.UILayout, obj: bpy.types.Object, finding: Finding) -> None:
+    draw_text(layout, f"{tr(finding.title)}: {finding.count:,}", icon="ERROR")
     if finding.groups:
-        draw_text(layout, context, names_text(finding.groups, NAMES_SHOWN))
-    draw_text(layout, context, finding.advice)
+        draw_text(layout, names_text(finding.groups, NAMES_SHOWN))
+    draw_text(layout, finding.advice)
     if len(finding.vertices):
         text = counted(len(finding.vertices), "Select {count} Vertex", "Select {count} Vertices")
         button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")

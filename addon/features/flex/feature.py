@@ -162,16 +162,15 @@ class SINEW_PT_flex(Sidebar, bpy.types.Panel):
         if result is None:
             return
         is_good = result.verdict.is_good
-        draw_text(layout, context, _headline(result), icon="CHECKMARK" if is_good else "ERROR")
+        draw_text(layout, _headline(result), icon="CHECKMARK" if is_good else "ERROR")
         if not stepped.draw_progress(layout, SINEW_OT_save_flex.bl_idname):
             layout.operator("sinew.save_flex", icon="URL")
         bad = [(number, joint) for number, joint in enumerate(result.verdict.joints) if not joint.is_good]
         told: set[str] = set()
         for number, joint in bad[:JOINTS_SHOWN]:
-            _draw_joint(layout.box().column(), context, number, joint, told)
+            _draw_joint(layout.box().column(), number, joint, told)
         if len(bad) > JOINTS_SHOWN:
-            text = tr("and {count} more: `sinew flex` lists all", count=len(bad) - JOINTS_SHOWN)
-            draw_text(layout, context, text)
+            draw_text(layout, "and {count} more: `sinew flex` lists all", count=len(bad) - JOINTS_SHOWN)
 
 
 def _headline(result: flex.Result) -> str:
@@ -181,9 +180,7 @@ def _headline(result: flex.Result) -> str:
     )
 
 
-def _draw_joint(
-    layout: bpy.types.UILayout, context: bpy.types.Context, number: int, joint: Joint, told: set[str]
-) -> None:
+def _draw_joint(layout: bpy.types.UILayout, number: int, joint: Joint, told: set[str]) -> None:
     """told: names of limits whose advice is above"""
     layout.label(text=joint.name, icon="BONE_DATA", translate=False)
     for place, finding in enumerate(joint.findings):
@@ -202,11 +199,11 @@ def _draw_joint(
             button.joint, button.finding = number, place
         if finding.mends:
             names = ", ".join(tr(properties.METHODS[name].label) for name in finding.mends)
-            draw_text(layout, context, tr("Not under {methods}", methods=names), icon="SOLO_ON")
+            draw_text(layout, "Not under {methods}", icon="SOLO_ON", methods=names)
         elif limit.name not in told:
             told.add(limit.name)
-            draw_text(layout, context, tr(limit.meaning))
-            draw_text(layout, context, tr(limit.advice))
+            draw_text(layout, tr(limit.meaning))
+            draw_text(layout, tr(limit.advice))
 
 
 FEATURE = Feature(

@@ -112,16 +112,16 @@ class SINEW_PT_verified(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, (worst, *others) = self.layout, results[context.scene.session_uid]
         whole, *causes = worst.sentences(characters.length_unit(context.scene))
-        draw_text(layout, context, f"{worst.mesh}: {tr(whole)}", alert=not worst.is_explained)
+        draw_text(layout, f"{worst.mesh}: {tr(whole)}", alert=not worst.is_explained)
         for cause in causes:
-            draw_text(layout, context, cause, icon="DOT")
+            draw_text(layout, cause, icon="DOT")
         if others:
             more = counted(
                 len(others),
                 "{count} more mesh differs less; the Info editor lists it",
                 "{count} more meshes differ less; the Info editor lists them",
             )
-            draw_text(layout, context, more, icon="INFO")
+            draw_text(layout, more, icon="INFO")
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:

@@ -135,13 +135,13 @@ class SINEW_PT_measures(Sidebar, OfHeatMap, bpy.types.Panel):
         shown = any(map(properties.shows_heat, objects))
         layout.operator("sinew.heat_map", icon="SHADING_RENDERED", depress=shown)
         layout.prop(settings, "quantity", text="")
-        draw_text(layout, context, settings.metric.text)
+        draw_text(layout, settings.metric.text)
         if settings.quantity in measures.BAKE_ERRORS and objects:
             before, after = (
                 units.text(context.scene, "length", bake_error.rms(objects, quantity))
                 for quantity in (bake_error.BEFORE, bake_error.AFTER)
             )
-            draw_text(layout, context, tr("RMS {before} before, {after} after", before=before, after=after))
+            draw_text(layout, "RMS {before} before, {after} after", before=before, after=after)
         if settings.quantity == "distance":
             column = layout.column(align=True)
             column.label(text="Compared with")
@@ -169,7 +169,7 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
         pairs = session.states_of(operators.sinew_targets(context), depsgraph)
         subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None
         if subject is None:
-            draw_text(self.layout, context, "Sinew deforms nothing here now", icon="INFO")
+            draw_text(self.layout, "Sinew deforms nothing here now", icon="INFO")
             return
         other = live.measured_under_other(subject, settings.other, depsgraph)
         shown = {properties.of(obj).method for obj, _skinned in pairs}
@@ -240,8 +240,9 @@ class SINEW_PT_worst_frames(Sidebar, operators.OfSkinned, bpy.types.Panel):
             return
         methods = joined(properties.METHODS[name].label for name in scan.methods)
         measure, count = tr(scan.metric.label), len(scan.frames)
-        text = tr("{measure}, {methods}, {count} frames", measure=measure, methods=methods, count=count)
-        draw_text(layout, context, text)
+        draw_text(
+            layout, "{measure}, {methods}, {count} frames", measure=measure, methods=methods, count=count
+        )
         column = layout.column(align=True)
         unit = "length" if scan.metric.unit == "length" else "share"
         for frame, value in scan.worst():

@@ -193,14 +193,6 @@ def _twists(part: Part, depsgraph: bpy.types.Depsgraph) -> TwistInputs:
     return armature_io.read_twists(armature.evaluated_get(depsgraph), part.bound.first_deformer.bones)
 
 
-def measured_under(subject: Subject, method: str, depsgraph: bpy.types.Depsgraph) -> Measured:
-    """Measures the frame of the last call of measure() under another method; distances are to the current
-    shape."""
-    worlds = [_world(part.obj, depsgraph) for part in subject.parts]
-    shape = _shape_of([_Other.of(part, method) for part in subject.parts], worlds)
-    return subject.gauge.measure(shape, subject.measured.shape.points.T)
-
-
 def measured_of_mix(
     subject: Subject, second_of: Callable[[bpy.types.Object], str], depsgraph: bpy.types.Depsgraph
 ) -> tuple[Measured, Measured]:
@@ -216,15 +208,15 @@ def measured_of_mix(
 
 
 def measured_under_other(subject: Subject, other: str, depsgraph: bpy.types.Depsgraph) -> Measured | None:
-    """Like measured_under(), computed once per frame; None where everything is shown under this method.
-
-    other  as given to measure()
-    """
+    """Measures the frame of the last call of measure() under the method given there, once per frame;
+    distances are to the current shape. None where everything is shown under this method."""
     shown = [frame for part in subject.parts for frame in part.skinned.shown.frames if frame is not None]
     if all(frame.method == other and not frame.mix for frame in shown):
         return None
     if subject.under_other is None:
-        subject.under_other = measured_under(subject, other, depsgraph)
+        worlds = [_world(part.obj, depsgraph) for part in subject.parts]
+        shape = _shape_of([_Other.of(part, other) for part in subject.parts], worlds)
+        subject.under_other = subject.gauge.measure(shape, subject.measured.shape.points.T)
     return subject.under_other
 
 

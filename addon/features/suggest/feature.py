@@ -119,23 +119,26 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         choice = recommend.choices[context.scene.session_uid]
         suggestion, used = suggest.suggestions.get(context.scene.session_uid), _used(context)
         _draw_recommended(layout, choice, used)
-        draw_text(layout, context, tr(choice.text), icon="SOLO_ON")
+        draw_text(layout, tr(choice.text), icon="SOLO_ON")
         if suggestion is None:
             return
         for method, why in suggestion.torn.items():
-            text = tr("{method} tears here: {why}", method=tr(suggestion.methods[method]), why=tr(why))
-            draw_text(layout, context, text, icon="ERROR")
+            draw_text(
+                layout,
+                "{method} tears here: {why}",
+                icon="ERROR",
+                method=tr(suggestion.methods[method]),
+                why=tr(why),
+            )
         count = len(suggestion.frames)
-        draw_text(
-            layout, context, counted(count, "The worst of {count} frame", "The worst of {count} frames")
-        )
+        draw_text(layout, counted(count, "The worst of {count} frame", "The worst of {count} frames"))
         criterion = next((c for c in CRITERIA if c.name == _View.measure), None)
         text = "Best at Each Measure" if criterion is None else criterion.label
         layout.operator_menu_enum("sinew.suggestions_by", "measure", text=text, icon="SORTSIZE")
         if criterion is None:
             _draw_best(layout, context, suggestion, used)
         else:
-            draw_text(layout, context, criterion.text)
+            draw_text(layout, criterion.text)
             _draw_order(layout, context, suggestion, criterion, used)
         layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
 
@@ -151,7 +154,7 @@ class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         suggestion, used = suggest.suggestions[context.scene.session_uid], _used(context)
-        draw_text(self.layout, context, "Each where it stretches most, in its worst frame")
+        draw_text(self.layout, "Each where it stretches most, in its worst frame")
         grid = self.layout.grid_flow(row_major=True, columns=PICTURES_IN_A_ROW, even_columns=True)
         for method in suggestion.methods:
             number = worst_pictures.icon(context.scene, method)
