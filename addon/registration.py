@@ -63,45 +63,17 @@ def _register_class(steps: ExitStack, cls: type) -> None:
 
 def _parts() -> tuple[Feature, ...]:
     """What an object and a character have, with its panel."""
-    from .attach import properties, stored_vertex_data
-    from .attach.feature import Feature
-    from .ui import (
-        character,
-        character_operators,
-        lesson,
-        main_panel,
-        manual,
-        menus,
-        meshes_panel,
-        modifier_panel,
-        operators,
-        precomputing,
-        preferences,
-        presets,
-        translations,
+    names = (
+        "ui.translations ui.preferences attach.properties attach.stored_vertex_data ui.character "
+        "ui.operators ui.character_operators ui.presets ui.lesson ui.precomputing ui.menus ui.manual "
+        "ui.modifier_panel ui.main_panel ui.meshes_panel"
     )
-
-    return (
-        translations.FEATURE,
-        Feature(preferences.CLASSES),
-        properties.FEATURE,
-        stored_vertex_data.FEATURE,
-        character.FEATURE,
-        Feature((*operators.CLASSES, *character_operators.CLASSES, *presets.CLASSES, *lesson.CLASSES)),
-        precomputing.FEATURE,
-        menus.FEATURE,
-        manual.FEATURE,
-        modifier_panel.FEATURE,
-        Feature((*main_panel.CLASSES, *meshes_panel.CLASSES)),
-    )
+    return tuple(import_module(f".{name}", __package__).FEATURE for name in names.split())
 
 
 def _features() -> tuple[Feature, ...]:
-    names = (
-        *("suggest", "action_copy", "inbetween", "blend", "ik", "corrective", "compare", "flex"),
-        *("heat", "auto_mix", "diagnose", "bake", "gltf"),
-    )
-    return tuple(import_module(f".features.{name}.feature", __package__).FEATURE for name in names)
+    names = "suggest action_copy inbetween blend ik corrective compare flex heat auto_mix diagnose bake gltf"
+    return tuple(import_module(f".features.{name}.feature", __package__).FEATURE for name in names.split())
 
 
 def _end() -> None:

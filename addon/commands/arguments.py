@@ -85,16 +85,6 @@ def methods(text: str) -> list[str]:
     return [read(name.strip()) for name in text.split(",")]
 
 
-def add_timeout(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--timeout",
-        type=seconds,
-        default=300.0,
-        metavar="SECONDS",
-        help="how long a file may take (default: %(default)g; 0: any time)",
-    )
-
-
 def add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help=FILES)
 

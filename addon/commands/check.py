@@ -10,7 +10,7 @@ from ..blender_process import Limits
 from ..core.errors import WrongUse
 from ..jobs.inputs import blend_files_below
 from ..jobs.workers import run_one_by_one
-from .arguments import add_json, add_timeout
+from .arguments import add_json, seconds
 from .console import Console
 
 SUMMARY = "check that files can be rendered with Sinew, before they are sent to a farm"
@@ -27,7 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files", nargs="+", type=Path, metavar="FILE_OR_FOLDER", help=".blend; a folder: all below it"
     )
     add_json(parser)
-    add_timeout(parser)
+    parser.add_argument(
+        "--timeout",
+        type=seconds,
+        default=300.0,
+        metavar="SECONDS",
+        help="how long a file may take (default: %(default)g; 0: any time)",
+    )
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

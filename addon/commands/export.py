@@ -77,7 +77,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         console.complain(f"{args.file}: {sentence}")
     unit = characters.length_unit(bpy.context.scene)
     console.note_on(args.file, (report.sentence(unit) for report in written.bendy))
-    for name, content in export.written().items() if args.out.suffix.lower() == ".glb" else ():
+    for name, content in export.current.written.items() if args.out.suffix.lower() == ".glb" else ():
         mixed = f", mixed with {content['mix']}" if "mix" in content else ""
         console.note(f"{name}: {content['method']}{mixed}")
     if args.json:

@@ -180,18 +180,26 @@ def decomposed(pose: np.ndarray, parents: np.ndarray) -> np.ndarray:
     return result.astype(np.float32)
 
 
+def ik_limits(bone: bpy.types.PoseBone) -> np.ndarray:
+    """Returns float64 [3, 2]: the least and the largest rotation about each axis that inverse kinematics has,
+    in radians; NaN where it is free."""
+    found = np.full((3, 2), np.nan)
+    for axis, letter in enumerate("xyz"):
+        if getattr(bone, f"lock_ik_{letter}"):
+            found[axis] = 0.0
+        elif getattr(bone, f"use_ik_limit_{letter}"):
+            found[axis] = getattr(bone, f"ik_min_{letter}"), getattr(bone, f"ik_max_{letter}")
+    return found
+
+
 def read_limits(armature: bpy.types.Object) -> dict[str, np.ndarray]:
     """Returns the limits of rotation of each bone that has some, as battery.Limits: those of inverse
     kinematics, or of a Limit Rotation in its own space."""
     limits = {}
     for bone in armature.pose.bones:
-        found = np.full((3, 2), np.nan)
+        found = ik_limits(bone)
         constraints = [each for each in bone.constraints if each.type == "LIMIT_ROTATION" and not each.mute]
         for axis, letter in enumerate("xyz"):
-            if getattr(bone, f"lock_ik_{letter}"):
-                found[axis] = 0.0
-            elif getattr(bone, f"use_ik_limit_{letter}"):
-                found[axis] = getattr(bone, f"ik_min_{letter}"), getattr(bone, f"ik_max_{letter}")
             for each in constraints:
                 if each.owner_space == "LOCAL" and getattr(each, f"use_limit_{letter}"):
                     found[axis] = getattr(each, f"min_{letter}"), getattr(each, f"max_{letter}")

@@ -13,7 +13,7 @@ from ..core.helper_bones import Blend
 from ..core.names import CENTRE, HELPER, SEGMENT
 from ..core.pose_samples import Joints
 from ..core.rig import Bones
-from . import actions, mesh_io, spaces
+from . import actions, armature_io, mesh_io, spaces
 
 COLLECTION = "Sinew helpers"
 # Attributes of a baked mesh: each vertex's rms error, after the bake and before it.
@@ -26,19 +26,8 @@ _LENGTH = 0.25
 
 def read_joints(rig: bpy.types.Object, bones: Bones) -> Joints:
     """Returns how far its bones may rotate: the limits of inverse kinematics, where they are set."""
-    number = {name: bone for bone, name in enumerate(bones.names)}
-    parents = np.full(len(bones.names), -1)
-    limits = np.full((len(bones.names), 3, 2), np.nan)
-    for bone, name in enumerate(bones.names):
-        pose_bone = rig.pose.bones[name]
-        if pose_bone.parent is not None:
-            parents[bone] = number[pose_bone.parent.name]
-        for at, axis in enumerate("xyz"):
-            if getattr(pose_bone, f"lock_ik_{axis}"):
-                limits[bone, at] = 0.0
-            elif getattr(pose_bone, f"use_ik_limit_{axis}"):
-                limits[bone, at] = (getattr(pose_bone, f"ik_{end}_{axis}") for end in ("min", "max"))
-    return Joints(bones.rest[: len(bones.names)], parents, limits)
+    limits = np.array([armature_io.ik_limits(rig.pose.bones[name]) for name in bones.names])
+    return Joints(bones.rest[: len(bones.names)], bones.parents, limits)
 
 
 def add_bones(

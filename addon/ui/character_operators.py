@@ -6,6 +6,7 @@ import contextlib
 import bpy
 
 from ..attach import properties
+from ..attach.feature import Feature
 from ..core.errors import SinewError
 from ..deform import session
 from . import character
@@ -115,4 +116,4 @@ def _view3d(context: bpy.types.Context) -> bpy.types.Area | None:
     return max(areas, key=lambda area: area.width * area.height, default=None)
 
 
-CLASSES = (SINEW_OT_use_method, SINEW_OT_switch, SINEW_OT_own_settings, SINEW_OT_open_tab)
+FEATURE = Feature((SINEW_OT_use_method, SINEW_OT_switch, SINEW_OT_own_settings, SINEW_OT_open_tab))

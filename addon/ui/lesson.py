@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 
+from ..attach.feature import Feature
 from .translations import tr
 
 FILE = Path(__file__).resolve().parent.parent / "lesson.blend"
@@ -34,4 +35,4 @@ def _open(how: str) -> set[str]:
     return bpy.ops.wm.read_homefile(how, filepath=str(FILE), load_ui=True)
 
 
-CLASSES = (SINEW_OT_open_lesson,)
+FEATURE = Feature((SINEW_OT_open_lesson,))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import bpy
 
 from ..attach import attach, other_tools, properties, stage_settings
+from ..attach.feature import Feature
 from ..deform import session
 from ..deform.plan import State
 from . import character, operators, precomputing, state_text, stepped
@@ -166,4 +167,4 @@ class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
         draw_stages(layout, settings, lead)
 
 
-CLASSES = (SINEW_MT_character, SINEW_PT_main, SINEW_PT_stages)
+FEATURE = Feature((SINEW_MT_character, SINEW_PT_main, SINEW_PT_stages))

@@ -4,6 +4,7 @@
 import bpy
 
 from ..attach import properties
+from ..attach.feature import Feature
 from ..deform import session
 from . import character, operators, state_text
 from .settings_layout import draw_method, draw_parameters, draw_stages, named
@@ -119,4 +120,4 @@ def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         named(column, name).label(text=shortened(value), translate=False)
 
 
-CLASSES = (SINEW_UL_meshes, SINEW_PT_meshes)
+FEATURE = Feature((SINEW_UL_meshes, SINEW_PT_meshes))

@@ -7,6 +7,7 @@ from typing import ClassVar
 import bpy
 
 from ..attach import attach, corrective_smooth, properties, stack, stage_settings
+from ..attach.feature import Feature
 from ..attach.stage_settings import method_items
 from ..attach.updates import is_rendering_in_window, updates_suspended
 from ..core.errors import SinewError
@@ -335,10 +336,12 @@ class SINEW_OT_make_group(OnSinewObjects, OfOneMesh, bpy.types.Operator):
         settings.group = group.name
 
 
-CLASSES = (
-    SINEW_OT_add,
-    SINEW_OT_rebind,
-    SINEW_OT_remove,
-    SINEW_OT_take_over_smooth,
-    SINEW_OT_make_group,
+FEATURE = Feature(
+    (
+        SINEW_OT_add,
+        SINEW_OT_rebind,
+        SINEW_OT_remove,
+        SINEW_OT_take_over_smooth,
+        SINEW_OT_make_group,
+    )
 )

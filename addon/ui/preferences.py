@@ -7,6 +7,7 @@ import os
 
 import bpy
 
+from ..attach.feature import Feature
 from ..attach.subscribers import notify, subscribers
 from ..deform import precomputing, safe_mode, session
 from ..io import addon_preferences
@@ -73,4 +74,4 @@ def _draw_variable(layout: bpy.types.UILayout, name: str) -> None:
         draw_text(layout, text, icon="INFO")
 
 
-CLASSES = (SinewPreferences,)
+FEATURE = Feature((SinewPreferences,))

@@ -6,6 +6,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
+from ..attach.feature import Feature
 from ..attach.properties import SETTING_GROUPS, SHARED
 from ..deform import session
 from .operators import OnSinewObjects
@@ -65,4 +66,4 @@ class SINEW_PT_method_presets(PresetPanel, bpy.types.Panel):
     preset_add_operator = SINEW_OT_method_preset_add.bl_idname
 
 
-CLASSES = (SINEW_OT_method_preset_add, SINEW_OT_method_preset, SINEW_PT_method_presets)
+FEATURE = Feature((SINEW_OT_method_preset_add, SINEW_OT_method_preset, SINEW_PT_method_presets))

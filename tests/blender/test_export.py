@@ -285,7 +285,7 @@ def test_off_is_not_exported(tmp_path):
     obj.sinew.enabled = False
     file = write(tmp_path / "a.glb")
     assert "SINEW_skinning" not in str(file.header)
-    assert export.left_out() == []
+    assert export.current.left_out == []
 
 
 def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
@@ -297,7 +297,7 @@ def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
     use(obj, "cor")
     use(other, "cor")
     file = write(tmp_path / "a.glb")
-    (sentence,) = export.left_out()
+    (sentence,) = export.current.left_out
     assert sentence.startswith("Other: exported without Sinew's skinning data: another object has its mesh")
     nodes = {
         node["name"]: file.header["meshes"][node["mesh"]] for node in file.header["nodes"] if "mesh" in node

@@ -329,18 +329,18 @@ def test_the_legend_says_range_unit_and_methods():
     choose("distance", range=measures.FIXED, length=0.02)
     bpy.context.scene.frame_set(11)
     bpy.ops.sinew.heat_map()
-    (content,) = heat_legend.contents.values()
-    assert content.title == "Distance, Dual Quaternion against Armature modifier"
-    assert heat_legend.labels(content.scale, scene)[0] == "0 m"
-    assert heat_legend.labels(content.scale, scene)[-1] == "\u2265 2 cm"
+    ((scale, title),) = heat_legend.contents.values()
+    assert title == "Distance, Dual Quaternion against Armature modifier"
+    assert heat_legend.labels(scale, scene)[0] == "0 m"
+    assert heat_legend.labels(scale, scene)[-1] == "\u2265 2 cm"
     choose("stretch", ratio=4.0)
-    assert heat_legend.labels(heat_legend.contents[scene.session_uid].scale, scene)[::2] == [
+    assert heat_legend.labels(heat_legend.contents[scene.session_uid][0], scene)[::2] == [
         "0.25\u00d7",
         "1.00\u00d7",
         "4.00\u00d7",
     ]
     choose("flips")
-    assert heat_legend.labels(heat_legend.contents[scene.session_uid].scale, scene)[::4] == ["0 %", "100 %"]
+    assert heat_legend.labels(heat_legend.contents[scene.session_uid][0], scene)[::4] == ["0 %", "100 %"]
     bpy.ops.sinew.heat_map()
     assert not heat_legend.contents
 

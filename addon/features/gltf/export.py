@@ -117,7 +117,7 @@ class _Export:
     all_custom: bool = True
 
 
-_current = _Export()
+current = _Export()
 
 
 def collect(context: bpy.types.Context) -> tuple[list[Skinning], list[str]]:
@@ -190,13 +190,13 @@ def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str
     settings         the exporter's own
     """
     end()
-    _current.written, _current.left_out, _current.bones = {}, list(left_out), {}
-    _current.all_custom = settings["gltf_attributes"]
+    current.written, current.left_out, current.bones = {}, list(left_out), {}
+    current.all_custom = settings["gltf_attributes"]
     for skinning in found:
         _add(skinning, y_up=settings["gltf_yup"])
-    if _current.meshes:
+    if current.meshes:
         settings["gltf_attributes"] = True
-    for sentence in _current.left_out:
+    for sentence in current.left_out:
         settings["log"].warning(sentence)
     if not bpy.app.background:
         # An exporter that fails while it reads does not announce its end.
@@ -205,15 +205,15 @@ def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str
 
 def _add(skinning: Skinning, y_up: bool) -> None:
     obj, mesh = skinning.obj, skinning.obj.data
-    if mesh in _current.meshes:
-        _current.left_out.append(
+    if mesh in current.meshes:
+        current.left_out.append(
             f"{obj.name}: exported without Sinew's skinning data: another object has its mesh; make it a "
             "single user (Object > Relations)"
         )
         return
-    _current.written[obj.name] = skinning.content
+    current.written[obj.name] = skinning.content
     if skinning.bones is not None:
-        _current.bones[skinning.bones.armature] = skinning.bones
+        current.bones[skinning.bones.armature] = skinning.bones
     if skinning.centres is not None:
         # In world space, as the exporter writes the positions of a skin.
         space = np.array(obj.matrix_world, dtype=np.float64)
@@ -222,12 +222,12 @@ def _add(skinning: Skinning, y_up: bool) -> None:
     for name, values in skinning.values.items():
         mesh_io.write_values(mesh, name, np.clip(values, 0.0, 1.0))
     if skinning.centres is not None or skinning.values:
-        _current.meshes.append(mesh)
+        current.meshes.append(mesh)
 
 
 def end() -> None:
     """Removes the attributes again."""
-    meshes, _current.meshes = _current.meshes, []
+    meshes, current.meshes = current.meshes, []
     for mesh in meshes:
         # After an export that failed, another file may be open.
         with suppress(ReferenceError):
@@ -237,7 +237,7 @@ def end() -> None:
 
 def end_if_failed(*_: Any) -> None:
     """Called with each evaluation, as no timer runs without a window."""
-    if _current.meshes and may_change_file() and not _is_exporting():
+    if current.meshes and may_change_file() and not _is_exporting():
         end()
 
 
@@ -249,16 +249,6 @@ def _is_exporting() -> bool:
             return True
         frame = frame.f_back
     return False
-
-
-def written() -> dict[str, dict[str, Any]]:
-    """What the extension says in the last export, by the names of objects."""
-    return dict(_current.written)
-
-
-def left_out() -> list[str]:
-    """A sentence for each object of the last export without the extension."""
-    return list(_current.left_out)
 
 
 def _extend(of: Any, content: dict[str, Any]) -> None:
@@ -274,14 +264,14 @@ class GltfExtension:
 
     def gather_attribute_keep(self, attribute: Any, _settings: dict[str, Any]) -> None:
         """Keeps attributes that begin with an underscore: all or only these, as the artist chose."""
-        if not _current.all_custom and attribute.attr_name not in ATTRIBUTES:
+        if not current.all_custom and attribute.attr_name not in ATTRIBUTES:
             attribute.keep = False
 
     def gather_mesh_hook(
         self, gltf_mesh: Any, _mesh: bpy.types.Mesh, obj: bpy.types.Object | None, *_: Any
     ) -> None:
         """obj: the object that the mesh is exported for, None for one without a skin."""
-        content = _current.written.get(obj.name) if obj is not None else None
+        content = current.written.get(obj.name) if obj is not None else None
         if content is not None:
             _extend(gltf_mesh, content)
             return
@@ -291,7 +281,7 @@ class GltfExtension:
                 primitive.attributes.pop(name, None)
 
     def gather_skin_hook(self, skin: Any, armature: bpy.types.Object, *_: Any) -> None:
-        bones = _current.bones.get(armature.name)
+        bones = current.bones.get(armature.name)
         if bones is not None:
             _extend(skin, bones.content([joint.name for joint in skin.joints]))
 

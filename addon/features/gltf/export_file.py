@@ -115,7 +115,7 @@ def write(
                 only = {check.mesh: check for check in recording.verify(alone, segments)}
                 checks = [check.without_actions(only[check.mesh]) for check in checks]
     if is_gltf:
-        left_out += export.left_out()
+        left_out += export.current.left_out
     return Written(bendy, checks, left_out)
 
 

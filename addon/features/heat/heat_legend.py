@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The legend of the heat map, drawn over the 3D views: what is shown, and the values of the colours."""
 
-from dataclasses import dataclass
-
 import bpy
 import numpy as np
 
@@ -15,19 +13,8 @@ STEPS = 64
 BACKGROUND, TEXT = (0.08, 0.08, 0.08, 0.75), (1.0, 1.0, 1.0, 1.0)
 
 
-@dataclass
-class Content:
-    """What the legend shows.
-
-    title  the measure, and the methods
-    """
-
-    scale: HeatScale
-    title: str
-
-
-# By the session_uid of the measured scene.
-contents: dict[int, Content] = {}
+# By the session_uid of the measured scene: the range, and the measure with its methods.
+contents: dict[int, tuple[HeatScale, str]] = {}
 
 
 def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str]:
@@ -42,14 +29,10 @@ def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str
 
 def draw() -> None:
     context = bpy.context
-    content = contents.get(context.scene.session_uid)
-    errors = bake_error.legend_of(context.scene) if content is None else None
-    if errors is not None:
-        content = Content(*errors)
-    if content is None:
+    content = contents.get(context.scene.session_uid) or bake_error.legend_of(context.scene)
+    if content is None or not context.space_data.overlay.show_overlays:
         return
-    if not context.space_data.overlay.show_overlays:
-        return
+    scale, title = content
     import blf
 
     size = context.preferences.system.ui_scale
@@ -61,7 +44,7 @@ def draw() -> None:
     line = blf.dimensions(0, "Mg")[1] + GAP * size
     pad = 1.5 * GAP * size
     _rectangle(x - 2 * pad, y - pad, width + 4 * pad, 2 * line + BAR * size + 2 * pad)
-    texts = labels(content.scale, context.scene)
+    texts = labels(scale, context.scene)
     if len(texts) * max(blf.dimensions(0, text)[0] + GAP * size for text in texts) > width:
         texts = [texts[0], *[""] * (len(texts) - 2), texts[-1]]
     for number, text in enumerate(texts):
@@ -73,8 +56,8 @@ def draw() -> None:
             x + share * (width - wide) if number in (0, len(texts) - 1) else x + share * width - wide / 2,
             y,
         )
-    _bar(content.scale, x, y + line, width, BAR * size)
-    _write(blf, content.title, x, y + line + (BAR + GAP) * size)
+    _bar(scale, x, y + line, width, BAR * size)
+    _write(blf, title, x, y + line + (BAR + GAP) * size)
 
 
 def _visible(context: bpy.types.Context) -> tuple[float, float]:

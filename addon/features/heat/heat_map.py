@@ -51,7 +51,7 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
     for (obj, _state), own in zip(shown, subject.split(colours), strict=True):
         heat_nodes.write_colours(obj, own)
     _last[scene] = (subject.measured, *choices)
-    heat_legend.contents[scene] = heat_legend.Content(scale, _title(settings, shown))
+    heat_legend.contents[scene] = scale, _title(settings, shown)
 
 
 def _has_points(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
