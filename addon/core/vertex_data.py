@@ -167,42 +167,35 @@ class VertexData:
         if method not in PROVIDERS:
             return True
         with self._lock:
-            entry = self._entries.get(method)
-            made = None if entry is None else entry.made
-            is_ready = made is not None
+            entry = self._entry(method)
+            is_ready = entry.made is not None
             if precomputations.waits:
                 # Outdated data is then computed again, which needs triangles.
-                is_outdated = entry is not None and entry.is_outdated
-                is_ready = self.triangles is not None or (is_ready and not is_outdated)
+                is_ready = self.triangles is not None or (is_ready and not entry.is_outdated)
             if not is_ready:
                 self.missed.add(method)
             return is_ready
 
     def has(self, method: str) -> bool:
         """Whether there is data, even if outdated; True for a method without vertex data."""
-        if method not in PROVIDERS:
-            return True
         with self._lock:
-            entry = self._entries.get(method)
-            return entry is not None and entry.made is not None
+            return method not in PROVIDERS or self._entry(method).made is not None
 
     def is_current(self, method: str) -> bool:
         """Whether there is data of this mesh."""
         with self._lock:
-            entry = self._entries.get(method)
-            return entry is not None and entry.made is not None and not entry.is_outdated
+            entry = self._entry(method)
+            return entry.made is not None and not entry.is_outdated
 
     def running(self, method: str) -> sinew.Precomputation | None:
         """Returns the running computation, if there is one."""
         with self._lock:
-            entry = self._entries.get(method)
-            return None if entry is None else entry.run
+            return self._entry(method).run
 
     def is_stopped(self, method: str) -> bool:
         """Whether the artist stopped the computation."""
         with self._lock:
-            entry = self._entries.get(method)
-            return entry is not None and bool(entry.key) and entry.key in precomputations.stopped
+            return self._entry(method).key in precomputations.stopped
 
     def of(self, method: str, bones_from_model: np.ndarray) -> np.ndarray | None:
         """Returns float32 [vertices or rows, Method.vertex_floats], object space; None for a method without
@@ -245,14 +238,18 @@ class VertexData:
         """Takes the result of a computation that has ended. Returns whether one has. Raises what the
         computation raised."""
         with self._lock:
-            entry = self._entries.get(method)
-            if entry is None or entry.run is None or not entry.run.has_ended:
+            entry = self._entry(method)
+            if entry.run is None or not entry.run.has_ended:
                 return False
             run, entry.run = entry.run, None
             made = run.result()
             if made is not None:
                 self._put(entry, made)
             return True
+
+    def _entry(self, method: str) -> _Entry:
+        """Returns an empty one where there is none. Called under the lock."""
+        return self._entries.get(method) or _Entry()
 
     def _prepare(self, entry: _Entry, method: str, bones_from_model: np.ndarray) -> Start:
         """Finds earlier data; returns what computes it otherwise. Called under the lock."""

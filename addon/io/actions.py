@@ -154,12 +154,9 @@ def unmuted_curves(
     action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
 ) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
     """Returns the curves that move bones, by bone, without muted ones."""
-    found = {}
-    for bone, pairs in bone_curves(action, slot).items():
-        pairs = [pair for pair in pairs if not pair[0].mute]
-        if pairs:
-            found[bone] = pairs
-    return found
+    played = bone_curves(action, slot).items()
+    found = {bone: [pair for pair in pairs if not pair[0].mute] for bone, pairs in played}
+    return {bone: pairs for bone, pairs in found.items() if pairs}
 
 
 def key_times(curves: Sequence[bpy.types.FCurve]) -> np.ndarray:

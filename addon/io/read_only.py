@@ -87,9 +87,9 @@ def _protect_all() -> list[str]:
             )
     if _marked or _moved:
         _protect()
-        bpy.app.handlers.save_pre.append(_before_saving)
+        bpy.app.handlers.save_pre.append(_release)
         for event in (bpy.app.handlers.save_post, bpy.app.handlers.save_post_fail):
-            event.insert(0, _after_saving)
+            event.insert(0, _protect)
     return sentences
 
 
@@ -135,13 +135,15 @@ def _domains_of(owner: bpy.types.Object | bpy.types.Scene) -> Iterator[bpy.types
             yield modifier
 
 
-def _protect() -> None:
+@persistent
+def _protect(*_args: object) -> None:
     _mark(bpy.ops.ptcache.bake_from_cache)
     for number, (domain, _folder) in enumerate(_moved_domains()):
         domain.cache_directory = str(Path(bpy.app.tempdir, f"fluid{number}"))
 
 
-def _release() -> None:
+@persistent
+def _release(*_args: object) -> None:
     _mark(bpy.ops.ptcache.free_bake)
     for domain, folder in _moved_domains():
         domain.cache_directory = folder
@@ -180,16 +182,6 @@ def _forget() -> None:
     _moved.clear()
     for event in ("save_pre", "save_post", "save_post_fail"):
         functions = getattr(bpy.app.handlers, event)
-        for function in (_before_saving, _after_saving):
+        for function in (_release, _protect):
             if function in functions:
                 functions.remove(function)
-
-
-@persistent
-def _before_saving(*_args: object) -> None:
-    _release()
-
-
-@persistent
-def _after_saving(*_args: object) -> None:
-    _protect()

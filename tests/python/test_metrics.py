@@ -248,7 +248,7 @@ def test_what_one_limb_gains_does_not_make_up_for_another(tube):
     assert measured.limb_change == pytest.approx(0.0, abs=1e-7)
     points = tube.rest.copy()
     points[:, 1:] *= np.where(points[:, :1] < 0.0, np.sqrt(0.8), np.sqrt(1.2))
-    measured = Measured(measured._pose, Shape(tube.surface, points), None)
+    measured = Measured(measured.pose, Shape(tube.surface, points), None)
     assert abs(measured.entry("volume_change")) < 0.01
     assert measured.entry("limb_change") == pytest.approx(0.2, rel=0.03)
 

@@ -162,10 +162,8 @@ class Region:
         # times the girth is the volume.
         whole = Shape(self.character.surface, points).volume - self.character.rest.volume
         change = whole / max(0.5 * rest.area * self.girth, 1e-30)
-        found["volume_loss"], found["volume_gain"] = (
-            (max(-change, 0.0), self.middle),
-            (max(change, 0.0), self.middle),
-        )
+        found["volume_loss"] = max(-change, 0.0), self.middle
+        found["volume_gain"] = max(change, 0.0), self.middle
         ratios = [_spread(shape, ring) / max(_spread(rest, ring), 1e-12) for ring in self.rings]
         if ratios:
             least = int(np.argmin(ratios))

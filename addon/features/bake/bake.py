@@ -151,10 +151,9 @@ class Bake(Started):
                 characters.set_frame(scene, frame)
                 for one in self.bakes:
                     one.take(points_of(one.obj))
-                if number == len(self.frames) - 1:
-                    for one in self.bakes:
-                        one.end()
                 yield (number + 1) / len(self.frames)
+            for one in self.bakes:
+                one.end()
 
     def place(self) -> None:
         with self.whole_or_nothing():

@@ -49,10 +49,8 @@ class VatBake(Started):
         self.armatures = {armature for obj in meshes for armature in properties.of(obj).armatures}
         self.frames, self.path, self.options = frames, path, options
         ending = ".png" if options.texels == vat.PNG else ".exr"
-        self.positions, self.normals = (
-            path.with_name(f"{path.stem}_{what}{ending}") for what in ("positions", "normals")
-        )
-        for each in (path, self.positions, self.normals, path.with_suffix(".json")):
+        self.textures = [path.with_name(f"{path.stem}_{what}{ending}") for what in ("positions", "normals")]
+        for _unfinished, each in self.files:
             files.check_free(each, overwrite)
         self.counts = [len(characters.final_points(obj)) for obj in self.meshes]
         self.layout = vat.Layout.of(sum(self.counts), len(frames))
@@ -66,7 +64,7 @@ class VatBake(Started):
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
-        paths = self.path, self.positions, self.normals, self.path.with_suffix(".json")
+        paths = self.path, *self.textures, self.path.with_suffix(".json")
         return [(unfinished_path(each), each) for each in paths]
 
     def discard(self) -> None:
@@ -119,11 +117,11 @@ class VatBake(Started):
         render = bpy.context.scene.render
         rate = render.fps / render.fps_base
         about = vat.description(self.layout, self.options, self.frames, rate, positions)
-        samples = (
-            ("positions", self.positions, positions - units * vat.in_axes(rest.astype(np.float64), axes)),
-            ("normals", self.normals, vat.in_axes(np.array(self._normals), axes)),
-        )
-        for (unfinished, _path), (name, path, values) in zip(self.files[1:], samples, strict=False):
+        samples = {
+            "positions": positions - units * vat.in_axes(rest.astype(np.float64), axes),
+            "normals": vat.in_axes(np.array(self._normals), axes),
+        }
+        for (unfinished, path), (name, values) in zip(self.files[1:], samples.items(), strict=False):
             data, back = vat.encoded(self.layout.texture(values), self.options.texels)
             about[name] = {"file": path.name, **back}
             with writing(path):

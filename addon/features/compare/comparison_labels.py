@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import blf
 import bpy
-import gpu
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...attach import properties
 from ...ui.translations import tr
+from ..heat.heat_legend import draw_rectangle
 from . import comparison, comparison_state
 
 FONT = 0
@@ -102,22 +101,10 @@ def _draw_label(
     text: str, colour: tuple[float, float, float], x: float, y: float, width: float, scale: float
 ) -> None:
     """White on dark, which is legible on any view, above a stripe of the colour."""
-    padding = PADDING * scale
-    left, right = x - padding, x + width + padding
-    bottom, top = y - padding, y + SIZE * scale * 0.75 + padding
-    gpu.state.blend_set("ALPHA")
-    _draw_rectangle(left, bottom, right, top, BACKGROUND)
-    _draw_rectangle(left, bottom - STRIPE * scale, right, bottom, (*colour, 1.0))
-    gpu.state.blend_set("NONE")
+    padding, stripe = PADDING * scale, STRIPE * scale
+    left, bottom, across = x - padding, y - padding, width + 2 * padding
+    draw_rectangle(left, bottom, across, SIZE * scale * 0.75 + 2 * padding, BACKGROUND)
+    draw_rectangle(left, bottom - stripe, across, stripe, (*colour, 1.0))
     blf.color(FONT, 1.0, 1.0, 1.0, 1.0)
     blf.position(FONT, x, y, 0.0)
     blf.draw(FONT, text)
-
-
-def _draw_rectangle(
-    left: float, bottom: float, right: float, top: float, colour: tuple[float, float, float, float]
-) -> None:
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
-    shader.uniform_float("color", colour)
-    batch_for_shader(shader, "TRIS", {"pos": corners}, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)

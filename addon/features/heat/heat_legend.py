@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The legend of the heat map, drawn over the 3D views: what is shown, and the values of the colours."""
 
+import blf
 import bpy
+import gpu
 import numpy as np
+from gpu_extras.batch import batch_for_shader
 
 from ...core.heat import HeatScale
 from ...io import units
@@ -33,8 +36,6 @@ def draw() -> None:
     if content is None or not context.space_data.overlay.show_overlays:
         return
     scale, title = content
-    import blf
-
     size = context.preferences.system.ui_scale
     left, right = _visible(context)
     width = min(WIDTH * size, right - left - 2 * MARGIN * size)
@@ -43,21 +44,17 @@ def draw() -> None:
     blf.color(0, *TEXT)
     line = blf.dimensions(0, "Mg")[1] + GAP * size
     pad = 1.5 * GAP * size
-    _rectangle(x - 2 * pad, y - pad, width + 4 * pad, 2 * line + BAR * size + 2 * pad)
+    draw_rectangle(x - 2 * pad, y - pad, width + 4 * pad, 2 * line + BAR * size + 2 * pad, BACKGROUND)
     texts = labels(scale, context.scene)
     if len(texts) * max(blf.dimensions(0, text)[0] + GAP * size for text in texts) > width:
         texts = [texts[0], *[""] * (len(texts) - 2), texts[-1]]
     for number, text in enumerate(texts):
         share, wide = number / (len(texts) - 1), blf.dimensions(0, text)[0]
         # The first begins at the start of the bar, and the last ends at its end.
-        _write(
-            blf,
-            text,
-            x + share * (width - wide) if number in (0, len(texts) - 1) else x + share * width - wide / 2,
-            y,
-        )
+        is_end = number in (0, len(texts) - 1)
+        _write(text, x + share * (width - wide) if is_end else x + share * width - wide / 2, y)
     _bar(scale, x, y + line, width, BAR * size)
-    _write(blf, title, x, y + line + (BAR + GAP) * size)
+    _write(title, x, y + line + (BAR + GAP) * size)
 
 
 def _visible(context: bpy.types.Context) -> tuple[float, float]:
@@ -76,14 +73,14 @@ def _visible(context: bpy.types.Context) -> tuple[float, float]:
     return left, right
 
 
-def _write(blf: object, text: str, x: float, y: float) -> None:
+def _write(text: str, x: float, y: float) -> None:
     blf.position(0, round(x), round(y), 0)
     blf.draw(0, text)
 
 
-def _rectangle(x: float, y: float, width: float, height: float) -> None:
+def draw_rectangle(x: float, y: float, width: float, height: float, colour: tuple[float, ...]) -> None:
     corners = [(x, y), (x + width, y), (x, y + height), (x + width, y + height)]
-    _strip(corners, [BACKGROUND] * 4)
+    _strip(corners, [colour] * 4)
 
 
 def _bar(scale: HeatScale, x: float, y: float, width: float, height: float) -> None:
@@ -93,9 +90,6 @@ def _bar(scale: HeatScale, x: float, y: float, width: float, height: float) -> N
 
 
 def _strip(corners: list[tuple[float, float]], colours: list[tuple[float, ...]]) -> None:
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     batch = batch_for_shader(shader, "TRI_STRIP", {"pos": [(*c, 0.0) for c in corners], "color": colours})
     gpu.state.blend_set("ALPHA")

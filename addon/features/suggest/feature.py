@@ -13,7 +13,7 @@ from ...attach.feature import Feature
 from ...core import parameters
 from ...core.errors import SinewError
 from ...core.recommendation import Choice
-from ...core.suggestion import CRITERIA, Criterion, Suggestion, Worst
+from ...core.suggestion import CRITERIA, Criterion, Suggestion
 from ...deform import characters, session
 from ...io import units
 from ...ui import character, operators, stepped
@@ -136,10 +136,10 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         text = "Best at Each Measure" if criterion is None else criterion.label
         layout.operator_menu_enum("sinew.suggestions_by", "measure", text=text, icon="SORTSIZE")
         if criterion is None:
-            _draw_best(layout, context, suggestion, used)
+            _draw_best(layout, suggestion, used)
         else:
             draw_text(layout, criterion.text)
-            _draw_order(layout, context, suggestion, criterion, used)
+            _draw_order(layout, suggestion, criterion, used)
         layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
 
 
@@ -176,15 +176,13 @@ def _used(context: bpy.types.Context) -> set[str]:
     return {settings.method for settings in shown} | stages
 
 
-def _draw_best(
-    layout: bpy.types.UILayout, context: bpy.types.Context, suggestion: Suggestion, used: set[str]
-) -> None:
+def _draw_best(layout: bpy.types.UILayout, suggestion: Suggestion, used: set[str]) -> None:
     """used: as from _used()"""
     for criterion in CRITERIA:
         best = suggestion.best(criterion)
         row = layout.split(factor=0.45)
         measured = suggestion.order(criterion)
-        value = _value(context, suggestion, criterion, measured[0])
+        value = _value(suggestion, criterion, measured[0])
         row.label(text=f"{tr(criterion.label)} {value}", translate=False)
         column = row.column(align=True)
         for method in best[:MOST_BEST]:
@@ -196,18 +194,14 @@ def _draw_best(
 
 
 def _draw_order(
-    layout: bpy.types.UILayout,
-    context: bpy.types.Context,
-    suggestion: Suggestion,
-    criterion: Criterion,
-    used: set[str],
+    layout: bpy.types.UILayout, suggestion: Suggestion, criterion: Criterion, used: set[str]
 ) -> None:
     best = suggestion.best(criterion)
     column = layout.column(align=True)
     for method in suggestion.order(criterion):
         row = column.split(factor=0.64, align=True)
         _draw_method(row, suggestion, method, used)
-        value = _value(context, suggestion, criterion, method)
+        value = _value(suggestion, criterion, method)
         row.label(text=value, icon="CHECKMARK" if method in best else "BLANK1", translate=False)
 
 
@@ -225,16 +219,13 @@ def _draw_recommended(layout: bpy.types.UILayout, choice: Choice, used: set[str]
     layout.operator("sinew.use_recommended", text="Recommended", depress=is_used)
 
 
-def _value(context: bpy.types.Context, suggestion: Suggestion, criterion: Criterion, method: str) -> str:
-    return value_text(context.scene, criterion, suggestion.worst.get((method, criterion.name)))
-
-
-def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:
+def _value(suggestion: Suggestion, criterion: Criterion, method: str) -> str:
+    worst = suggestion.worst.get((method, criterion.name))
     if worst is None:
         return tr("none")
     if criterion.unit == "count":
         return f"{worst.value:,.0f}"
-    return units.text(scene, criterion.unit, worst.value)
+    return units.text(bpy.context.scene, criterion.unit, worst.value)
 
 
 def _begin() -> None:
