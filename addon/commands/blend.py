@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import argparse
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import SinewError, WrongUse
 from ..core.motion.blend import METHODS, Settings
 from ..core.output import file_to_write
 from ..core.steps import result_of
-from .arguments import count
+from .arguments import add_file, count
 from .console import Console
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ ROOT_MOTIONS = {"travel": "travel", "in-place": "in_place", "keyed": "keyed"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    add_file(parser)
     parser.add_argument("--armature", metavar="NAME", help="which, where the file has several that are moved")
     parser.add_argument("--actions", nargs="+", required=True, metavar="NAME", help="two or more of the file")
     for name, text in (

@@ -3,7 +3,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import sinew
@@ -11,12 +11,6 @@ import sinew
 from .rig import Weighting
 from .scale_rule import IGNORED
 from .stage_mesh import StageMesh
-
-
-class Native(Protocol):
-    """The library's object for such a stage."""
-
-    def set_rest_points(self, rest_points: np.ndarray, bones_from_model: np.ndarray) -> None: ...
 
 
 class BoneStage(ABC):
@@ -36,8 +30,8 @@ class BoneStage(ABC):
     @abstractmethod
     def _make(
         self, binding: sinew.Binding, weighting: Weighting, space: np.ndarray, weights: np.ndarray | None
-    ) -> Native:
-        """Binds the native stage.
+    ) -> Any:
+        """Returns the library's object for the stage, bound.
 
         space    float32 [4, 4], from object space to armature space
         weights  float32 [vertices] of the vertex group, None for none

@@ -206,12 +206,22 @@ class Report:
         if self.segments is not None:
             said.insert(0, self.segments.sentence(unit))
         if self.unseen_before is not None and self.unseen_after is not None:
+            numbers = (
+                self.unseen_after.rms,
+                self.unseen_after.worst,
+                self.unseen_before.rms,
+                self.unseen_before.worst,
+            )
+            rms, worst, rms_before, worst_before = (f"{number:.2g}" for number in numbers)
             said.append(
                 phrase(
                     "In other poses, which they were not made from: {rms} {unit} rms, {worst} at most; "
                     "linear blending has {rms_before} and {worst_before}",
                     unit=unit,
-                    **_numbers(self.unseen_before, self.unseen_after),
+                    rms=rms,
+                    worst=worst,
+                    rms_before=rms_before,
+                    worst_before=worst_before,
                 )
             )
         return said
@@ -225,15 +235,12 @@ class Report:
             name=self.armature,
             count=self.helpers,
             unit=unit,
+            rms=f"{self.after.rms:.2g}",
+            worst=f"{self.after.worst:.2g}",
             shares=" / ".join(shares),
-            **_numbers(self.before, self.after),
+            rms_before=f"{self.before.rms:.2g}",
+            worst_before=f"{self.before.worst:.2g}",
         )
-
-
-def _numbers(before: Errors, after: Errors) -> dict[str, str]:
-    """As the report's sentences name them."""
-    numbers = {"rms": after.rms, "worst": after.worst, "rms_before": before.rms, "worst_before": before.worst}
-    return {name: f"{number:.2g}" for name, number in numbers.items()}
 
 
 def solve(

@@ -49,8 +49,11 @@ class SegmentReport:
             bones=self.bones,
             bendy=self.bendy,
             unit=unit,
+            method=f"{self.method:.2g}",
+            sliding=f"{self.sliding:.2g}",
+            shear=f"{self.shear:.2g}",
+            cut=f"{self.cut:.2g}",
             influences=self.influences,
-            **{name: f"{getattr(self, name):.2g}" for name in ("method", "sliding", "shear", "cut")},
         )
 
 

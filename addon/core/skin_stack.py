@@ -143,7 +143,7 @@ class SkinDeformer:
         Raises ValueError where `out` has another shape.
         """
         last, known = self.last_frame, self.rest_points
-        is_packed_anew = self.vertex_data is not None and self._take_new_data(frame)
+        is_packed_anew = self._take_new_data(frame)
         if out is None and last is not None and are_equal(rest_points, known) and _same(last, frame):
             if not is_packed_anew:
                 return False

@@ -361,12 +361,8 @@ class Viewer:
 
     def _header(self, places: list[dict[str, Any]]) -> dict[str, Any]:
         scales = [
-            HeatScale.over_values(
-                METRICS["distance"], self._distance.least, self._distance.most, self._diagonal
-            ),
-            HeatScale.over_values(
-                METRICS["stretch"], self._stretch.least, self._stretch.most, self._diagonal
-            ),
+            HeatScale.over_values(METRICS[name], own.least, own.most, self._diagonal)
+            for name, own in (("distance", self._distance), ("stretch", self._stretch))
         ]
         boxes = np.array(self._boxes)
         return {

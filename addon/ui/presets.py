@@ -26,7 +26,6 @@ PATHS = (
 
 
 class SINEW_OT_method_preset_add(AddPresetBase, OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.method_preset_add"
     bl_label = "Add Method Preset"
     bl_description = "Keep the method, its parameters and the stages under a name, or remove that preset"
     bl_options = {"REGISTER"}
@@ -38,7 +37,6 @@ class SINEW_OT_method_preset_add(AddPresetBase, OnSinewObjects, bpy.types.Operat
 
 
 class SINEW_OT_method_preset(OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.method_preset"
     bl_label = "Use Method Preset"
     bl_description = "Set the character to this method, with its parameters and stages"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}

@@ -32,10 +32,11 @@ def test_texts_are_given_the_values_that_they_name():
     wrong, count = [], 0
     for path in sorted(Path(sinew_addon.__file__).parent.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "phrase"):
-                texts = texts_of(node.args[0])
+            name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+            if name in ("tr", "phrase", "draw_text"):
+                texts = texts_of(node.args[name == "draw_text"])
                 count += len(texts)
-                given = {keyword.arg for keyword in node.keywords}
+                given = {keyword.arg for keyword in node.keywords} - {"icon", "alert"}
                 wrong += [f"{path}:{node.lineno}: {text}" for text in texts if names_in_braces(text) != given]
     assert count > 50
     assert wrong == []

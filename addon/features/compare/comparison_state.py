@@ -70,9 +70,6 @@ class SinewComparison(bpy.types.PropertyGroup):
     view_moved: bpy.props.FloatVectorProperty(size=4, options={"HIDDEN"})
 
 
-CLASSES = (SinewComparison,)
-
-
 def of_scene(scene: bpy.types.Scene) -> SinewComparison | None:
     """None where the scene shows no comparison."""
     # Reading an unset property would leave an empty group in the file.

@@ -222,9 +222,8 @@ def _draw_arrangement(
 
 FEATURE = Feature(
     (
-        *comparison_state.CLASSES,
-        *(SinewComparisonChoice, SINEW_OT_compare, SINEW_OT_flip_comparison, SINEW_OT_end_comparison),
-        SINEW_OT_save_comparison,
+        *(comparison_state.SinewComparison, SinewComparisonChoice, SINEW_OT_compare),
+        *(SINEW_OT_flip_comparison, SINEW_OT_end_comparison, SINEW_OT_save_comparison),
         SINEW_PT_comparison,
     ),
     {"Scene.sinew_comparison": bpy.props.PointerProperty(type=comparison_state.SinewComparison)},

@@ -56,7 +56,7 @@ def _colour(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> 
 
 
 FEATURE = Feature(
-    (*measures.CLASSES, *heat_panel.CLASSES),
+    (measures.SinewMeasures, *heat_panel.CLASSES),
     {
         **measures.PROPERTIES,
         # The artist's choices while colours are shown.

@@ -89,9 +89,9 @@ class SINEW_OT_worst_frames(_Scans, bpy.types.Operator):
     over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 
     def run(self, context: bpy.types.Context) -> None:
-        worst = worst_frames.scans[context.scene.session_uid].worst()
-        text = tr("worst at {frame}", frame=f"{worst[0][0]:g}") if worst else tr("nothing at any frame")
         scan = worst_frames.scans[context.scene.session_uid]
+        worst = scan.worst()
+        text = tr("worst at {frame}", frame=f"{worst[0][0]:g}") if worst else tr("nothing at any frame")
         measure, count = tr(scan.metric.label), len(scan.frames)
         text = tr("{measure} over {count} frames: {result}", measure=measure, count=count, result=text)
         self.report({"INFO"}, text)

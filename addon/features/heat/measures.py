@@ -125,9 +125,6 @@ def clear(scene: bpy.types.Scene) -> None:
     scene.property_unset("sinew_most_influences")
 
 
-CLASSES = (SinewMeasures,)
-
-
 PROPERTIES = {
     "Scene.sinew_measures": bpy.props.PointerProperty(type=SinewMeasures),
     # Not in that group, as this setting is also read in files without anything of Sinew's.
