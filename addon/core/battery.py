@@ -134,34 +134,8 @@ _OTHERS = (
 _LEFT, _RIGHT = r"left|(?<![a-z])l(?![a-z])", r"right|(?<![a-z])r(?![a-z])"
 
 
-def poses(bones: Bones, limits: Limits, moving: np.ndarray) -> list[Pose]:
-    """Returns the battery of a rig.
-
-    moving  bool [bones], those that move vertices
-    """
-    return _Battery(bones, limits, moving).poses()
-
-
 COMBINED = ("Arms crossed", "Squat", "Back bent", "Back turned", "Neck turned")
 """Figures in which joints that depend on each other bend at once."""
-
-
-def combined(bones: Bones, limits: Limits, moving: np.ndarray) -> list[Pose]:
-    """Returns those poses of figures that bend several joints at once."""
-    return [pose for pose in poses(bones, limits, moving) if pose.name in COMBINED]
-
-
-def joint_poses(
-    bones: Bones, limits: Limits, moving: np.ndarray, table: Mapping[str, tuple[Move, ...]] = JOINTS
-) -> list[tuple[int, Pose]]:
-    """Returns the poses of single joints, each with its bone. Arguments as of poses(); `table` is by role."""
-    return list(_Battery(bones, limits, moving).of_joints(table))
-
-
-def roles(bones: Bones) -> list[str]:
-    """Returns the role of each bone; "" for all in a rig that is no figure that stands upright."""
-    battery = _Battery(bones, {}, np.zeros(len(bones.names), bool))
-    return [battery.role_of(bone) if battery.is_figure else "" for bone in range(len(bones.names))]
 
 
 def sides(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -219,8 +193,9 @@ def bend_angles(bones: Bones, pose: np.ndarray) -> np.ndarray:
     return np.where(bones.carriers >= 0, np.arccos(cosines.clip(-1.0, 1.0)), 0.0)
 
 
-class _Battery:
+class Battery:
     def __init__(self, bones: Bones, limits: Limits, moving: np.ndarray) -> None:
+        """moving: bool [bones], those that move vertices."""
         self._bones, self._limits = bones, limits
         count = len(bones.names)
         rest = bones.rest[:count].astype(np.float64)
@@ -242,7 +217,12 @@ class _Battery:
         found += self._general(free)
         return [pose for pose in found if pose.rotations]
 
-    def of_joints(self, table: Mapping[str, tuple[Move, ...]]) -> Iterator[tuple[int, Pose]]:
+    def combined(self) -> list[Pose]:
+        """Those poses of figures that bend several joints at once."""
+        return [pose for pose in self.poses() if pose.name in COMBINED]
+
+    def of_joints(self, table: Mapping[str, tuple[Move, ...]] = JOINTS) -> Iterator[tuple[int, Pose]]:
+        """The poses of single joints, each with its bone. `table` is by role."""
         for bone in self._joints:
             if self._bones.names[bone] in self._limits:
                 found = list(self._within_limits([bone]))
@@ -257,6 +237,10 @@ class _Battery:
     @property
     def is_figure(self) -> bool:
         return self._directions is not None
+
+    def roles(self) -> list[str]:
+        """The role of each bone; "" for all in a rig that is no figure that stands upright."""
+        return [self.role_of(bone) if self.is_figure else "" for bone in range(len(self._words))]
 
     def role_of(self, bone: int) -> str:
         above = any(self._roles[each] == "neck" for each in self._above(bone)[1:])

@@ -115,7 +115,7 @@ def figure(naming="rigify", limbs=LIMBS):
 
 
 def poses_of(bones, limits=None):
-    found = battery.poses(bones, limits or {}, np.ones(len(bones.names), bool))
+    found = battery.Battery(bones, limits or {}, np.ones(len(bones.names), bool)).poses()
     return {pose.name: battery.posed(bones, pose) for pose in found}
 
 

@@ -249,7 +249,7 @@ def test_graphs_are_those_of_scipy():
 @pytest.mark.parametrize("naming", ["rigify", "unreal", "mixamo", "makehuman"])
 def test_each_joint_of_a_figure_is_bent_by_itself(naming):
     bones, number = figure(naming)
-    found = battery.joint_poses(bones, {}, np.ones(len(bones.names), bool))
+    found = list(battery.Battery(bones, {}, np.ones(len(bones.names), bool)).of_joints())
     for bone, pose in found:
         assert set(pose.rotations) == {bone}
         angle = math.degrees(math.acos(min(1.0, (np.trace(pose.rotations[bone]) - 1.0) / 2.0)))
@@ -284,7 +284,7 @@ def test_limits_of_a_joint_are_its_poses():
     limits = {bones.names[shin]: np.array([[0.0, math.radians(80.0)], [0.0, 0.0], [0.0, 0.0]])}
     poses = [
         pose
-        for bone, pose in battery.joint_poses(bones, limits, np.ones(len(bones.names), bool))
+        for bone, pose in battery.Battery(bones, limits, np.ones(len(bones.names), bool)).of_joints()
         if bone == shin
     ]
     (only,) = poses
@@ -301,7 +301,7 @@ def test_a_file_overrides_limits_and_poses(tmp_path):
     assert table.limits["bulge"] == LIMITS["bulge"]
     assert LIMITS["stretch"].value != 9.0
     bones, number = figure()
-    found = battery.joint_poses(bones, {}, np.ones(len(bones.names), bool), table.joints)
+    found = list(battery.Battery(bones, {}, np.ones(len(bones.names), bool)).of_joints(table.joints))
     assert [pose.name for bone, pose in found if bone == number["forearm", "L"]] == ["bend 140 front"]
 
 

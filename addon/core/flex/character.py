@@ -24,7 +24,7 @@ class Skeleton:
     tails    float64 [bones, 3]
     above    int [bones], what carries each; -1 for none
     deform   bool [bones], those that may move vertices
-    roles    [bones], as battery.roles()
+    roles    [bones], as battery.Battery.roles()
     side     int [bones], 1 for left, -1 for right, 0 for neither
     mirror   int [bones], the bone of the other side; -1 for none
     rig      int [bones], the armature of each

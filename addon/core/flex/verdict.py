@@ -183,21 +183,20 @@ class _Worst(NamedTuple):
     vertices: int = 0
 
 
+@dataclass
 class _Judging:
-    def __init__(
-        self,
-        character: Character,
-        methods: Sequence[str],
-        limits: Mapping[str, Limit],
-        crossings: Crossings,
-    ) -> None:
-        self._character, self._methods, self._limits = character, methods, limits
-        self._crossings = crossings
-        self._worst: dict[tuple[int, str, str], _Worst] = {}
-        self._regions: dict[int, tuple[Region, set[tuple[int, int]]]] = {}
-        self._poses: Counter[int] = Counter()
-        for each in WeightCheck(character).values():
-            self._add(each.bone, methods[0], each.name, _Worst(each.value, "", each.place, each.vertices))
+    _character: Character
+    _methods: Sequence[str]
+    _limits: Mapping[str, Limit]
+    _crossings: Crossings
+    _worst: dict[tuple[int, str, str], _Worst] = field(default_factory=dict)
+    _regions: dict[int, tuple[Region, set[tuple[int, int]]]] = field(default_factory=dict)
+    _poses: Counter[int] = field(default_factory=Counter)
+
+    def __post_init__(self) -> None:
+        own = self._methods[0]
+        for each in WeightCheck(self._character).values():
+            self._add(each.bone, own, each.name, _Worst(each.value, "", each.place, each.vertices))
 
     def add_pose(self, pose: Pose) -> None:
         self._poses.update(pose.bones)

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import bpy
 import numpy as np
 
 from ...attach import properties
 from ...core import battery
+from ...core.battery import Battery
 from ...core.errors import SinewError
 from ...core.flex.character import Character, Skeleton
 from ...core.flex.limits import Table
@@ -40,9 +41,10 @@ class _Rig:
     moving: set[str]
     world: np.ndarray
 
-    @property
-    def is_moving(self) -> np.ndarray:
-        return np.array([name in self.moving for name in self.bones.names], bool)
+    @cached_property
+    def battery(self) -> Battery:
+        moving = np.array([name in self.moving for name in self.bones.names], bool)
+        return Battery(self.bones, armature_io.read_limits(self.armature), moving)
 
     def rest(self) -> np.ndarray:
         return self.world @ self.bones.rest[: len(self.bones.names)].astype(np.float64)
@@ -152,7 +154,7 @@ def _skeleton(rigs: Sequence[_Rig]) -> Skeleton:
     for number, rig in enumerate(rigs):
         bones, rest = rig.bones, rig.rest()
         names += bones.names
-        roles += battery.roles(bones)
+        roles += rig.battery.roles()
         side, mirror = battery.sides(bones.names)
         parts.append(
             (
@@ -173,10 +175,9 @@ def _skeleton(rigs: Sequence[_Rig]) -> Skeleton:
 def _poses(rigs: Sequence[_Rig], table: Table) -> Iterator[tuple[_Rig, tuple[int, ...], battery.Pose]]:
     """Yields each pose with the bones that it bends."""
     for rig in rigs:
-        limits = armature_io.read_limits(rig.armature)
-        for bone, pose in battery.joint_poses(rig.bones, limits, rig.is_moving, table.joints):
+        for bone, pose in rig.battery.of_joints(table.joints):
             yield rig, (bone,), pose
-        for pose in battery.combined(rig.bones, limits, rig.is_moving):
+        for pose in rig.battery.combined():
             yield rig, tuple(pose.rotations), pose
 
 

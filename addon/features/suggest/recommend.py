@@ -113,7 +113,7 @@ def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
     found: dict[tuple[str, ...], list[battery.Pose]] = {}
     for bones, names, limits in rigs.values():
         moving = np.array([name in names for name in bones.names], bool)
-        found[bones.names] = battery.poses(bones, limits, moving)
+        found[bones.names] = battery.Battery(bones, limits, moving).poses()
     longest = max(found.values(), key=len, default=[])
     moments = []
     for number, (name, _rotations) in enumerate(longest):
