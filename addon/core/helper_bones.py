@@ -19,6 +19,7 @@ from .errors import SinewError
 from .influences import Influences
 from .phrases import Phrase, phrase
 from .segment_bones import SegmentReport
+from .vectors import distances_from_axes
 
 # At most this many of the rig's bones, and of the helper bones, are tried for a vertex.
 OWN_CANDIDATES, HELPER_CANDIDATES = 8, 8
@@ -399,15 +400,16 @@ class Solver:
         """Adds a helper bone where the error is largest; its weights are provisional until weigh()."""
         energy = np.square(self.residual).sum(axis=1)
         seed = int(energy.argmax())
-        may_move = self._share_bones(seed)
+        own = self.own[seed][self.own[seed] >= 0]
+        may_move = np.asarray(np.isin(self.own, own).any(axis=1))
         eligible = np.flatnonzero(may_move)
         distances = np.square(self.middle[eligible] - self.middle[seed]).sum(axis=1)
         near = eligible[np.argsort(distances, kind="stable")[:_SEED_VERTICES]]
         middle = np.average(self.middle[near], axis=0, weights=energy[near] + 1e-30)
-        parent = self._nearest_bone(middle, np.unique(self.own[seed][self.own[seed] >= 0]))
-        own = self.motion.bones[:, parent]
-        scale = np.maximum(np.cbrt(np.abs(np.linalg.det(own[:, :, :3]))), _SMALLEST_SCALE)
-        helper = Helper(own, parent, scale, may_move)
+        parent = self._nearest_bone(middle, np.unique(own))
+        motion = self.motion.bones[:, parent]
+        scale = np.maximum(np.cbrt(np.abs(np.linalg.det(motion[:, :, :3]))), _SMALLEST_SCALE)
+        helper = Helper(motion, parent, scale, may_move)
         # At first it moves only the vertices around the seed, rigidly.
         helper.motion = self._fitted(helper, near, np.ones(len(near)), self.targets[near].astype(np.float64))
         for _step in range(_SEED_STEPS):
@@ -437,18 +439,9 @@ class Solver:
             now = weights[:, None] * self._moved(helper.motion, vertices)
             self.residual[vertices] += (now - was).astype(np.float32)
 
-    def _share_bones(self, seed: int) -> np.ndarray:
-        """bool [vertices]: those that share one of the rig's bones with this one."""
-        bones = self.own[seed]
-        shared = np.isin(self.own, bones[bones >= 0])
-        return np.asarray(shared.any(axis=1))
-
     def _nearest_bone(self, point: np.ndarray, bones: np.ndarray) -> int:
-        heads, tails = self.motion.segments[bones, 0], self.motion.segments[bones, 1]
-        along = tails - heads
-        length = np.maximum(np.square(along).sum(axis=1), 1e-30)
-        share = np.clip(((point - heads) * along).sum(axis=1) / length, 0.0, 1.0)
-        return int(bones[np.linalg.norm(heads + share[:, None] * along - point, axis=1).argmin()])
+        heads, tails = self.motion.segments[bones].transpose(1, 2, 0)
+        return int(bones[distances_from_axes(point[:, None], heads, tails - heads).argmin()])
 
     def _best_shares(self, helper: Helper, vertices: np.ndarray) -> np.ndarray:
         """float64 [vertices]: the best weight of the helper bone for each vertex, while the rest of the blend

@@ -97,30 +97,23 @@ def problem_of(tree: Tree, posed: Posed) -> Problem:
     parent_axes, parent_heads = axes[:, tree.parents], heads[:, tree.parents]
     parent_axes[:, 0], parent_heads[:, 0] = _axes_of(posed.parent), heads[:, 0]
     to_parent = np.swapaxes(parent_axes, -1, -2)
-    rest = np.broadcast_to(np.eye(4), posed.bones.shape).copy()
-    rest[..., :3, :3] = tree.rest
-    rest[..., :3, 3] = (to_parent @ (heads - parent_heads)[..., None])[..., 0]
-    root = np.broadcast_to(np.eye(4), posed.parent.shape).copy()
-    root[..., :3, :3], root[..., :3, 3] = parent_axes[:, 0], heads[:, 0]
+    rest_axes = np.broadcast_to(tree.rest, axes.shape)
+    rest = _rigid(rest_axes, (to_parent @ (heads - parent_heads)[..., None])[..., 0])
     own = np.swapaxes(tree.rest, -1, -2) @ to_parent @ axes
     tip_bones = [effector.bone for effector in tree.effectors]
     tips = np.zeros((*posed.goals.shape[:2], 3))
     tips[..., 1] = (tree.lengths * scales[..., 1])[:, tip_bones]
-    goals = np.broadcast_to(np.eye(4), posed.goals.shape).copy()
-    goals[..., :3, :3], goals[..., :3, 3] = _axes_of(posed.goals), posed.goals[..., :3, 3]
-    goals = affine.to_quat_vec(goals)
+    goals = _rigid(_axes_of(posed.goals), posed.goals[..., :3, 3])
     if not tree.has_pole:
-        now = np.broadcast_to(np.eye(4), posed.goals.shape).copy()
-        now[..., :3, :3] = axes[:, tip_bones]
-        now[..., :3, 3] = heads[:, tip_bones] + (axes[:, tip_bones] @ tips[..., None])[..., 0]
-        goals = _between(affine.to_quat_vec(now), goals, posed.influences)
+        reached = heads[:, tip_bones] + (axes[:, tip_bones] @ tips[..., None])[..., 0]
+        goals = _between(_rigid(axes[:, tip_bones], reached), goals, posed.influences)
     return Problem(
-        affine.to_quat_vec(rest),
+        rest,
         tips,
         goals,
         posed.poles.astype(np.float64),
-        affine.to_quat_vec(_with_axes(own))[..., :4],
-        affine.to_quat_vec(root),
+        _rigid(own, 0.0)[..., :4],
+        _rigid(parent_axes[:, 0], heads[:, 0]),
         scales,
     )
 
@@ -203,7 +196,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
 
 
-def _with_axes(axes: np.ndarray) -> np.ndarray:
-    result = np.zeros((*axes.shape[:-2], 4, 4))
-    result[..., :3, :3], result[..., 3, 3] = axes, 1.0
-    return result
+def _rigid(axes: np.ndarray, heads: np.ndarray | float) -> np.ndarray:
+    """[.., 7], in the layout of sinew.quat_vec, of axes [.., 3, 3] and heads [.., 3]."""
+    matrices = np.zeros((*axes.shape[:-2], 4, 4))
+    matrices[..., :3, :3], matrices[..., :3, 3], matrices[..., 3, 3] = axes, heads, 1.0
+    return affine.to_quat_vec(matrices)

@@ -21,7 +21,7 @@ import numpy as np
 from .influences import Influences
 from .rig import Bones
 from .surface import Parts, Surface
-from .vectors import cross, dots, rotated, rotations_of
+from .vectors import cross, distances_from_axes, dots, rotated, rotations_of
 
 
 @dataclass(frozen=True)
@@ -248,12 +248,8 @@ class Skin:
         bone."""
         heads = np.ascontiguousarray(axes[:, 0].T, dtype=np.float64)
         bones = np.ascontiguousarray((axes[:, 1] - axes[:, 0]).T, dtype=np.float64)
-        along = bones.take(self.heaviest, axis=1)
-        from_head = points.take(self.weighted, axis=1) - heads.take(self.heaviest, axis=1)
-        squared = dots(along, along)
-        share = np.divide(dots(from_head, along), squared, out=np.zeros_like(squared), where=squared > 0.0)
-        offset = from_head - share.clip(0.0, 1.0) * along
-        return np.sqrt(dots(offset, offset))
+        heads, along = (each.take(self.heaviest, axis=1) for each in (heads, bones))
+        return distances_from_axes(points.take(self.weighted, axis=1), heads, along)
 
     @cached_property
     def limbs(self) -> Parts:

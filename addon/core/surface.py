@@ -117,21 +117,9 @@ class Caps:
     @classmethod
     def over(cls, starts: np.ndarray, stops: np.ndarray) -> Caps:
         vertices, index = np.unique(np.concatenate([starts, stops]), return_inverse=True)
-        first, second = index.reshape(2, -1)
-        holes = np.arange(len(vertices))
-        while True:
-            # Each vertex takes the smallest number of its border; pointer doubling keeps the number of rounds
-            # small.
-            least = np.minimum(holes[first], holes[second])
-            spread = holes.copy()
-            np.minimum.at(spread, first, least)
-            np.minimum.at(spread, second, least)
-            spread = spread[spread]
-            if np.array_equal(spread, holes):
-                break
-            holes = spread
-        numbers, holes = np.unique(holes, return_inverse=True)
-        return cls(starts, stops, vertices, holes, holes[first], len(numbers))
+        pairs = index.reshape(2, -1).T
+        numbers, holes = np.unique(components(len(vertices), pairs), return_inverse=True)
+        return cls(starts, stops, vertices, holes, holes[pairs[:, 0]], len(numbers))
 
     def volumes(self, points: np.ndarray) -> np.ndarray:
         """float64 [holes]: six times the volume that each fan adds, for float64 points [3, vertices]."""
@@ -189,6 +177,23 @@ class Parts:
         count = int(self.part_of.max(initial=-1)) + 1
         inside = np.bincount(self.part_of, dots(a, cross(b, c)), count)
         return (inside + np.bincount(self._part_of_hole, self.surface.caps.volumes(own), count)) / 6.0
+
+
+def components(count: int, pairs: np.ndarray) -> np.ndarray:
+    """int [count]: for each, the lowest of those that pairs [n, 2] join it with."""
+    lowest = np.arange(count)
+    while len(pairs):
+        least = np.minimum(lowest[pairs[:, 0]], lowest[pairs[:, 1]])
+        spread = lowest.copy()
+        for end in (0, 1):
+            np.minimum.at(spread, lowest[pairs[:, end]], least)
+            np.minimum.at(spread, pairs[:, end], least)
+        # Pointer doubling keeps the number of rounds small.
+        spread = spread[spread]
+        if np.array_equal(spread, lowest):
+            break
+        lowest = spread
+    return lowest
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:

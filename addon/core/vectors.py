@@ -16,6 +16,15 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+def distances_from_axes(points: np.ndarray, heads: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """float64 [n]: of points [3, n] from an axis each, from its head [3, n] along [3, n] to its tail."""
+    from_head = points - heads
+    squared = dots(along, along)
+    share = np.divide(dots(from_head, along), squared, out=np.zeros_like(squared), where=squared > 0.0)
+    offset = from_head - share.clip(0.0, 1.0) * along
+    return np.sqrt(dots(offset, offset))
+
+
 def rotations_of(motions: np.ndarray) -> np.ndarray:
     """Unit quaternions, float64 [4, n], of the rotations nearest to the linear parts `motions` [n, 3, 3]."""
     affine = np.zeros((len(motions), 3, 4))

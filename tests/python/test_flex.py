@@ -18,14 +18,14 @@ from scipy.spatial import cKDTree
 from sinew_addon.core import battery
 from sinew_addon.core.errors import WrongUse
 from sinew_addon.core.flex import weights as flex_weights
-from sinew_addon.core.flex.character import Character, Skeleton, components
+from sinew_addon.core.flex.character import Character, Skeleton
 from sinew_addon.core.flex.limits import LIMITS, Table, read_table
 from sinew_addon.core.flex.measures import BENT, RINGS, SHORT, Region
 from sinew_addon.core.flex.report import junit, lines, markdown, of_file
 from sinew_addon.core.flex.verdict import OWN, Pose, judge
 from sinew_addon.core.flex.weights import WeightCheck
 from sinew_addon.core.metrics import FrameOfRig
-from sinew_addon.core.surface import Surface, coincident_vertices
+from sinew_addon.core.surface import Surface, coincident_vertices, components
 from test_battery import figure
 from test_metrics import LENGTH, RADIUS, Tube, influences_of
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..influences import Influences
 from ..metrics import Shape
 from ..surface import Surface
-from ..vectors import dots
+from ..vectors import distances_from_axes
 
 
 @dataclass(frozen=True)
@@ -78,12 +78,7 @@ class Skeleton:
 
     def distances(self, points: np.ndarray, bones: np.ndarray) -> np.ndarray:
         """float64 [n]: of points [n, 3] from the axis of one bone each."""
-        heads, along = self.heads[bones].T, (self.tails - self.heads)[bones].T
-        offset = points.T - heads
-        squared = dots(along, along)
-        share = np.divide(dots(offset, along), squared, out=np.zeros_like(squared), where=squared > 0.0)
-        offset = offset - share.clip(0.0, 1.0) * along
-        return np.sqrt(dots(offset, offset))
+        return distances_from_axes(points.T, self.heads[bones].T, (self.tails - self.heads)[bones].T)
 
 
 @dataclass(frozen=True)
@@ -148,19 +143,3 @@ class Character:
                 return name, vertex
             vertex -= count
         raise IndexError(vertex)
-
-
-def components(count: int, pairs: np.ndarray) -> np.ndarray:
-    """int [count]: for each, the lowest of those that pairs [n, 2] join it with."""
-    lowest = np.arange(count)
-    while len(pairs):
-        least = np.minimum(lowest[pairs[:, 0]], lowest[pairs[:, 1]])
-        spread = lowest.copy()
-        for end in (0, 1):
-            np.minimum.at(spread, lowest[pairs[:, end]], least)
-            np.minimum.at(spread, pairs[:, end], least)
-        spread = spread[spread]
-        if np.array_equal(spread, lowest):
-            break
-        lowest = spread
-    return lowest

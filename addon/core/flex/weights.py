@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .character import Character, components
+from ..surface import components
+from .character import Character
 from .measures import Place
 
 # A weight that is no more than this moves a vertex by too little to be seen.

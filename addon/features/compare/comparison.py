@@ -147,22 +147,22 @@ def end(context: bpy.types.Context) -> None:
             collections += [(scene, state.collection)] if state.collection is not None else []
             scene.property_unset("sinew_comparison")
     compared = {properties.of(copy).identity.copied for copy in copies} - {None}
-    _remove_copies(copies)
+    for copy in copies:
+        upstream_proxy.remove(copy)
+        point_buffer.remove(copy)
+    bpy.data.batch_remove(copies)
     for scene, collection in collections:
         _remove_collection(scene, collection)
     # An object that the artist deleted was kept in the file only by its copies.
     for obj in compared:
         if obj.users == 0:
             bpy.data.objects.remove(obj)
-    _remove_left_over()
+    # What belonged to copies that were deleted by hand.
+    for action in [action for action in bpy.data.actions if action.get(ACTION_MARK)]:
+        bpy.data.actions.remove(action)
+    offset_nodes.remove_unused()
+    orphans.remove()
     session.refresh(context)
-
-
-def _remove_copies(copies: list[bpy.types.Object]) -> None:
-    for copy in copies:
-        upstream_proxy.remove(copy)
-        point_buffer.remove(copy)
-    bpy.data.batch_remove(copies)
 
 
 def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
@@ -174,14 +174,6 @@ def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection)
         if child.name not in scene.collection.children:
             scene.collection.children.link(child)
     bpy.data.collections.remove(collection)
-
-
-def _remove_left_over() -> None:
-    """Removes what belonged to copies that were deleted by hand."""
-    for action in [action for action in bpy.data.actions if action.get(ACTION_MARK)]:
-        bpy.data.actions.remove(action)
-    offset_nodes.remove_unused()
-    orphans.remove()
 
 
 def corners(evaluated: bpy.types.Object) -> np.ndarray:

@@ -57,15 +57,11 @@ class Written:
     left_out: list[str]
 
 
-def _no_report(_share: float) -> None:
-    pass
-
-
 def write(
     path: Path,
     skinned: list[bpy.types.Object],
     options: ExportOptions,
-    report: Callable[[float], None] = _no_report,
+    report: Callable[[float], None] = lambda _share: None,
 ) -> Written:
     """Writes the scene; the open file is changed for it.
 
