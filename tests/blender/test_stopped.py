@@ -33,7 +33,7 @@ Steps = Iterator[float]
 def inbetweens(_folder: Path) -> Steps:
     armature = test_inbetween.make_rig()
     test_inbetween.key_random_poses(armature)
-    return inbetween_bake.steps(armature, inbetween_bake.Settings("sclerp"), [])
+    return inbetween_bake.steps(armature, inbetween_bake.Settings("sclerp"))
 
 
 def inverse_kinematics(_folder: Path) -> Steps:
@@ -46,14 +46,14 @@ def inverse_kinematics(_folder: Path) -> Steps:
 
     def steps() -> Steps:
         with stepped.kept_frame(bpy.context.scene, [arm]):
-            yield from ik_bake.steps(arm, ik_io.read_trees(arm), list(test_ik.FRAMES), "dls", [])
+            yield from ik_bake.steps(arm, ik_io.read_trees(arm), list(test_ik.FRAMES), "dls")
 
     return steps()
 
 
 def blend(_folder: Path) -> Steps:
     armature, chosen, _pair = test_blend.make_walks()
-    actions.play(armature, chosen[0], actions.slot_for(chosen[0], armature))
+    actions.play(armature, chosen[0])
     return blend_actions.make(armature, chosen, (1, 1), test_blend.Settings())
 
 
