@@ -24,6 +24,7 @@ import program
 import psutil
 import pytest
 import scenes
+import test_cluster
 import whole_file
 from program import ENVIRONMENT, run_sinew
 from sinew_addon.attach import properties
@@ -589,39 +590,33 @@ def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
     return good, broken
 
 
-class Cluster:
+class Cluster(ExitStack):
     """A dask scheduler and two workers, in their own processes."""
 
     def __init__(self, folder: Path) -> None:
-        self._processes: list[subprocess.Popen] = []
+        super().__init__()
         address_file = folder / "scheduler.json"
         options = ("--scheduler-file", str(address_file), "--no-dashboard")
-        self._start("scheduler", *options, "--port", "0", "--host", "127.0.0.1")
-        for _ in range(2):
-            self._start("worker", *options, "--nthreads", "1", "--local-directory", str(folder))
+        self._start(folder, "scheduler", *options, "--port", "0", "--host", "127.0.0.1")
+        worker = ("worker", *options, "--nthreads", "1", "--local-directory", str(folder))
+        self._workers = [self._start(folder, *worker) for _ in range(2)]
         end = time.monotonic() + 60
         while not address_file.exists() and time.monotonic() < end:
             time.sleep(0.1)
         self.address = json.loads(address_file.read_text())["address"]
 
-    def __enter__(self) -> Cluster:
-        return self
-
-    def __exit__(self, *_exception: object) -> None:
-        for process in reversed(self._processes):
-            process.terminate()
-        for process in self._processes:
-            process.wait(timeout=30)
+    def _start(self, folder: Path, *arguments: str) -> subprocess.Popen:
+        return self.enter_context(test_cluster.running(folder, *arguments, environment=ENVIRONMENT))
 
     def lose_a_worker(self) -> None:
         """Kills one with its current process; its nanny starts another."""
-        for process in psutil.Process(self._processes[-1].pid).children():
+        for process in psutil.Process(self._workers[-1].pid).children():
             process.kill()
 
     def workers(self) -> list[psutil.Process]:
         return [
             child
-            for keeper in self._processes[1:]
+            for keeper in self._workers
             for child in psutil.Process(keeper.pid).children()
             if "spawn_main" in " ".join(command_of(child))
         ]
@@ -633,8 +628,3 @@ class Cluster:
             for child in worker.children()
             if any(part.endswith(".worker") for part in command_of(child))
         ]
-
-    def _start(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "dask", *arguments]
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        self._processes.append(subprocess.Popen(command, env=ENVIRONMENT, **quiet))
