@@ -27,8 +27,8 @@ BONES = (2, 5, 10)
 KINDS = ("free", "limited")
 CHAINS = 100
 FRAMES = 120
-SOLVERS = ("blender", *sinew.ik.METHODS)
-LABELS = {"blender": "Blender", "dls": "Sinew, dls", "ccd": "Sinew, ccd"}
+# Names in times() and in animated(), and those in the picture.
+SOLVERS = (("blender", "blender", "Blender"), ("sinew 1e-06", "sinew", "Sinew"))
 
 
 def make_chains(bones: int, kind: str, count: int) -> tuple[bpy.types.Object, list]:
@@ -106,20 +106,19 @@ def times(bones: int, kind: str, seconds: float) -> dict:
             bpy.context.view_layer.update()
         return (time.process_time() - began) / 3
 
-    def solve(method: str, tolerance: float) -> sinew.ik.Solution:
+    def solve(tolerance: float) -> sinew.ik.Solution:
         return solver.solve(
             problem.rest,
             problem.tips,
             problem.goals,
             rotations=problem.rotations,
             root=problem.root,
-            method=method,
             tolerance=tolerance,
             iterations=core.ITERATIONS,
         )
 
-    ways = [(method, tolerance) for method in sinew.ik.METHODS for tolerance in (1e-3, 1e-6)]
-    taken: dict[str, list[float]] = {"blender": [], **{f"{m} {t:g}": [] for m, t in ways}}
+    tolerances = (1e-3, 1e-6)
+    taken: dict[str, list[float]] = {"blender": [], **{f"sinew {t:g}": [] for t in tolerances}}
     with_it, without = [], []
     end = time.perf_counter() + seconds
     while time.perf_counter() < end or len(taken["blender"]) < 5:
@@ -128,10 +127,10 @@ def times(bones: int, kind: str, seconds: float) -> dict:
         ik_io.set_muted(armature, names, True)
         without.append(update() / CHAINS)
         taken["blender"].append(with_it[-1] - without[-1])
-        for method, tolerance in ways:
+        for tolerance in tolerances:
             began = time.process_time()
-            solve(method, tolerance)
-            taken[f"{method} {tolerance:g}"].append((time.process_time() - began) / CHAINS)
+            solve(tolerance)
+            taken[f"sinew {tolerance:g}"].append((time.process_time() - began) / CHAINS)
     found = {}
     for name, turns in taken.items():
         low, median, high = np.percentile(turns, [25, 50, 75]) * 1e6
@@ -142,8 +141,7 @@ def times(bones: int, kind: str, seconds: float) -> dict:
                 min(with_it) - min(without),
             )
         else:
-            method, tolerance = name.split()
-            solution = solve(method, float(tolerance))
+            solution = solve(float(name.split()[1]))
             matrices = core.matrices_of(trees[0], problem, solution.rotations)
             errors = core.tip_errors(trees[0], problem, matrices)
             iterations, least = float(np.mean(solution.iterations)), min(turns)
@@ -176,8 +174,7 @@ def animated(bones: int, kind: str) -> dict:
             frames.append(ik_io.read_posed(armature, tree))
     problem = core.problem_of(tree, core.stack(posed))
     matrices = {"blender": core.stack(theirs).bones.astype(float)}
-    for method in sinew.ik.METHODS:
-        matrices[method] = core.matrices_of(tree, problem, core.solve(tree, problem, method).rotations)
+    matrices["sinew"] = core.matrices_of(tree, problem, core.solve(tree, problem).rotations)
     return {
         solver: {
             "errors": core.tip_errors(tree, problem, of).tolist(),
@@ -189,25 +186,18 @@ def animated(bones: int, kind: str) -> dict:
 
 def draw(spreads: dict, motions: dict) -> None:
     figure, (first, second, third) = plt.subplots(1, 3, figsize=(12.6, 3.6), layout="constrained")
-    styles = dict(zip(SOLVERS, (("#ee6677", "^"), ("#4477aa", "o"), ("#ccbb44", "s")), strict=True))
-    for solver, (colour, marker) in styles.items():
-        name = solver if solver == "blender" else f"{solver} 1e-06"
+    styles = (("#ee6677", "^"), ("#4477aa", "o"))
+    for (name, solver, text), (colour, marker) in zip(SOLVERS, styles, strict=True):
         for kind, line in zip(KINDS, ("-", ":"), strict=True):
             values = [spreads[f"{bones} {kind}"][name]["median"] for bones in BONES]
-            label = LABELS[solver] if kind == "free" else None
-            first.loglog(BONES, values, line, color=colour, marker=marker, label=label)
+            first.loglog(BONES, values, line, color=colour, marker=marker)
+        for axes in (first, third):
+            axes.plot([], [], color=colour, marker=marker, label=text)
         errors = np.maximum(motions["5 free"][solver]["errors"], 1e-12)
-        second.semilogy(errors, color=colour, label=LABELS[solver])
+        second.semilogy(errors, color=colour, label=text)
         for kind, line in zip(KINDS, ("-", ":"), strict=True):
             values = [motions[f"{bones} {kind}"][solver]["acceleration"] for bones in BONES]
-            third.loglog(
-                BONES,
-                values,
-                line,
-                color=colour,
-                marker=marker,
-                label=LABELS[solver] if kind == "free" else None,
-            )
+            third.loglog(BONES, values, line, color=colour, marker=marker)
     first.set(xlabel="bones", ylabel="microseconds a solve", title="Time (dotted: with limits)")
     second.set(xlabel="frame", ylabel="distance to the goal, chain's lengths", title="What is left, 5 bones")
     third.set(xlabel="bones", ylabel="rms, radians per frame²", title="Angular acceleration")

@@ -4,8 +4,6 @@
 import argparse
 from dataclasses import dataclass
 
-import sinew
-
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.steps import result_of
@@ -32,7 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="only chains with this bone; may be given several times",
     )
-    parser.add_argument("--method", choices=sinew.ik.METHODS, default="dls", help="default: dls")
     parser.add_argument("--frames", type=_range, metavar="FIRST-LAST", help="default: the scene's frames")
 
 
@@ -82,7 +79,7 @@ def _solve(outcome: Solved, args: argparse.Namespace) -> None:
             except SinewError as error:
                 reasons.append(str(error))
                 continue
-            found = result_of(ik_bake.steps(armature, trees, wanted, args.method))
+            found = result_of(ik_bake.steps(armature, trees, wanted))
         outcome.worst = max([outcome.worst, *(float(each.errors.max()) for each in found)])
         outcome.chains += len(trees)
         outcome.bones += sum(len(tree.bones) for tree in trees)

@@ -9,13 +9,8 @@ from sinew import affine, ik, quat, quat_vec
 
 from .errors import SinewError
 
-# The iterations of commands and the panel: Blender's own limit, which dls never nearly reaches.
+# The iterations of commands and the panel: Blender's own limit, which the solver never nearly reaches.
 ITERATIONS = 500
-
-LABELS = {
-    "dls": ("Damped least squares", "A few steps of all bones at once; the faster one nearly always"),
-    "ccd": ("Cyclic descent", "One bone after the other from the tip: bends most near the tip"),
-}
 
 
 @dataclass(frozen=True)
@@ -118,7 +113,7 @@ def problem_of(tree: Tree, posed: Posed) -> Problem:
     )
 
 
-def solve(tree: Tree, problem: Problem, method: ik.Method, iterations: int = ITERATIONS) -> ik.Solution:
+def solve(tree: Tree, problem: Problem, iterations: int = ITERATIONS) -> ik.Solution:
     return tree.solver().solve(
         problem.rest,
         problem.tips,
@@ -126,7 +121,6 @@ def solve(tree: Tree, problem: Problem, method: ik.Method, iterations: int = ITE
         problem.poles if tree.has_pole else None,
         rotations=problem.rotations,
         root=problem.root,
-        method=method,
         iterations=iterations,
     )
 

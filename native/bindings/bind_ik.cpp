@@ -139,10 +139,8 @@ py::array_t<double> as_dual_quats(const py::object& value, const char* argument,
     });
 }
 
-IkOptions checked_options(const py::object& method, const py::object& tolerance,
-                          const py::object& iterations) {
+IkOptions checked_options(const py::object& tolerance, const py::object& iterations) {
     IkOptions options;
-    options.method = static_cast<IkMethod>(checked_choice(method, "method", kIkMethods));
     const std::string positive = "a finite number above 0";
     options.tolerance = checked_number(tolerance, "tolerance", positive);
     if (!(options.tolerance > 0.0) || !std::isfinite(options.tolerance)) {
@@ -155,9 +153,8 @@ IkOptions checked_options(const py::object& method, const py::object& tolerance,
 
 Solution solve(Solver& self, const ArrayLike& rest, const ArrayLike& tips, const ArrayLike& goals,
                const OptionalArrayLike& poles, const OptionalArrayLike& rotations,
-               const OptionalArrayLike& root, const Typed<"sinew.ik.Method">& method, const Number& tolerance,
-               const Index& iterations) {
-    const IkOptions options = checked_options(method, tolerance, iterations);
+               const OptionalArrayLike& root, const Number& tolerance, const Index& iterations) {
+    const IkOptions options = checked_options(tolerance, iterations);
     const std::size_t bones = self.bone_count;
     const std::size_t effectors = self.effector_count;
     if (self.has_pole && poles.is_none()) fail("poles", "a point for the effector with a pole", "None");
@@ -224,7 +221,6 @@ Solution solve(Solver& self, const ArrayLike& rest, const ArrayLike& tips, const
 
 void bind_ik(py::module_& m) {
     auto ik = m.def_submodule("ik");
-    ik.attr("METHODS") = names_in_python(kIkMethods);
     def<Quat>(
         ik, "swing_twist_angles", {"rotations"},
         []<class T>(const Quat<T>& q) {
@@ -249,10 +245,11 @@ limits: [bones, 3, 2], the smallest and the largest angle about x, y and z, radi
     IK limits. With limits of x and z a bone's swing stays within an ellipse through the four. Bones with
     limits or locks swing by at most 177.7 degrees.
 stiffness: [bones, 3], 0 to below 1: how much less the bone rotates about an axis than about others.)")
-        .def("solve", &solve, "rest"_a, "tips"_a, "goals"_a, "poles"_a = py::none(), py::kw_only(),
-             "rotations"_a = py::none(), "root"_a = py::none(), "method"_a = "dls", "tolerance"_a = 1e-6,
-             "iterations"_a = 100,
-             R"(Finds rotations that bring the tips to the goals.
+        .def(
+            "solve", &solve, "rest"_a, "tips"_a, "goals"_a, "poles"_a = py::none(), py::kw_only(),
+            "rotations"_a = py::none(), "root"_a = py::none(), "tolerance"_a = 1e-6, "iterations"_a = 100,
+            R"(Finds rotations that bring the tips to the goals, by damped least squares on screws; each step moves all
+axes (Wampler 1986; Sugihara 2011).
 
 rest: [.., bones, 4, 4], [.., bones, 3, 4], [.., bones, 7] or [.., bones, 8]: each bone relative to its
     parent, not rotated. A matrix's linear part is replaced by the nearest rotation.
@@ -263,13 +260,8 @@ poles: [.., effectors, 3], points; None if no effector has a pole.
 rotations: [.., bones, 4], the start; rotations beyond the limits are brought within. None: no rotation.
 root: [.., 4, 4], [.., 3, 4], [.., 7] or [.., 8], applied after the transform of every bone without a parent;
     None: the identity. Goals and poles are in the space that it maps to.
-method: one of METHODS.
 tolerance: errors that count as reached, in lengths of the longest chain and in radians.
-iterations: maximum number of steps of all axes, or of sweeps over all bones.
-
-dls  damped least squares on screws; each step moves all axes (Wampler 1986; Sugihara 2011)
-ccd  cyclic descent, one bone after the other from the tip (Wang, Chen 1991): cheap steps, but many of them
-     where a chain is nearly straight or limited
+iterations: maximum number of steps.
 
 If a chain with one effector whose rotation does not count can not reach its goal, the goal is moved to the
 nearest point of its range; a chain without limits stretches straight towards it. A straight chain that points

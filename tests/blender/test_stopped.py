@@ -46,7 +46,7 @@ def inverse_kinematics(_folder: Path) -> Steps:
 
     def steps() -> Steps:
         with stepped.kept_frame(bpy.context.scene, [arm]):
-            yield from ik_bake.steps(arm, ik_io.read_trees(arm), list(test_ik.FRAMES), "dls")
+            yield from ik_bake.steps(arm, ik_io.read_trees(arm), list(test_ik.FRAMES))
 
     return steps()
 

@@ -38,9 +38,6 @@ double limit_violation(const BoneLimits& limits, const Quat<double>& q) noexcept
 
 using test::Random;
 
-constexpr IkMethod kDls = IkMethod::damped_least_squares;
-constexpr IkMethod kCcd = IkMethod::cyclic_descent;
-
 /// Bones along y, each at the end of the one before, unless parents say otherwise.
 struct Rig {
     std::vector<std::int32_t> parents;
@@ -137,32 +134,30 @@ BoneLimits random_limits(Random& random) {
 
 TEST(Ik, limits_are_never_violated_and_nearly_always_what_is_reachable_is_reached) {
     Random random(5);
-    for (const IkMethod method : {kDls, kCcd}) {
-        int reached = 0;
+    int reached = 0;
 
-        for (int i = 0; i < 400; ++i) {
-            Rig rig = Rig::chain(random_lengths(random));
-            for (BoneLimits& limits : rig.limits) limits = random_limits(random);
-            const std::size_t end = rig.parents.size() - 1;
-            // Rotations within the limits, made by a solve without a step, which limits its start.
-            const auto within = [&](const std::vector<Quat<double>>& any) {
-                return solve(rig, {last(rig)}, {at({0, 0, 0})}, any, {.iterations = 0}).rotations;
-            };
-            const auto posed = within(random_rotations(random, end + 1, 1.5));
-            for (std::size_t bone = 0; bone <= end; ++bone) {
-                EXPECT_LT(limit_violation(rig.limits[bone], posed[bone]), 1e-7) << i << " " << bone;
-            }
-            const Vec3<double> goal = rig.tip(posed, end);
-            const auto found = solve(rig, {last(rig)}, {at(goal)}, random_rotations(random, end + 1, 0.3),
-                                     {.method = method, .iterations = method == kDls ? 200 : 3000});
-            for (std::size_t bone = 0; bone <= end; ++bone) {
-                EXPECT_LT(limit_violation(rig.limits[bone], found.rotations[bone]), 1e-7) << i << " " << bone;
-            }
-            reached += found.result.is_reached;
+    for (int i = 0; i < 400; ++i) {
+        Rig rig = Rig::chain(random_lengths(random));
+        for (BoneLimits& limits : rig.limits) limits = random_limits(random);
+        const std::size_t end = rig.parents.size() - 1;
+        // Rotations within the limits, made by a solve without a step, which limits its start.
+        const auto within = [&](const std::vector<Quat<double>>& any) {
+            return solve(rig, {last(rig)}, {at({0, 0, 0})}, any, {.iterations = 0}).rotations;
+        };
+        const auto posed = within(random_rotations(random, end + 1, 1.5));
+        for (std::size_t bone = 0; bone <= end; ++bone) {
+            EXPECT_LT(limit_violation(rig.limits[bone], posed[bone]), 1e-7) << i << " " << bone;
         }
-        RecordProperty(method == kDls ? "dls" : "ccd", reached);
-        EXPECT_GE(reached, method == kDls ? 390 : 380);
+        const Vec3<double> goal = rig.tip(posed, end);
+        const auto found =
+            solve(rig, {last(rig)}, {at(goal)}, random_rotations(random, end + 1, 0.3), {.iterations = 200});
+        for (std::size_t bone = 0; bone <= end; ++bone) {
+            EXPECT_LT(limit_violation(rig.limits[bone], found.rotations[bone]), 1e-7) << i << " " << bone;
+        }
+        reached += found.result.is_reached;
     }
+    RecordProperty("reached", reached);
+    EXPECT_GE(reached, 390);
 }
 
 /// A trunk of two bones, and two branches of three bones each.
@@ -182,92 +177,80 @@ Rig tree() {
 TEST(Ik, trees_reach_two_goals) {
     Random random(7);
     const Rig rig = tree();
-    for (const IkMethod method : {kDls, kCcd}) {
-        for (int i = 0; i < 100; ++i) {
-            const auto posed = random_rotations(random, 8, 0.6);
-            const std::vector<Vec3<double>> goals{rig.tip(posed, 4), rig.tip(posed, 7)};
-            const auto found =
-                solve(rig, {{.bone = 4}, {.bone = 7}}, {at(goals[0]), at(goals[1])},
-                      random_rotations(random, 8, 0.3), {.method = method, .iterations = 5000});
-            EXPECT_LT(test::distance(rig.tip(found.rotations, 4), goals[0]), 4.5e-6) << i;
-            EXPECT_LT(test::distance(rig.tip(found.rotations, 7), goals[1]), 4.5e-6) << i;
-        }
+    for (int i = 0; i < 100; ++i) {
+        const auto posed = random_rotations(random, 8, 0.6);
+        const std::vector<Vec3<double>> goals{rig.tip(posed, 4), rig.tip(posed, 7)};
+        const auto found = solve(rig, {{.bone = 4}, {.bone = 7}}, {at(goals[0]), at(goals[1])},
+                                 random_rotations(random, 8, 0.3), {.iterations = 5000});
+        EXPECT_LT(test::distance(rig.tip(found.rotations, 4), goals[0]), 4.5e-6) << i;
+        EXPECT_LT(test::distance(rig.tip(found.rotations, 7), goals[1]), 4.5e-6) << i;
     }
 }
 
 TEST(Ik, poles_choose_the_plane_and_the_side_of_the_bend) {
     Random random(8);
-    for (const IkMethod method : {kDls, kCcd}) {
-        for (int i = 0; i < 200; ++i) {
-            // Bent about x, so that its plane contains z, the axis that the pole angle refers to.
-            const Rig rig = Rig::chain(random_lengths(random));
-            const std::size_t end = rig.parents.size() - 1;
-            const std::vector<Quat<double>> start(end + 1,
-                                                  quat_from_rotation_vector(Vec3<double>(0.15, 0.0, 0.0)));
-            const Vec3<double> towards = unit(random.vector(1.0), {1, 0, 0});
-            const Vec3<double> goal = random.uniform(0.5, 0.9) * rig.length() * towards;
-            const Vec3<double> pole = 3.0 * unit(random.vector(1.0), {0, 1, 0});
-            IkEffector effector = last(rig);
-            effector.has_pole = true;
-            effector.pole_angle = 0.5 * std::numbers::pi;
-            const auto found =
-                solve(rig, {effector}, {at(goal)}, start, {.method = method, .iterations = 5000}, {pole});
-            EXPECT_TRUE(found.result.is_reached);
-            const Vec3<double> up = glm::normalize(pole - glm::dot(pole, towards) * towards);
-            const Vec3<double> normal = glm::cross(towards, up);
-            for (std::size_t bone = 0; bone < end; ++bone) {
-                EXPECT_NEAR(glm::dot(rig.tip(found.rotations, bone), normal), 0.0, 1e-9);
-            }
-            // The chain is bent away from the direction of its bones' z axes.
-            EXPECT_LT(glm::dot(rig.tip(found.rotations, 0), up), 0.0) << i;
+    for (int i = 0; i < 200; ++i) {
+        // Bent about x, so that its plane contains z, the axis that the pole angle refers to.
+        const Rig rig = Rig::chain(random_lengths(random));
+        const std::size_t end = rig.parents.size() - 1;
+        const std::vector<Quat<double>> start(end + 1,
+                                              quat_from_rotation_vector(Vec3<double>(0.15, 0.0, 0.0)));
+        const Vec3<double> towards = unit(random.vector(1.0), {1, 0, 0});
+        const Vec3<double> goal = random.uniform(0.5, 0.9) * rig.length() * towards;
+        const Vec3<double> pole = 3.0 * unit(random.vector(1.0), {0, 1, 0});
+        IkEffector effector = last(rig);
+        effector.has_pole = true;
+        effector.pole_angle = 0.5 * std::numbers::pi;
+        const auto found = solve(rig, {effector}, {at(goal)}, start, {.iterations = 5000}, {pole});
+        EXPECT_TRUE(found.result.is_reached);
+        const Vec3<double> up = glm::normalize(pole - glm::dot(pole, towards) * towards);
+        const Vec3<double> normal = glm::cross(towards, up);
+        for (std::size_t bone = 0; bone < end; ++bone) {
+            EXPECT_NEAR(glm::dot(rig.tip(found.rotations, bone), normal), 0.0, 1e-9);
         }
+        // The chain is bent away from the direction of its bones' z axes.
+        EXPECT_LT(glm::dot(rig.tip(found.rotations, 0), up), 0.0) << i;
     }
 }
 
 TEST(Ik, a_straight_chain_bends_to_a_goal_on_its_line) {
-    for (const IkMethod method : {kDls, kCcd}) {
-        for (const double goal : {0.3, 1.0, 2.0, -0.5, -2.0}) {
-            Rig rig = Rig::chain({1, 1, 1});
-            const std::vector<Quat<double>> straight(3, Quat<double>(1, 0, 0, 0));
-            const auto found =
-                solve(rig, {last(rig)}, {at({0, goal, 0})}, straight, {.method = method, .iterations = 5000});
-            EXPECT_LT(test::distance(rig.tip(found.rotations, 2), {0, goal, 0}), 3e-6) << goal;
-            // A knee: bends only to one side.
-            for (std::size_t bone : {1, 2}) {
-                for (std::size_t axis : {1, 2}) rig.limits[bone][axis].is_locked = true;
-                rig.limits[bone][0].is_limited = true;
-                rig.limits[bone][0].min = 0.0;
-                rig.limits[bone][0].max = 2.6;
-            }
-            const auto knee =
-                solve(rig, {last(rig)}, {at({0, goal, 0})}, straight, {.method = method, .iterations = 5000});
-            EXPECT_LT(test::distance(rig.tip(knee.rotations, 2), {0, goal, 0}), 3e-6) << goal;
-            for (std::size_t bone : {1, 2}) {
-                EXPECT_LT(limit_violation(rig.limits[bone], knee.rotations[bone]), 1e-7);
-            }
+    for (const double goal : {0.3, 1.0, 2.0, -0.5, -2.0}) {
+        Rig rig = Rig::chain({1, 1, 1});
+        const std::vector<Quat<double>> straight(3, Quat<double>(1, 0, 0, 0));
+        const auto found = solve(rig, {last(rig)}, {at({0, goal, 0})}, straight, {.iterations = 5000});
+        EXPECT_LT(test::distance(rig.tip(found.rotations, 2), {0, goal, 0}), 3e-6) << goal;
+        // A knee: bends only to one side.
+        for (std::size_t bone : {1, 2}) {
+            for (std::size_t axis : {1, 2}) rig.limits[bone][axis].is_locked = true;
+            rig.limits[bone][0].is_limited = true;
+            rig.limits[bone][0].min = 0.0;
+            rig.limits[bone][0].max = 2.6;
+        }
+        const auto knee = solve(rig, {last(rig)}, {at({0, goal, 0})}, straight, {.iterations = 5000});
+        EXPECT_LT(test::distance(rig.tip(knee.rotations, 2), {0, goal, 0}), 3e-6) << goal;
+        for (std::size_t bone : {1, 2}) {
+            EXPECT_LT(limit_violation(rig.limits[bone], knee.rotations[bone]), 1e-7);
         }
     }
 }
 
 TEST(Ik, degenerate_chains_are_finite) {
-    for (const IkMethod method : {kDls, kCcd}) {
-        const std::vector<Quat<double>> straight(3, Quat<double>(1, 0, 0, 0));
-        for (const std::vector<double>& lengths :
-             {std::vector<double>{0, 0, 0}, {1, 0, 1}, {0, 1, 0}, {3, 1, 0.5}, {1, 1, 1}}) {
-            for (const Vec3<double>& goal : {Vec3<double>(0, 0, 0), {0, 0.4, 0}, {1, 1, 0}, {1e9, 0, 0}}) {
-                const Rig rig = Rig::chain(lengths);
-                IkEffector effector = last(rig);
-                effector.has_pole = true;
-                const auto found = solve(rig, {effector}, {at(goal)}, straight,
-                                         {.method = method, .iterations = 2000}, {{0, 5, 0}});
-                for (const Quat<double>& q : found.rotations) EXPECT_NEAR(glm::length(q), 1.0, 1e-9);
-                EXPECT_TRUE(std::isfinite(found.result.distance));
-                double least = test::distance(goal, Vec3<double>(0.0)) - rig.length();
-                least = std::max(least, 2.0 * *std::max_element(lengths.begin(), lengths.end()) -
-                                            rig.length() - test::distance(goal, Vec3<double>(0.0)));
-                EXPECT_LE(found.result.distance, std::max(least, 0.0) * (1 + 1e-9) + 1e-4 * rig.length())
-                    << lengths[0] << lengths[1] << lengths[2] << " " << goal.x << " " << goal.y;
-            }
+    const std::vector<Quat<double>> straight(3, Quat<double>(1, 0, 0, 0));
+    for (const std::vector<double>& lengths :
+         {std::vector<double>{0, 0, 0}, {1, 0, 1}, {0, 1, 0}, {3, 1, 0.5}, {1, 1, 1}}) {
+        for (const Vec3<double>& goal : {Vec3<double>(0, 0, 0), {0, 0.4, 0}, {1, 1, 0}, {1e9, 0, 0}}) {
+            const Rig rig = Rig::chain(lengths);
+            IkEffector effector = last(rig);
+            effector.has_pole = true;
+            const auto found =
+                solve(rig, {effector}, {at(goal)}, straight, {.iterations = 2000}, {{0, 5, 0}});
+            for (const Quat<double>& q : found.rotations) EXPECT_NEAR(glm::length(q), 1.0, 1e-9);
+            EXPECT_TRUE(std::isfinite(found.result.distance));
+            double least = test::distance(goal, Vec3<double>(0.0)) - rig.length();
+            least = std::max(least, 2.0 * *std::max_element(lengths.begin(), lengths.end()) - rig.length() -
+                                        test::distance(goal, Vec3<double>(0.0)));
+            EXPECT_LE(found.result.distance, std::max(least, 0.0) * (1 + 1e-9) + 1e-4 * rig.length())
+                << lengths[0] << lengths[1] << lengths[2] << " " << goal.x << " " << goal.y;
         }
     }
 }
@@ -281,16 +264,11 @@ TEST(Ik, a_rigid_motion_of_everything_changes_nothing) {
         const Vec3<double> pole = random.vector(4.0);
         const auto start = random_rotations(random, 4, 0.4);
         const IkEffector effector{.bone = 3, .rotation_weight = i % 2 ? 0.5 : 0.0, .has_pole = i % 3 == 0};
-        for (const IkMethod method : {kDls, kCcd}) {
-            const auto here =
-                solve(rig, {effector}, {goal}, start, {.method = method, .iterations = 30}, {pole});
-            const auto there =
-                solve(rig, {effector}, {motion * goal}, start, {.method = method, .iterations = 30},
-                      {transform_point(motion, pole)}, motion);
-            for (std::size_t bone = 0; bone < 4; ++bone) {
-                EXPECT_LT(angle_between(here.rotations[bone], there.rotations[bone]), 1e-5)
-                    << i << " " << bone;
-            }
+        const auto here = solve(rig, {effector}, {goal}, start, {.iterations = 30}, {pole});
+        const auto there = solve(rig, {effector}, {motion * goal}, start, {.iterations = 30},
+                                 {transform_point(motion, pole)}, motion);
+        for (std::size_t bone = 0; bone < 4; ++bone) {
+            EXPECT_LT(angle_between(here.rotations[bone], there.rotations[bone]), 1e-5) << i << " " << bone;
         }
     }
 }
@@ -307,34 +285,29 @@ TEST(Ik, signs_of_quaternions_do_not_matter_and_the_same_gives_the_same_bits) {
         for (const Quat<double>& q : start) negative.push_back(-q);
         const DualQuat<double> goal = at(random.vector(1.5), random.rotation());
         const IkEffector effector{.bone = 2, .rotation_weight = 0.5};
-        for (const IkMethod method : {kDls, kCcd}) {
-            const auto once = solve(rig, {effector}, {goal}, start, {.method = method});
-            const auto again = solve(rig, {effector}, {-goal}, negative, {.method = method});
-            const auto same = solve(rig, {effector}, {goal}, start, {.method = method});
-            for (std::size_t bone = 0; bone < 3; ++bone) {
-                EXPECT_LT(glm::length(once.rotations[bone] - again.rotations[bone]), 1e-9) << i;
-                EXPECT_GE(once.rotations[bone].w, 0.0);
-            }
-            EXPECT_EQ(std::memcmp(once.rotations.data(), same.rotations.data(), 3 * sizeof(Quat<double>)), 0);
+        const auto once = solve(rig, {effector}, {goal}, start);
+        const auto again = solve(rig, {effector}, {-goal}, negative);
+        const auto same = solve(rig, {effector}, {goal}, start);
+        for (std::size_t bone = 0; bone < 3; ++bone) {
+            EXPECT_LT(glm::length(once.rotations[bone] - again.rotations[bone]), 1e-9) << i;
+            EXPECT_GE(once.rotations[bone].w, 0.0);
         }
+        EXPECT_EQ(std::memcmp(once.rotations.data(), same.rotations.data(), 3 * sizeof(Quat<double>)), 0);
     }
 }
 
 TEST(Ik, stiff_bones_rotate_less) {
     Rig rig = Rig::chain({1, 1, 1});
     const std::vector<Quat<double>> start(3, quat_from_rotation_vector(Vec3<double>(0.2, 0, 0)));
-    const auto turn_of_root = [&](IkMethod method) {
-        const auto found =
-            solve(rig, {last(rig)}, {at({0.5, 2, 1})}, start, {.method = method, .iterations = 5000});
+    const auto turn_of_root = [&] {
+        const auto found = solve(rig, {last(rig)}, {at({0.5, 2, 1})}, start, {.iterations = 5000});
         EXPECT_TRUE(found.result.is_reached);
         return angle_between(start[0], found.rotations[0]);
     };
-    for (const IkMethod method : {kDls, kCcd}) {
-        for (AxisLimit& limit : rig.limits[0]) limit.stiffness = 0.0;
-        const double loose = turn_of_root(method);
-        for (AxisLimit& limit : rig.limits[0]) limit.stiffness = 0.9;
-        EXPECT_LT(turn_of_root(method), 0.7 * loose);
-    }
+    for (AxisLimit& limit : rig.limits[0]) limit.stiffness = 0.0;
+    const double loose = turn_of_root();
+    for (AxisLimit& limit : rig.limits[0]) limit.stiffness = 0.9;
+    EXPECT_LT(turn_of_root(), 0.7 * loose);
 }
 
 TEST(IkSolver, solves_nothing_where_sizes_do_not_fit) {

@@ -348,12 +348,9 @@ TEST(InverseKinematics, allocates_nothing_and_locks_nothing) {
     std::vector<Quat<double>> rotations(3, Quat<double>(1, 0, 0, 0));
     const int before = allocations;
     const int locks_before = locks;
-    for (const IkMethod method : {IkMethod::damped_least_squares, IkMethod::cyclic_descent}) {
-        for (int i = 0; i < 20; ++i) {
-            const std::array goals{
-                to_dual_quat(QuatVec<double>{{1, 0, 0, 0}, {0.1 * i, 2.0 - 0.2 * i, 0.0}})};
-            EXPECT_TRUE(solver.solve({{}, rest, tips, goals, {}}, rotations, {.method = method}));
-        }
+    for (int i = 0; i < 20; ++i) {
+        const std::array goals{to_dual_quat(QuatVec<double>{{1, 0, 0, 0}, {0.1 * i, 2.0 - 0.2 * i, 0.0}})};
+        EXPECT_TRUE(solver.solve({{}, rest, tips, goals, {}}, rotations));
     }
     EXPECT_EQ(allocations, before);
     EXPECT_EQ(locks, locks_before);

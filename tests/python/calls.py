@@ -207,7 +207,7 @@ MORE = {
     "Solver": {"locked": [[0, 1, 0]], "limits": [[[-1, 1]] * 3], "stiffness": [[0.5, 0, 0]]},
     "solve": {
         **{"poles": [[0, 0, 1]], "rotations": [[1, 0, 0, 0]], "root": CHAIN["goals"][0]},
-        **{"method": "ccd", "tolerance": 1e-6, "iterations": 5},
+        **{"tolerance": 1e-6, "iterations": 5},
     },
     "rigid": {
         **{"weights": HALF, "source_directions": POINTS, "target_directions": POINTS},

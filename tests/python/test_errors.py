@@ -240,7 +240,6 @@ ROWS = [
     ("solve", "rest", np.tile(CHAIN["rest"], (2, 1)), None, None),
     ("solve", "goals", CHAIN["goals"][0], None, None),
     ("solve", "tips", [[0, np.inf, 0]], None, None),
-    ("solve", "method", "fabrik", None, None),
     ("solve", "iterations", -1, None, None),
     ("solve", "poles", None, None, None),
     ("rigid", "target", SHEET, None, None),

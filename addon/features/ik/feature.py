@@ -7,7 +7,6 @@ import bpy
 import numpy as np
 
 from ...attach.feature import Feature
-from ...core import ik as core
 from ...deform import characters
 from ...io import ik_io
 from ...ui import operators, stepped
@@ -25,11 +24,6 @@ class SINEW_OT_bake_ik(OnArmature, stepped.WithDialog, bpy.types.Operator):
 
     saying = "Sinew solves inverse kinematics"
 
-    method: bpy.props.EnumProperty(
-        name="Method",
-        description="How the rotations are found",
-        items=[(name, label, text) for name, (label, text) in core.LABELS.items()],
-    )
     over: bpy.props.EnumProperty(**stepped.OVER_WHICH)
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
@@ -37,7 +31,7 @@ class SINEW_OT_bake_ik(OnArmature, stepped.WithDialog, bpy.types.Operator):
         frames = stepped.frames_over(context.scene, [armature], self.over)
         with stepped.kept_frame(context.scene, [armature]):
             trees = ik_io.read_trees(armature, selected_bones(armature))
-            self._found = yield from ik_bake.steps(armature, trees, frames, self.method)
+            self._found = yield from ik_bake.steps(armature, trees, frames)
 
     def run(self, context: bpy.types.Context) -> None:
         # The baked action applies at the current frame, too.

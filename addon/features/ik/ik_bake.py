@@ -25,7 +25,7 @@ class Baked:
 
 
 def steps(
-    armature: bpy.types.Object, trees: Sequence[core.Tree], frames: Sequence[int], method: core.ik.Method
+    armature: bpy.types.Object, trees: Sequence[core.Tree], frames: Sequence[int]
 ) -> Generator[float, None, list[Baked]]:
     """Bakes trees, those nearest to the root first; yields the progress.
 
@@ -45,7 +45,7 @@ def steps(
                 characters.set_frame(bpy.context.scene, frame)
                 posed.append(ik_io.read_posed(armature, tree))
                 yield (number + len(posed) / len(frames)) / len(trees)
-            found.append(_bake(armature, tree, core.stack(posed), frames, method))
+            found.append(_bake(armature, tree, core.stack(posed), frames))
     return found
 
 
@@ -74,10 +74,9 @@ def _bake(
     tree: core.Tree,
     posed: core.Posed,
     frames: Sequence[int],
-    method: core.ik.Method,
 ) -> Baked:
     problem = core.problem_of(tree, posed)
-    solution = core.solve(tree, problem, method)
+    solution = core.solve(tree, problem)
     rotations = core.blended(tree, problem, solution.rotations, posed.influences)
     matrices = core.matrices_of(tree, problem, rotations)
     for number, name in enumerate(tree.bones):

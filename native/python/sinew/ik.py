@@ -7,17 +7,12 @@ frames of an animation. Each problem starts from its own `rotations` and does no
 solver's results are float64.
 """
 
-from typing import Final, Literal, NamedTuple
+from typing import NamedTuple
 
-from ._native import ik as _native
 from ._native.ik import Solver, swing_twist_angles
 from ._types import Solution
 
-__all__ = ["METHODS", "Effector", "Method", "Solution", "Solver", "swing_twist_angles"]
-
-Method = Literal["dls", "ccd"]
-
-METHODS: Final[tuple[Method, ...]] = _native.METHODS
+__all__ = ["Effector", "Solution", "Solver", "swing_twist_angles"]
 
 
 class Effector(NamedTuple):

@@ -279,7 +279,7 @@ void IkSolver::State::bend() noexcept {
     update();
 }
 
-int IkSolver::State::solve_by_least_squares(const IkOptions& options) noexcept {
+int IkSolver::State::run(const IkOptions& options) noexcept {
     double error = cost();
     double least = error;
     double damping = 1.0;

@@ -384,19 +384,15 @@ std::optional<IkResult> IkSolver::solve(const IkProblem& problem, std::span<Quat
         return std::nullopt;
     }
     const std::scoped_lock lock(state.mutex);
-    const auto run = [&] {
-        return options.method == IkMethod::damped_least_squares ? state.solve_by_least_squares(options)
-                                                                : state.solve_by_descent(options);
-    };
     state.start(problem, rotations);
     IkResult result;
-    result.iterations = run();
+    result.iterations = state.run(options);
     if (!state.is_reached(options.tolerance) && state.can_rotate_to_goal()) {
         const double error = state.cost();
         state.keep(state.first);
         state.start(problem, rotations);
         state.rotate_to_goal();
-        result.iterations += run();
+        result.iterations += state.run(options);
         if (!(state.cost() < error)) state.restore(state.first);
     }
     for (std::size_t i = 0; i < rotations.size(); ++i) {

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
 
 #include "sinew/base/owned.h"
 #include "sinew/export.h"
@@ -31,22 +30,9 @@ struct IkEffector {
     double pole_angle = 0.0;
 };
 
-/// How to find the rotations.
-///
-///   damped_least_squares  each free axis is a unit screw; steps solve (J J^T + l 1) y = e, with l following the
-///                         error (Wampler 1986; Sugihara 2011)
-///   cyclic_descent        each bone in turn, starting at the tip, rotates to bring its tips as near to their
-///                         goals as possible (Wang, Chen 1991): cheap steps, but many of them where a chain is nearly
-///                         straight
-enum class IkMethod : std::uint8_t { damped_least_squares, cyclic_descent };
-
-/// The names of the methods, in the order of IkMethod.
-inline constexpr std::array<std::string_view, 2> kIkMethods{"dls", "ccd"};
-
 /// tolerance   errors that count as reached, in lengths of the chain and in radians
-/// iterations  maximum: steps of all axes, or sweeps over all bones
+/// iterations  maximum number of steps of all axes
 struct IkOptions {
-    IkMethod method = IkMethod::damped_least_squares;
     double tolerance = 1e-6;
     int iterations = 100;
 };
@@ -77,7 +63,9 @@ struct IkResult {
     bool is_reached = false;
 };
 
-/// Finds rotations of bones, within their limits, that bring tips of a tree of bones to their goals.
+/// Finds rotations of bones, within their limits, that bring tips of a tree of bones to their goals, by damped least
+/// squares: each free axis is a unit screw; steps solve (J J^T + l 1) y = e, with l following the error (Wampler 1986;
+/// Sugihara 2011).
 ///
 /// Each solve starts from the given rotations and depends on nothing else, so the same input gives the same bits.
 /// The signs of quaternions do not matter. A rigid motion of root, goals and poles does not change the result.

@@ -87,7 +87,6 @@ struct IkSolver::State {
     double length = 1.0;  ///< of the longest chain
     Vec3<double> pole{0.0};
 
-    // For damped least squares.
     std::vector<double> columns;  ///< [axes, rows]
     std::vector<double> residual, solution, normal;
     std::vector<double> steps, gradient;
@@ -112,8 +111,8 @@ struct IkSolver::State {
     void keep(Pose& pose) const noexcept;
     void restore(const Pose& pose) noexcept;
 
-    int solve_by_least_squares(const IkOptions& options) noexcept;
-    int solve_by_descent(const IkOptions& options) noexcept;
+    /// Returns the number of iterations.
+    int run(const IkOptions& options) noexcept;
     /// For a second try, if a chain has folded onto itself on the way to a goal behind it.
     [[nodiscard]] bool can_rotate_to_goal() const noexcept;
     void rotate_to_goal() noexcept;
@@ -137,8 +136,6 @@ private:
     bool block_steps() noexcept;
     void take_steps() noexcept;
 
-    void descend(std::size_t index) noexcept;
-    static Quat<double> rotation_since(const IkBone& bone, const Quat<double>& rotation) noexcept;
     /// The unit vector about which the bone rotates as its coordinate grows, and the speed.
     static Vec3<double> direction_of(const IkBone& bone, std::size_t axis, double& speed) noexcept;
 };
