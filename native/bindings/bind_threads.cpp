@@ -5,7 +5,7 @@
 #include "gil.h"
 #include "module.h"
 #include "signatures.h"
-#include "sinew/base/forks.h"
+#include "sinew/base/fork_safe.h"
 
 namespace sinew::bindings {
 namespace {

@@ -4,9 +4,13 @@
 #include <atomic>
 #include <cstdint>
 
-#include "sinew/base/forks.h"
+#include "sinew/export.h"
 
 namespace sinew {
+
+/// How many forks lie between the process that loaded the library and this one. A forked child has none of its
+/// parent's threads, so their unfinished work stays unfinished in the child.
+[[nodiscard]] SINEW_EXPORT std::uint32_t forks() noexcept;
 
 /// kBits bits that threads share and wait for. A forked child finds them all 0: it has none of the threads that
 /// could clear what they had set, and would otherwise wait for them forever.

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "sinew/base/forks.h"
+#include "sinew/base/fork_safe.h"
 #include "sinew/base/thread_pool.h"
 
 #if defined(_WIN32)

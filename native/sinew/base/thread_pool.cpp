@@ -21,7 +21,7 @@
 #include <immintrin.h>
 #endif
 
-#include "sinew/base/forks.h"
+#include "sinew/base/fork_safe.h"
 
 // Without a futex, as under mingw, this libstdc++'s std::atomic::wait compares the value before it locks the
 // mutex that it sleeps under, and can miss a wake-up (docs/install.md).

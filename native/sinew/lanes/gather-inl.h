@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Gathers points of arbitrary vertices into lanes. Compiled once for each instruction set.
+// Gathers points of arbitrary vertices, and deformed ones, which stages read again, into lanes. Compiled once for each instruction set.
 #if defined(SINEW_LANES_GATHER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_LANES_GATHER_INL_H_
 #undef SINEW_LANES_GATHER_INL_H_
@@ -70,6 +70,25 @@ HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* ver
                 hn::BitCast(d, hn::InterleaveLower(pairs, z01, z23))};
     }
     return load_consecutive(d, reinterpret_cast<const float*>(points + *vertices));
+}
+
+/// The deformed points of block `b`.
+template <class D>
+HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b, std::size_t lane) {
+    const Block& block = from.blocks[b];
+    const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
+    if (HWY_UNLIKELY(!from.points.is_contiguous())) {
+        return load_apart(
+            d, [ vertices, points = from.points ](std::size_t i) -> auto& { return points[vertices[i]]; });
+    }
+    const Vec3<float>* const points = from.points.data();
+    if constexpr (hn::MaxLanes(D()) > 1) {
+        if (block.consecutive) return load_consecutive(d, &points[block.output + lane].x);
+#if HWY_TARGET == HWY_AVX3
+        if (block.runs > 0) return load_runs(d, from.runs + block.output, block.runs, &points->x);
+#endif
+    }
+    return points_of<true>(d, points, vertices);
 }
 
 }  // namespace HWY_NAMESPACE

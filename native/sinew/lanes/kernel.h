@@ -10,7 +10,6 @@
 #include "sinew/base/strided.h"
 #include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
-#include "sinew/lanes/spaces.h"
 #include "sinew/mesh/packed_mesh.h"
 
 namespace sinew {

@@ -11,14 +11,11 @@
 #define SINEW_LANES_RIGID_INL_H_
 #endif
 
-#include <algorithm>
-#include <cmath>
 #include <concepts>
-#include <cstring>
 #include <type_traits>
 
 #include "sinew/lanes/block_loop-inl.h"
-#include "sinew/lanes/centre-inl.h"
+#include "sinew/lanes/bones-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {

@@ -29,7 +29,7 @@ void scaled_bone_rows(const Bones& bones, Palette& palette) {
     }
 }
 
-/// A bone that does not move, as rows of CentreRows (centre-inl.h).
+/// A bone that does not move, as rows of CentreRows (bones-inl.h).
 inline constexpr Float4 kCentreRestRow[] = {{{1, 0, 0, 0}}, {{0, 0, 0, 0}}, {{0, 0, 0, 0}}, {{0, 0, 0, 0}}};
 
 /// Stores one bone as such rows, and its scale apart.

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <unordered_map>
 
-#include "sinew/methods/check_bind_data.h"
+#include "sinew/methods/packed_binding.h"
 
 namespace sinew {
 namespace {

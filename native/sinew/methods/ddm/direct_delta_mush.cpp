@@ -9,8 +9,8 @@
 #include <map>
 #include <string>
 
-#include "sinew/methods/check_bind_data.h"
 #include "sinew/methods/ddm/block_factor.h"
+#include "sinew/methods/packed_binding.h"
 
 namespace sinew {
 namespace {

@@ -11,7 +11,7 @@
 //
 #include "hwy/highway.h"
 #include "sinew/lanes/block_loop-inl.h"
-#include "sinew/lanes/deformed-inl.h"
+#include "sinew/lanes/gather-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {

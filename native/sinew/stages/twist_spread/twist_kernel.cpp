@@ -13,7 +13,7 @@
 //
 #include "hwy/highway.h"
 #include "sinew/lanes/block_loop-inl.h"
-#include "sinew/lanes/deformed-inl.h"
+#include "sinew/lanes/gather-inl.h"
 #include "sinew/lanes/exponential-inl.h"
 
 HWY_BEFORE_NAMESPACE();
