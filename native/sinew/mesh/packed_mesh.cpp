@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <iterator>
 #include <numeric>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "sinew/base/thread_pool.h"
 
@@ -18,82 +21,47 @@ constexpr std::size_t kMinLanes = 6;
 // A run takes three masked stores. With more runs than this, one store for each vertex is as fast.
 constexpr std::size_t kMaxRuns = 5;
 
-class VertexSets {
-public:
-    VertexSets(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences)
-        : offsets_(offsets), influences_(influences), set_of_(offsets.size() - 1), slots_(1024, kNone) {
-        for (std::size_t vertex = 0; vertex < set_of_.size(); ++vertex) {
-            // Adjacent vertices mostly have the same bones.
-            const bool as_before = vertex > 0 && equal(vertex, vertex - 1);
-            const std::uint32_t set = as_before ? set_of_[vertex - 1] : find_or_add(vertex);
-            set_of_[vertex] = set;
-            ++sizes_[set];
-        }
-    }
+/// The vertices by set of bones, with sets in the order of their first vertex, and where each set starts.
+struct VertexSets {
+    std::vector<std::uint32_t> vertices;
+    std::vector<std::uint32_t> starts{0};
+};
 
-    [[nodiscard]] std::size_t count() const { return sizes_.size(); }
-
-    /// Lists the vertices by set, with sets in the order of their first vertex, and where each set starts.
-    void order(std::vector<std::uint32_t>& vertices, std::vector<std::uint32_t>& starts) const {
-        starts.assign(sizes_.size() + 1, 0);
-        std::partial_sum(sizes_.begin(), sizes_.end(), starts.begin() + 1);
-        std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
-        vertices.resize(set_of_.size());
-        for (std::size_t vertex = 0; vertex < set_of_.size(); ++vertex) {
-            vertices[next[set_of_[vertex]]++] = static_cast<std::uint32_t>(vertex);
-        }
-    }
-
-private:
-    static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-
-    [[nodiscard]] std::span<const Influence<float>> of(std::size_t vertex) const {
-        return influences_.subspan(offsets_[vertex], offsets_[vertex + 1] - offsets_[vertex]);
-    }
-
-    [[nodiscard]] bool equal(std::size_t a, std::size_t b) const {
+VertexSets sets_of(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences) {
+    const auto of = [&](std::size_t vertex) {
+        return influences.subspan(offsets[vertex], offsets[vertex + 1] - offsets[vertex]);
+    };
+    const auto equal = [&](std::size_t a, std::size_t b) {
         return std::ranges::equal(of(a), of(b), {}, &Influence<float>::bone, &Influence<float>::bone);
-    }
-
-    [[nodiscard]] std::size_t hash(std::size_t vertex) const {
+    };
+    const auto hash = [&](std::size_t vertex) {
         std::uint64_t h = 0;
         for (const Influence<float>& influence : of(vertex)) {
             h = (std::rotl(h, 23) ^ static_cast<std::uint64_t>(influence.bone)) * 0x9E3779B97F4A7C15u;
         }
         return static_cast<std::size_t>(h ^ (h >> 32));
+    };
+    // By their first vertex.
+    std::unordered_map<std::size_t, std::size_t, decltype(hash), decltype(equal)> known(1024, hash, equal);
+    std::vector<std::size_t> set_of(offsets.size() - 1);
+    std::vector<std::uint32_t> sizes;
+    for (std::size_t vertex = 0; vertex < set_of.size(); ++vertex) {
+        // Adjacent vertices mostly have the same bones.
+        const bool as_before = vertex > 0 && equal(vertex, vertex - 1);
+        set_of[vertex] =
+            as_before ? set_of[vertex - 1] : known.try_emplace(vertex, sizes.size()).first->second;
+        if (set_of[vertex] == sizes.size()) sizes.push_back(0);
+        ++sizes[set_of[vertex]];
     }
-
-    std::uint32_t find_or_add(std::size_t vertex) {
-        const std::size_t mask = slots_.size() - 1;
-        std::size_t slot = hash(vertex) & mask;
-        for (; slots_[slot] != kNone; slot = (slot + 1) & mask) {
-            if (equal(vertex, first_vertices_[slots_[slot]])) return slots_[slot];
-        }
-        const auto set = static_cast<std::uint32_t>(sizes_.size());
-        slots_[slot] = set;
-        sizes_.push_back(0);
-        first_vertices_.push_back(static_cast<std::uint32_t>(vertex));
-        if (2 * sizes_.size() > slots_.size()) grow();
-        return set;
+    VertexSets sets;
+    std::partial_sum(sizes.begin(), sizes.end(), std::back_inserter(sets.starts));
+    sets.vertices.resize(set_of.size());
+    std::vector<std::uint32_t> next(sets.starts);
+    for (std::size_t vertex = 0; vertex < set_of.size(); ++vertex) {
+        sets.vertices[next[set_of[vertex]]++] = static_cast<std::uint32_t>(vertex);
     }
-
-    void grow() {
-        slots_.assign(4 * slots_.size(), kNone);
-        const std::size_t mask = slots_.size() - 1;
-        for (std::uint32_t set = 0; set < first_vertices_.size(); ++set) {
-            std::size_t slot = hash(first_vertices_[set]) & mask;
-            while (slots_[slot] != kNone) slot = (slot + 1) & mask;
-            slots_[slot] = set;
-        }
-    }
-
-    std::span<const std::uint32_t> offsets_;
-    std::span<const Influence<float>> influences_;
-    std::vector<std::uint32_t> set_of_;
-    std::vector<std::uint32_t> slots_;
-    std::vector<std::uint32_t> sizes_;
-    std::vector<std::uint32_t> first_vertices_;
-};
+    return sets;
+}
 
 class Packer {
 public:
@@ -101,14 +69,12 @@ public:
         : offsets_(offsets), influences_(influences) {}
 
     PackedMesh run(std::span<const Vec3<float>> rest_points, std::span<const std::int32_t> more_bones) {
-        std::vector<std::uint32_t> order;
-        std::vector<std::uint32_t> starts;
-        VertexSets(offsets_, influences_).order(order, starts);
-        mesh_.blocks.reserve(order.size() / kLanes + starts.size());
-        mesh_.vertices.reserve(order.size() / kLanes + starts.size());
+        const auto [vertices, starts] = sets_of(offsets_, influences_);
+        mesh_.blocks.reserve(vertices.size() / kLanes + starts.size());
+        mesh_.vertices.reserve(vertices.size() / kLanes + starts.size());
         std::vector<std::uint32_t> scattered;
         for (std::size_t set = 0; set + 1 < starts.size(); ++set) {
-            add_set(std::span(order).subspan(starts[set], starts[set + 1] - starts[set]), scattered);
+            add_set(std::span(vertices).subspan(starts[set], starts[set + 1] - starts[set]), scattered);
         }
         // Vertices with similar numbers of influences become adjacent, which minimises padding.
         std::ranges::stable_sort(scattered, {}, [this](std::uint32_t vertex) { return count(vertex); });
@@ -246,47 +212,22 @@ private:
 
     /// Fills PackedMesh::pairs. Takes linear time, as a mesh may have as many sets of bones as vertices.
     void list_bone_pairs() {
-        struct Set {
-            std::uint32_t begin;
-            std::uint32_t end;
-        };
-        std::vector<Set> sets;
-        const std::uint32_t* before = nullptr;
+        std::unordered_set<std::uint64_t> pairs;
         for (const Block& block : mesh_.blocks) {
-            if (block.influences == 0) continue;
-            const bool as_before = before != nullptr && *before == block.first_bone;
-            before = &block.first_bone;
-            if (as_before && !block.own_bones) continue;
-            const std::size_t vertices = block.own_bones ? block.vertices : 1;
-            for (std::uint32_t i = 0; i < vertices; ++i) {
-                const std::uint32_t begin = block.first_bone + i * block.influences;
-                sets.push_back({begin, begin + block.influences});
-            }
-        }
-        std::vector<std::uint32_t> starts(mesh_.used_bones.size() + 1);
-        const auto first_of = [this](const Set& set) {
-            return static_cast<std::size_t>(mesh_.bones[set.begin]);
-        };
-        for (const Set& set : sets) ++starts[first_of(set) + 1];
-        std::partial_sum(starts.begin(), starts.end(), starts.begin());
-        std::vector<Set> by_first(sets.size());
-        std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
-        for (const Set& set : sets) by_first[next[first_of(set)]++] = set;
-
-        std::vector<std::int32_t> found_for(mesh_.used_bones.size(), -1);
-        for (std::size_t first = 0; first < mesh_.used_bones.size(); ++first) {
-            const auto bone = static_cast<std::int32_t>(first);
-            found_for[first] = bone;
-            for (std::uint32_t s = starts[first]; s < starts[first + 1]; ++s) {
-                for (std::uint32_t i = by_first[s].begin + 1; i < by_first[s].end; ++i) {
-                    const std::int32_t later = mesh_.bones[i];
-                    std::int32_t& found = found_for[static_cast<std::size_t>(later)];
-                    if (found == bone) continue;
-                    found = bone;
-                    mesh_.pairs.first.push_back(bone);
-                    mesh_.pairs.later.push_back(later);
+            const std::size_t sets = block.own_bones ? block.vertices : 1;
+            for (std::size_t i = 0; i < sets; ++i) {
+                const auto bones =
+                    std::span(mesh_.bones).subspan(block.first_bone + i * block.influences, block.influences);
+                for (const std::int32_t later : bones) {
+                    if (later == bones[0]) continue;
+                    pairs.insert(static_cast<std::uint64_t>(bones[0]) << 32 |
+                                 static_cast<std::uint32_t>(later));
                 }
             }
+        }
+        for (const std::uint64_t pair : pairs) {
+            mesh_.pairs.first.push_back(static_cast<std::int32_t>(pair >> 32));
+            mesh_.pairs.later.push_back(static_cast<std::int32_t>(pair));
         }
         while (mesh_.pairs.first.size() % kLanes != 0) {
             mesh_.pairs.first.push_back(0);

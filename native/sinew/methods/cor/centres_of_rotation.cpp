@@ -68,45 +68,6 @@ struct Cell {
     double second = 0.0;
 };
 
-/// Finds cells by their pair and rounded weights.
-class CellTable {
-public:
-    std::uint32_t find_or_add(std::uint64_t key, std::uint32_t next) {
-        if (2 * (used_ + 1) > slots_.size()) grow();
-        Slot& slot = slots_[find(slots_, key)];
-        if (slot.cell == kNone) {
-            slot = {key, next};
-            ++used_;
-        }
-        return slot.cell;
-    }
-
-private:
-    static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-    struct Slot {
-        std::uint64_t key = 0;
-        std::uint32_t cell = kNone;
-    };
-
-    static std::size_t find(const std::vector<Slot>& slots, std::uint64_t key) {
-        const std::size_t mask = slots.size() - 1;
-        std::size_t slot = static_cast<std::size_t>(std::rotl(key * 0x9E3779B97F4A7C15u, 31)) & mask;
-        while (slots[slot].cell != kNone && slots[slot].key != key) slot = (slot + 1) & mask;
-        return slot;
-    }
-
-    void grow() {
-        std::vector<Slot> larger(4 * slots_.size());
-        for (const Slot& slot : slots_) {
-            if (slot.cell != kNone) larger[find(larger, slot.key)] = slot;
-        }
-        slots_ = std::move(larger);
-    }
-
-    std::vector<Slot> slots_ = std::vector<Slot>(1024);
-    std::size_t used_ = 0;
-};
-
 /// Splits triangles and adds the parts to cells.
 class Collector {
 public:
@@ -213,8 +174,9 @@ private:
             const auto rounded = [](double weight) {
                 return static_cast<std::uint64_t>(std::lround(weight * kCellsOfOne));
             };
-            cell = table_.find_or_add(
-                static_cast<std::uint64_t>(pair) << 16 | rounded(first) << 8 | rounded(second), next);
+            const std::uint64_t key =
+                static_cast<std::uint64_t>(pair) << 16 | rounded(first) << 8 | rounded(second);
+            cell = known_.try_emplace(key, next).first->second;
         }
         if (cell == next) cells_.push_back({pair, 0.0, Vec3<double>(0.0), 0.0, 0.0});
         return cells_[cell];
@@ -223,7 +185,7 @@ private:
     bool exact_;
     PairNumbers numbers_;
     std::vector<Cell> cells_;
-    CellTable table_;
+    std::unordered_map<std::uint64_t, std::uint32_t> known_;  // by their pair and rounded weights
     // Scratch for the current triangle.
     std::vector<std::int32_t> bones_;   // ascending
     std::vector<std::uint32_t> pairs_;  // [bones][bones] their numbers

@@ -79,8 +79,8 @@ HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run) {
     for (std::size_t i = run.begin; i < run.end; ++i, neighbours += step) {
         const std::size_t behind = run.is_consecutive ? i - run.begin : 0;
         smooth_numbers<kValence>(
-            d, numbers_of(frame.from + i), numbers_of(frame.to + i), run.valence, hn::Set(d, frame.factors[i]),
-            [&](std::size_t k) HWY_ATTR {
+            d, numbers_of(frame.from + i), numbers_of(frame.to + i), run.valence,
+            hn::Set(d, frame.factors[i]), [&](std::size_t k) HWY_ATTR {
                 return numbers_of(frame.from + static_cast<std::size_t>(neighbours[k]) + behind);
             });
     }

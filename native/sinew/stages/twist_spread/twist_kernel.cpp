@@ -13,8 +13,8 @@
 //
 #include "hwy/highway.h"
 #include "sinew/lanes/block_loop-inl.h"
-#include "sinew/lanes/gather-inl.h"
 #include "sinew/lanes/exponential-inl.h"
+#include "sinew/lanes/gather-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
