@@ -58,7 +58,6 @@ template <class T>
 /// 2007); and the mean of the translations. Not defined if two rotations are equally good.
 [[nodiscard]] inline Blended<DualQuat<double>> chordal_mean(const Poses& poses) noexcept {
     Mat4Rows<double> k{};
-    Mat4Rows<double> vectors{};
     Vec3<double> translations(0.0);
     for (std::size_t i = 0; i < poses.size(); ++i) {
         const Quat<double>& q = poses.poses[i].real;
@@ -70,36 +69,13 @@ template <class T>
         }
         translations += poses.weights[i] * translation(poses.poses[i]);
     }
-    for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = 1.0;
-    jacobi(k, vectors);
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < 4; ++i) {
-        if (k[i][i] > k[best][best]) best = i;
-    }
-    double second = 0.0;
-    for (std::size_t i = 0; i < 4; ++i) {
-        if (i != best) second = std::max(second, k[i][i]);
-    }
-    const Quat<double> rotation =
-        glm::normalize(Quat<double>(vectors[0][best], vectors[1][best], vectors[2][best], vectors[3][best]));
-    return {to_dual_quat(QuatVec<double>{rotation.w < 0.0 ? -rotation : rotation, translations}),
-            k[best][best] - second > kDegenerateBlend};
-}
-
-struct Deviation {
-    double angle = 0.0;
-    double distance = 0.0;
-};
-
-[[nodiscard]] inline Deviation deviation(const DualQuat<double>& mean,
-                                         const DualQuat<double>& pose) noexcept {
-    const RigidDistance<double> apart = rigid_distance(mean, pose);
-    return {apart.angle, apart.translation};
+    const NearestRotation<double> found = largest_eigenvector(k);
+    return {to_dual_quat(QuatVec<double>{found.rotation, translations}), found.gap > kDegenerateBlend};
 }
 
 /// The weighted median; if several values are, the smallest.
 [[nodiscard]] inline double median(std::vector<std::pair<double, double>>& values_and_weights) noexcept {
-    std::sort(values_and_weights.begin(), values_and_weights.end());
+    std::ranges::sort(values_and_weights);
     double sum = 0.0;
     for (const auto& [value, weight] : values_and_weights) sum += weight;
     double before = 0.0;
@@ -111,13 +87,14 @@ struct Deviation {
 }
 
 /// The medians of the deviations from `mean`, but at least rounding errors.
-[[nodiscard]] inline Deviation spread(const Poses& poses, const DualQuat<double>& mean, double rounding) {
+[[nodiscard]] inline RigidDistance<double> spread(const Poses& poses, const DualQuat<double>& mean,
+                                                  double rounding) {
     std::vector<std::pair<double, double>> angles;
     std::vector<std::pair<double, double>> distances;
     for (std::size_t i = 0; i < poses.size(); ++i) {
-        const Deviation off = deviation(mean, poses.poses[i]);
+        const RigidDistance<double> off = rigid_distance(mean, poses.poses[i]);
         angles.emplace_back(off.angle, poses.weights[i]);
-        distances.emplace_back(off.distance, poses.weights[i]);
+        distances.emplace_back(off.translation, poses.weights[i]);
     }
     return {std::max(median(angles), rounding), std::max(median(distances), rounding * poses.longest)};
 }
@@ -129,9 +106,9 @@ struct Deviation {
     DualQuat<double> best = poses.poses.front();
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < poses.size(); i += step) {
-        const Deviation medians = spread(poses, poses.poses[i], rounding);
+        const RigidDistance<double> medians = spread(poses, poses.poses[i], rounding);
         // The two deviations have no common unit; their product does not depend on either unit.
-        const double size = medians.angle * std::max(medians.distance, std::numeric_limits<double>::min());
+        const double size = medians.angle * std::max(medians.translation, std::numeric_limits<double>::min());
         if (size < least) {
             least = size;
             best = poses.poses[i];
@@ -204,7 +181,7 @@ template <class T>
     if (known.size() == 0) return {{}, false};
     const double rounding = 16.0 * std::numeric_limits<T>::epsilon();
     DualQuat<double> mean = detail::medoid(known, rounding);
-    detail::Deviation medians;
+    RigidDistance<double> medians;
     std::vector<double> parts(known.size());
     bool has_settled = false;
     for (int step = 0; step < detail::kAverageSteps && !has_settled; ++step) {
@@ -213,9 +190,9 @@ template <class T>
         Twist<double> correction;
         double sum = 0.0;
         for (std::size_t i = 0; i < known.size(); ++i) {
-            const detail::Deviation off = detail::deviation(mean, known.poses[i]);
-            parts[i] =
-                detail::biweight(off.angle, medians.angle) * detail::biweight(off.distance, medians.distance);
+            const RigidDistance<double> off = rigid_distance(mean, known.poses[i]);
+            parts[i] = detail::biweight(off.angle, medians.angle) *
+                       detail::biweight(off.translation, medians.translation);
             if (parts[i] == 0.0) continue;
             sum += known.weights[i] * parts[i];
             correction =
@@ -236,7 +213,7 @@ template <class T>
         kept[i] = static_cast<T>(parts[next]);
         if (parts[next] > 0.0) {
             counted += known.weights[next];
-            is_within_90 = is_within_90 && detail::deviation(mean, known.poses[next]).angle < kQuarterTurn;
+            is_within_90 = is_within_90 && rigid_distance(mean, known.poses[next]).angle < kQuarterTurn;
         }
         ++next;
     }

@@ -23,10 +23,9 @@ struct KeyInterval {
 template <class T>
 [[nodiscard]] KeyInterval<T> key_interval(std::span<const T> times, T time) noexcept {
     assert(!times.empty());
-    const auto after = std::upper_bound(times.begin(), times.end(), time);
-    if (after == times.begin()) return {};
-    const auto next = static_cast<std::size_t>(after - times.begin());
-    if (after == times.end()) return {next - 1, next - 1};
+    const auto next = static_cast<std::size_t>(std::ranges::upper_bound(times, time) - times.begin());
+    if (next == 0) return {};
+    if (next == times.size()) return {next - 1, next - 1};
     const T length = times[next] - times[next - 1];
     return {next - 1, next, (time - times[next - 1]) / length, length};
 }

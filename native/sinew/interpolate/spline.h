@@ -31,10 +31,9 @@ template <class T>
 [[nodiscard]] SplineSpan<T> spline_span(std::span<const T> times, T time) noexcept {
     assert(!times.empty());
     const std::size_t last = times.size() - 1;
-    const auto after = std::upper_bound(times.begin(), times.end(), time);
-    if (after == times.begin()) return {{0, 0, 0, 0}};
-    if (after == times.end()) return {{last, last, last, last}};
-    const auto next = static_cast<std::size_t>(after - times.begin());
+    const auto next = static_cast<std::size_t>(std::ranges::upper_bound(times, time) - times.begin());
+    if (next == 0) return {{0, 0, 0, 0}};
+    if (next > last) return {{last, last, last, last}};
     const std::size_t key = next - 1;
     const std::size_t before = key > 0 && times[key - 1] < times[key] ? key - 1 : key;
     const std::size_t beyond = next < last && times[next] < times[next + 1] ? next + 1 : next;

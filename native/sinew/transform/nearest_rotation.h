@@ -20,14 +20,18 @@ namespace detail {
 template <class T>
 using Mat4Rows = std::array<std::array<T, 4>, 4>;
 
-/// Diagonalises the symmetric matrix `k`. The columns of `vectors` become its eigenvectors (Jacobi 1846).
+/// The eigenvector of the symmetric matrix `k` with the largest eigenvalue, as a unit quaternion with w >= 0, and how
+/// much larger this is than the second (Jacobi 1846).
 template <class T>
-void jacobi(Mat4Rows<T>& k, Mat4Rows<T>& vectors) noexcept {
+[[nodiscard]] NearestRotation<T> largest_eigenvector(Mat4Rows<T> k) noexcept {
     using std::abs;
     using std::sqrt;
+    Mat4Rows<T> vectors{};
+    for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = T(1);
     // Converges quadratically: reaches rounding errors in 4 or 5 sweeps.
-    for (int sweep = 0; sweep < 12; ++sweep) {
-        bool is_diagonal = true;
+    bool is_diagonal = false;
+    for (int sweep = 0; sweep < 12 && !is_diagonal; ++sweep) {
+        is_diagonal = true;
         for (std::size_t p = 0; p < 3; ++p) {
             for (std::size_t q = p + 1; q < 4; ++q) {
                 // An off-diagonal entry that does not change the diagonal when added to it is rounding.
@@ -59,8 +63,18 @@ void jacobi(Mat4Rows<T>& k, Mat4Rows<T>& vectors) noexcept {
                 k[p][q] = k[q][p] = T(0);
             }
         }
-        if (is_diagonal) return;
     }
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < 4; ++i) {
+        if (k[i][i] > k[best][best]) best = i;
+    }
+    T second = best == 0 ? k[1][1] : k[0][0];
+    for (std::size_t i = 1; i < 4; ++i) {
+        if (i != best && k[i][i] > second) second = k[i][i];
+    }
+    const Quat<T> q =
+        glm::normalize(Quat<T>(vectors[0][best], vectors[1][best], vectors[2][best], vectors[3][best]));
+    return {q.w < T(0) ? -q : q, k[best][best] - second};
 }
 
 }  // namespace detail
@@ -79,24 +93,7 @@ template <class T>
     k[1] = {k[0][1], m(0, 0) - m(1, 1) - m(2, 2), m(0, 1) + m(1, 0), m(0, 2) + m(2, 0)};
     k[2] = {k[0][2], k[1][2], m(1, 1) - m(0, 0) - m(2, 2), m(1, 2) + m(2, 1)};
     k[3] = {k[0][3], k[1][3], k[2][3], m(2, 2) - m(0, 0) - m(1, 1)};
-    detail::Mat4Rows<T> vectors{};
-    for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = T(1);
-    detail::jacobi(k, vectors);
-
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < 4; ++i) {
-        if (k[i][i] > k[best][best]) best = i;
-    }
-    bool has_second = false;
-    T second = T(0);
-    for (std::size_t i = 0; i < 4; ++i) {
-        if (i == best || (has_second && k[i][i] <= second)) continue;
-        second = k[i][i];
-        has_second = true;
-    }
-    const Quat<T> q =
-        glm::normalize(Quat<T>(vectors[0][best], vectors[1][best], vectors[2][best], vectors[3][best]));
-    return {q.w < T(0) ? -q : q, k[best][best] - second};
+    return detail::largest_eigenvector(k);
 }
 
 }  // namespace sinew
