@@ -9,7 +9,7 @@
 namespace sinew {
 
 /// Instruction sets that kernels were compiled for and that this processor supports, the fastest first, with
-/// Highway's names: "AVX3" (AVX-512), "AVX2", "SSE4", "SSE2", "NEON", "EMU128" (none).
+/// Highway's names: "AVX3" (AVX-512), "AVX2", "SSE4", "SSE2", "NEON", "SCALAR".
 [[nodiscard]] SINEW_EXPORT std::vector<std::string_view> simd_targets();
 
 /// The instruction set in use: the first of simd_targets(), unless use_simd_target() chose another.

@@ -298,12 +298,15 @@ HWY_INLINE void sum_group(const NormalFrame& frame, std::size_t group, Float4& s
         sum = {{point.x, point.y, point.z, 0.0f}};
         return;
     }
-    auto numbers = hn::Zero(d);
-    for (std::uint32_t i = offsets[0]; i < offsets[1]; ++i) {
-        const std::uint32_t source = sources[i];
-        numbers = hn::Add(numbers, hn::Mul(hn::Load(d, slots + (source & ~7u)), hn::Set(d, slots[source])));
+    for (std::size_t number = 0; number < 4; number += hn::Lanes(d)) {
+        auto numbers = hn::Zero(d);
+        for (std::uint32_t i = offsets[0]; i < offsets[1]; ++i) {
+            const std::uint32_t source = sources[i];
+            const auto normal = hn::Load(d, slots + (source & ~7u) + number);
+            numbers = hn::Add(numbers, hn::Mul(normal, hn::Set(d, slots[source])));
+        }
+        hn::Store(numbers, d, sum.value.data() + number);
     }
-    hn::Store(numbers, d, sum.value.data());
 }
 
 /// Calls store(first group, number of groups, unit vectors in lanes) for groups [begin, end).

@@ -34,7 +34,7 @@ namespace {
 /// by loads, the reloads cost a tenth of its time.
 template <class V>
 HWY_INLINE V in_register(V v) {
-#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_SCALAR
     asm("" : "+v"(v.raw));
 #endif
     return v;
@@ -190,6 +190,8 @@ inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t 
                          [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k])}; });
 }
 
+#if HWY_TARGET != HWY_SCALAR
+
 /// Deforms one vertex, with x, y and z in the lanes: the same operations in the same order.
 ///
 /// rest     the vertex's rest point: numbers kLanes apart
@@ -248,6 +250,34 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     }
 }
 
+#else
+
+inline void deform_own_bones(const Frame& frame, std::size_t b) {
+    const One d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Block& block = pointers.blocks[b];
+    const float* const weights = weights_of(pointers, b);
+    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+        const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
+        const bool plain = is_added_plainly(*frame.palette, bones, block.influences);
+        const Points<One> p = load_points(d, pointers, b, lane);
+        Points<One> sum = p;
+        const Columns first{columns_of_bone(frame, bones[0])};
+        const Vec<One> weight_of_first = hn::Load(d, weights + lane);
+        plain ? add_bone<1, true>(d, first, &weight_of_first, &p, &sum)
+              : add_bone<1, false>(d, first, &weight_of_first, &p, &sum);
+        for (std::size_t k = 1; k < block.influences; ++k) {
+            const float* const columns = columns_of_bone(frame, bones[k]);
+            const Vec<One> weight = hn::Load(d, weights + kLanes * k + lane);
+            plain ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
+                  : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
+        }
+        store_points(d, pointers, b, lane, sum);
+    }
+}
+
+#endif
+
 void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     const Block& block = frame.mesh->blocks[begin];
     if (is_added_plainly(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
@@ -272,6 +302,8 @@ void deform(const Frame& frame, std::size_t begin, std::size_t end) {
         frame, begin, end, [&](std::size_t b, std::size_t after) HWY_ATTR { deform_sets(frame, b, after); },
         [&](std::size_t b) HWY_ATTR { deform_own_bones(frame, b); });
 }
+
+#if HWY_TARGET != HWY_SCALAR
 
 /// Writes the columns of each bone's displacement.
 void rows_in_model(const Bones& bones, Palette& palette) {
@@ -299,6 +331,12 @@ void rows_in_model(const Bones& bones, Palette& palette) {
             length < kLong ? std::max(size, kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
     }
 }
+
+#else
+
+void rows_in_model(const Bones& bones, Palette& palette) { linear_rows_between_spaces(bones, palette); }
+
+#endif
 
 void bone_rows(const Bones& bones, Palette& palette) {
     is_identity(bones.bones_from_model) ? rows_in_model(bones, palette)

@@ -78,11 +78,13 @@ HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run) {
     const std::size_t step = run.is_consecutive ? 0 : run.valence;
     for (std::size_t i = run.begin; i < run.end; ++i, neighbours += step) {
         const std::size_t behind = run.is_consecutive ? i - run.begin : 0;
-        smooth_numbers<kValence>(
-            d, numbers_of(frame.from + i), numbers_of(frame.to + i), run.valence,
-            hn::Set(d, frame.factors[i]), [&](std::size_t k) HWY_ATTR {
-                return numbers_of(frame.from + static_cast<std::size_t>(neighbours[k]) + behind);
-            });
+        for (std::size_t at = 0; at < 4; at += hn::Lanes(d)) {
+            smooth_numbers<kValence>(
+                d, numbers_of(frame.from + i) + at, numbers_of(frame.to + i) + at, run.valence,
+                hn::Set(d, frame.factors[i]), [&](std::size_t k) HWY_ATTR {
+                    return numbers_of(frame.from + static_cast<std::size_t>(neighbours[k]) + behind) + at;
+                });
+        }
     }
 }
 
@@ -111,6 +113,28 @@ void smooth(const MushFrame& frame, std::size_t begin, std::size_t end) {
 /// vectors of x, y and z by exchanging numbers only within quarters of a 16-lane vector, which is cheaper than
 /// across quarters. Shorter vectors use the same order, since the details are stored in it.
 HWY_INLINE std::size_t vertex_of(std::size_t lane) { return 4 * (lane % 4) + lane / 4; }
+
+#if HWY_TARGET == HWY_SCALAR
+
+/// Points for the lanes from `lane` on, for a batch of kLanes consecutive vertices.
+template <class D>
+HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
+    const float* const numbers = numbers_of(points + vertex_of(lane));
+    return in_all_lanes(d, numbers);
+}
+
+/// The same for arbitrary points: index_of(vertex) returns the index of the point.
+template <class D, class Index>
+HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
+    return consecutive_points(d, points + static_cast<std::size_t>(index_of(vertex_of(lane))), 0);
+}
+
+template <class D>
+HWY_INLINE void store_lanes(D, const Points<D>& p, Float4* to, std::size_t lane) {
+    to[vertex_of(lane)] = {{hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z), 0.0f}};
+}
+
+#else
 
 /// The first halves of all quarters, alternating between `a` and `b`.
 template <class D>
@@ -172,6 +196,8 @@ HWY_INLINE void store_lanes(D d, const Points<D>& p, Float4* to, std::size_t lan
     hn::StoreU(first_halves(d, xy_high, z_high), d, numbers + 32);
     hn::StoreU(second_halves(d, xy_high, z_high), d, numbers + 48);
 }
+
+#endif
 
 /// 1 / length of a vector, from its square; 0 if the vector has no direction.
 template <class D>
@@ -339,7 +365,7 @@ void take_details(const MushFrame& frame, std::size_t begin, std::size_t end) {
 /// sqrt(x) for x >= 0. For x below any relevant squared length, some similarly small number.
 template <class D>
 HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
     // As in inverse_root().
     x = hn::Max(x, hn::Set(d, 1e-37f));
     const auto inverse = hn::ApproximateReciprocalSqrt(x);
@@ -354,7 +380,7 @@ HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
 /// 1 / x for positive x. A division takes as long as the root.
 template <class D>
 HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
     const auto estimate = hn::ApproximateReciprocal(x);
     return hn::Mul(estimate, hn::NegMulAdd(x, estimate, hn::Set(d, 2.0f)));
 #else
