@@ -93,7 +93,15 @@ struct Normals::State {
 
     /// Writes to each element of `to` the normal that `sources` names.
     void write(std::span<Vec3<float>> to, const std::int32_t* sources, const Float4* from,
-               std::size_t threads) const noexcept;
+               std::size_t threads) const noexcept {
+        const auto part = [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                const Float4& normal = from[index(sources[i])];
+                to[i] = {normal.value[0], normal.value[1], normal.value[2]};
+            }
+        };
+        parallel_for(to.size(), threads, part);
+    }
 
     std::vector<std::int32_t> corner_vertices;  // as given to the constructor
     NormalDomain domain;
@@ -103,17 +111,6 @@ struct Normals::State {
     mutable ForkSafeMutex mutex;
     mutable std::vector<Float4> normals;  // indexed as NormalMesh::corner_sources
 };
-
-void Normals::State::write(std::span<Vec3<float>> to, const std::int32_t* sources, const Float4* from,
-                           std::size_t threads) const noexcept {
-    const auto part = [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const Float4& normal = from[index(sources[i])];
-            to[i] = {normal.value[0], normal.value[1], normal.value[2]};
-        }
-    };
-    parallel_for(to.size(), threads, part);
-}
 
 Normals::Normals(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness)
     : state_(

@@ -40,10 +40,45 @@ bool is_orthonormal(const Mat3<double>& m) {
 }  // namespace
 
 struct BulgeLimit::State {
-    State(const Binding& binding, const BulgeLimitData& data);
+    State(const Binding& binding, const BulgeLimitData& data) : packed(binding.packed()) {
+        check_segments(data.segments, packed->bone_count);
+        if (!data.weights.empty()) check_weights("weights", data.weights, packed->vertex_count);
+        check_space(data.bones_from_model);
+        for (const std::int32_t bone : mesh.used_bones) {
+            segments.push_back(data.segments[static_cast<std::size_t>(bone)]);
+        }
+        bones.resize(segments.size());
+        for (std::vector<Lanes<float>>& of_form : distances) of_form.resize(mesh.blocks.size());
+        weights = pack_weights(mesh, data.weights);
+        measure(unpack(mesh, mesh.rest_points, packed->vertex_count).rest_points, data.bones_from_model);
+    }
 
-    void measure(std::span<const Vec3<float>> points, const Affine<float>& space);
-    [[nodiscard]] BulgeFrame frame(Strided<Vec3<float>> points) const;
+    void measure(std::span<const Vec3<float>> points, const Affine<float>& space) {
+        space_rows = SpaceRows(space);
+        for (std::size_t i = 0; i < bones.size(); ++i) {
+            bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
+        }
+        // The kernel only reads them here.
+        const BulgeFrame all =
+            frame({const_cast<Vec3<float>*>(points.data()), points.size(), sizeof(points[0])});
+        parallel_for_blocks(mesh, points.size(), 0, [&](std::size_t begin, std::size_t end) {
+            kBulgeKernel.measure[target_in_use()](all, begin, end);
+        });
+    }
+
+    [[nodiscard]] BulgeFrame frame(Strided<Vec3<float>> points) const {
+        // measure() alone writes the distances, and no other call runs at the same time.
+        return {
+            &mesh,
+            bones.data(),
+            {const_cast<Lanes<float>*>(distances[0].data()), const_cast<Lanes<float>*>(distances[1].data())},
+            weights.empty() ? nullptr : weights.data(),
+            BulgeForm::continuous,
+            1.0f,
+            false,
+            space_rows.spaces(),
+            points};
+    }
 
     std::shared_ptr<const PackedBinding> packed;
     const PackedMesh& mesh = packed->mesh;
@@ -54,44 +89,6 @@ struct BulgeLimit::State {
     mutable std::vector<BulgeBone> bones;  // scratch for one call
     mutable ForkSafeMutex mutex;
 };
-
-BulgeLimit::State::State(const Binding& binding, const BulgeLimitData& data) : packed(binding.packed()) {
-    check_segments(data.segments, packed->bone_count);
-    if (!data.weights.empty()) check_weights("weights", data.weights, packed->vertex_count);
-    check_space(data.bones_from_model);
-    for (const std::int32_t bone : mesh.used_bones) {
-        segments.push_back(data.segments[static_cast<std::size_t>(bone)]);
-    }
-    bones.resize(segments.size());
-    for (std::vector<Lanes<float>>& of_form : distances) of_form.resize(mesh.blocks.size());
-    weights = pack_weights(mesh, data.weights);
-    measure(unpack(mesh, mesh.rest_points, packed->vertex_count).rest_points, data.bones_from_model);
-}
-
-BulgeFrame BulgeLimit::State::frame(Strided<Vec3<float>> points) const {
-    // measure() alone writes the distances, and no other call runs at the same time.
-    return {&mesh,
-            bones.data(),
-            {const_cast<Lanes<float>*>(distances[0].data()), const_cast<Lanes<float>*>(distances[1].data())},
-            weights.empty() ? nullptr : weights.data(),
-            BulgeForm::continuous,
-            1.0f,
-            false,
-            space_rows.spaces(),
-            points};
-}
-
-void BulgeLimit::State::measure(std::span<const Vec3<float>> points, const Affine<float>& space) {
-    space_rows = SpaceRows(space);
-    for (std::size_t i = 0; i < bones.size(); ++i) {
-        bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
-    }
-    // The kernel only reads them here.
-    const BulgeFrame all = frame({const_cast<Vec3<float>*>(points.data()), points.size(), sizeof(points[0])});
-    parallel_for_blocks(mesh, points.size(), 0, [&](std::size_t begin, std::size_t end) {
-        kBulgeKernel.measure[target_in_use()](all, begin, end);
-    });
-}
 
 BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
     : state_(make_owned<State>(binding, data)) {}

@@ -84,25 +84,159 @@ Quat<double> rotation_between(const Mat3<double>& base, const Mat3<double>& tip,
 }  // namespace
 
 struct TwistSpread::State {
-    State(const Binding& binding, const TwistSpreadData& data);
+    State(const Binding& binding, const TwistSpreadData& data)
+        : packed(binding.packed()),
+          twists(data.twists.begin(), data.twists.end()),
+          rest_bones(data.rest_bones.begin(), data.rest_bones.end()) {
+        check_rest_bones(rest_bones, packed->bone_count);
+        check_twists(twists, rest_bones);
+        check_parents(data.parents, rest_bones.size());
+        if (!data.weights.empty()) check_weights("weights", data.weights, packed->vertex_count);
+        if (!data.mix.empty()) check_weights("mix", data.mix, packed->vertex_count);
+        check_space(data.bones_from_model);
+        weights = pack_weights(mesh, data.weights);
+        mix = pack_weights(mesh, data.mix);
+        bones.resize(twists.size());
+        list_blocks(data.parents);
+        for (const TwistBone& twist : twists) {
+            const auto bone = cast<double>(rest_bones[static_cast<std::size_t>(twist.bone)]);
+            const Vec3<double> along = Vec3<double>(twist.tail) - Vec3<double>(twist.head);
+            const double squared = glm::dot(along, along);
+            const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
+            const Float4 row = float4(share.x, share.y, share.z, -glm::dot(share, Vec3<double>(twist.head)));
+            TwistRest& of = rest.emplace_back();
+            of.line = twist_line(bone.translation, glm::normalize(bone.linear[1]));
+            std::ranges::copy(row.value, of.share);
+        }
+        measure(data.bones_from_model);
+    }
 
     /// Measures the vertices' shares and arms in the space of the bones.
-    void measure(const Affine<float>& space);
-    [[nodiscard]] TwistFrame frame(Strided<Vec3<float>> points) const noexcept;
+    void measure(const Affine<float>& space) {
+        space_rows = SpaceRows(space);
+        kTwistKernel.measure[target_in_use()](frame({}), 0, blocks.size());
+    }
+
+    [[nodiscard]] TwistFrame frame(Strided<Vec3<float>> points) const noexcept {
+        return {.mesh = &mesh,
+                .rest_points = own_rest_points.empty() ? mesh.rest_points.data() : own_rest_points.data(),
+                .blocks = blocks.data(),
+                // measure() alone writes them, and no other call runs at the same time.
+                .block_twists = const_cast<BlockTwist*>(block_twists.data()),
+                .rest = rest.data(),
+                .bones = bones.data(),
+                .weights = weights.empty() ? nullptr : weights.data(),
+                .mix = mix.empty() ? nullptr : mix.data(),
+                .spaces = space_rows.spaces(),
+                .points = points};
+    }
+
     [[nodiscard]] Affine<double> motion(std::span<const Affine<float>> posed,
-                                        std::int32_t bone) const noexcept;
+                                        std::int32_t bone) const noexcept {
+        const auto number = static_cast<std::size_t>(bone);
+        return number < posed.size() ? cast<double>(posed[number]) : Affine<double>{};
+    }
+
     [[nodiscard]] TwistSpreadStage::Reading<double> read(
         std::size_t twist, std::span<const Affine<float>> posed,
-        std::span<const TwistChannels<float>> channels) const noexcept;
+        std::span<const TwistChannels<float>> channels) const noexcept {
+        const TwistBone& of = twists[twist];
+        const auto tip_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.tip)]);
+        const Vec3<double> axis =
+            glm::normalize(Vec3<double>(rest_bones[static_cast<std::size_t>(of.bone)].linear[1]));
+        const Quat<double> rotation =
+            rotation_between(motion(posed, of.base).linear, motion(posed, of.tip).linear, tip_rest.linear);
+        double expected = 0.0;
+        if (!channels.empty() && channels[twist].rotation != Quat<float>(0.0f, 0.0f, 0.0f, 0.0f)) {
+            const TwistChannels<double> told{glm::normalize(Quat<double>(channels[twist].rotation)),
+                                             Vec3<double>(channels[twist].angles)};
+            const Quat<double> axes = to_quat(rotation_keeping_y(tip_rest.linear));
+            expected = TwistSpreadStage::expected(told, rotation, axes, axis);
+        }
+        return TwistSpreadStage::read(rotation, axis, expected);
+    }
+
     /// Lists blocks and block_twists.
     ///
     /// parents  TwistSpreadData::parents
-    void list_blocks(std::span<const std::int32_t> parents);
+    void list_blocks(std::span<const std::int32_t> parents) {
+        std::vector<std::vector<std::uint8_t>> are_below;
+        are_below.reserve(twists.size());
+        for (const TwistBone& twist : twists) are_below.push_back(below(twist.tip, parents, mesh.used_bones));
+        for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
+            const std::size_t first = block_twists.size();
+            // The last first: those that other bones carry.
+            for (std::size_t i = twists.size(); i-- > 0;) {
+                BlockTwist twist{.twist = i};
+                bool is_shared = false;
+                for (std::size_t lane = 0; lane < kLanes; ++lane) {
+                    bool has_others = false;
+                    for (std::size_t k = 0; k < mesh.blocks[b].influences; ++k) {
+                        const auto [bone, weight] = influence_at(mesh, b, lane, k);
+                        if (weight == 0.0f) continue;
+                        const bool is_below = are_below[i][static_cast<std::size_t>(bone)] != 0;
+                        if (is_below) twist.below.lane[lane] += weight;
+                        has_others = has_others || !is_below;
+                        if (mesh.used_bones[static_cast<std::size_t>(bone)] != twists[i].bone) continue;
+                        twist.weight.lane[lane] += weight;
+                        twist.has_weight = true;
+                    }
+                    is_shared = is_shared || (has_others && twist.below.lane[lane] > 0.0f);
+                }
+                if (twist.has_weight || is_shared) block_twists.push_back(twist);
+            }
+            if (block_twists.size() > first) blocks.push_back({b, first, block_twists.size()});
+        }
+    }
+
     /// Fills `bones`. Returns whether one is twisted.
     ///
     /// is_linear  as in TwistFrame: what other blends need is then left out
     bool prepare(std::span<const Affine<float>> posed, const TwistSpreadOptions& options,
-                 bool is_linear) const noexcept;
+                 bool is_linear) const noexcept {
+        bool any = false;
+        const double amount = within(options.amount, 0.0f, 1.0f, 1.0f);
+        for (std::size_t twist = 0; twist < twists.size(); ++twist) {
+            TwistedBone& bone = bones[twist];
+            bone.is_twisted = false;
+            const double own =
+                options.amounts.empty() ? 1.0 : within(options.amounts[twist], 0.0f, 1.0f, 1.0f);
+            if (amount * own == 0.0) continue;
+            const auto [angle, around, part] = read(twist, posed, options.channels);
+            if (angle == 0.0) continue;
+            any = bone.is_twisted = true;
+            const TwistBone& of = twists[twist];
+            const Affine<double> by = motion(posed, of.bone);
+            const TwistLine& line = rest[twist].line;
+            for (std::size_t k = 0; k < 2; ++k) {
+                const Vec3<double> image =
+                    by.linear * Vec3<double>(line.axes[k][0], line.axes[k][1], line.axes[k][2]);
+                for (int i = 0; i < 3; ++i) bone.images[k][i] = static_cast<float>(image[i]);
+            }
+            bone.curve = options.curves.empty() ? 0.0f : within(options.curves[twist], -1.0f, 1.0f, 0.0f);
+            bone.is_short = std::abs(angle) <= 0.5;
+            bone.angle = static_cast<float>(std::numbers::pi * amount * own * angle);
+            bone.offset = of.is_from_parent ? -bone.angle : 0.0f;
+            bone.around = static_cast<float>(around);
+            bone.part = static_cast<float>(amount * own * part);
+            if (is_linear) continue;
+            const auto at_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.bone)]);
+            const Vec3<double> posed_axis = by.linear * glm::normalize(at_rest.linear[1]);
+            const double length = glm::length(posed_axis);
+            const double sign = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
+            bone.has_axis = length > 0.0;
+            if (bone.has_axis) {
+                bone.posed = twist_line(transform_point(by, at_rest.translation), sign / length * posed_axis);
+            }
+            std::array<Float4, kDisplacementRows> rows;
+            write_displacement(by, rows.data());
+            for (std::size_t row = 0; row < rows.size(); ++row) {
+                std::ranges::copy(rows[row].value, bone.displacement + 4 * row);
+            }
+            bone.is_scaled = split_scale(by, at_rest).has_scale;
+        }
+        return any;
+    }
 
     std::shared_ptr<const PackedBinding> packed;
     const PackedMesh& mesh = packed->mesh;
@@ -118,152 +252,6 @@ struct TwistSpread::State {
     mutable std::vector<TwistedBone> bones;  // [twists] scratch for one call
     mutable ForkSafeMutex mutex;
 };
-
-TwistSpread::State::State(const Binding& binding, const TwistSpreadData& data)
-    : packed(binding.packed()),
-      twists(data.twists.begin(), data.twists.end()),
-      rest_bones(data.rest_bones.begin(), data.rest_bones.end()) {
-    check_rest_bones(rest_bones, packed->bone_count);
-    check_twists(twists, rest_bones);
-    check_parents(data.parents, rest_bones.size());
-    if (!data.weights.empty()) check_weights("weights", data.weights, packed->vertex_count);
-    if (!data.mix.empty()) check_weights("mix", data.mix, packed->vertex_count);
-    check_space(data.bones_from_model);
-    weights = pack_weights(mesh, data.weights);
-    mix = pack_weights(mesh, data.mix);
-    bones.resize(twists.size());
-    list_blocks(data.parents);
-    for (const TwistBone& twist : twists) {
-        const auto bone = cast<double>(rest_bones[static_cast<std::size_t>(twist.bone)]);
-        const Vec3<double> along = Vec3<double>(twist.tail) - Vec3<double>(twist.head);
-        const double squared = glm::dot(along, along);
-        const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
-        const Float4 row = float4(share.x, share.y, share.z, -glm::dot(share, Vec3<double>(twist.head)));
-        TwistRest& of = rest.emplace_back();
-        of.line = twist_line(bone.translation, glm::normalize(bone.linear[1]));
-        std::ranges::copy(row.value, of.share);
-    }
-    measure(data.bones_from_model);
-}
-
-void TwistSpread::State::list_blocks(std::span<const std::int32_t> parents) {
-    std::vector<std::vector<std::uint8_t>> are_below;
-    are_below.reserve(twists.size());
-    for (const TwistBone& twist : twists) are_below.push_back(below(twist.tip, parents, mesh.used_bones));
-    for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
-        const std::size_t first = block_twists.size();
-        // The last first: those that other bones carry.
-        for (std::size_t i = twists.size(); i-- > 0;) {
-            BlockTwist twist{.twist = i};
-            bool is_shared = false;
-            for (std::size_t lane = 0; lane < kLanes; ++lane) {
-                bool has_others = false;
-                for (std::size_t k = 0; k < mesh.blocks[b].influences; ++k) {
-                    const auto [bone, weight] = influence_at(mesh, b, lane, k);
-                    if (weight == 0.0f) continue;
-                    const bool is_below = are_below[i][static_cast<std::size_t>(bone)] != 0;
-                    if (is_below) twist.below.lane[lane] += weight;
-                    has_others = has_others || !is_below;
-                    if (mesh.used_bones[static_cast<std::size_t>(bone)] != twists[i].bone) continue;
-                    twist.weight.lane[lane] += weight;
-                    twist.has_weight = true;
-                }
-                is_shared = is_shared || (has_others && twist.below.lane[lane] > 0.0f);
-            }
-            if (twist.has_weight || is_shared) block_twists.push_back(twist);
-        }
-        if (block_twists.size() > first) blocks.push_back({b, first, block_twists.size()});
-    }
-}
-
-TwistFrame TwistSpread::State::frame(Strided<Vec3<float>> points) const noexcept {
-    return {.mesh = &mesh,
-            .rest_points = own_rest_points.empty() ? mesh.rest_points.data() : own_rest_points.data(),
-            .blocks = blocks.data(),
-            // measure() alone writes them, and no other call runs at the same time.
-            .block_twists = const_cast<BlockTwist*>(block_twists.data()),
-            .rest = rest.data(),
-            .bones = bones.data(),
-            .weights = weights.empty() ? nullptr : weights.data(),
-            .mix = mix.empty() ? nullptr : mix.data(),
-            .spaces = space_rows.spaces(),
-            .points = points};
-}
-
-void TwistSpread::State::measure(const Affine<float>& space) {
-    space_rows = SpaceRows(space);
-    kTwistKernel.measure[target_in_use()](frame({}), 0, blocks.size());
-}
-
-Affine<double> TwistSpread::State::motion(std::span<const Affine<float>> posed,
-                                          std::int32_t bone) const noexcept {
-    const auto number = static_cast<std::size_t>(bone);
-    return number < posed.size() ? cast<double>(posed[number]) : Affine<double>{};
-}
-
-TwistSpreadStage::Reading<double> TwistSpread::State::read(
-    std::size_t twist, std::span<const Affine<float>> posed,
-    std::span<const TwistChannels<float>> channels) const noexcept {
-    const TwistBone& of = twists[twist];
-    const auto tip_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.tip)]);
-    const Vec3<double> axis =
-        glm::normalize(Vec3<double>(rest_bones[static_cast<std::size_t>(of.bone)].linear[1]));
-    const Quat<double> rotation =
-        rotation_between(motion(posed, of.base).linear, motion(posed, of.tip).linear, tip_rest.linear);
-    double expected = 0.0;
-    if (!channels.empty() && channels[twist].rotation != Quat<float>(0.0f, 0.0f, 0.0f, 0.0f)) {
-        const TwistChannels<double> told{glm::normalize(Quat<double>(channels[twist].rotation)),
-                                         Vec3<double>(channels[twist].angles)};
-        const Quat<double> axes = to_quat(rotation_keeping_y(tip_rest.linear));
-        expected = TwistSpreadStage::expected(told, rotation, axes, axis);
-    }
-    return TwistSpreadStage::read(rotation, axis, expected);
-}
-
-bool TwistSpread::State::prepare(std::span<const Affine<float>> posed, const TwistSpreadOptions& options,
-                                 bool is_linear) const noexcept {
-    bool any = false;
-    const double amount = within(options.amount, 0.0f, 1.0f, 1.0f);
-    for (std::size_t twist = 0; twist < twists.size(); ++twist) {
-        TwistedBone& bone = bones[twist];
-        bone.is_twisted = false;
-        const double own = options.amounts.empty() ? 1.0 : within(options.amounts[twist], 0.0f, 1.0f, 1.0f);
-        if (amount * own == 0.0) continue;
-        const auto [angle, around, part] = read(twist, posed, options.channels);
-        if (angle == 0.0) continue;
-        any = bone.is_twisted = true;
-        const TwistBone& of = twists[twist];
-        const Affine<double> by = motion(posed, of.bone);
-        const TwistLine& line = rest[twist].line;
-        for (std::size_t k = 0; k < 2; ++k) {
-            const Vec3<double> image =
-                by.linear * Vec3<double>(line.axes[k][0], line.axes[k][1], line.axes[k][2]);
-            for (int i = 0; i < 3; ++i) bone.images[k][i] = static_cast<float>(image[i]);
-        }
-        bone.curve = options.curves.empty() ? 0.0f : within(options.curves[twist], -1.0f, 1.0f, 0.0f);
-        bone.is_short = std::abs(angle) <= 0.5;
-        bone.angle = static_cast<float>(std::numbers::pi * amount * own * angle);
-        bone.offset = of.is_from_parent ? -bone.angle : 0.0f;
-        bone.around = static_cast<float>(around);
-        bone.part = static_cast<float>(amount * own * part);
-        if (is_linear) continue;
-        const auto at_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.bone)]);
-        const Vec3<double> posed_axis = by.linear * glm::normalize(at_rest.linear[1]);
-        const double length = glm::length(posed_axis);
-        const double sign = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
-        bone.has_axis = length > 0.0;
-        if (bone.has_axis) {
-            bone.posed = twist_line(transform_point(by, at_rest.translation), sign / length * posed_axis);
-        }
-        std::array<Float4, kDisplacementRows> rows;
-        write_displacement(by, rows.data());
-        for (std::size_t row = 0; row < rows.size(); ++row) {
-            std::ranges::copy(rows[row].value, bone.displacement + 4 * row);
-        }
-        bone.is_scaled = split_scale(by, at_rest).has_scale;
-    }
-    return any;
-}
 
 TwistSpread::TwistSpread(const Binding& binding, const TwistSpreadData& data)
     : state_(make_owned<State>(binding, data)) {}
