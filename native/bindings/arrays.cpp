@@ -9,16 +9,10 @@
 
 #include "items.h"
 #include "sinew/deformer.h"
+#include "sinew/mesh/check_arrays.h"
 
 namespace sinew::bindings {
 namespace {
-
-bool is_finite(const float* values, py::ssize_t count) {
-    for (py::ssize_t i = 0; i < count; ++i) {
-        if (!std::isfinite(values[i])) return false;
-    }
-    return true;
-}
 
 /// str(value), for any content.
 std::string printed(const py::handle& value) {
@@ -150,12 +144,6 @@ std::size_t checked_choice(const py::handle& value, const char* argument,
     fail(argument, wanted, "'" + checked_name(value, argument, wanted) + "'");
 }
 
-py::tuple names_in_python(std::span<const std::string_view> names) {
-    py::tuple texts(names.size());
-    for (std::size_t i = 0; i < names.size(); ++i) texts[i] = py::str(std::string(names[i]));
-    return texts;
-}
-
 py::array_t<float> checked_points(const py::handle& value, const char* argument) {
     return checked_rows<float>(value, argument, 3, "float32 [n, 3]", kMaxVertices);
 }
@@ -169,13 +157,7 @@ py::array_t<float> checked_points(const py::handle& value, const char* argument,
 }
 
 void refuse_rest_points(const py::array_t<float>& points, std::size_t count) {
-    if (static_cast<std::size_t>(points.shape(0)) != count) {
-        fail("rest_points", std::to_string(count) + " points", std::to_string(points.shape(0)));
-    }
-    for (py::ssize_t i = 0; i < points.shape(0); ++i) {
-        if (is_finite(points.data(i, 0), 3)) continue;
-        fail("rest_points", "finite values", "NaN or infinity at vertex " + std::to_string(i));
-    }
+    check_points(as_points(points), count);
     refuse_space();
 }
 
@@ -191,9 +173,7 @@ std::vector<Affine<float>> checked_affines(const py::handle& value, const char* 
     affines.reserve(static_cast<std::size_t>(array.shape(0)));
     for (py::ssize_t i = 0; i < array.shape(0); ++i) {
         const float* rows = array.data(i, 0, 0);
-        if (!is_finite(rows, 12)) {
-            fail(argument, "finite values", "NaN or infinity at index " + std::to_string(i));
-        }
+        check_finite(rows, 12, argument, i);
         affines.push_back(Item<Affine<float>>::read(rows));
     }
     return affines;
@@ -206,8 +186,9 @@ Affine<float> checked_affine(const py::handle& value, const char* argument) {
     if (array.shape(1) != 4 || (array.shape(0) != 4 && array.shape(0) != 3)) {
         fail(argument, wanted, describe(value));
     }
-    if (!is_finite(array.data(), 12)) fail(argument, "finite values", "NaN or infinity");
-    return Item<Affine<float>>::read(array.data());
+    const auto affine = Item<Affine<float>>::read(array.data());
+    if (!is_finite(affine)) fail(argument, "finite values", "NaN or infinity");
+    return affine;
 }
 
 py::array_t<float> array_of(std::span<const Vec3<float>> points) {

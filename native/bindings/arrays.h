@@ -4,6 +4,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <cmath>
 #include <limits>
 #include <new>
 #include <span>
@@ -26,6 +27,16 @@ inline constexpr std::size_t kAnyLength = std::numeric_limits<std::size_t>::max(
 
 using Shape = std::vector<py::ssize_t>;
 
+/// ValueError if a number of the item at `index` is not finite.
+template <class T>
+void check_finite(const T* numbers, std::size_t count, const char* argument, py::ssize_t index) {
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!std::isfinite(numbers[i])) {
+            fail(argument, "finite values", "NaN or infinity at index " + std::to_string(index));
+        }
+    }
+}
+
 /// The shape as text, such as "[2, 3]".
 std::string shape_text(const Shape& shape);
 
@@ -46,9 +57,6 @@ std::string checked_name(const py::handle& value, const char* argument, const st
 /// The index of a name among these. ValueError for another name, TypeError if it is no str.
 std::size_t checked_choice(const py::handle& value, const char* argument,
                            std::span<const std::string_view> names);
-
-/// The names as a tuple of Python's.
-py::tuple names_in_python(std::span<const std::string_view> names);
 
 /// `value` as a C-contiguous, aligned array of element type T. Copies only if it is not one already.
 template <class T>

@@ -152,7 +152,8 @@ Blended hermite_spline(const ArrayLike& keys, const ArrayLike& tangents, const A
 
 void bind_interpolate(py::module_& m) {
     auto interpolate = m.def_submodule("interpolate");
-    interpolate.attr("METHODS") = names_in_python(names_of(Interpolations{}));
+    interpolate.attr("METHODS") =
+        std::apply([](auto... rows) { return py::make_tuple(std::string(rows.name)...); }, Interpolations{});
     interpolate.def("between", &between, "a"_a, "b"_a, "t"_a, "method"_a = "dlb",
                     R"(Interpolates from `a` at t = 0 to `b` at t = 1; other t extrapolate.
 

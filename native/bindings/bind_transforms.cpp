@@ -17,6 +17,15 @@ void check_rigid(const X& a, const char* argument) {
     }
 }
 
+/// `f` of a rigid argument `a`.
+template <class F>
+auto of_rigid(F f) {
+    return [f](const auto& a) {
+        check_rigid(a, "a");
+        return f(a);
+    };
+}
+
 // The functions of every representation.
 template <template <class> class X>
 void bind_representation(py::module_& m) {
@@ -63,14 +72,11 @@ axis, moment: [.., 3], Pluecker coordinates of the line. Both are divided by the
             return to<X>(screw_about(axis, point, angle, translation));
         },
         "As from_screw(), with the line given by any of its points, `point`, [.., 3].");
-    def<X>(
-        m, "to_screw", {"a"},
-        [](const auto& a) {
-            check_rigid(a, "a");
-            const auto screw = to_screw(a);
-            return named<"Screw">(screw.axis, screw.moment, screw.angle, screw.translation, screw.pitch());
-        },
-        R"(The screw of rigid `a` (Chasles 1830).
+    def<X>(m, "to_screw", {"a"}, of_rigid([](const auto& a) {
+               const auto screw = to_screw(a);
+               return named<"Screw">(screw.axis, screw.moment, screw.angle, screw.translation, screw.pitch());
+           }),
+           R"(The screw of rigid `a` (Chasles 1830).
 
 The angle is 0 to pi; at pi the axis has one of its two directions. The moment is point x axis. The pitch is
 translation / angle; it is infinite for a pure translation, for which the axis is its direction, angle and
@@ -79,11 +85,7 @@ moment are 0 and translation >= 0. The axis of the identity is z.)");
         m, "from_twist", {"twist"}, [](const auto& twist) { return to<X>(twist); },
         "The exponential of `twist`, [.., 6]: angular velocity, then linear velocity, of any angle.");
     def<X>(
-        m, "to_twist", {"a"},
-        [](const auto& a) {
-            check_rigid(a, "a");
-            return to_twist(a);
-        },
+        m, "to_twist", {"a"}, of_rigid([](const auto& a) { return to_twist(a); }),
         R"(The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, with an angle of 0 to pi. At 180
 degrees it has one of the two directions of the axis.)");
     const auto def_conversion = [&](const char* name, auto f, const char* doc) {
@@ -96,20 +98,12 @@ degrees it has one of the two directions of the axis.)");
     }
     if constexpr (!std::is_same_v<X<double>, QuatVec<double>>) {
         def_conversion(
-            "to_quat_vec",
-            [](const auto& a) {
-                check_rigid(a, "a");
-                return to<QuatVec>(a);
-            },
+            "to_quat_vec", of_rigid([](const auto& a) { return to<QuatVec>(a); }),
             "Rigid `a` in the layout of sinew.quat_vec, [.., 7]. The length of quaternions is not checked.");
     }
     if constexpr (!std::is_same_v<X<double>, DualQuat<double>>) {
         def_conversion(
-            "to_dual_quat",
-            [](const auto& a) {
-                check_rigid(a, "a");
-                return to<DualQuat>(a);
-            },
+            "to_dual_quat", of_rigid([](const auto& a) { return to<DualQuat>(a); }),
             "Rigid `a` in the layout of sinew.dual_quat, [.., 8]. The length of quaternions is not checked.");
     }
     def<X, X>(
@@ -205,23 +199,17 @@ void bind_dual_numbers(py::module_& m) {
         m, "cos", {"a"}, [](const auto& a) { return cos(a); }, "The cosine, radians.");
     def<Dual>(
         m, "exp", {"a"}, [](const auto& a) { return exp(a); }, "The exponential.");
-    const auto check_positive = [](const auto& a) {
-        if (!(a.real > 0)) fail("a", "dual numbers whose real part is above 0", "one that is not");
+    const auto of_positive = [](auto f) {
+        return [f](const auto& a) {
+            if (!(a.real > 0)) fail("a", "dual numbers whose real part is above 0", "one that is not");
+            return f(a);
+        };
     };
     def<Dual>(
-        m, "sqrt", {"a"},
-        [check_positive](const auto& a) {
-            check_positive(a);
-            return sqrt(a);
-        },
+        m, "sqrt", {"a"}, of_positive([](const auto& a) { return sqrt(a); }),
         "The square root with a positive real part. ValueError if the real part of `a` is not positive.");
-    def<Dual>(
-        m, "log", {"a"},
-        [check_positive](const auto& a) {
-            check_positive(a);
-            return log(a);
-        },
-        "The natural logarithm. ValueError if the real part of `a` is not positive.");
+    def<Dual>(m, "log", {"a"}, of_positive([](const auto& a) { return log(a); }),
+              "The natural logarithm. ValueError if the real part of `a` is not positive.");
 }
 
 void bind_quaternions(py::module_& m) {

@@ -55,15 +55,6 @@ std::string element_name() {
     return std::is_same_v<T, double> ? "float64 " : "float32 ";
 }
 
-template <class T>
-void check_finite(const T* numbers, std::size_t count, const char* argument, py::ssize_t index) {
-    for (std::size_t i = 0; i < count; ++i) {
-        if (!std::isfinite(numbers[i])) {
-            fail(argument, "finite values", "NaN or infinity at index " + std::to_string(index));
-        }
-    }
-}
-
 /// `value`, a result of promoted(), as items of `Value`, finite, with element type T. A plain number is allowed
 /// as a scalar.
 template <class T, class Value>
@@ -266,16 +257,14 @@ py::object map(const std::array<const char*, sizeof...(In)>& arguments,
 }
 
 template <template <class> class>
-struct ArgumentFor {
-    using type = const ArrayLike&;
-};
+using ArrayFor = const ArrayLike&;
 
 /// Defines a function of the module whose arguments are arrays of the items `In`.
 template <template <class> class... In, class F>
 void def(py::module_& m, const char* name, const std::array<const char*, sizeof...(In)>& arguments, F f,
          const char* doc) {
     using Result = decltype(f(std::declval<const In<double>&>()...));
-    const auto function = [arguments, f](typename ArgumentFor<In>::type... values) ->
+    const auto function = [arguments, f](ArrayFor<In>... values) ->
         typename SignatureOf<Result>::type { return map<In...>(arguments, {values...}, f); };
     std::apply([&](auto... argument) { m.def(name, function, py::arg(argument)..., doc); }, arguments);
 }

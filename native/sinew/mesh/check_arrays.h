@@ -7,6 +7,7 @@
 #include <string>
 
 #include "sinew/base/fail.h"
+#include "sinew/export.h"
 #include "sinew/transform/affine.h"
 
 namespace sinew {
@@ -17,7 +18,7 @@ namespace sinew {
 void check_finite(const std::string& argument, std::span<const Vec3<float>> vectors, const std::string& of);
 
 /// Throws if the rest points are not `count`, or if one is not finite.
-void check_points(std::span<const Vec3<float>> points, std::size_t count);
+SINEW_EXPORT void check_points(std::span<const Vec3<float>> points, std::size_t count);
 /// Whether check_points() does not throw.
 [[nodiscard]] bool are_points(std::span<const Vec3<float>> points, std::size_t count) noexcept;
 
