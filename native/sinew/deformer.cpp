@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "sinew/lanes/palette_store.h"
-#include "sinew/mesh/bone_sets.h"
 #include "sinew/methods/packed_binding.h"
 #include "sinew/methods/signs.h"
 #include "sinew/stages/mix/mix_blocks.h"

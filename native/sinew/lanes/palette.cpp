@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "sinew/lanes/kernel.h"
-#include "sinew/mesh/bone_sets.h"
 
 namespace sinew {
 

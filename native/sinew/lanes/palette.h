@@ -59,8 +59,6 @@ struct Palette {
     bool keeps_signs = false;  // whether rows are added with the signs that they have
 };
 
-struct BoneSets;
-
 /// The bones of a mesh in one pose.
 struct Bones {
     std::span<const std::int32_t> used;  // their numbers in the pose

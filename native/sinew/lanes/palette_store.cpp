@@ -10,14 +10,8 @@
 #include <utility>
 
 namespace sinew {
-namespace {
-
-constexpr std::uint32_t kReaders = (std::uint32_t{1} << PaletteStore::kMax) - 1;
-constexpr std::uint32_t kWriter = kReaders + 1;
 
 static_assert(alignof(Float4) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);
-
-}  // namespace
 
 /// One thread's palettes.
 struct PaletteStore::Palettes {
@@ -80,32 +74,28 @@ bool PaletteStore::make(std::uint32_t index) noexcept {
     return true;
 }
 
-std::uint32_t PaletteStore::start_reading() noexcept {
+PaletteStore::Reading::Reading(PaletteStore& store) noexcept : store_(store) {
     for (;;) {
-        const std::uint32_t before = state_.change([](std::uint32_t state) {
+        const std::uint32_t before = store.state_.change([](std::uint32_t state) {
             const bool is_free = (state & kWriter) == 0 && (state & kReaders) != kReaders;
             return is_free ? state | (state + 1) : state;  // sets the lowest bit that is not set
         });
-        const auto index = static_cast<std::uint32_t>(std::countr_one(before));
-        if (make(index)) return index;
+        index_ = static_cast<std::uint32_t>(std::countr_one(before));
+        if (store.make(index_)) return;
         // Without memory for more, threads take turns.
-        end_reading(index);
+        store.state_.clear(std::uint32_t{1} << index_);
         std::this_thread::yield();
     }
 }
 
-Palette& PaletteStore::palette(std::size_t kernel, std::uint32_t index) noexcept {
-    return palettes_[index].load(std::memory_order_relaxed)->of_kernels[kernel];
+Palette& PaletteStore::Reading::palette(std::size_t kernel) const noexcept {
+    return store_.palettes_[index_].load(std::memory_order_relaxed)->of_kernels[kernel];
 }
 
-void PaletteStore::end_reading(std::uint32_t index) noexcept { state_.clear(std::uint32_t{1} << index); }
-
-void PaletteStore::start_writing() noexcept {
+PaletteStore::Writing::Writing(PaletteStore& store) noexcept : store_(store) {
     // Set the writer's bit first, so that threads that deform continuously do not keep it waiting.
-    state_.change([](std::uint32_t state) { return state | kWriter; });
-    state_.wait_until_clear(kReaders);
+    store.state_.change([](std::uint32_t state) { return state | kWriter; });
+    store.state_.wait_until_clear(kReaders);
 }
-
-void PaletteStore::end_writing() noexcept { state_.clear(kWriter); }
 
 }  // namespace sinew

@@ -34,15 +34,13 @@ public:
     /// Holds palettes for the caller, and the mesh for reading, while this object lives.
     class Reading {
     public:
-        explicit Reading(PaletteStore& store) noexcept : store_(store), index_(store.start_reading()) {}
-        ~Reading() { store_.end_reading(index_); }
+        explicit Reading(PaletteStore& store) noexcept;
+        ~Reading() { store_.state_.clear(std::uint32_t{1} << index_); }
         Reading(const Reading&) = delete;
         Reading& operator=(const Reading&) = delete;
 
         /// The palette for the kernel with this index.
-        [[nodiscard]] Palette& palette(std::size_t kernel) const noexcept {
-            return store_.palette(kernel, index_);
-        }
+        [[nodiscard]] Palette& palette(std::size_t kernel) const noexcept;
 
     private:
         PaletteStore& store_;
@@ -52,8 +50,8 @@ public:
     /// Holds the mesh for writing while this object lives.
     class Writing {
     public:
-        explicit Writing(PaletteStore& store) noexcept : store_(store) { store.start_writing(); }
-        ~Writing() { store_.end_writing(); }
+        explicit Writing(PaletteStore& store) noexcept;
+        ~Writing() { store_.state_.clear(kWriter); }
         Writing(const Writing&) = delete;
         Writing& operator=(const Writing&) = delete;
 
@@ -64,13 +62,11 @@ public:
 private:
     struct Palettes;
 
-    std::uint32_t start_reading() noexcept;
-    void end_reading(std::uint32_t index) noexcept;
-    void start_writing() noexcept;
-    void end_writing() noexcept;
+    static constexpr std::uint32_t kReaders = (std::uint32_t{1} << kMax) - 1;
+    static constexpr std::uint32_t kWriter = kReaders + 1;
+
     /// Makes the palettes of the thread that has this bit. Returns false without memory.
     bool make(std::uint32_t index) noexcept;
-    [[nodiscard]] Palette& palette(std::size_t kernel, std::uint32_t index) noexcept;
 
     std::array<const Kernel*, kMaxKernels> kernels_{};
     std::size_t bones_;

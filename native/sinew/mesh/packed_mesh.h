@@ -86,6 +86,17 @@ struct PackedMesh {
     return {mesh.bones[block.first_bone + k], (k == 0 ? mesh.first_weights[b] : weights[k - 1]).lane[lane]};
 }
 
+/// The sets of bones that a mesh's vertices have, each once: for methods whose rows depend on them.
+struct BoneSets {
+    std::vector<std::uint32_t> offsets{0};  // [sets + 1] into `bones`
+    std::vector<std::uint32_t> bones;       // [entries] indices into PackedMesh::used_bones
+    // [PackedMesh::bones] an index into `bones` for each; where the weight is 0, any of its set
+    std::vector<std::int32_t> entries;
+};
+
+/// Finds the sets, in the order of the mesh's blocks. The same bones in another order are another set.
+[[nodiscard]] BoneSets find_bone_sets(const PackedMesh& mesh);
+
 /// Packs a mesh.
 ///
 /// rest_points  [vertices]

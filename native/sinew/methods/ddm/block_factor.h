@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "sinew/base/targets.h"
@@ -31,13 +30,6 @@ struct BlockFactor {
 
     [[nodiscard]] static constexpr std::size_t triangle(std::size_t width) { return width * (width - 1) / 2; }
 };
-
-/// Makes a factor with blocks from one by columns.
-///
-/// starts, rows, values  L below its diagonal, by columns: [columns + 1], rows ascending in each column
-[[nodiscard]] BlockFactor make_block_factor(std::span<const std::int32_t> starts,
-                                            std::span<const std::int32_t> rows,
-                                            std::span<const double> values, std::vector<double> diagonal);
 
 /// Right sides are solved in groups of this many. The first of a group is not negative, and shows where the group
 /// is 0.

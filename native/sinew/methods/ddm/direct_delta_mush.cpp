@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string>
 
@@ -30,6 +31,12 @@ constexpr double kLeastExact = 1e-10;
 // A neighbourhood whose sum of squared extents is below this share of the mesh's is a point: its computed extents
 // are rounding errors, from which no rotation can be found.
 constexpr double kLeastExtentOfMesh = 1e-12;
+
+// The rows of one block then fit into the first-level cache together with the right sides that they change.
+constexpr std::size_t kMaxColumns = 32;
+
+// Share of zeros that a block may store: up to this share they cost less than one more block.
+constexpr double kMaxZeros = 0.3;
 
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
 
@@ -102,6 +109,86 @@ Smoothing smoothing_of(std::span<const Vec3<float>> points, std::span<const std:
     return smoothing;
 }
 
+/// Makes the blocks of a factor.
+class BlockMaker {
+public:
+    /// lower  L below its diagonal, by columns, with ascending rows in each
+    BlockMaker(const SparseMatrix& lower, const Eigen::VectorXd& diagonal) : lower_(lower) {
+        factor_.diagonal.assign(diagonal.begin(), diagonal.end());
+    }
+
+    BlockFactor run() {
+        const std::size_t columns = factor_.diagonal.size();
+        for (std::size_t column = 0; column < columns; ++column) {
+            if (column > begin_ && !add(column)) {
+                close(column);
+                begin_ = column;
+            }
+            if (column == begin_) {
+                const auto of = rows_of(column);
+                below_.assign(of.begin(), of.end());
+                numbers_ = of.size();
+            }
+        }
+        if (columns > 0) close(columns);
+        return std::move(factor_);
+    }
+
+private:
+    [[nodiscard]] std::span<const std::int32_t> rows_of(std::size_t column) const {
+        const std::int32_t* const starts = lower_.outerIndexPtr() + column;
+        return {lower_.innerIndexPtr() + starts[0], lower_.innerIndexPtr() + starts[1]};
+    }
+
+    /// Adds `column` to the block of columns from begin_ on, if that stores few enough zeros. Returns whether it
+    /// did.
+    bool add(std::size_t column) {
+        const std::size_t width = column + 1 - begin_;
+        if (width > kMaxColumns) return false;
+        if (below_.empty() || below_.front() != static_cast<std::int32_t>(column)) return false;
+        const auto of = rows_of(column);
+        merged_.clear();
+        std::set_union(below_.begin() + 1, below_.end(), of.begin(), of.end(), std::back_inserter(merged_));
+        const std::size_t all = width * merged_.size() + BlockFactor::triangle(width);
+        const std::size_t numbers = numbers_ + of.size();
+        if (static_cast<double>(all - numbers) > kMaxZeros * static_cast<double>(all)) return false;
+        below_.swap(merged_);
+        numbers_ = numbers;
+        return true;
+    }
+
+    /// Writes the block of columns [begin_, end).
+    void close(std::size_t end) {
+        const std::size_t width = end - begin_;
+        const std::size_t first_value = factor_.values.size();
+        factor_.blocks.push_back({static_cast<std::uint32_t>(begin_), static_cast<std::uint32_t>(width),
+                                  static_cast<std::uint32_t>(factor_.rows.size()),
+                                  static_cast<std::uint32_t>(below_.size()), first_value});
+        factor_.rows.insert(factor_.rows.end(), below_.begin(), below_.end());
+        const std::size_t below = first_value + BlockFactor::triangle(width);
+        factor_.values.resize(below + width * below_.size());
+        for (std::size_t k = 0; k < width; ++k) {
+            SparseMatrix::InnerIterator i(lower_, static_cast<Eigen::Index>(begin_ + k));
+            for (; i && static_cast<std::size_t>(i.row()) < end; ++i) {
+                const std::size_t row = static_cast<std::size_t>(i.row()) - begin_;
+                factor_.values[first_value + BlockFactor::triangle(row) + k] = i.value();
+            }
+            for (std::size_t row = 0; i; ++i, ++row) {
+                while (below_[row] != i.row()) ++row;
+                factor_.values[below + width * row + k] = i.value();
+            }
+        }
+    }
+
+    const SparseMatrix& lower_;
+    BlockFactor factor_;
+    // The block of columns from begin_ on.
+    std::size_t begin_ = 0;
+    std::vector<std::int32_t> below_;
+    std::size_t numbers_ = 0;
+    std::vector<std::int32_t> merged_;
+};
+
 /// Solves a step for kGroups bones at once, and only for rows where they are not 0.
 class Solver {
 public:
@@ -112,12 +199,7 @@ public:
             fail("rest_points", "a mesh whose areas are numbers", "one that is too large or too small");
         }
         const auto count = static_cast<std::size_t>(matrix.rows());
-        const SparseMatrix& lower = factor.matrixL().nestedExpression();
-        const auto numbers = static_cast<std::size_t>(lower.nonZeros());
-        const auto diagonal = factor.vectorD();
-        factor_ = make_block_factor({lower.outerIndexPtr(), count + 1}, {lower.innerIndexPtr(), numbers},
-                                    {lower.valuePtr(), numbers},
-                                    std::vector<double>(diagonal.data(), diagonal.data() + diagonal.size()));
+        factor_ = BlockMaker(factor.matrixL().nestedExpression(), factor.vectorD()).run();
         for (std::size_t i = 0; i < count; ++i) {
             row_numbers_.push_back(
                 static_cast<std::size_t>(factor.permutationP().indices()(static_cast<Eigen::Index>(i))));
@@ -149,24 +231,21 @@ Columns columns_of(const Vec3<double>& p, double weight) {
     return columns;
 }
 
+/// The axes whose product is in each column after the first four.
+constexpr std::array<std::array<int, 2>, 6> kSecond{{{0, 0}, {1, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}}};
+
 /// The moments relative to `o`.
 std::array<float, kColumns> moved_to(const Vec3<double>& o, const Columns& m) {
     const double weight = m[0];
     const Vec3<double> first = Vec3<double>(m[1], m[2], m[3]) - weight * o;
+    std::array<float, kColumns> moved{static_cast<float>(weight), static_cast<float>(first.x),
+                                      static_cast<float>(first.y), static_cast<float>(first.z)};
     // Moments of (p - o) (p - o)^T: those of p p^T minus first o^T, minus o first^T, minus weight o o^T.
-    const auto second = [&](std::size_t column, int a, int b) {
-        return static_cast<float>(m[column] - first[a] * o[b] - o[a] * first[b] - weight * o[a] * o[b]);
-    };
-    return {static_cast<float>(weight),
-            static_cast<float>(first.x),
-            static_cast<float>(first.y),
-            static_cast<float>(first.z),
-            second(4, 0, 0),
-            second(5, 1, 1),
-            second(6, 2, 2),
-            second(7, 1, 2),
-            second(8, 0, 2),
-            second(9, 0, 1)};
+    for (std::size_t i = 0; const auto [a, b] : kSecond) {
+        const double number = m[4 + i] - first[a] * o[b] - o[a] * first[b] - weight * o[a] * o[b];
+        moved[4 + i++] = static_cast<float>(number);
+    }
+    return moved;
 }
 
 /// An influence of a bone.
@@ -279,17 +358,14 @@ void add_rows(std::uint32_t vertex, const Vec3<double>& point,
     for (const auto& [bone, found] : of_bones) {
         const double weight = at(*found, 0) / total;
         const Vec3<double> first = Vec3<double>(at(*found, 1), at(*found, 2), at(*found, 3)) / total;
-        const auto second = [&, found = found](std::size_t column, int a, int b) {
-            if (is_point) return 0.0f;
-            const double moment = at(*found, column) / total;
-            return static_cast<float>(moment - first[a] * centre[b] - centre[a] * first[b] +
-                                      weight * centre[a] * centre[b]);
-        };
         const Vec3<float> from_origin(first + weight * point);
-        rows.insert(rows.end(),
-                    {static_cast<float>(vertex), static_cast<float>(bone), static_cast<float>(weight),
-                     from_origin.x, from_origin.y, from_origin.z, second(4, 0, 0), second(5, 1, 1),
-                     second(6, 2, 2), second(7, 1, 2), second(8, 0, 2), second(9, 0, 1)});
+        rows.insert(rows.end(), {static_cast<float>(vertex), static_cast<float>(bone),
+                                 static_cast<float>(weight), from_origin.x, from_origin.y, from_origin.z});
+        for (std::size_t i = 0; const auto [a, b] : kSecond) {
+            const double moment = at(*found, 4 + i++) / total - first[a] * centre[b] - centre[a] * first[b] +
+                                  weight * centre[a] * centre[b];
+            rows.push_back(is_point ? 0.0f : static_cast<float>(moment));
+        }
     }
 }
 

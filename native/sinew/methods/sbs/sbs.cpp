@@ -7,7 +7,6 @@
 
 #include "sinew/base/targets.h"
 #include "sinew/lanes/kernel.h"
-#include "sinew/mesh/bone_sets.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sinew/methods/sbs/sbs.cpp"
