@@ -35,8 +35,7 @@ py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points
                          const Typed<"typing.Literal['continuous', 'kim_han']">& form,
                          const Threads& threads) {
     const auto given = checked_points(points, "points", limit.vertex_count());
-    const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
-    check_bone_count(bones, limit.bone_count());
+    const std::vector<Affine<float>> bones = checked_bones(bone_transforms, limit.bone_count());
     BulgeLimitOptions options;
     const auto checked_option = [](const py::object& value, const std::string& id) {
         const Parameter& parameter = parameter_of(BulgeLimitStage::kParameters, id);

@@ -123,8 +123,6 @@ Timed<Deformer> make_deformer_of(const Binding& binding, const Name& method, con
 
 // --- Pickles: the data that a Binding keeps, as arrays; for a Deformer also its method and mix.
 
-}  // namespace
-
 py::tuple mesh_state(const BoundMesh& mesh) {
     py::object rest_bones = py::none();
     if (!mesh.rest_bones.empty()) {
@@ -150,8 +148,6 @@ py::tuple mesh_state(const BoundMesh& mesh) {
                           array_of(std::span(mesh.influence_weights)), rest_bones, vertex_data);
 }
 
-namespace {
-
 py::tuple state_of(const Deformer& deformer) {
     py::object mix = py::none();
     if (const MethodInfo* const mixed = deformer.mixed_method(); mixed != nullptr) {
@@ -161,12 +157,6 @@ py::tuple state_of(const Deformer& deformer) {
 }
 
 BindArguments arrays_of_state(const py::object& state) { return from_state<6>(state, &checked_arrays); }
-
-}  // namespace
-
-Binding binding_of_state(const py::object& state) { return Binding(arrays_of_state(state).data(true)); }
-
-namespace {
 
 Timed<Deformer> deformer_of_state(const py::object& state) {
     const BindArguments arrays = arrays_of_state(part_of(state, 3, 0));
@@ -277,6 +267,12 @@ Parameters checked_parameters(const Deformer& deformer, const py::object& parame
     return values;
 }
 
+void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_t least) {
+    if (bone_transforms.size() >= least) return;
+    fail("bone_transforms", "at least " + std::to_string(least) + " bones",
+         std::to_string(bone_transforms.size()));
+}
+
 std::vector<Quat<float>> checked_turns(const py::object& turns) {
     std::vector<Quat<float>> result;
     if (turns.is_none()) return result;
@@ -291,10 +287,10 @@ std::vector<Quat<float>> checked_turns(const py::object& turns) {
 
 }  // namespace
 
-void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_t least) {
-    if (bone_transforms.size() >= least) return;
-    fail("bone_transforms", "at least " + std::to_string(least) + " bones",
-         std::to_string(bone_transforms.size()));
+std::vector<Affine<float>> checked_bones(const py::object& bone_transforms, std::size_t least) {
+    std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
+    check_bone_count(bones, least);
+    return bones;
 }
 
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
@@ -368,7 +364,7 @@ At most 2^31 - 1 vertices and influences, 65,536 influences for a vertex, 1,048,
         .def_property_readonly("bone_count", &Binding::bone_count, kBoneCount)
         .def("__repr__", [](const Binding& binding) { return "<sinew.Binding: " + counts_of(binding); })
         .def(py::pickle([](const Binding& binding) { return mesh_state(binding.unpack()); },
-                        &binding_of_state));
+                        [](const py::object& state) { return Binding(arrays_of_state(state).data(true)); }));
 
     py::class_<Timed<Deformer>>(m, "Deformer",
                                 R"(A binding and a method, ready to deform any pose.

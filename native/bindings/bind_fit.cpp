@@ -70,24 +70,20 @@ py::object fit_items(const std::array<py::object, 6>& values) {
         source.input,           target.input, weights.input, source_directions.input, target_directions.input,
         direction_weights.input};
     const Shape common = broadcast(std::span<Input<T>>(inputs));
-    Output<Named<"RigidFit", QuatVec<T>, T, bool, bool>> output(common);
-    const py::ssize_t count = count_of(common);
-    without_gil([&] {
-        const auto rows = [&]<class Value>(const Rows<T, Value>& of, std::size_t index, py::ssize_t item) {
-            return rows_of<Value>(inputs[index], of.count, item, common);
+    using Fit = Named<"RigidFit", QuatVec<T>, T, bool, bool>;
+    return each_of<Fit>(common, [&](py::ssize_t i) -> Fit {
+        const auto rows = [&]<class Value>(const Rows<T, Value>& of, std::size_t index) {
+            return rows_of<Value>(inputs[index], of.count, i, common);
         };
-        for (py::ssize_t i = 0; i < count; ++i) {
-            const auto a = rows(source, 0, i);
-            const auto b = rows(target, 1, i);
-            const auto w = rows(weights, 2, i);
-            const auto c = rows(source_directions, 3, i);
-            const auto d = rows(target_directions, 4, i);
-            const auto v = rows(direction_weights, 5, i);
-            const auto fit = fit_rigid(Pairs<T>{a, b, w, c, d, v});
-            output.write(i, {fit.transform, fit.error, fit.is_defined, fit.is_mirrored});
-        }
+        const auto a = rows(source, 0);
+        const auto b = rows(target, 1);
+        const auto w = rows(weights, 2);
+        const auto c = rows(source_directions, 3);
+        const auto d = rows(target_directions, 4);
+        const auto v = rows(direction_weights, 5);
+        const auto fit = fit_rigid(Pairs<T>{a, b, w, c, d, v});
+        return {fit.transform, fit.error, fit.is_defined, fit.is_mirrored};
     });
-    return output.take();
 }
 
 NamedTuple<"RigidFit"> rigid(const ArrayLike& source, const ArrayLike& target,
@@ -127,19 +123,15 @@ py::object hand_eye_items(const std::array<py::object, 3>& values) {
     const auto weights = checked_weights<T>(values[2], "weights", a.count);
     std::array inputs{a.input, b.input, weights.input};
     const Shape common = broadcast(std::span<Input<T>>(inputs));
-    Output<Named<"HandEye", Transform, T, T, bool>> output(common);
-    const py::ssize_t count = count_of(common);
-    without_gil([&] {
-        for (py::ssize_t i = 0; i < count; ++i) {
-            const auto from = as_dual_quats<Transform, T>(rows_of<Transform>(inputs[0], a.count, i, common));
-            const auto onto = as_dual_quats<Transform, T>(rows_of<Transform>(inputs[1], a.count, i, common));
-            const auto w = rows_of<T>(inputs[2], weights.count, i, common);
-            const auto found = hand_eye<T>(from, onto, w);
-            output.write(i, {in_layout<Transform>(found.transform), found.error.angle,
-                             found.error.translation, found.is_defined});
-        }
+    using Found = Named<"HandEye", Transform, T, T, bool>;
+    return each_of<Found>(common, [&](py::ssize_t i) -> Found {
+        const auto from = as_dual_quats<Transform, T>(rows_of<Transform>(inputs[0], a.count, i, common));
+        const auto onto = as_dual_quats<Transform, T>(rows_of<Transform>(inputs[1], a.count, i, common));
+        const auto w = rows_of<T>(inputs[2], weights.count, i, common);
+        const auto found = hand_eye<T>(from, onto, w);
+        return {in_layout<Transform>(found.transform), found.error.angle, found.error.translation,
+                found.is_defined};
     });
-    return output.take();
 }
 
 NamedTuple<"HandEye"> solve_hand_eye(const ArrayLike& a, const ArrayLike& b,
@@ -158,21 +150,16 @@ py::object average_items(const std::array<py::object, 2>& values, bool is_robust
     const Shape common = broadcast(std::span<Input<T>>(inputs));
     Shape with_rows = common;
     with_rows.push_back(poses.count);
-    Output<std::tuple<Transform, bool>> output(common);
     Output<T> parts(with_rows);
-    const py::ssize_t count = count_of(common);
-    without_gil([&] {
-        for (py::ssize_t i = 0; i < count; ++i) {
-            const auto of =
-                as_dual_quats<Transform, T>(rows_of<Transform>(inputs[0], poses.count, i, common));
-            const auto w = rows_of<T>(inputs[1], weights.count, i, common);
-            const std::span<T> kept(parts.data + i * poses.count, of.size());
-            std::fill(kept.begin(), kept.end(), T(1));
-            const auto found = is_robust ? robust_average<T>(of, w, kept) : average<T>(of, w);
-            output.write(i, {in_layout<Transform>(found.transform), found.is_defined});
-        }
+    using Found = std::tuple<Transform, bool>;
+    const py::tuple transforms = each_of<Found>(common, [&](py::ssize_t i) -> Found {
+        const auto of = as_dual_quats<Transform, T>(rows_of<Transform>(inputs[0], poses.count, i, common));
+        const auto w = rows_of<T>(inputs[1], weights.count, i, common);
+        const std::span<T> kept(parts.data + i * poses.count, of.size());
+        std::fill(kept.begin(), kept.end(), T(1));
+        const auto found = is_robust ? robust_average<T>(of, w, kept) : average<T>(of, w);
+        return {in_layout<Transform>(found.transform), found.is_defined};
     });
-    const py::tuple transforms = output.take();
     return named_tuple("Averaged", py::make_tuple(transforms[0], transforms[1], parts.take()));
 }
 

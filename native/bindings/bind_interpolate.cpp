@@ -45,18 +45,13 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
     take_last_axis(inputs[1], weights,
                    element_name<T>() + "[.., " + std::to_string(terms) + "], one for each transform", terms);
     const Shape common = broadcast(std::span<Input<T>>(inputs));
-    Output<Blend<Transform>> output(common);
-    const py::ssize_t count = count_of(common);
-    without_gil([&] {
-        std::vector<Transform> items(static_cast<std::size_t>(terms));
-        for (py::ssize_t i = 0; i < count; ++i) {
-            read_rows(inputs[0], i, common, items);
-            const std::span<const T> shares(inputs[1].at(i, common), items.size());
-            const auto result = Method::template blend<signs, T>(items, shares);
-            output.write(i, {result.transform, result.is_defined});
-        }
+    std::vector<Transform> items(static_cast<std::size_t>(terms));
+    return each_of<Blend<Transform>>(common, [&](py::ssize_t i) -> Blend<Transform> {
+        read_rows(inputs[0], i, common, items);
+        const std::span<const T> shares(inputs[1].at(i, common), items.size());
+        const auto result = Method::template blend<signs, T>(items, shares);
+        return {result.transform, result.is_defined};
     });
-    return output.take();
 }
 
 Blended blend(const ArrayLike& any_transforms, const ArrayLike& any_weights, const Method& method,
@@ -80,16 +75,11 @@ py::object along_keys(const py::object& keys, const py::object& times, const py:
     const std::vector<Key> items = items_of<Key>(input);
     const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
     const auto moments = checked_input<T, T>(at, "at");
-    Output<Blend<Key>> output(moments.lead);
-    const py::ssize_t count = count_of(moments.lead);
-    without_gil([&] {
-        for (py::ssize_t i = 0; i < count; ++i) {
-            const auto result =
-                evaluate(std::span<const Key>(items), std::span<const T>(key_times), moments.data[i]);
-            output.write(i, {result.transform, result.is_defined});
-        }
+    return each_of<Blend<Key>>(moments.lead, [&](py::ssize_t i) -> Blend<Key> {
+        const auto result =
+            evaluate(std::span<const Key>(items), std::span<const T>(key_times), moments.data[i]);
+        return {result.transform, result.is_defined};
     });
-    return output.take();
 }
 
 Blended spline(const ArrayLike& any_keys, const ArrayLike& any_times, const ArrayLike& any_at,

@@ -148,20 +148,16 @@ Running centres(const ArrayLike& rest_points, const ArrayLike& influence_offsets
 
 Running moments(const ArrayLike& rest_points, const ArrayLike& influence_offsets,
                 const ArrayLike& influence_bones, const ArrayLike& influence_weights,
-                const ArrayLike& triangles, double radius, bool exact, const Threads& threads,
-                bool gives_way) {
+                const ArrayLike& triangles, [[maybe_unused]] double radius, [[maybe_unused]] bool exact,
+                const Threads& threads, [[maybe_unused]] bool gives_way) {
     Mesh mesh({rest_points, influence_offsets, influence_bones, influence_weights}, triangles);
-    const std::size_t most = checked_threads(threads);
+    [[maybe_unused]] const std::size_t most = checked_threads(threads);
 #if SINEW_WITH_DDM
     const auto make = [radius, exact](const Mesh& of, Job& job) {
         return direct_delta_mush(of.data(), of.corners, radius, job, exact);
     };
     return std::make_unique<Precomputation>(most, gives_way, std::move(mesh), kMomentFloats, make);
 #else
-    static_cast<void>(radius);
-    static_cast<void>(exact);
-    static_cast<void>(most);
-    static_cast<void>(gives_way);
     throw std::runtime_error("direct_delta_mush: this build of Sinew is without the method ddm");
 #endif
 }

@@ -73,8 +73,7 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
                          const OptionalArrayLike& channels, const Blend& blend, const Blend& mix_blend,
                          const Threads& threads) {
     const auto given = checked_points(points, "points", spread.vertex_count());
-    const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
-    check_bone_count(bones, spread.bone_count());
+    const std::vector<Affine<float>> bones = checked_bones(bone_transforms, spread.bone_count());
     const auto of_bones = one_for_each<float>(amounts, "amounts", spread.twist_count(), "float32");
     const auto curved = one_for_each<float>(curves, "curves", spread.twist_count(), "float32");
     const auto told = checked_channels(channels, spread.twist_count());

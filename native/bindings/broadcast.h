@@ -224,6 +224,17 @@ inline py::ssize_t count_of(const Shape& shape) {
     return count;
 }
 
+/// The results of make(i), which runs without the GIL, for each item of an Output<Value> of this shape.
+template <class Value, class Make>
+py::object each_of(const Shape& shape, const Make& make) {
+    Output<Value> output(shape);
+    const py::ssize_t count = count_of(shape);
+    without_gil([&] {
+        for (py::ssize_t i = 0; i < count; ++i) output.write(i, make(i));
+    });
+    return output.take();
+}
+
 /// Calls `f` for each item of the arguments, broadcast together.
 template <class T, template <class> class... In, class F, std::size_t... I>
 py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
@@ -231,14 +242,8 @@ py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
     std::array<Input<T>, sizeof...(In)> inputs{checked_input<T, In<T>>(values[I], arguments[I])...};
     const Shape common = broadcast(std::span<Input<T>>(inputs));
     using Result = decltype(f(std::declval<const In<T>&>()...));
-    Output<Result> output(common);
-    const py::ssize_t count = count_of(common);
-    without_gil([&] {
-        for (py::ssize_t i = 0; i < count; ++i) {
-            output.write(i, f(Item<In<T>>::read(inputs[I].at(i, common))...));
-        }
-    });
-    return output.take();
+    return each_of<Result>(
+        common, [&](py::ssize_t i) -> Result { return f(Item<In<T>>::read(inputs[I].at(i, common))...); });
 }
 
 /// The same with the element type that all arguments have after promoted(). The first argument must not be a

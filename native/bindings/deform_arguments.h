@@ -24,10 +24,6 @@ struct MeshArguments {
     }
 };
 
-// Pickles of bindings: the data that a Binding keeps, as arrays.
-py::tuple mesh_state(const BoundMesh& mesh);
-Binding binding_of_state(const py::object& state);
-
 /// The method with this name. ValueError that names `argument`; TypeError if it is no str.
 MethodInfo checked_method(const py::object& method, const char* argument);
 
@@ -63,8 +59,8 @@ struct DeformArguments {
     DeformArguments(const DeformArguments&) = delete;
 };
 
-/// ValueError for fewer bones.
-void check_bone_count(std::span<const Affine<float>> bone_transforms, std::size_t least);
+/// The argument `bone_transforms`. ValueError for fewer bones.
+std::vector<Affine<float>> checked_bones(const py::object& bone_transforms, std::size_t least);
 
 /// The arguments of Deformer.deform, except for `out`.
 DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
