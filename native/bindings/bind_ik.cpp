@@ -10,8 +10,6 @@ using Solution = Typed<"sinew._types.Solution">;
 
 struct Solver {
     IkSolver solver;
-    std::size_t bone_count;
-    std::size_t effector_count;
     bool has_pole;
 };
 
@@ -93,11 +91,9 @@ std::unique_ptr<Solver> make(const ArrayLike& any_parents, const Effectors& any_
     std::vector<IkEffector> effectors;
     for (const py::handle effector : items) effectors.push_back(checked_effector(effector));
     const Skeleton skeleton(as_span(parents));
-    const std::size_t bone_count = skeleton.bone_count();
+    const auto of_bones = limits_of(locked, limits, stiffness, skeleton.bone_count());
     const bool has_pole = effectors.size() == 1 && effectors[0].has_pole;
-    return std::make_unique<Solver>(
-        Solver{IkSolver(skeleton, limits_of(locked, limits, stiffness, bone_count), effectors), bone_count,
-               effectors.size(), has_pole});
+    return std::make_unique<Solver>(Solver{IkSolver(skeleton, of_bones, effectors), has_pole});
 }
 
 /// `array` as float64 [.., count, numbers of a Value]: its last two axes are an item, the others broadcast.
@@ -155,8 +151,8 @@ Solution solve(Solver& self, const ArrayLike& rest, const ArrayLike& tips, const
                const OptionalArrayLike& poles, const OptionalArrayLike& rotations,
                const OptionalArrayLike& root, const Number& tolerance, const Index& iterations) {
     const IkOptions options = checked_options(tolerance, iterations);
-    const std::size_t bones = self.bone_count;
-    const std::size_t effectors = self.effector_count;
+    const std::size_t bones = self.solver.bone_count();
+    const std::size_t effectors = self.solver.effector_count();
     if (self.has_pole && poles.is_none()) fail("poles", "a point for the effector with a pole", "None");
     const Shape one_root{8};
     py::array_t<double> no_rotations(Shape{static_cast<py::ssize_t>(bones), 4});
