@@ -16,6 +16,11 @@ void check_finite(const std::string& argument, std::span<const Vec3<float>> vect
     }
 }
 
+void check_optional(const std::string& argument, std::size_t got, std::size_t count, const std::string& of) {
+    if (got == 0 || got == count) return;
+    fail(argument, "none, or one for each of the " + std::to_string(count) + " " + of, std::to_string(got));
+}
+
 void check_points(std::span<const Vec3<float>> points, std::size_t count) {
     if (points.size() != count) {
         fail("rest_points", std::to_string(count) + " points", std::to_string(points.size()));

@@ -17,6 +17,11 @@ namespace sinew {
 /// of  what the vectors belong to, such as "vertex"
 void check_finite(const std::string& argument, std::span<const Vec3<float>> vectors, const std::string& of);
 
+/// Throws unless `got` is none, or one for each of `count`.
+///
+/// of  what these are, such as "edges"
+void check_optional(const std::string& argument, std::size_t got, std::size_t count, const std::string& of);
+
 /// Throws if the rest points are not `count`, or if one is not finite.
 SINEW_EXPORT void check_points(std::span<const Vec3<float>> points, std::size_t count);
 /// Whether check_points() does not throw.

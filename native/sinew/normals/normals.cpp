@@ -30,14 +30,6 @@ bool all(std::span<const std::uint8_t> flags) {
     return !flags.empty() && std::ranges::all_of(flags, [](std::uint8_t flag) { return flag != 0; });
 }
 
-void check_flags(const char* argument, std::span<const std::uint8_t> flags, const char* of,
-                 std::size_t count) {
-    if (!flags.empty() && flags.size() != count) {
-        fail(argument, "none, or one for each of the " + std::to_string(count) + " " + of,
-             std::to_string(flags.size()));
-    }
-}
-
 void check(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness) {
     check(topology, vertex_count, "vertex_count", kMaxNormalVertices);
     if (topology.corner_vertices.size() > kMaxNormalCorners) {
@@ -48,8 +40,8 @@ void check(const MeshTopology& topology, std::size_t vertex_count, const Sharpne
         fail("face_offsets", "at most " + std::to_string(kMaxNormalCorners) + " faces",
              std::to_string(topology.face_offsets.size() - 1));
     }
-    check_flags("sharp_edges", sharpness.edges, "edges", topology.edges.size() / 2);
-    check_flags("sharp_faces", sharpness.faces, "faces", topology.face_offsets.size() - 1);
+    check_optional("sharp_edges", sharpness.edges.size(), topology.edges.size() / 2, "edges");
+    check_optional("sharp_faces", sharpness.faces.size(), topology.face_offsets.size() - 1, "faces");
     const std::size_t numbers = 2 * topology.corner_vertices.size();
     if (!sharpness.custom.empty() && sharpness.custom.size() != numbers) {
         fail("custom_normals", "none, or two numbers for each corner, " + std::to_string(numbers),

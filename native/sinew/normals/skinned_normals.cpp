@@ -27,14 +27,8 @@ void check(const RestFrames& rest, std::size_t vertex_count) {
         fail("normals", "one for each of the " + std::to_string(vertex_count) + " vertices",
              std::to_string(count));
     }
-    if (!rest.vertices.empty() && rest.vertices.size() != count) {
-        fail("vertices", "none, or one for each of the " + std::to_string(count) + " normals",
-             std::to_string(rest.vertices.size()));
-    }
-    if (!rest.tangents.empty() && rest.tangents.size() != count) {
-        fail("tangents", "none, or one for each of the " + std::to_string(count) + " normals",
-             std::to_string(rest.tangents.size()));
-    }
+    check_optional("vertices", rest.vertices.size(), count, "normals");
+    check_optional("tangents", rest.tangents.size(), count, "normals");
     for (std::size_t i = 0; i < rest.vertices.size(); ++i) {
         if (rest.vertices[i] < 0 || static_cast<std::size_t>(rest.vertices[i]) >= vertex_count) {
             fail("vertices", "vertices below " + std::to_string(vertex_count),

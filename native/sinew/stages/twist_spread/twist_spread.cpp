@@ -40,12 +40,8 @@ void check_twists(std::span<const TwistBone> twists, std::span<const Affine<floa
 }
 
 void check_parents(std::span<const std::int32_t> parents, std::size_t bone_count) {
-    if (parents.empty()) return;
-    if (parents.size() != bone_count) {
-        fail("parents", "none, or one for each of the " + std::to_string(bone_count) + " rest bones",
-             std::to_string(parents.size()));
-    }
-    for (std::size_t bone = 0; bone < bone_count; ++bone) {
+    check_optional("parents", parents.size(), bone_count, "rest bones");
+    for (std::size_t bone = 0; bone < parents.size(); ++bone) {
         if (parents[bone] < -1 || parents[bone] >= static_cast<std::int32_t>(bone_count)) {
             fail("parents", "-1, or bones below " + std::to_string(bone_count),
                  std::to_string(parents[bone]) + " at bone " + std::to_string(bone));
