@@ -22,47 +22,82 @@ constexpr std::size_t kMinLanes = 6;
 // A run takes three masked stores. With more runs than this, one store for each vertex is as fast.
 constexpr std::size_t kMaxRuns = 5;
 
-/// The vertices by set of bones, with sets in the order of their first vertex, and where each set starts.
-struct VertexSets {
-    std::vector<std::uint32_t> vertices;
-    std::vector<std::uint32_t> starts{0};
-};
+class VertexSets {
+public:
+    VertexSets(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences)
+        : offsets_(offsets), influences_(influences), set_of_(offsets.size() - 1), slots_(1024, kNone) {
+        for (std::size_t vertex = 0; vertex < set_of_.size(); ++vertex) {
+            // Adjacent vertices mostly have the same bones.
+            const bool as_before = vertex > 0 && equal(vertex, vertex - 1);
+            const std::uint32_t set = as_before ? set_of_[vertex - 1] : find_or_add(vertex);
+            set_of_[vertex] = set;
+            ++sizes_[set];
+        }
+    }
 
-VertexSets sets_of(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences) {
-    const auto of = [&](std::size_t vertex) {
-        return influences.subspan(offsets[vertex], offsets[vertex + 1] - offsets[vertex]);
-    };
-    const auto equal = [&](std::size_t a, std::size_t b) {
+    [[nodiscard]] std::size_t count() const { return sizes_.size(); }
+
+    /// Lists the vertices by set, with sets in the order of their first vertex, and where each set starts.
+    void order(std::vector<std::uint32_t>& vertices, std::vector<std::uint32_t>& starts) const {
+        starts.assign(sizes_.size() + 1, 0);
+        std::partial_sum(sizes_.begin(), sizes_.end(), starts.begin() + 1);
+        std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
+        vertices.resize(set_of_.size());
+        for (std::size_t vertex = 0; vertex < set_of_.size(); ++vertex) {
+            vertices[next[set_of_[vertex]]++] = static_cast<std::uint32_t>(vertex);
+        }
+    }
+
+private:
+    static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+
+    [[nodiscard]] std::span<const Influence<float>> of(std::size_t vertex) const {
+        return influences_.subspan(offsets_[vertex], offsets_[vertex + 1] - offsets_[vertex]);
+    }
+
+    [[nodiscard]] bool equal(std::size_t a, std::size_t b) const {
         return std::ranges::equal(of(a), of(b), {}, &Influence<float>::bone, &Influence<float>::bone);
-    };
-    const auto hash = [&](std::size_t vertex) {
+    }
+
+    [[nodiscard]] std::size_t hash(std::size_t vertex) const {
         std::uint64_t h = 0;
         for (const Influence<float>& influence : of(vertex)) {
             h = (std::rotl(h, 23) ^ static_cast<std::uint64_t>(influence.bone)) * 0x9E3779B97F4A7C15u;
         }
         return static_cast<std::size_t>(h ^ (h >> 32));
-    };
-    // By their first vertex.
-    std::unordered_map<std::size_t, std::size_t, decltype(hash), decltype(equal)> known(1024, hash, equal);
-    std::vector<std::size_t> set_of(offsets.size() - 1);
-    std::vector<std::uint32_t> sizes;
-    for (std::size_t vertex = 0; vertex < set_of.size(); ++vertex) {
-        // Adjacent vertices mostly have the same bones.
-        const bool as_before = vertex > 0 && equal(vertex, vertex - 1);
-        set_of[vertex] =
-            as_before ? set_of[vertex - 1] : known.try_emplace(vertex, sizes.size()).first->second;
-        if (set_of[vertex] == sizes.size()) sizes.push_back(0);
-        ++sizes[set_of[vertex]];
     }
-    VertexSets sets;
-    std::partial_sum(sizes.begin(), sizes.end(), std::back_inserter(sets.starts));
-    sets.vertices.resize(set_of.size());
-    std::vector<std::uint32_t> next(sets.starts);
-    for (std::size_t vertex = 0; vertex < set_of.size(); ++vertex) {
-        sets.vertices[next[set_of[vertex]]++] = static_cast<std::uint32_t>(vertex);
+
+    std::uint32_t find_or_add(std::size_t vertex) {
+        const std::size_t mask = slots_.size() - 1;
+        std::size_t slot = hash(vertex) & mask;
+        for (; slots_[slot] != kNone; slot = (slot + 1) & mask) {
+            if (equal(vertex, first_vertices_[slots_[slot]])) return slots_[slot];
+        }
+        const auto set = static_cast<std::uint32_t>(sizes_.size());
+        slots_[slot] = set;
+        sizes_.push_back(0);
+        first_vertices_.push_back(static_cast<std::uint32_t>(vertex));
+        if (2 * sizes_.size() > slots_.size()) grow();
+        return set;
     }
-    return sets;
-}
+
+    void grow() {
+        slots_.assign(4 * slots_.size(), kNone);
+        const std::size_t mask = slots_.size() - 1;
+        for (std::uint32_t set = 0; set < first_vertices_.size(); ++set) {
+            std::size_t slot = hash(first_vertices_[set]) & mask;
+            while (slots_[slot] != kNone) slot = (slot + 1) & mask;
+            slots_[slot] = set;
+        }
+    }
+
+    std::span<const std::uint32_t> offsets_;
+    std::span<const Influence<float>> influences_;
+    std::vector<std::uint32_t> set_of_;
+    std::vector<std::uint32_t> slots_;
+    std::vector<std::uint32_t> sizes_;
+    std::vector<std::uint32_t> first_vertices_;
+};
 
 class Packer {
 public:
@@ -70,12 +105,14 @@ public:
         : offsets_(offsets), influences_(influences) {}
 
     PackedMesh run(std::span<const Vec3<float>> rest_points, std::span<const std::int32_t> more_bones) {
-        const auto [vertices, starts] = sets_of(offsets_, influences_);
-        mesh_.blocks.reserve(vertices.size() / kLanes + starts.size());
-        mesh_.vertices.reserve(vertices.size() / kLanes + starts.size());
+        std::vector<std::uint32_t> order;
+        std::vector<std::uint32_t> starts;
+        VertexSets(offsets_, influences_).order(order, starts);
+        mesh_.blocks.reserve(order.size() / kLanes + starts.size());
+        mesh_.vertices.reserve(order.size() / kLanes + starts.size());
         std::vector<std::uint32_t> scattered;
         for (std::size_t set = 0; set + 1 < starts.size(); ++set) {
-            add_set(std::span(vertices).subspan(starts[set], starts[set + 1] - starts[set]), scattered);
+            add_set(std::span(order).subspan(starts[set], starts[set + 1] - starts[set]), scattered);
         }
         // Vertices with similar numbers of influences become adjacent, which minimises padding.
         std::ranges::stable_sort(scattered, {}, [this](std::uint32_t vertex) { return count(vertex); });
