@@ -268,7 +268,7 @@ class TwistSpread:
 
         points: float32 [vertices, 3], deformed, model space.
         bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
-        out: None, or float32 [vertices, 3], written and returned. May be `points`.
+        out: may be `points`.
         amount: how much of each twist is spread, 0 to 1.
         amounts: None, or float32 [twists], the same for each bone.
         curves: None, or float32 [twists], -1 to 1: below 0 more of the twist is near the tail, above 0 near the head.
@@ -279,7 +279,6 @@ class TwistSpread:
             "logarithms" (log, dib). With "linear" the bone's matrix M of each vertex becomes M R; otherwise the vertex is
             rotated about the posed axis by its weight times its share of the twist.
         mix_blend: the same for the second method, where `mix` is above 0.
-        threads: at most so many; None or 0: as many as useful.
 
         Where no bone is twisted, no bit changes.
         """

@@ -4,7 +4,7 @@ import numpy.typing
 import sinew._types
 import sinew.ik
 import typing
-__all__: list[str] = ['METHODS', 'Solver', 'swing_twist_angles']
+__all__: list[str] = ['Solver', 'swing_twist_angles']
 class Solver:
     """A solver for one tree of bones with its limits and effectors. solve() allocates only its result."""
     def __init__(self, parents: numpy.typing.ArrayLike, effectors: collections.abc.Sequence[sinew.ik.Effector], *, locked: numpy.typing.ArrayLike | None = None, limits: numpy.typing.ArrayLike | None = None, stiffness: numpy.typing.ArrayLike | None = None) -> None:
@@ -18,8 +18,9 @@ class Solver:
             limits or locks swing by at most 177.7 degrees.
         stiffness: [bones, 3], 0 to below 1: how much less the bone rotates about an axis than about others.
         """
-    def solve(self, rest: numpy.typing.ArrayLike, tips: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, poles: numpy.typing.ArrayLike | None = None, *, rotations: numpy.typing.ArrayLike | None = None, root: numpy.typing.ArrayLike | None = None, method: sinew.ik.Method = 'dls', tolerance: float = 1e-06, iterations: typing.SupportsIndex = 100) -> sinew._types.Solution:
-        """Finds rotations that bring the tips to the goals.
+    def solve(self, rest: numpy.typing.ArrayLike, tips: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, poles: numpy.typing.ArrayLike | None = None, *, rotations: numpy.typing.ArrayLike | None = None, root: numpy.typing.ArrayLike | None = None, tolerance: float = 1e-06, iterations: typing.SupportsIndex = 100) -> sinew._types.Solution:
+        """Finds rotations that bring the tips to the goals, by damped least squares on screws; each step moves all
+        axes (Wampler 1986; Sugihara 2011).
 
         rest: [.., bones, 4, 4], [.., bones, 3, 4], [.., bones, 7] or [.., bones, 8]: each bone relative to its
             parent, not rotated. A matrix's linear part is replaced by the nearest rotation.
@@ -30,13 +31,8 @@ class Solver:
         rotations: [.., bones, 4], the start; rotations beyond the limits are brought within. None: no rotation.
         root: [.., 4, 4], [.., 3, 4], [.., 7] or [.., 8], applied after the transform of every bone without a parent;
             None: the identity. Goals and poles are in the space that it maps to.
-        method: one of METHODS.
         tolerance: errors that count as reached, in lengths of the longest chain and in radians.
-        iterations: maximum number of steps of all axes, or of sweeps over all bones.
-
-        dls  damped least squares on screws; each step moves all axes (Wampler 1986; Sugihara 2011)
-        ccd  cyclic descent, one bone after the other from the tip (Wang, Chen 1991): cheap steps, but many of them
-             where a chain is nearly straight or limited
+        iterations: maximum number of steps.
 
         If a chain with one effector whose rotation does not count can not reach its goal, the goal is moved to the
         nearest point of its range; a chain without limits stretches straight towards it. A straight chain that points
@@ -51,4 +47,3 @@ def swing_twist_angles(rotations: numpy.typing.ArrayLike) -> numpy.typing.NDArra
 
     rotations: [.., 4]; signs and lengths do not matter. For a swing by 180 degrees the twist is 0.
     """
-METHODS: tuple = ('dls', 'ccd')
