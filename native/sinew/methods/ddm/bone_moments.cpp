@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <ranges>
 
 namespace sinew {
 namespace {
@@ -54,8 +53,13 @@ private:
     [[nodiscard]] std::size_t vertex_of(std::size_t row) const { return static_cast<std::size_t>(*at(row)); }
 
     [[nodiscard]] std::size_t first_of(std::size_t vertex) const {
-        const auto of_row = [this](std::size_t row) { return vertex_of(row); };
-        return *std::ranges::lower_bound(std::views::iota(std::size_t{0}, count()), vertex, {}, of_row);
+        std::size_t begin = 0;
+        std::size_t end = count();
+        while (begin < end) {
+            const std::size_t middle = begin + (end - begin) / 2;
+            vertex_of(middle) < vertex ? begin = middle + 1 : end = middle;
+        }
+        return begin;
     }
 
     /// The vertex's rest point as its neighbourhood, with the weights of its influences.
