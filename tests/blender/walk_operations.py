@@ -924,9 +924,12 @@ _KEEP_COLLAPSED = {"ARMATURE", "SUBSURF", "MIRROR", "TRIANGULATE", "MASK"}
 
 def _is_collapsed_once(obj: bpy.types.Object) -> bool:
     """Whether one transform of the mesh and its armatures has no inverse. Where two have none, or one nearly
-    has none, rounding decides the shape."""
-    all_of = [obj, *(modifier.object for modifier in armature_modifiers(obj))]
-    sizes = [abs(each.matrix_world.determinant()) for each in all_of if each is not None]
+    has none, rounding decides the shape. Where one is hidden, its transform may be an earlier one."""
+    armatures = (modifier.object for modifier in armature_modifiers(obj))
+    all_of = [obj, *(each for each in armatures if each is not None)]
+    if not all(each.visible_get() for each in all_of):
+        return False
+    sizes = [abs(each.matrix_world.determinant()) for each in all_of]
     return sorted(size for size in sizes if size < 1e-6) == [0.0]
 
 
