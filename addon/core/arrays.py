@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Comparison of arrays that may be None."""
+"""Arrays that may be None compared; arrays read from Blender's collections."""
 
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -22,3 +22,14 @@ class OfArrays:
             a.equals(b) if isinstance(a, OfArrays) else a == b if isinstance(a, tuple) else are_equal(a, b)
             for a, b in pairs
         )
+
+
+def read(elements: Any, name: str, width: int = 1, kind: type = np.float32) -> np.ndarray:
+    """Returns a property of all elements of one of Blender's collections, a copy: [elements], or
+    [elements, width] for a property of several numbers.
+
+    kind  that of Blender's own array, or reading takes many times as long
+    """
+    values = np.empty((len(elements), width), kind)
+    elements.foreach_get(name, values.ravel())
+    return values if width > 1 else values[:, 0]

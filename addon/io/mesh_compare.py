@@ -7,9 +7,9 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ..core.arrays import read
 from ..core.influences import GroupWeights
 from . import mesh_io
-from .elements import read
 
 _SETTINGS = ("texspace_location", "texspace_size", "use_auto_texspace", "has_custom_normals")
 _KEY_SETTINGS = ("name", "mute", "vertex_group", "slider_min", "slider_max", "interpolation")

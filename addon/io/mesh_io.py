@@ -14,13 +14,13 @@ import bpy
 import numpy as np
 
 from ..core import sdef
+from ..core.arrays import read
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights
 from ..core.shading import Shading
 from ..core.shape_keys import ShapeKeys
 from ..core.stage_mesh import Topology
 from ..core.surface import Surface, coincident_vertices
-from .elements import read
 
 # The attribute with a mesh's vertices: as a whole it is read and written a hundred times as fast as the
 # vertices' "co".

@@ -6,8 +6,8 @@ import numpy as np
 import sinew
 from mathutils import Euler, Quaternion
 
+from ..core.arrays import read
 from ..core.inbetween import Poses
-from .elements import read
 
 CHANNELS = 10
 

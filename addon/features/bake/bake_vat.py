@@ -14,12 +14,12 @@ import numpy as np
 from ...attach import properties
 from ...core import bake as core
 from ...core import vat
+from ...core.arrays import read
 from ...core.errors import SinewError
 from ...core.output import remove, unfinished_path, writing
 from ...core.vectors import transformed
 from ...deform import characters
 from ...io import files, mesh_io
-from ...io.elements import read
 from . import bake_state
 from .bake_export import carried_by, selected
 from .bake_state import Started

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...attach import attach
 from ...attach.subscribers import subscribers
+from ...core.arrays import read
 from ...core.diagnostics import Finding
 from ...core.errors import SinewError
 from ...core.influences import GroupWeights
@@ -18,7 +19,6 @@ from ...core.rig import Bones
 from ...core.vectors import rotations_of
 from ...deform import characters, session
 from ...io import armature_io, mesh_io
-from ...io.elements import read
 from ...ui import stepped
 from ...ui.translations import tr
 from ..pages.measure import Edited
