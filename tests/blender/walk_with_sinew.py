@@ -137,12 +137,11 @@ class SinewSide(Side):
         """Like a user who clicks: first, what is on is switched off."""
         wanted = whole_stages(number)
         for stage in sinew.stages():
-            group, switch = getattr(obj.sinew, stage.name), stage.parameters[0].id
-            if stage.name not in wanted:
-                setattr(group, switch, "OFF" if stage.name == "mix" else False)
-                continue
-            for parameter, value in wanted[stage.name].items():
-                setattr(group, parameter, value)
+            off = {stage.parameters[0].id: "OFF" if stage.name == "mix" else False}
+            for parameter, value in wanted.get(stage.name, off).items():
+                # Where its Armature modifier is gone, a change takes Sinew off, and its settings with it.
+                if self.has_sinew(obj):
+                    setattr(getattr(obj.sinew, stage.name), parameter, value)
 
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
         obj.sinew.enabled = on
