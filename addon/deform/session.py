@@ -16,6 +16,7 @@ from ..attach import (
     point_store,
     properties,
     references,
+    stack,
     upstream_proxy,
 )
 from ..attach.subscribers import notify, subscribers
@@ -244,7 +245,8 @@ def changing(context: bpy.types.Context) -> Iterator[None]:
 def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Called when one of an object's Sinew settings was changed: its shape may differ, and what prevented it
     may be gone."""
-    if plan_of(obj).state is State.REFUSED:
+    # Without an Armature modifier it stays refused. Unknown, it would lose Sinew and the settings themselves.
+    if plan_of(obj).state is State.REFUSED and stack.armature_modifier(obj) is not None:
         _forget_known(obj)
     refresh(context)
     # Blender then touches the object's mesh. In a window that is a separate evaluation; a script may change

@@ -100,6 +100,20 @@ def test_an_error_refuses_one_object_once_and_no_other(monkeypatch, caplog):
     assert_follows(other)
 
 
+@pytest.mark.by_sinew
+def test_settings_stay_where_the_armature_modifier_is_gone():
+    obj, _armature = scenes.skinned_arm()
+    obj.modifiers.remove(obj.modifiers["Armature"])
+    bpy.context.view_layer.update()
+    mix = obj.sinew.mix
+    mix.method = "lbs"
+    # A group that was removed meanwhile would be freed memory.
+    mix.group = "lower"
+    assert (obj.sinew.mix.method, obj.sinew.mix.group) == ("lbs", "lower")
+    assert session.plan_of(obj).state is State.REFUSED
+    assert "was deleted or applied" in properties.of(obj).error
+
+
 def test_an_unchanged_object_is_not_written(monkeypatch):
     monkeypatch.setattr(safe_mode, "_forced", True)
     _obj, _armature = scenes.skinned_arm()
