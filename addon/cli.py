@@ -22,8 +22,20 @@ if TYPE_CHECKING:
 
 # In the order of the help: each is a module of commands/.
 COMMANDS = (
-    *("methods", "info", "check", "points", "reskin", "restore", "ik", "inbetween", "blend", "bake"),
-    *("export", "compare", "flex", "render"),
+    *(
+        "methods",
+        "info",
+        "check",
+        "points",
+        "reskin",
+        "restore",
+        "ik",
+        "inbetween",
+        "blend",
+        "bake",
+        "export",
+    ),
+    *("compare", "flex", "render"),
 )
 # Batches start Blenders of their own, or prepare this one later.
 WITHOUT_BLENDER = ("methods", "check", "flex", "reskin", "restore")

@@ -10,9 +10,20 @@ from types import ModuleType
 # The parts of the library that the extension uses.
 NAMES = (
     *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Lock", "Method", "Normals", "Parameter"),
-    *("Precomputation", "Skeleton", "SkinnedNormals", "Stage", "TwistSpread", "affine", "dual_quat", "ik"),
-    *("centres_of_rotation", "direct_delta_mush", "interpolate", "keep_thread_state", "methods", "quat"),
-    *("quat_vec", "spline", "stages", "thread_id"),
+    *(
+        "Precomputation",
+        "Skeleton",
+        "SkinnedNormals",
+        "Stage",
+        "TwistSpread",
+        "affine",
+        "centres_of_rotation",
+        "direct_delta_mush",
+        "dual_quat",
+        "ik",
+        "interpolate",
+    ),
+    *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages", "thread_id"),
 )
 
 

@@ -30,6 +30,6 @@ def read(elements: Any, name: str, width: int = 1, kind: type = np.float32) -> n
 
     kind  that of Blender's own array, or reading takes many times as long
     """
-    values = np.empty((len(elements), width), kind)
+    values: np.ndarray = np.empty((len(elements), width), kind)
     elements.foreach_get(name, values.ravel())
     return values if width > 1 else values[:, 0]

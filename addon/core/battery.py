@@ -194,8 +194,12 @@ def bend_angles(bones: Bones, pose: np.ndarray) -> np.ndarray:
 
 
 class Battery:
+    """Makes the poses of a rig.
+
+    moving  bool [bones], those that move vertices
+    """
+
     def __init__(self, bones: Bones, limits: Limits, moving: np.ndarray) -> None:
-        """moving: bool [bones], those that move vertices."""
         self._bones, self._limits = bones, limits
         count = len(bones.names)
         rest = bones.rest[:count].astype(np.float64)

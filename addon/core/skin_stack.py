@@ -144,10 +144,10 @@ class SkinDeformer:
         """
         last, known = self.last_frame, self.rest_points
         is_packed_anew = self._take_new_data(frame)
-        if out is None and last is not None and are_equal(rest_points, known) and _same(last, frame):
-            if not is_packed_anew:
-                return False
-        elif self.weighting.depends_on_points and (
+        is_written = out is not None or is_packed_anew
+        if not is_written and last is not None and are_equal(rest_points, known) and _same(last, frame):
+            return False
+        if self.weighting.depends_on_points and (
             last is None
             or rest_points is not known
             or not np.array_equal(frame.bones_from_model, last.bones_from_model)

@@ -245,9 +245,8 @@ def changing(context: bpy.types.Context) -> Iterator[None]:
 def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Called when one of an object's Sinew settings was changed: its shape may differ, and what prevented it
     may be gone."""
-    # Without an Armature modifier it stays refused. Unknown, it would lose Sinew and the settings themselves.
-    if plan_of(obj).state is State.REFUSED and stack.armature_modifier(obj) is not None:
-        _forget_known(obj)
+    if plan_of(obj).state is State.REFUSED:
+        _read_again(obj)
     refresh(context)
     # Blender then touches the object's mesh. In a window that is a separate evaluation; a script may change
     # weights before it.
@@ -255,9 +254,16 @@ def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
         expect_mesh_update(obj)
 
 
+def _read_again(obj: bpy.types.Object) -> None:
+    """Forgets the object, so that the next event reads it. Without an Armature modifier it stays refused:
+    unknown, it would lose Sinew, and with it its settings."""
+    if stack.armature_modifier(obj) is not None:
+        _forget_known(obj)
+
+
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Reads mesh, weights and bones of the object again, also after an error, and switches it on."""
-    _forget_known(obj)
+    _read_again(obj)
     precomputations.stopped.clear()
     settings = properties.of(obj)
     if not settings.enabled:

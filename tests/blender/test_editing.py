@@ -102,7 +102,7 @@ def test_an_error_refuses_one_object_once_and_no_other(monkeypatch, caplog):
 
 @pytest.mark.by_sinew
 def test_settings_stay_where_the_armature_modifier_is_gone():
-    obj, _armature = scenes.skinned_arm()
+    obj, armature = scenes.skinned_arm()
     obj.modifiers.remove(obj.modifiers["Armature"])
     bpy.context.view_layer.update()
     mix = obj.sinew.mix
@@ -110,8 +110,14 @@ def test_settings_stay_where_the_armature_modifier_is_gone():
     # A group that was removed meanwhile would be freed memory.
     mix.group = "lower"
     assert (obj.sinew.mix.method, obj.sinew.mix.group) == ("lbs", "lower")
+    bpy.context.view_layer.objects.active = obj
+    with pytest.raises(RuntimeError, match="was deleted or applied; add another and press Rebind"):
+        bpy.ops.sinew.rebind()
     assert session.plan_of(obj).state is State.REFUSED
     assert "was deleted or applied" in properties.of(obj).error
+    obj.modifiers.new("Armature", "ARMATURE").object = armature
+    bpy.ops.sinew.rebind()
+    assert_follows(obj)
 
 
 def test_an_unchanged_object_is_not_written(monkeypatch):
