@@ -59,8 +59,6 @@ LEFT_OUT: dict[str, dict[str, str]] = {
 BPY = "bpy==4.5.*"
 # The version that Blender 4.5 includes, which its compiled code requires.
 NUMPY = "numpy==1.26.*"
-# A pytest plugin, found because pytest starts in the checkout.
-WINE_LACKS = ("-p", "tools.wine_lacks")
 # Seconds for a program: a multiple of the time that it takes on a machine with two processors.
 LIMITS = {"native": 3600, "python": 5400, "blender": 2400}
 
@@ -156,8 +154,7 @@ class Emulated:
 
     def pytest(self, limit: int, *options: str) -> int:
         words: list[str | Path] = ["wine"] if self.platform.is_windows else []
-        words += [self.python, "-X", "faulthandler", "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-        words += [*(WINE_LACKS if self.platform.is_windows else ()), *options]
+        words += [self.python, "-X", "faulthandler", "-m", "pytest", "-q", "-p", "no:cacheprovider", *options]
         for test, reason in LEFT_OUT[self.platform.name].items():
             print(f"left out: {test}: {reason}")
             words.append(f"--deselect={test}")

@@ -552,7 +552,7 @@ def undecided_by(deformer: skin_stack.SkinDeformer) -> np.ndarray:
     rest_axes = deformer.bones.rest_axes.astype(np.float64)
     quaternions = np.array(
         [
-            reference.quaternion(reference.rotation_of_bone(motion, rest))
+            reference.skin.quaternion(reference.rotation_of_bone(motion, rest))
             for motion, rest in zip(motions, rest_axes, strict=True)
         ]
     )

@@ -266,9 +266,7 @@ def _have_same_extents(kept: np.ndarray, moved: np.ndarray, vertices: np.ndarray
     it, and in armature space, where the distance from the origin matters."""
 
     def is_point(rows: np.ndarray, number: int) -> bool:
-        own = rows[slice(*np.searchsorted(rows[:, 0], (number, number + 1)))]
-        centroid = own[:, 3:6].sum(axis=0)
-        return not own[:, 6:9].sum() > reference.LEAST_EXTENT * centroid @ centroid
+        return not reference.methods.has_extent(reference.kept_of("ddm", rows, number) or ())
 
     return np.array([is_point(kept, v) == is_point(moved, place) for place, v in enumerate(vertices)])
 

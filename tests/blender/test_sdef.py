@@ -64,11 +64,11 @@ def expected_points(obj: bpy.types.Object, rest: np.ndarray | None = None) -> np
         if is_spherical:
             c, r0, r1 = (moved(to_armature, np.array(key.data[vertex.index].co)) for key in keys)
             mean = weights[0] * r0 + weights[1] * r1
-            quaternions = [reference.quaternion(motion[:3, :3]) for motion in motions]
+            quaternions = [reference.skin.quaternion(motion[:3, :3]) for motion in motions]
             if quaternions[0] @ quaternions[1] < 0.0:
                 quaternions[1] = -quaternions[1]
             blended = weights @ np.array(quaternions)
-            at = reference.rotation(blended / np.linalg.norm(blended)) @ (point - c)
+            at = reference.methods.rotation_of(blended) @ (point - c)
             for weight, motion, end in zip(weights, motions, (r0, r1), strict=True):
                 at += weight * moved(motion, (c + (c + end - mean)) / 2.0)
         else:

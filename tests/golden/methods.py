@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each method for one vertex: its point by the pose, armature space.
 
+The papers are Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013, section 3.6 (qv), Kavan,
+Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor),
+Kavan, Zara 2005 (sbs) and Le, Lewis 2019 (ddm); sdef is mmd_tools' formula.
+
 x           the rest point
 of          int [n], its bones or joints, in stored order
 w           float [n], their weights, of sum 1
@@ -13,8 +17,8 @@ from skin import moved_by
 
 
 def multiply(p, q):
-    (a, *u), (b, *v) = p, q
-    return np.array([a * b - np.dot(u, v), *(a * np.array(v) + b * np.array(u) + np.cross(u, v))])
+    a, b, c, d = p
+    return np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]]) @ q
 
 
 def rotation_of(q):  # 3x3, of a quaternion of any length
@@ -127,24 +131,31 @@ def sdef(x, of, w, pose, kept, interpolation):
 
 def ddm(x, of, w, pose, kept, variant, radius):
     """kept: moments of the vertex's neighbourhood, one for each bone. The radius is in them."""
-    c = np.array([m.weight for m in kept])
-    of_rows = np.array([m.bone for m in kept])
-    r, t = pose.rotation[of_rows], pose.translation[of_rows]
-    first, second = np.array([m.first for m in kept]), np.array([m.second for m in kept])
-    centroid = first.sum(axis=0)
-    target = np.einsum("bij,bj->i", r, first) + c @ t
-    if variant == "4":
-        target = c @ (r @ centroid + t)
-    rotation = rotation_of(blended(pose.quaternion[of_rows], c))
-    if variant == "0" and np.trace(second.sum(axis=0)) > 1e-10 * centroid @ centroid:
-        moved = r @ centroid + t - target
-        correlation = (r @ second).sum(axis=0) + moved.T @ (first - c[:, None] * centroid)
+    rows, c, centroid, target, correlation = neighbourhood(kept, pose)
+    rotation = rotation_of(blended(pose.quaternion[rows], c))
+    if variant == "0" and has_extent(kept):
         u, sizes, vt = np.linalg.svd(correlation)
         mirrored = np.sign(np.linalg.det(u @ vt))
         # Where two rotations are as near as each other, the blended quaternion stands.
         if 2 * (sizes[1] + mirrored * sizes[2]) > 1e-6 * np.abs(correlation).max():
             rotation = u @ np.diag([1, 1, mirrored]) @ vt
+    if variant == "4":
+        target = c @ by_rigid_bones(centroid, rows, pose)
     return rotation @ (x - centroid) + target + scaled(x, of, w, pose)
+
+
+def neighbourhood(kept, pose):  # bones, weights, the centroid, its image, and how both correlate
+    rows, c = np.array([m.bone for m in kept]), np.array([m.weight for m in kept])
+    first, second = np.array([m.first for m in kept]), np.array([m.second for m in kept])
+    r, t, centroid = pose.rotation[rows], pose.translation[rows], first.sum(axis=0)
+    target = np.einsum("bij,bj->i", r, first) + c @ t
+    moved = r @ centroid + t - target
+    return rows, c, centroid, target, (r @ second).sum(axis=0) + moved.T @ (first - c[:, None] * centroid)
+
+
+def has_extent(kept):  # more than a point
+    centroid = sum((m.first for m in kept), np.zeros(3))
+    return sum(np.trace(m.second) for m in kept) > 1e-10 * centroid @ centroid
 
 
 def cross_matrix(v):
@@ -178,21 +189,29 @@ def log(x, of, w, pose, kept):
 
 
 def dib(x, of, w, pose, kept, signs="blender"):
-    """From the blend of dq on: corrected by the mean of the motions that are left, until nothing is."""
+    for q, t, _left in corrections(x, of, w, pose, signs):
+        point = rotation_of(q) @ x + t
+    return point
+
+
+def corrections(x, of, w, pose, signs):
+    """The blend of dq, corrected by the mean of the motions that are left until nothing is: after each step
+    the quaternion, the translation, and the rotation vectors of what was left."""
     is_kept = signs == "hierarchy"
     real, dual = dual_blend(x, of, w, pose, signs)
     length = np.linalg.norm(real)
     q, t = real / length, 2 * multiply(dual, real * [1, -1, -1, -1])[1:] / length**2
-    moved = translations(x, of, pose)
+    rotations, moved = signed(of, w, pose, signs), translations(x, of, pose)
     for _step in range(100):
         inverse, rotation = q * [1, -1, -1, -1], rotation_of(q)
         left = [
             logarithm(multiply(inverse, each), rotation.T @ (to - t), is_kept)
-            for each, to in zip(signed(of, w, pose, signs), moved, strict=True)
+            for each, to in zip(rotations, moved, strict=True)
         ]
-        vector, linear = (w @ np.array(part) for part in zip(*left, strict=True))
+        vectors, linears = (np.array(part) for part in zip(*left, strict=True))
+        vector, linear = w @ vectors, w @ linears
         step, by = exponential(vector, linear)
         q, t = multiply(q, step), t + rotation @ by
+        yield q, t, vectors
         if np.abs(vector).max() < 1e-12 and np.abs(linear).max() < 1e-12:
             break
-    return rotation_of(q) @ x + t

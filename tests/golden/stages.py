@@ -84,39 +84,45 @@ def segments(case):
     return heads, tails
 
 
-def stretch(
-    linear, axis
-):  # how much longer the motion makes what is across the bone, seen along its image, at most
+def stretch(linear, axis):  # how much longer, at most, the motion makes what is across the bone and its image
     if not axis.any():
         return np.linalg.norm(linear) / np.sqrt(3)
     axis = axis / np.linalg.norm(axis)
     image = linear @ axis
-    across = np.eye(3) - np.outer(image, image) / (image @ image)
+    across = np.eye(3) - np.outer(image, image) / max(image @ image, 1e-300)
     return np.linalg.svd(across @ linear @ (np.eye(3) - np.outer(axis, axis)))[1][0]
 
 
-def bulge_limit(case, points, strength, form, group):
-    to, motion, result = case["armature_from_mesh"], skin.bones(case).motion, points.copy()
-    heads, tails = segments(case)
+def as_limits(heads, tails, motion):  # for all bones: the ends at rest, where they are posed, and the stretch
+    posed = [
+        np.array([skin.moved_by(m, end) for m, end in zip(motion, ends, strict=True)])
+        for ends in (heads, tails)
+    ]
     stretches = [stretch(m[:3, :3], t - h) for m, h, t in zip(motion, heads, tails, strict=True)]
-    for v, (rest, x) in enumerate(
-        zip(skin.moved_by(to, case["points"]), skin.moved_by(to, points), strict=True)
-    ):
-        of, w = skin.influences(case, v, rest)
-        if len(of) < 2:
-            continue
-        if form == "kim_han":  # the heaviest bone alone
-            of, w = of[[w.argmax()]], np.ones(1)
-        at_rest = w @ [np.linalg.norm(rest - nearest(heads[b], tails[b], rest)) for b in of]
-        allowed = at_rest * (w @ [stretches[b] for b in of])
-        ends = [skin.moved_by(motion[b], np.array([heads[b], tails[b]])) for b in of]
-        centre = w @ [nearest(*end, x) for end in ends]
-        distance = np.linalg.norm(x - centre)
-        if distance > allowed:
-            amount = strength * np.clip(case[group][v], 0, 1)
-            x = x + amount * (1 - allowed / distance) * (centre - x)
-            result[v] = skin.moved_by(np.linalg.inv(to), x)
-    return result
+    return heads, tails, *posed, np.array(stretches)
+
+
+def limited(x, rest, of, w, bones, amount, form):
+    """A point, its place at rest, its bones and their weights; bones: as_limits()"""
+    if len(of) < 2:
+        return x
+    if form == "kim_han":  # the heaviest bone alone
+        of, w = of[[w.argmax()]], np.ones(1)
+    heads, tails, posed_heads, posed_tails, stretches = (each[of] for each in bones)
+    at_rest = w @ [np.linalg.norm(rest - nearest(*ends, rest)) for ends in zip(heads, tails, strict=True)]
+    allowed = at_rest * (w @ stretches)
+    centre = w @ [nearest(*ends, x) for ends in zip(posed_heads, posed_tails, strict=True)]
+    distance = np.linalg.norm(x - centre)
+    return x + amount * (1 - allowed / distance) * (centre - x) if distance > allowed else x
+
+
+def bulge_limit(case, points, strength, form, group):
+    to, bones = case["armature_from_mesh"], as_limits(*segments(case), skin.bones(case).motion)
+    at_rest, result = skin.moved_by(to, case["points"]), skin.moved_by(to, points)
+    for v, rest in enumerate(at_rest):
+        amount = strength * np.clip(case[group][v], 0, 1)
+        result[v] = limited(result[v], rest, *skin.influences(case, v, rest), bones, amount, form)
+    return skin.moved_by(np.linalg.inv(to), result)
 
 
 # --- Delta Mush

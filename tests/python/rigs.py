@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import reference
 import sinew
-from reference import rotation
+from reference import methods
 
 METHODS = {method.name for method in sinew.methods()}
 
@@ -18,7 +18,7 @@ LINEAR = {method.name: None for method in sinew.methods() if method.vertex_float
 
 def random_rotation(rng):
     q = rng.normal(size=4)
-    return rotation(q / np.linalg.norm(q))
+    return methods.rotation_of(q)
 
 
 def about(axis, degrees):
@@ -26,7 +26,7 @@ def about(axis, degrees):
     half = np.radians(degrees) / 2
     axis = np.asarray(axis, np.float64) / np.linalg.norm(axis)
     matrix = np.eye(4)
-    matrix[:3, :3] = rotation([np.cos(half), *(np.sin(half) * axis)])
+    matrix[:3, :3] = methods.rotation_of([np.cos(half), *(np.sin(half) * axis)])
     return matrix
 
 

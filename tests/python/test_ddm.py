@@ -61,8 +61,18 @@ def omega_of(rows, vertices, bones):
         own = rows[slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1)))]
         centroid = own[:, 3:6].sum(axis=0)
         for row in own:
-            found[vertex, int(row[1])] = reference.second_moments(row[2:], centroid)
+            found[vertex, int(row[1])] = second_moments(row[2:], centroid)
     return found
+
+
+def second_moments(row, centroid):
+    """The 4x4 matrix that Le and Lewis call Psi."""
+    weight, first, (xx, yy, zz, yz, xz, xy) = row[0], row[1:4], row[4:]
+    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    shifted = np.outer(first, centroid) + np.outer(centroid, first) - weight * np.outer(centroid, centroid)
+    psi = np.empty((4, 4))
+    psi[:3, :3], psi[:3, 3], psi[3, :3], psi[3, 3] = about + shifted, first, first, weight
+    return psi
 
 
 def shares_of(tube):

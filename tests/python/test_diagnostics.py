@@ -93,15 +93,14 @@ def test_dependence_on_the_order_of_groups_is_found(seed):
     found = pose_check([rig.transforms], influences).get("order_of_groups")
     found = set() if found is None else set(found.vertices.tolist())
     expected, unsure = set(), set()
+    pose = reference.pose_of(rig.transforms.astype(np.float64), rig.rest_bones.astype(np.float64))
     for vertex in range(len(rig.rest_points)):
         span = slice(rig.offsets[vertex], rig.offsets[vertex + 1])
         bones, weights = rig.bones[span], rig.weights[span].astype(np.float64)
         points, margins = [], []
-        for order in permutations(range(len(bones))):
-            order = list(order)
-            motions = rig.transforms[bones[order]].astype(np.float64)
+        for order in map(list, permutations(range(len(bones)))):
             share = weights[order] / weights.sum()
-            point, margin = reference.dq(rig.rest_points[vertex], motions, motions[:, :3, :3], share)
+            point, margin = reference.deformed("dq", rig.rest_points[vertex], bones[order], share, pose, None)
             points.append(point)
             margins.append(margin)
         if min(margins) < 1e-4:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import sinew
 import twist_spread_reference
+from reference import skin
 from rigs import about, random_motion, random_rig, transform, translation
 from test_deformer import TOLERANCE
 from tube import Tube
@@ -38,7 +39,7 @@ def true_channels(rig, twists, turns):
             *rig.transforms[[base, tip]].astype(np.float64), rig.rest_bones[tip].astype(np.float64)
         )
         axes = rig.rest_bones[tip, :3, :3].astype(np.float64)
-        row[:4] = twist_spread_reference.quaternion(axes.T @ turned @ axes)
+        row[:4] = skin.quaternion(axes.T @ turned @ axes)
         row[4:] = 0.1, 2.0 * np.pi * turns, -0.2
     return channels
 
@@ -144,7 +145,7 @@ def told(degrees, swing=0.0):
     """Its channels, as Euler angles."""
     turned = about([1, 0, 0], swing) @ about([0, 1, 0], degrees)
     angles = np.radians([swing, degrees, 0.0])
-    return np.float32([[*twist_spread_reference.quaternion(turned[:3, :3]), *angles]])
+    return np.float32([[*skin.quaternion(turned[:3, :3]), *angles]])
 
 
 def poser(made, spread, method):

@@ -2,7 +2,7 @@
 """The stage twist_spread in float64 numpy, by its definition and matrices: the oracle for the library."""
 
 import numpy as np
-from reference import axes_keeping_y, is_rigid, quaternion, rotation, rotation_of_bone
+from reference import axes_keeping_y, is_rigid, methods, rotation_of_bone, skin
 
 FADE_START, HALF, TURN = np.radians(150.0), np.pi, 2.0 * np.pi
 
@@ -49,8 +49,8 @@ def expected_angle(channels, turned, axes, axis):
     told = np.asarray(channels[:4], np.float64)
     if not told.any():
         return 0.0
-    told = axes @ rotation(told / np.linalg.norm(told)) @ axes.T
-    apart = 2.0 * np.arccos(min(1.0, abs(quaternion(told) @ quaternion(turned))))
+    told = axes @ methods.rotation_of(told) @ axes.T
+    apart = 2.0 * np.arccos(min(1.0, abs(skin.quaternion(told) @ skin.quaternion(turned))))
     return fade(apart, np.radians(1.0), np.radians(5.0)) * (np.asarray(channels[4:], float) @ (axes.T @ axis))
 
 
