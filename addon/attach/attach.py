@@ -8,6 +8,7 @@ that core/icons.py gives it.
 """
 
 from collections.abc import Collection
+from typing import TypeAlias
 
 import bpy
 
@@ -32,6 +33,9 @@ from . import (
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
+
+# Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about it.
+Pairs: TypeAlias = list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -167,11 +171,12 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
 def _begin_with_icons(obj: bpy.types.Object) -> None:
     """Has Sinew deform in both views where the Armature modifiers are off in both: what replaces them, such
     as a bake, is switched off then."""
-    views = {name: _view(obj, name) for name in VIEWS}
+    pairs = replaced_modifiers(obj)
+    views = {name: _view(obj, pairs, name) for name in VIEWS}
     if any(any(view.shown) for view in views.values()):
         return
     for name, view in views.items():
-        _store(obj, name, view.switched_on())
+        _store(obj, pairs, name, view.switched_on())
     _set_icons(obj, Situation.OFF)
     baked.switch_off(obj)
 
@@ -300,7 +305,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
     # With a modifier that is gone, Sinew's icon was another.
     is_any_gone = len(settings.replaced_modifiers) > len(pairs)
     for name in VIEWS:
-        view = _view(obj, name)
+        view = _view(obj, pairs, name)
         before = icons.icons(view, situation)
         modifiers = tuple(
             was_on if _is_keyed(obj, modifier, replaced) else getattr(modifier, f"show_{name}")
@@ -314,7 +319,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
         if is_left and now.sinew and obj.mode not in ("EDIT", "SCULPT"):
             # The artist wants Sinew to deform it, though it is small.
             property_groups.store(settings, "leave_small", False)
-        _store(obj, name, icons.follow(view, situation, now))
+        _store(obj, pairs, name, icons.follow(view, situation, now))
     # So that what was taken over is not taken for another click.
     _set_icons(obj, situation)
 
@@ -339,42 +344,44 @@ def _follow_ended_keys(obj: bpy.types.Object) -> None:
 
 def show(obj: bpy.types.Object) -> None:
     """Has Sinew deform it in both views, whatever was switched before."""
+    pairs = replaced_modifiers(obj)
     for name in VIEWS:
-        _store(obj, name, _view(obj, name).switched_on())
+        _store(obj, pairs, name, _view(obj, pairs, name).switched_on())
     _set_icons(obj, Situation(properties.of(obj).stack.situation))
 
 
-def deformer(obj: bpy.types.Object, name: str) -> Deformer:
-    """Returns what deforms it in a view while Sinew is on. What animated icons do is not known."""
-    return _view(obj, name).deformer
+def deformers(obj: bpy.types.Object) -> tuple[Deformer, Deformer]:
+    """Returns what deforms it in the viewport and in renders while Sinew is on. What animated icons do is not
+    known."""
+    pairs = replaced_modifiers(obj)
+    viewport, render = (_view(obj, pairs, name).deformer for name in VIEWS)
+    return viewport, render
 
 
 def deforms(obj: bpy.types.Object) -> bool:
     """Whether Sinew deforms it in one of the views while it is on."""
-    return any(deformer(obj, name) is Deformer.SINEW for name in VIEWS)
+    return Deformer.SINEW in deformers(obj)
 
 
 def do_views_differ(obj: bpy.types.Object) -> bool:
     """Whether Sinew deforms by other Armature modifiers in the viewport than in renders."""
-    viewport, render = (_view(obj, name).taking_part for name in VIEWS)
+    pairs = replaced_modifiers(obj)
+    viewport, render = (_view(obj, pairs, name).taking_part for name in VIEWS)
     return any(viewport) and any(render) and viewport != render
 
 
-def _view(obj: bpy.types.Object, name: str) -> icons.View:
-    settings = properties.of(obj)
-    pairs = replaced_modifiers(obj)
+def _view(obj: bpy.types.Object, pairs: Pairs, name: str) -> icons.View:
     shown, forced, switched = (
         tuple(getattr(replaced, f"{kind}_{name}") for _modifier, replaced in pairs)
         for kind in ("show", "was_off", "switched")
     )
     # One that an animation switches may be on in any frame.
     shown = tuple(is_shown or _is_keyed(obj, *pair) for is_shown, pair in zip(shown, pairs, strict=True))
-    return icons.View(shown, forced, getattr(settings.stack, f"hidden_{name}"), switched)
+    return icons.View(shown, forced, getattr(properties.of(obj).stack, f"hidden_{name}"), switched)
 
 
-def _store(obj: bpy.types.Object, name: str, view: icons.View) -> None:
+def _store(obj: bpy.types.Object, pairs: Pairs, name: str, view: icons.View) -> None:
     property_groups.store(properties.of(obj).stack, f"hidden_{name}", view.hidden)
-    pairs = replaced_modifiers(obj)
     none = (False,) * len(pairs)
     for pair, shown, forced, switched in zip(
         pairs, view.shown, view.forced or none, view.switched or none, strict=True
@@ -390,7 +397,7 @@ def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
     helping, smooth = stack.helping_modifiers(obj), {}
     for name in VIEWS:
-        view = _view(obj, name)
+        view = _view(obj, pairs, name)
         wanted = icons.icons(view, situation)
         for (modifier, replaced), is_on in zip(pairs, wanted.modifiers, strict=True):
             is_keyed = is_visibility_animated(obj, modifier)
@@ -531,9 +538,7 @@ def _replaced_modifier(
     return found
 
 
-def replaced_modifiers(
-    obj: bpy.types.Object,
-) -> list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]:
+def replaced_modifiers(obj: bpy.types.Object) -> Pairs:
     """Returns the Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about
     it."""
     run, kept = stack.armature_modifiers(obj), properties.of(obj).replaced_modifiers

@@ -118,7 +118,7 @@ def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier
     """Returns the Armature modifiers that Sinew replaces, or would replace: the first and those directly
     behind it, which Blender may chain as Multi Modifiers."""
     own, run = own_modifiers(obj), []
-    for modifier in list(obj.modifiers)[_start(obj) :]:
+    for modifier in list(obj.modifiers)[_start(obj, own) :]:
         if modifier.type == "ARMATURE":
             run.append(modifier)
         elif modifier not in own:
@@ -126,14 +126,13 @@ def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier
     return run
 
 
-def _start(obj: bpy.types.Object) -> int:
+def _start(obj: bpy.types.Object, own: list[bpy.types.Modifier]) -> int:
     """Returns the index of the first Armature modifier that Sinew replaces. Without Sinew, that is the first
     with an armature, preferably one that is on."""
     modifiers = list(obj.modifiers)
     if not properties.has_sinew(obj):
         candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
         return _index(obj, min(candidates, key=lambda m: not can_be_on(obj, m), default=None))
-    own = own_modifiers(obj)
     behind_own = max((_index(obj, modifier) for modifier in own), default=len(modifiers)) + 1
     found = [modifier_of(obj, replaced) for replaced in properties.of(obj).replaced_modifiers]
     known = sorted(_index(obj, modifier) for modifier in found if modifier is not None)

@@ -19,7 +19,7 @@ from ..attach import (
     upstream_proxy,
 )
 from ..core.errors import SinewError
-from ..core.icons import RENDER, VIEWPORT, VIEWS
+from ..core.icons import VIEWS
 from ..io import armature_io
 from . import safe_mode, small_meshes
 from .bound import Bound
@@ -39,6 +39,7 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
         return ObjectFacts(enabled=False)
     if not is_linked:
         attach.follow_icons(obj)
+    viewport, render = attach.deformers(obj)
     return ObjectFacts(
         enabled=settings.enabled,
         error=error,
@@ -46,8 +47,8 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
         mode=mode_of(obj),
         has_upstream=upstream_proxy.is_needed(obj),
         visibility_is_keyed=stack.visibility_is_animated(obj),
-        viewport=attach.deformer(obj, VIEWPORT),
-        render=attach.deformer(obj, RENDER),
+        viewport=viewport,
+        render=render,
     )
 
 

@@ -191,8 +191,11 @@ def states_of(
 # --- Settings
 
 
-def refresh(context: bpy.types.Context) -> None:
-    """Deforms all skinned objects at the current frame, as after a change of settings."""
+def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None) -> None:
+    """Deforms the skinned objects at the current frame, as after a change of settings.
+
+    changed  the only object whose plan may differ; None for all
+    """
     if is_rendering_in_window():
         # Not waiting for the render's thread, which would go on to its next frame during what follows.
         phase.must_refresh = True
@@ -202,8 +205,8 @@ def refresh(context: bpy.types.Context) -> None:
             # Updates are suspended, or a handler switched an object off: whoever did that goes on from here.
             return
         current.objects = None
-        for state in current.skinned.values():
-            state.needs_apply = True
+        for uid, state in current.skinned.items():
+            state.needs_apply |= changed is None or uid == changed.session_uid
     # Handlers react to this evaluation by themselves, in time for what others' later handlers change. What
     # these change of objects that are deformed after the update is only there at its end.
     depsgraph = context.evaluated_depsgraph_get()
@@ -247,7 +250,7 @@ def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     may be gone."""
     if plan_of(obj).state is State.REFUSED:
         _read_again(obj)
-    refresh(context)
+    refresh(context, obj)
     # Blender then touches the object's mesh. In a window that is a separate evaluation; a script may change
     # weights before it.
     if not bpy.app.background:
