@@ -147,7 +147,8 @@ def apply_saved(obj: bpy.types.Object) -> None:
 def apply_resumed(obj: bpy.types.Object, was_on: bool, is_alone: bool) -> None:
     """was_on: Sinew deformed it before it was saved. is_alone: as its plan says."""
     attach.restore_volume(obj)
-    if stack.sinew_modifier(obj) is not None:
+    # One that is off was not changed, and animations may have set its icons since.
+    if stack.sinew_modifier(obj) is not None and (was_on or not attach.is_off(obj)):
         attach.switch(obj, was_on, is_alone)
 
 

@@ -92,6 +92,7 @@ class Noted:
     visibility_keyed     for each Armature modifier, whether an animation switches it on and off
     state                what the artist can change about the object itself, from state_of()
     switches             a part of the state, from switches_of()
+    surroundings         from surroundings_of()
     groups               the names of its vertex groups
     loses_marks          as from undeformed.loses_marks()
     dependencies         the session_uid of everything that the shape depends on
@@ -108,6 +109,7 @@ class Noted:
     visibility_keyed: list[bool]
     state: list
     switches: list
+    surroundings: list
     groups: list[str]
     loses_marks: bool
     dependencies: set[int]
@@ -128,6 +130,7 @@ class Noted:
             visibility_keyed=[is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)],
             state=state_of(obj),
             switches=switches_of(obj),
+            surroundings=surroundings_of(obj),
             groups=obj.vertex_groups.keys(),
             loses_marks=undeformed.loses_marks(obj),
             dependencies=own | set(bound.armatures),
@@ -271,6 +274,10 @@ class SkinnedObject:
         has_proxy = properties.of(obj).storage.upstream_proxy is not None
         return not has_proxy or self.noted.loses_marks == undeformed.loses_marks(obj)
 
+    def has_same_surroundings(self, obj: bpy.types.Object) -> bool:
+        """Whether the data around it is as it was when the plan was applied."""
+        return self.noted.surroundings == surroundings_of(obj)
+
     def was_deformed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the last evaluation gave the object its shape."""
         if self.plan.uses_builtin:
@@ -318,6 +325,21 @@ def state_of(obj: bpy.types.Object) -> list:
         if modifier.type == "ARMATURE":
             state += (uid(modifier.object), attach.method_of(modifier), *ModifierOptions.values(modifier))
     return state + switches_of(obj)
+
+
+def surroundings_of(obj: bpy.types.Object) -> list:
+    """Everything about other data that can change with the scene's structure and that decides how the object
+    is deformed."""
+    settings, mesh = properties.of(obj), obj.data
+    gives_normals = normals.are_given(settings) and normals.domain_of(mesh) != ""
+    return [
+        obj.is_editable,
+        mesh.is_editable,
+        uid(settings.storage.point_buffer),
+        uid(settings.storage.upstream_proxy),
+        [attach.is_deleted(armature) for armature in settings.armatures],
+        gives_normals and normals.is_read_by_others(obj),
+    ]
 
 
 def switches_of(obj: bpy.types.Object) -> list:

@@ -96,7 +96,7 @@ class _Event:
             return facts
         if self._lacks_points(skinned):
             return replace(facts, lacks_points=True)
-        if changes.structure or self._may_be_other(skinned):
+        if self._may_be_other(skinned):
             return replace(facts, is_other=True)
         # Blender lists an armature's bones with each change of its pose.
         has_shape = skinned.was_deformed(obj, self.depsgraph) and obj.data.session_uid not in changes.touched
@@ -165,8 +165,15 @@ class _Event:
     def _may_be_other(self, skinned: SkinnedObject) -> bool:
         """Whether the object itself may not be as it was when its plan was applied."""
         obj, changes = self.obj, self.changes
-        is_touched = obj.session_uid in changes.objects or uid(obj.data.shape_keys) in changes.touched
-        if not (is_touched or changes.armatures):
+        if changes.structure:
+            # Of undo steps and of other depsgraphs not all is listed.
+            if changes.after_step or not changes.complete or not skinned.has_same_surroundings(obj):
+                return True
+        elif not (
+            changes.armatures
+            or obj.session_uid in changes.objects
+            or uid(obj.data.shape_keys) in changes.touched
+        ):
             return False
         is_mesh_touched = obj.data.session_uid in changes.touched
         if is_mesh_touched and normals.domain_of(obj.data) != skinned.noted.normals_domain:

@@ -148,6 +148,8 @@ CASES = {
     "enabled Arm; clear_animation Arm; update",
     "keys while Sinew is on": "clear_animation Rig; add Arm; key_visibility Arm 2 3 0.0; frame 1; "
     "pose Rig lower; update; frame 3",
+    "keys while Sinew is off, saved": "add Arm; enabled Arm; key_visibility Arm 3 7 0.0; frame 5; save_copy; "
+    "frame 8",
     "a keyed modifier renamed while it is off": "key_visibility Arm 3 9 0.0; add Arm; rename_modifier Arm; "
     "frame 11; frame 6",
     "a driver while Sinew is on": "add Arm dq; frame 8; drive_visibility Arm Rig Armature; frame 6",

@@ -14,7 +14,7 @@ import numpy as np
 import routes
 import sinew
 import sinew_addon
-from sinew_addon.attach import attach, other_tools, properties, stack, stage_settings
+from sinew_addon.attach import attach, other_tools, properties, stack, stage_settings, undeformed
 from sinew_addon.attach.subscribers import notify, subscribers
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
@@ -392,6 +392,8 @@ class SinewSide(Side):
 
     def left_over(self) -> list[str]:
         """What remains of Sinew in a file where it deforms nothing."""
+        # As a window's timer, the next frame and saving do.
+        undeformed.remove_leftovers()
         # Without a user it is not saved; it belonged to a deleted object.
         objects = [o for o in bpy.data.objects if o.library is None and o.users]
         used = {o.data for o in objects}
