@@ -12,6 +12,7 @@ proxy, so Sinew does not know their result.
 """
 
 from enum import Enum
+from functools import cache
 
 import bpy
 
@@ -140,8 +141,16 @@ def may_read_meshes(obj: bpy.types.Object) -> bool:
 def is_read_by_others(obj: bpy.types.Object) -> bool:
     """Whether another object reads, or may read, its evaluated mesh, directly or through a collection."""
     sources = {obj, *_collections_of(obj)}
-    users = {user for found in bpy.data.user_map(subset=sources).values() for user in found} - {obj}
+    users = {user for source in sources for user in users_of_all().get(source, ())} - {obj}
     return any(_reads(user, sources) for user in users)
+
+
+@cache
+def users_of_all() -> dict[bpy.types.ID, set[bpy.types.ID]]:
+    """Returns who uses each object, mesh and so on, without Sinew's helpers. Found once: each event clears
+    the cache."""
+    helpers = {obj for obj in bpy.data.objects if properties.is_helper(obj)}
+    return {used: users - helpers for used, users in bpy.data.user_map().items()}
 
 
 def _collections_of(obj: bpy.types.Object) -> set[bpy.types.Collection]:
@@ -157,7 +166,7 @@ def _reads(user: bpy.types.ID, sources: set[bpy.types.ID]) -> bool:
     # Hair curves refer to the mesh that they grow on.
     if isinstance(user, bpy.types.GeometryNodeTree | bpy.types.ParticleSettings | bpy.types.Curves):
         return True
-    if not isinstance(user, bpy.types.Object) or properties.is_helper(user):
+    if not isinstance(user, bpy.types.Object):
         return False
     bones = user.pose.bones if user.pose is not None else ()
     constraints = [*user.constraints, *(each for bone in bones for each in bone.constraints)]

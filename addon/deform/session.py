@@ -282,6 +282,7 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     """Brings all objects up to date with an evaluation and its changes, and notifies the subscribers."""
     # Those of another evaluation.
     changes.bones.clear()
+    normals.users_of_all.cache_clear()
     with updates_suspended():
         if depsgraph.mode == "VIEWPORT":
             current.view_layers.add(identity_of_layer(depsgraph.scene, depsgraph.view_layer))
@@ -298,6 +299,7 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
             state.needs_recheck |= changes.lost
         for obj in objects_with_sinew(changes):
             _update(obj, depsgraph, changes)
+        normals.users_of_all.cache_clear()
         _find_pairs(objects_with_sinew(Changes()))
         for obj, state in current.pairs:
             state.needs_recheck |= obj.data.session_uid in read_later
