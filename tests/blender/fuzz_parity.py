@@ -480,8 +480,7 @@ def bind_to_cage(
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     mesh = bpy.data.meshes.new("Cage")
     mesh.from_pydata(corners, [], sides)
-    modifier.object, modifier.precision = bpy.data.objects.new("Cage", mesh), 3
-    bpy.context.scene.collection.objects.link(modifier.object)
+    modifier.object, modifier.precision = scenes.added("Cage", mesh), 3
     # The command works on what is visible, in object mode.
     bpy.context.view_layer.objects.active = obj
     bpy.context.view_layer.update()

@@ -114,21 +114,23 @@ def put_in_front(obj: bpy.types.Object, kind: str = "SUBSURF", name: str = "Fron
     return modifier
 
 
+def points_of(vertices: bpy.types.bpy_prop_collection, name: str = "co") -> np.ndarray:
+    """float32 [vertices, 3] of a mesh or a shape key, read without Sinew's code."""
+    points = np.empty((len(vertices), 3), dtype=np.float32)
+    vertices.foreach_get(name, points.ravel())
+    return points
+
+
 def final_points(obj: bpy.types.Object, name: str = "co") -> np.ndarray:
     """float32 [vertices, 3]: the final evaluated mesh, object space.
 
     name  undeformed_co for its Generated texture coordinates, if hair or the like has Blender make them
     """
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get(name, points.ravel())
-    return points
+    return points_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices, name)
 
 
 def rest_points(obj: bpy.types.Object) -> np.ndarray:
-    points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
-    obj.data.vertices.foreach_get("co", points.ravel())
-    return points
+    return points_of(obj.data.vertices)
 
 
 def diagonal(obj: bpy.types.Object) -> float:
@@ -260,9 +262,8 @@ def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
     group.links.new(grid.outputs["Mesh"], set_position.inputs["Geometry"])
     group.links.new(next(s for s in blur.outputs if s.enabled), set_position.inputs["Position"])
     group.links.new(set_position.outputs["Geometry"], out.inputs[0])
-    obj = bpy.data.objects.new("Slow", bpy.data.meshes.new("Slow"))
+    obj = added("Slow", bpy.data.meshes.new("Slow"))
     obj.modifiers.new("Slow", "NODES").node_group = group
-    bpy.context.scene.collection.objects.link(obj)
     path.parent.mkdir(parents=True, exist_ok=True)
     # Saving the open file would evaluate it.
     bpy.data.libraries.write(str(path), {bpy.context.scene}, compress=True)
@@ -273,7 +274,14 @@ def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
 def link(path: Path | str, *names: str, link: bool = True) -> list[bpy.types.Object]:
     """Objects of another file, linked, or appended, into an empty scene."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(path), link=link) as (_there, here):
+    return link_here(path, *names, link=link)
+
+
+def link_here(
+    path: Path | str, *names: str, link: bool = True, relative: bool = False
+) -> list[bpy.types.Object]:
+    """The same into the current scene."""
+    with bpy.data.libraries.load(str(path), link=link, relative=relative) as (_there, here):
         here.objects = list(names)
     for obj in here.objects:
         bpy.context.scene.collection.objects.link(obj)
@@ -312,8 +320,7 @@ class KeepingEngine(bpy.types.RenderEngine):
             if obj.type != "MESH":
                 continue
             for name, kept in (("co", self.shapes), ("undeformed_co", self.undeformed)):
-                kept[obj.name] = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
-                obj.data.vertices.foreach_get(name, kept[obj.name].ravel())
+                kept[obj.name] = points_of(obj.data.vertices, name)
             self.attributes[obj.name] = obj.data.attributes.keys()
         self.end_result(self.begin_result(0, 0, 4, 4))
 
@@ -327,8 +334,7 @@ def rendering() -> Iterator[Callable[[bpy.types.Object], np.ndarray]]:
     def render(obj: bpy.types.Object) -> np.ndarray:
         scene = bpy.context.scene
         if scene.camera is None:
-            scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-            scene.collection.objects.link(scene.camera)
+            scene.camera = added("Camera", bpy.data.cameras.new("Camera"))
         scene.render.engine = KeepingEngine.bl_idname
         scene.render.resolution_x = scene.render.resolution_y = 4
         KeepingEngine.shapes.clear()

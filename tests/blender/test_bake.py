@@ -419,11 +419,7 @@ def test_a_library_override_whose_library_keys_visibility(arm, tmp_path, kind):
     scenes.save(path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     shot = scenes.save(path.with_name("shot.blend"))
-    with bpy.data.libraries.load(str(path), link=True, relative=True) as (_, to):
-        to.objects = ["Arm", "Arm Rig"]
-    for linked in list(to.objects):
-        bpy.context.scene.collection.objects.link(linked)
-    for linked in list(to.objects):
+    for linked in list(scenes.link_here(path, "Arm", "Arm Rig", relative=True)):
         linked.override_create(remap_local_usages=True)
     obj = next(o for o in bpy.data.objects if o.override_library and o.type == "MESH")
     obj.modifiers["Armature"].object = next(

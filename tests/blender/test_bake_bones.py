@@ -253,12 +253,7 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
         scenes.put_in_front(obj, "MIRROR", "Mirror")
     else:
         scenes.save(path)
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        with bpy.data.libraries.load(str(path), link=True) as (_, to):
-            to.objects = ["Arm", "Arm Rig"]
-        obj = bpy.data.objects["Arm"].copy()
-        for each in (obj, bpy.data.objects["Arm Rig"]):
-            bpy.context.scene.collection.objects.link(each)
+        obj = scenes.copied(scenes.link(path, "Arm", "Arm Rig")[0], linked=True)
     scenes.add_sinew(obj, METHOD)
     sentence = {
         "two modifiers": "has several Armature modifiers",

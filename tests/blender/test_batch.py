@@ -325,9 +325,7 @@ def test_links_are_kept_and_reported(tmp_path):
     for library, relative in ((hero, True), (tmp_path / "library" / "gone.blend", False)):
         if not library.exists():
             shutil.copy(hero, library)
-        with bpy.data.libraries.load(str(library), link=True, relative=relative) as (_, to):
-            to.objects = ["Arm"]
-        bpy.context.scene.collection.objects.link(to.objects[0])
+        scenes.link_here(library, "Arm", relative=relative)
     scenes.save(shot)
     (tmp_path / "library" / "gone.blend").unlink()
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+import scenes
 from mathutils import Matrix
 from program import run_sinew
 from sinew import quat_vec
@@ -29,8 +30,7 @@ MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
 def make_legs(modes=("QUATERNION",), name="Legs"):
     """The rig of walks.py in Blender, with alternating rotation modes."""
     rig = walks.rig()
-    armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
-    bpy.context.scene.collection.objects.link(armature)
+    armature = scenes.added(name, bpy.data.armatures.new(name))
     bpy.context.view_layer.objects.active = armature
     armature.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")

@@ -92,19 +92,14 @@ def test_a_character_appended_in_place_of_two_objects(tmp_path):
     expected = scenes.shapes(obj, [11])
     path = str(tmp_path / "arm.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
-    names = [obj.name, armature.name]
+    obj_name, armature_name = obj.name, armature.name
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    others = [bpy.data.objects.new("Empty", None) for _number in range(2)]
-    for other in others:
-        bpy.context.scene.collection.objects.link(other)
+    others = [scenes.added("Empty", None) for _number in range(2)]
     bpy.context.view_layer.update()
     for other in others:
         bpy.data.objects.remove(other)
-    with bpy.data.libraries.load(path) as (_source, target):
-        target.objects = names
-    for appended in target.objects:
-        bpy.context.scene.collection.objects.link(appended)
-    assert np.array_equal(scenes.shapes(target.objects[0], [11]), expected)
+    appended = scenes.link_here(path, obj_name, armature_name, link=False)[0]
+    assert np.array_equal(scenes.shapes(appended, [11]), expected)
 
 
 @pytest.mark.usefixtures("route")
@@ -120,12 +115,10 @@ def test_two_objects_swap_their_names():
     bpy.context.scene.frame_set(5)
     obj.name, other.name, obj.name = "Third", "Arm", "Other"
     seen = []
-    monitor = bpy.app.handlers.frame_change_post
-    monitor.insert(0, lambda *_args: seen.append(scenes.final_points(obj)))
-    try:
+    with scenes.handler(
+        "frame_change_post", lambda *_args: seen.append(scenes.final_points(obj)), first=True
+    ):
         bpy.context.scene.frame_set(11)
-    finally:
-        monitor.pop(0)
     for each, shape in zip((obj, other), expected, strict=True):
         assert np.array_equal(scenes.final_points(each), shape[0])
     assert safe_mode.is_on() or np.array_equal(seen[0], expected[0][0])

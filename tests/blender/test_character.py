@@ -67,8 +67,7 @@ def test_the_lead_follows_what_belongs_to_the_character_now(armature):
     context = bpy.context
     first = character.lead(context)
     assert len(character.known_meshes(context)) == 5
-    other = bpy.data.objects.new("Other Rig", armature.data)
-    context.scene.collection.objects.link(other)
+    other = scenes.added("Other Rig", armature.data)
     properties.of(first).enabled = False
     first.modifiers["Armature"].object = other
     # Also while Sinew is off.

@@ -319,10 +319,8 @@ def test_clothes_stand_with_their_body():
 
 def test_eyes_on_a_bone_stand_with_their_body():
     body, armature = scenes.make_arm()
-    eye = bpy.data.objects.new("Eye", body.data.copy())
-    holder = bpy.data.objects.new("Holder", None)
-    for obj in (eye, holder):
-        bpy.context.scene.collection.objects.link(obj)
+    eye = scenes.added("Eye", body.data.copy())
+    holder = scenes.added("Holder", None)
     eye.parent = holder
     holder.parent, holder.parent_type, holder.parent_bone = armature, "BONE", "bone.1"
     before = whole_file.content()

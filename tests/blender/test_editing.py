@@ -42,7 +42,7 @@ def test_a_grey_add_says_why():
 
 
 def shared_mesh(obj):
-    bpy.context.scene.collection.objects.link(obj.copy())
+    scenes.copied(obj, linked=True)
 
 
 @pytest.mark.parametrize("by_script", [True, False])

@@ -67,7 +67,7 @@ def modifier_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> Non
 
 
 def shared_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    bpy.context.collection.objects.link(bpy.data.objects.new("Other", obj.data))
+    scenes.added("Other", obj.data)
 
 
 def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
@@ -183,9 +183,7 @@ def mute_driver(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
 
 
 def swap_armature(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    other = armature.copy()
-    bpy.context.collection.objects.link(other)
-    obj.modifiers["Armature"].object = other
+    obj.modifiers["Armature"].object = scenes.copied(armature, linked=True)
 
 
 @pytest.mark.parametrize("change", [rename, hide_in_renders, edit_bone, mute_driver, swap_armature])

@@ -290,9 +290,7 @@ def test_off_is_not_exported(tmp_path):
 
 def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
     obj = make_character()
-    other = obj.copy()
-    other.name = "Other"
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.copied(obj, "Other", linked=True)
     other.location.x += 2.0
     use(obj, "cor")
     use(other, "cor")

@@ -117,10 +117,7 @@ def test_what_moves_is_read_where_the_exporter_reads_it(scene, tmp_path, ending)
     skip_without_reader(ending)
     _obj, rig = scene
     scenes.key(rig, "location", ((0, (0.3, -0.4, 0.2)), (11, (0.5, 0.1, 0.2))))
-    other = rig.copy()
-    other.name = "Z"
-    other.animation_data_clear()
-    bpy.context.scene.collection.objects.link(other)
+    scenes.copied(rig, "Z", linked=True).animation_data_clear()
     bpy.context.scene.frame_set(6)
     assert found_causes(exported(tmp_path, ending=ending)) == set()
 

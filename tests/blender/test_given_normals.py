@@ -163,9 +163,8 @@ def add_nodes_that_read(obj):
 
 
 def add_other():
-    other = bpy.data.objects.new("Other", bpy.data.meshes.new("Other"))
+    other = scenes.added("Other", bpy.data.meshes.new("Other"))
     other.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
-    bpy.context.scene.collection.objects.link(other)
     return other
 
 
@@ -194,7 +193,7 @@ def add_shrinkwrap_of_bone(obj):
 def add_hair(obj):
     curves = bpy.data.hair_curves.new("Hair")
     curves.surface = obj
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Hair", curves))
+    scenes.added("Hair", curves)
 
 
 def instance_faces(obj):
@@ -369,13 +368,10 @@ def light_scene(obj):
     """A camera and a lamp that see the arm, whose material has a tangent-space map of normals across
     seams."""
     scene = bpy.context.scene
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.camera = camera = scenes.added("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (1.0, -5.0, 1.0), (1.4, 0.0, 0.0)
-    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
+    lamp = scenes.added("Lamp", bpy.data.lights.new("Lamp", "SUN"))
     lamp.rotation_euler, lamp.data.energy = (0.8, 0.3, 0.0), 3.0
-    for each in (camera, lamp):
-        scene.collection.objects.link(each)
-    scene.camera = camera
     uv = obj.data.uv_layers.new(name="UVMap")
     uv.data.foreach_set("uv", np.random.default_rng(3).random(2 * len(uv.data), dtype=np.float32))
     material = bpy.data.materials.new("Skin")

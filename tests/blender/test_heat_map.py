@@ -137,9 +137,7 @@ def test_what_is_not_finite_has_the_colour_of_the_worst(quantity):
 
 def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     first, armature = scenes.make_arm()
-    second = first.copy()
-    second.name = "Twin"
-    bpy.context.scene.collection.objects.link(second)
+    second = scenes.copied(first, "Twin", linked=True)
     rig = scenes.copied(armature, linked=True)
     second.modifiers["Armature"].object = rig
     rig.animation_data_clear()
@@ -301,8 +299,7 @@ def test_a_render_shows_it(tmp_path):
     scenes.add_sinew(obj, "lbs")
     choose("stretch", range=measures.FIXED, ratio=2.0)
     scene = bpy.context.scene
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
+    scene.camera = scenes.added("Camera", bpy.data.cameras.new("Camera"))
     scene.camera.location, scene.camera.data.type = (0.5, 0.0, 5.0), "ORTHO"
     scene.camera.data.ortho_scale = 0.2
     scene.world = bpy.data.worlds.new("World")

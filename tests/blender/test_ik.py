@@ -9,6 +9,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+import scenes
 import sinew
 from mathutils import Matrix, Vector
 from sinew_addon import cli
@@ -20,8 +21,7 @@ FRAMES = range(1, 25)
 
 
 def make_empty(name, places):
-    empty = bpy.data.objects.new(name, None)
-    bpy.context.scene.collection.objects.link(empty)
+    empty = scenes.added(name, None)
     for frame, place in zip((1, 9, 17, 24), places, strict=False):
         empty.location = place
         empty.rotation_euler = (0.1 * frame, 0.03 * frame, 0.0)
@@ -33,8 +33,7 @@ def make_empty(name, places):
 def make_arm(count=2, mode="QUATERNION", lean=0.25):
     """A base bone, a chain of `count` bones up Z, slightly bent, and a hand parented to it; in an object
     that is moved, rotated and scaled."""
-    arm = bpy.data.objects.new("Arm", bpy.data.armatures.new("Arm"))
-    bpy.context.scene.collection.objects.link(arm)
+    arm = scenes.added("Arm", bpy.data.armatures.new("Arm"))
     bpy.context.view_layer.objects.active = arm
     arm.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")

@@ -101,9 +101,7 @@ def test_a_proxy_at_the_address_of_a_deleted_object(route):
     obj, _armature = scenes.skinned_arm()
     bpy.context.scene.frame_set(8)
     mesh = bpy.data.meshes.new_from_object(obj)
-    others = [bpy.data.objects.new("Other", mesh) for _each in range(50)]
-    for other in others:
-        bpy.context.scene.collection.objects.link(other)
+    others = [scenes.added("Other", mesh) for _each in range(50)]
     bpy.context.view_layer.update()
     addresses = {other.as_pointer() for other in others}
 
@@ -112,10 +110,9 @@ def test_a_proxy_at_the_address_of_a_deleted_object(route):
             bpy.data.objects.remove(others.pop())
 
     # Like another add-on's handler, before Sinew's.
-    bpy.app.handlers.depsgraph_update_post.insert(0, delete)
-    scenes.put_in_front(obj)
-    bpy.context.view_layer.update()
-    bpy.app.handlers.depsgraph_update_post.remove(delete)
+    with scenes.handler("depsgraph_update_post", delete, first=True):
+        scenes.put_in_front(obj)
+        bpy.context.view_layer.update()
     assert properties.of(obj).storage.upstream_proxy.as_pointer() in addresses, "nothing is tested"
     shown = scenes.final_points(obj)
     properties.of(obj).enabled = False
@@ -237,11 +234,10 @@ def test_a_mesh_that_another_addon_edits_while_its_copy_is_made(event):
             edits.append(obj.vertex_groups["bone.1"].add(range(0, 60), 0.3, "ADD"))
             obj.data.update_tag()
 
-    getattr(bpy.app.handlers, event).insert(0, edit)
-    obj.data.vertices[0].co.y += 0.1
-    obj.data.update()
-    bpy.context.view_layer.update()
-    getattr(bpy.app.handlers, event).remove(edit)
+    with scenes.handler(event, edit, first=True):
+        obj.data.vertices[0].co.y += 0.1
+        obj.data.update()
+        bpy.context.view_layer.update()
     assert edits
     bpy.context.view_layer.update()
     got = scenes.final_points(obj)

@@ -8,6 +8,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+import scenes
 import sinew
 from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import Rotation
@@ -28,8 +29,7 @@ CLOSE = 2e-6
 
 def make_rig(modes: tuple[str, ...] = ("QUATERNION", "ZXY", "AXIS_ANGLE"), name: str = "Rig"):
     """A chain of bones along Y, each rotated about X by 0.3 at rest, with all rotation modes in turn."""
-    armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
-    bpy.context.scene.collection.objects.link(armature)
+    armature = scenes.added(name, bpy.data.armatures.new(name))
     bpy.context.view_layer.objects.active = armature
     armature.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")

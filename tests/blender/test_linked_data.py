@@ -34,19 +34,15 @@ def save_library(folder: Path, skinned: bool, front: bool) -> np.ndarray:
 
 def link(folder: Path, override: bool) -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_source, target):
-        if override:
-            target.collections = ["Character"]
-        else:
-            target.objects = ["Arm", "Arm Rig"]
+    library = folder / "library.blend"
     if override:
+        with bpy.data.libraries.load(str(library), link=True) as (_source, target):
+            target.collections = ["Character"]
         target.collections[0].override_hierarchy_create(
             bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
         )
     else:
-        for obj in target.objects:
-            bpy.context.scene.collection.objects.link(obj)
-        target.objects[0].make_local()
+        scenes.link_here(library, "Arm", "Arm Rig")[0].make_local()
     bpy.context.view_layer.update()
 
 

@@ -316,7 +316,6 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
     assert "disk on fire" in state.evaluation.failure
     assert state.plan.state is State.AFTER_UPDATE
     assert "disk on fire" in state.plan.reason
-    expected = scenes.modifier_shapes(obj, [2, 3, 4, 5], preserve_volume=True)
     monkeypatch.undo()
     attach.remove(obj)
     expected = scenes.modifier_shapes(obj, [4, 5], preserve_volume=True)

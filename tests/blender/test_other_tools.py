@@ -69,12 +69,6 @@ def make(prepare: Callable, has_sinew: bool) -> bpy.types.Object:
 # --- What is seen of a mesh
 
 
-def points_of(vertices: bpy.types.bpy_prop_collection) -> np.ndarray:
-    points = np.empty((len(vertices), 3), dtype=np.float32)
-    vertices.foreach_get("co", points.ravel())
-    return points
-
-
 def seen_of(obj: bpy.types.Object, name: str = "") -> Seen:
     """The mesh itself, its shape in this pose, weights, shape keys and modifiers but for Sinew's."""
     bpy.context.view_layer.update()
@@ -83,10 +77,10 @@ def seen_of(obj: bpy.types.Object, name: str = "") -> Seen:
     left = [m for m in obj.modifiers if m not in own]
     weights = [[round(group.weight, 4) for group in vertex.groups] for vertex in obj.data.vertices]
     return {
-        f"{name} rest": points_of(obj.data.vertices),
+        f"{name} rest": scenes.points_of(obj.data.vertices),
         f"{name} posed": scenes.final_points(obj),
         f"{name} weights": weights,
-        **{f"{name} key {key.name}": points_of(key.data) for key in keys},
+        **{f"{name} key {key.name}": scenes.points_of(key.data) for key in keys},
         f"{name} keys": [key.name for key in keys],
         f"{name} modifiers": [(m.type, m.name, m.show_viewport, m.show_render) for m in left],
         f"{name} armatures": [m.object.name for m in left if m.type == "ARMATURE"],
@@ -96,7 +90,7 @@ def seen_of(obj: bpy.types.Object, name: str = "") -> Seen:
 def evaluated(obj: bpy.types.Object) -> np.ndarray:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     shown = obj.evaluated_get(depsgraph)
-    points = points_of(shown.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph).vertices)
+    points = scenes.points_of(shown.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph).vertices)
     shown.to_mesh_clear()
     return points
 
@@ -133,13 +127,6 @@ def make_active(obj: bpy.types.Object) -> None:
     for each in bpy.context.scene.objects:
         each.select_set(each == obj)
     bpy.context.view_layer.objects.active = obj
-
-
-def copy_of(obj: bpy.types.Object) -> bpy.types.Object:
-    new = obj.copy()
-    new.data = obj.data.copy()
-    bpy.context.scene.collection.objects.link(new)
-    return new
 
 
 # --- Exporters: the file, read again, and what they leave
@@ -193,7 +180,7 @@ def vrm_0(obj: bpy.types.Object, _folder: Path) -> Seen:
 
 def vrm_1(obj: bpy.types.Object, folder: Path) -> Seen:
     """The same on a copy, which Blender's glTF exporter then writes."""
-    new = copy_of(obj)
+    new = scenes.copied(obj)
     found: Seen = {"skins": [m.object.name for m in skins_of(new)]}
     make_active(new)
     path = folder / "arm.glb"
@@ -207,7 +194,7 @@ def cgcookie(obj: bpy.types.Object, _folder: Path) -> Seen:
     chosen = [m.name for m in obj.modifiers if m.type in ("MIRROR", "SUBSURF")]
     names = [key.name for key in obj.data.shape_keys.key_blocks] if obj.data.shape_keys else []
     with hidden(skins_of(obj)):
-        copies = [copy_of(obj) for _name in names[1:]]
+        copies = [scenes.copied(obj) for _name in names[1:]]
         for number, each in enumerate((obj, *copies)):
             make_active(each)
             _keep_key(each, number)
@@ -221,7 +208,7 @@ def _keep_key(obj: bpy.types.Object, number: int) -> None:
     """Makes a key the mesh's shape."""
     if obj.data.shape_keys is None:
         return
-    points = points_of(obj.data.shape_keys.key_blocks[number].data)
+    points = scenes.points_of(obj.data.shape_keys.key_blocks[number].data)
     obj.shape_key_clear()
     obj.data.vertices.foreach_set("co", points.ravel())
     obj.data.update()
@@ -246,7 +233,7 @@ def gret(obj: bpy.types.Object, _folder: Path) -> Seen:
     if obj.data.users > 1:
         obj.data = obj.data.copy()
     keys = obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
-    shapes = [(key.name, points_of(key.data)) for key in keys]
+    shapes = [(key.name, scenes.points_of(key.data)) for key in keys]
     copies = []
     for _name, points in shapes:
         new = obj.copy()
@@ -265,7 +252,7 @@ def gret(obj: bpy.types.Object, _folder: Path) -> Seen:
                 else:
                     bpy.ops.object.modifier_remove(modifier=name)
     for (name, _points), each in zip(shapes, copies, strict=True):
-        obj.shape_key_add(name=name).data.foreach_set("co", points_of(each.data.vertices).ravel())
+        obj.shape_key_add(name=name).data.foreach_set("co", scenes.points_of(each.data.vertices).ravel())
         bpy.data.objects.remove(each)
     return seen_of(obj)
 
@@ -273,7 +260,7 @@ def gret(obj: bpy.types.Object, _folder: Path) -> Seen:
 def skkeeper(obj: bpy.types.Object, _folder: Path) -> Seen:
     """Apply All Modifiers (Keep Shapekeys): each key on a copy, which is converted."""
     names = [key.name for key in obj.data.shape_keys.key_blocks] if obj.data.shape_keys else ["Basis"]
-    copies = [copy_of(obj) for _name in names]
+    copies = [scenes.copied(obj) for _name in names]
     for number, each in enumerate(copies):
         _keep_key(each, number)
         make_active(each)
@@ -317,7 +304,7 @@ def convert(obj: bpy.types.Object, _folder: Path) -> Seen:
 
 def convert_hidden(obj: bpy.types.Object, _folder: Path) -> Seen:
     """A copy at rest: its Armature modifiers are hidden, and it is converted."""
-    new = copy_of(obj)
+    new = scenes.copied(obj)
     for modifier in skins_of(new):
         modifier.show_viewport = False
     make_active(new)
@@ -390,9 +377,7 @@ def data_transfer(obj: bpy.types.Object, _folder: Path) -> Seen:
 def rigify(obj: bpy.types.Object, folder: Path) -> Seen:
     """Game rigs: the mesh gets another armature, and is exported."""
     armature = obj.parent
-    other = armature.copy()
-    other.data, other.name = armature.data.copy(), "Game Rig"
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.copied(armature, "Game Rig")
     for modifier in skins_of(obj):
         modifier.object = other
     obj.parent = other
@@ -402,7 +387,7 @@ def rigify(obj: bpy.types.Object, folder: Path) -> Seen:
 def auto_rig_pro(obj: bpy.types.Object, folder: Path) -> Seen:
     """Exports copies, with other names of bones: all modifiers but the Armature modifier are applied, where
     there are no shape keys."""
-    new, armature = copy_of(obj), copy_of(obj.parent)
+    new, armature = scenes.copied(obj), scenes.copied(obj.parent)
     new.parent = armature
     for modifier in skins_of(new):
         modifier.object = armature

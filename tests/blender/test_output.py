@@ -316,10 +316,7 @@ def test_two_objects_of_one_name(tmp_path):
     library = scenes.save(tmp_path / "library.blend")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scenes.make_arm(sides=8, rings=5, name="Arm")
-    with bpy.data.libraries.load(str(library), link=True) as (_there, here):
-        here.objects = ["Arm", "Arm Rig"]
-    for obj in here.objects:
-        bpy.context.scene.collection.objects.link(obj)
+    scenes.link_here(library, "Arm", "Arm Rig")
     shot = scenes.save(tmp_path / "shot.blend")
     out = tmp_path / "points.npz"
     run_sinew("points", shot, "--method", "blender", "--frames", "1,6", "--out", out)

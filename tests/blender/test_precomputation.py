@@ -393,10 +393,7 @@ def test_copies_and_libraries_have_it(gate, tmp_path):
     forget_made()
     obj = bpy.data.objects["Arm"]
     for linked in (True, False):
-        copy = obj.copy()
-        if not linked:
-            copy.data = obj.data.copy()
-        bpy.context.scene.collection.objects.link(copy)
+        copy = scenes.copied(obj, linked=linked)
         bpy.context.view_layer.update()
         session.refresh(bpy.context)
         assert "cor" in session.state_of(copy).bound.first_deformer.vertex_data.made

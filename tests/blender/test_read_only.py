@@ -24,8 +24,7 @@ def _simulate(folder):
     for name, kind in SIMULATED.items():
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata([(x, y, 0.0) for x in range(2) for y in range(2)], [], [(0, 1, 3, 2)])
-        obj = bpy.data.objects.new(name, mesh)
-        scene.collection.objects.link(obj)
+        obj = scenes.added(name, mesh)
         simulated = obj.modifiers.new(kind, kind)
         if kind == "DYNAMIC_PAINT":
             with bpy.context.temp_override(object=obj, active_object=obj):
@@ -92,8 +91,7 @@ def written(tmp_path_factory):
     _simulate(folder)
     _add_fluid(folder)
     _add_file_outputs(folder)
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
+    scene.camera = scenes.added("Camera", bpy.data.cameras.new("Camera"))
     scene.render.engine, scene.cycles.samples = "CYCLES", 1
     scene.render.resolution_x = scene.render.resolution_y = 64
     scenes.enter(arm, "EDIT")

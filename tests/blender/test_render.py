@@ -18,14 +18,11 @@ SIZE = 96
 
 def prepare(scene: bpy.types.Scene, motion_blur: bool) -> None:
     """Cycles with the same noise in each run: one seed, no denoiser."""
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.camera = camera = scenes.added("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 3.0
     camera.matrix_world = Matrix.Translation((1.0, 0.0, 5.0))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun = scenes.added("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.rotation_euler = (0.5, 0.3, 0.0)
-    scene.collection.objects.link(sun)
     scene.render.engine = "CYCLES"
     scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CPU", 16, 1
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
@@ -148,9 +145,8 @@ def test_renders_animate_modifiers_behind_and_other_users_of_the_mesh(tmp_path):
     scene = bpy.context.scene
     prepare(scene, motion_blur=False)
     moving_parent(obj, armature)
-    other = obj.copy()
+    other = scenes.copied(obj, linked=True)
     other.location.y += 1.0
-    scene.collection.objects.link(other)
     behind = obj.modifiers.new("Cast", "CAST")
     flags = other.modifiers["Armature"]
     scenes.key(behind, "factor", ((1, 0.0), (4, 1.0)))

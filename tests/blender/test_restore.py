@@ -104,9 +104,7 @@ def add_what_takes_helpers() -> None:
 
 def add_what_is_shown_elsewhere(obj: bpy.types.Object) -> None:
     # Two objects of one mesh; one that is only rendered; one that no armature deforms.
-    twin = obj.copy()
-    twin.name = "Twin"
-    bpy.context.scene.collection.objects.link(twin)
+    scenes.copied(obj, "Twin", linked=True)
     shadow, _ = scenes.make_arm(sides=6, rings=9, name="Render Only")
     shadow.modifiers["Armature"].show_viewport = False
     shadow.modifiers["Armature"].show_expanded = False

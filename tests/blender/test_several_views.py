@@ -12,10 +12,7 @@ from sinew_addon.deform import handlers, session
 
 
 def points_in(obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
-    mesh = obj.evaluated_get(scene.view_layers[0].depsgraph).data
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", points.ravel())
-    return points
+    return scenes.points_of(obj.evaluated_get(scene.view_layers[0].depsgraph).data.vertices)
 
 
 def instanced_points() -> np.ndarray:
@@ -23,9 +20,7 @@ def instanced_points() -> np.ndarray:
     # Data of an instance is invalid outside the loop.
     for instance in depsgraph.object_instances:
         if instance.is_instance and instance.object.type == "MESH":
-            mesh = instance.object.data
-            points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-            mesh.vertices.foreach_get("co", points.ravel())
+            points = scenes.points_of(instance.object.data.vertices)
     return points
 
 
@@ -57,9 +52,8 @@ def test_a_view_layer_is_shown_for_the_first_time(route):
         scenes.add_sinew(obj, "lbs")
         scene.frame_set(5)
         unmoved = scenes.final_points(obj)
-        bpy.app.handlers.frame_change_post.append(lift)
-        scene.frame_set(5)
-        bpy.app.handlers.frame_change_post.remove(lift)
+        with scenes.handler("frame_change_post", lift):
+            scene.frame_set(5)
         bpy.context.window.view_layer = scene.view_layers.new("Second")
         bpy.context.view_layer.update()
         handlers.check_unannounced()
@@ -122,9 +116,8 @@ def test_an_instanced_collection():
     for each in (obj, armature):
         bpy.context.scene.collection.objects.unlink(each)
         collection.objects.link(each)
-    empty = bpy.data.objects.new("Instance", None)
+    empty = scenes.added("Instance", None)
     empty.instance_type, empty.instance_collection = "COLLECTION", collection
-    bpy.context.scene.collection.objects.link(empty)
     expected = []
     for frame in (1, 9):
         bpy.context.scene.frame_set(frame)

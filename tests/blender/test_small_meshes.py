@@ -200,11 +200,7 @@ def test_what_a_script_appends_between_two_frames_is_deformed(arm, tmp_path, bes
         bpy.context.scene.frame_set(1)
         assert deformer(other) == "blender"
     bpy.context.view_layer.update()
-    with bpy.data.libraries.load(str(tmp_path / "arm.blend")) as (_, to):
-        to.objects = ["Arm", "Arm Rig"]
-    for appended in to.objects:
-        bpy.context.scene.collection.objects.link(appended)
-    obj = to.objects[0]
+    obj = scenes.link_here(tmp_path / "arm.blend", "Arm", "Arm Rig", link=False)[0]
     assert scenes.worst(scenes.shapes(obj, FRAMES), of_qv) <= 1e-5 * scenes.diagonal(obj)
 
 

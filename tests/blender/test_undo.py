@@ -112,7 +112,7 @@ def _removed(arm):
 
 
 def _added_object(_arm):
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Empty", None))
+    scenes.added("Empty", None)
 
 
 def _added_modifier(arm):
@@ -162,11 +162,8 @@ def test_undo_that_takes_another_object_for_the_object(helper):
                 node_group.set_inputs(nodes, {name: found})
         setattr(group, helper, found)
 
-    bpy.app.handlers.undo_post.insert(0, take)
-    try:
+    with scenes.handler("undo_post", take, first=True):
         bpy.ops.ed.undo()
-    finally:
-        bpy.app.handlers.undo_post.remove(take)
     arm = bpy.data.objects["Arm"]
     assert scenes.worst(scenes.final_points(arm), shape) <= 1e-6
     np.testing.assert_array_equal(scenes.rest_points(arm), mesh)

@@ -20,13 +20,6 @@ from pathlib import Path
 import walk_script
 
 
-class Render:
-    """The shape of each mesh in Blender's evaluation for a render."""
-
-    def __init__(self) -> None:
-        self.shapes: dict[str, object] = {}
-
-
 def make_engine(walker, points_of) -> type:
     import bpy
 
@@ -200,10 +193,7 @@ class Child:
         return found
 
     def points_of(self, evaluated, name="co"):
-        mesh = evaluated.data
-        points = self.np.empty((len(mesh.vertices), 3), dtype=self.np.float32)
-        mesh.vertices.foreach_get(name, points.ravel())
-        return points
+        return self.sides.points_of(evaluated.data.vertices, name)
 
     def shapes(self, depsgraph) -> tuple[dict, list[str]]:
         """Points and matrix of each mesh in the visible view layer; the names of those whose shape the

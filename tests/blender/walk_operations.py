@@ -215,6 +215,11 @@ class Walker:
             bpy.ops.ed.undo_push(message="step")
         self.unpushed = False
 
+    def evaluate(self) -> None:
+        """As a window does between two events."""
+        self.before_evaluation()
+        bpy.context.view_layer.update()
+
     def this_frame(self) -> None:
         """Restores what was changed without a key where there are keys: such changes are not expected to
         last."""
@@ -432,8 +437,7 @@ def parameters(w: Walker, r: random.Random) -> None:
     """Parameters of methods: changes are visible where the method is used."""
     obj, value = w.mesh(r, w.side.has_sinew), r.choice(("nlerp", "slerp"))
     # Sinew evaluates immediately, and with it what was changed before.
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     if w.side.is_sinew:
         obj.sinew.sdef.interpolation = value
     else:
@@ -506,8 +510,7 @@ def icons(w: Walker, r: random.Random) -> None:
         w.side.click(obj, modifier, view, deformers())
         bpy.context.view_layer.update()
 
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     for number, (modifier, view) in enumerate(clicks):
         click(modifier, view)
         w.rendered[f"{obj.name_full} in the render, click {number + 1}"] = w.shown_points(obj)
@@ -576,8 +579,7 @@ def compare(w: Walker, r: random.Random) -> None:
             and o.override_library is None
             # Sinew refuses this.
             and not (o.parent_type == "ARMATURE" and armature_modifiers(o)[0].use_multi_modifier)
-            and "PARTICLE_SYSTEM"
-            not in [m.type for m in o.modifiers][: list(o.modifiers).index(armature_modifiers(o)[0])]
+            and not _is_behind_hair(o)
         ),
     )
     methods = r.sample((*METHODS, "blender"), r.randint(1, 2))
@@ -609,8 +611,7 @@ def _character(w: Walker, r: random.Random) -> bpy.types.Object | None:
         return obj.library is None and obj.override_library is None and not w.side.is_method_keyed(obj)
 
     # As in a window between two clicks: by then Sinew knows a modifier's armature.
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     w.skip_if(not all(_has_its_armatures(obj) for obj in w.objects("MESH") if w.side.has_sinew(obj)))
     rigs = [rig for rig in w.armatures() if rig.visible_get()]
     meshes = {rig: w.side.character(rig) for rig in rigs}
@@ -655,8 +656,7 @@ def mend(w: Walker, r: random.Random) -> None:
     w.skip_if(obj.mode != "OBJECT" or obj.data.is_editmode or obj.parent_type == "ARMATURE")
     modifiers = armature_modifiers(obj)
     w.skip_if(len(modifiers) != 1 or modifiers[0].object is None or modifiers[0].object.data.is_editmode)
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     w.skip_if(w.side.mend(obj, how, most) is None)
 
 
@@ -848,12 +848,7 @@ def constrain_bone(w: Walker, r: random.Random) -> None:
     rig = w.armature(r)
     bone = w.one(r, rig.pose.bones)
     target = w.one(r, [a for a in w.armatures() if a != rig])
-    if (
-        bone is None
-        or target is None
-        or any(c.type == "COPY_ROTATION" for b in target.pose.bones for c in b.constraints)
-    ):
-        raise NothingError
+    w.skip_if(any(c.type == "COPY_ROTATION" for b in target.pose.bones for c in b.constraints))
     of_artist = [c for c in bone.constraints if c.type in ("COPY_ROTATION", "IK")]
     if of_artist:
         bone.constraints.remove(of_artist[0])
@@ -1032,8 +1027,7 @@ def paint_weights(w: Walker, r: random.Random) -> None:
     w.push_undo()
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     # As in a window: tools need the armature of the modifiers, which Sinew restores meanwhile.
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     obj.vertex_groups.active_index = r.randrange(len(obj.vertex_groups))
     what = r.choice(("smooth", "normalize_all", "invert", "levels"))
     if what == "smooth":
@@ -1748,8 +1742,7 @@ def duplicate(w: Walker, r: random.Random) -> None:
                 made.animation_data.action_slot = made.animation_data.action.slots[slot.identifier]
         bpy.context.scene.collection.objects.link(made)
     else:
-        if not w.select(obj):
-            raise NothingError
+        w.skip_if(not w.select(obj))
         bpy.ops.object.duplicate(linked=linked)
         made = bpy.context.view_layer.objects.active
     made.name = w.new_name("object")
@@ -1813,11 +1806,10 @@ def move_to_collection(w: Walker, r: random.Random) -> None:
     obj, collection = w.mesh(r), w.one(r, w.collections())
     w.skip_if(obj.mode != "OBJECT")
     if collection in list(obj.users_collection):
-        if len([c for c in obj.users_collection if not c.name.startswith("Sinew")]) > 1:
-            collection.objects.unlink(obj)
-            return
-        raise NothingError
-    collection.objects.link(obj)
+        w.skip_if(len([c for c in obj.users_collection if not c.name.startswith("Sinew")]) == 1)
+        collection.objects.unlink(obj)
+    else:
+        collection.objects.link(obj)
 
 
 @operation(0.5)
@@ -1852,8 +1844,7 @@ def scene(w: Walker, r: random.Random) -> None:
     if r.random() < 0.3:
         other.frame_set(r.randint(*FRAMES))
     else:
-        w.before_evaluation()
-        bpy.context.view_layer.update()
+        w.evaluate()
         bpy.context.window.scene = other
     w.this_scene()
 
@@ -1881,8 +1872,7 @@ def view_layer(w: Walker, r: random.Random) -> None:
         layers.new("Second")
     other = next(layer for layer in layers if layer != bpy.context.view_layer)
     # As a window does: Blender sends no notification of a view layer's first evaluation.
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     bpy.context.window.view_layer = other
     # As a window does immediately.
     bpy.context.view_layer.update()
@@ -1943,8 +1933,7 @@ def save_and_load(w: Walker, r: random.Random) -> None:
     bpy.ops.wm.open_mainfile(filepath=path)
     _read_keys_of_hidden()
     modes = {o.mode for o in w.objects()}
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     for obj in w.meshes() if modes != {"OBJECT"} else ():
         if obj.visible_get() and obj.mode == "OBJECT" and not obj.data.is_editmode:
             w.rendered[f"{obj.name_full} in the render, opened"] = w.shown_points(obj)
@@ -2050,8 +2039,7 @@ def export(w: Walker, r: random.Random) -> None:
     """The data that another program receives."""
     obj = w.mesh(r)
     w.skip_if(not w.select(obj))
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
     path = w.folder / "walk.obj"
     bpy.ops.wm.obj_export(
         filepath=str(path),
@@ -2081,13 +2069,7 @@ def neighbour(w: Walker, r: random.Random) -> None:
         r.choice(("rename", "toggle", "add", "delete", "weights", "move", "name")),
         r.randint(*FRAMES),
     )
-    if (
-        obj is None
-        or obj.override_library is not None
-        or obj.mode != "OBJECT"
-        or obj.data.library is not None
-    ):
-        raise NothingError
+    w.skip_if(obj.override_library is not None or obj.mode != "OBJECT" or obj.data.library is not None)
     modifier = w.one_or_none(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE"])
     w.skip_if(what in ("rename", "toggle", "delete") and modifier is None)
     name, vertices, new = obj.name, _vertices(w, r, obj), w.new_name("neighbour")
@@ -2101,14 +2083,12 @@ def neighbour(w: Walker, r: random.Random) -> None:
     handlers.append(act)
     if when == "depsgraph_update_post":
         obj.update_tag()
-        w.before_evaluation()
-        bpy.context.view_layer.update()
+        w.evaluate()
         # Objects touched before and again in a handler are compared at the next event.
         w.this_frame()
     else:
         # So are newly set ones, because that touches the mesh, too.
-        w.before_evaluation()
-        bpy.context.view_layer.update()
+        w.evaluate()
         bpy.context.scene.frame_set(number)
         if what in ("move", "weights") and when == "frame_change_post":
             # Changes by another handler are visible at the next event after the update, and weights where
@@ -2131,8 +2111,7 @@ def touch(w: Walker, r: random.Random) -> None:
 
 @operation(2)
 def update(w: Walker, r: random.Random) -> None:
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    w.evaluate()
 
 
 @operation(0)

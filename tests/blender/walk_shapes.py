@@ -154,12 +154,6 @@ def _is_plain(rig: bpy.types.Object) -> bool:
     )
 
 
-def _points(mesh: bpy.types.Mesh) -> np.ndarray:
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", points.ravel())
-    return points
-
-
 def _triangles(mesh: bpy.types.Mesh) -> np.ndarray:
     mesh.calc_loop_triangles()
     corners = [tuple(triangle.vertices) for triangle in mesh.loop_triangles]
@@ -206,8 +200,8 @@ def _read(
 ) -> _Read:
     groups = _groups(mesh, obj)
     return _Read(
-        _points(mesh),
-        _points(obj.data) if len(mesh.vertices) == len(obj.data.vertices) else None,
+        walk_sides.points_of(mesh.vertices),
+        walk_sides.points_of(obj.data.vertices) if len(mesh.vertices) == len(obj.data.vertices) else None,
         _triangles(obj.data),
         _topology(mesh),
         groups,
@@ -221,12 +215,8 @@ def _sdef_keys(mesh: bpy.types.Mesh) -> list[np.ndarray] | None:
     names = ("mmd_sdef_c", "mmd_sdef_r0", "mmd_sdef_r1")
     if not all(name in blocks for name in names):
         return None
-    found = []
-    for block in (mesh.shape_keys.reference_key, *(blocks[name] for name in names)):
-        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-        block.data.foreach_get("co", points.ravel())
-        found.append(points)
-    return found
+    of = (mesh.shape_keys.reference_key, *(blocks[name] for name in names))
+    return [walk_sides.points_of(block.data) for block in of]
 
 
 def _read_armature(

@@ -108,13 +108,18 @@ def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
 MENDS = {"no_weights": ("fill",), "small_sums": ("normalize", "fill"), "many_influences": ("limit",)}
 
 
+def points_of(vertices: bpy.types.bpy_prop_collection, name: str = "co") -> np.ndarray:
+    """float32 [vertices, 3] of a mesh or a shape key."""
+    points = np.empty((len(vertices), 3), dtype=np.float32)
+    vertices.foreach_get(name, points.ravel())
+    return points
+
+
 def world_points(obj: bpy.types.Object) -> np.ndarray:
     """float64 [vertices, 3], as Blender shows it."""
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    points = np.empty((len(evaluated.data.vertices), 3), dtype=np.float32)
-    evaluated.data.vertices.foreach_get("co", points.ravel())
     matrix = np.array(evaluated.matrix_world)
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
+    return points_of(evaluated.data.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def animated_paths(obj: bpy.types.Object) -> set[str]:
