@@ -16,19 +16,6 @@ from sinew_addon.ui import state_text
 from test_editing import assert_follows
 
 
-@pytest.fixture
-def keyed():
-    """An arm with Sinew and two shape keys, the second at half."""
-    obj, armature = scenes.make_arm()
-    obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="wide")
-    key.data.foreach_set("co", (1.2 * scenes.rest_points(obj)).ravel())
-    key.value = 0.5
-    scenes.add_sinew(obj)
-    scenes.shapes(obj, [1, 6])
-    return obj, armature
-
-
 def test_swapped_bone_names_swap_the_groups():
     obj, armature = scenes.skinned_arm()
     bones = armature.data.bones
@@ -185,20 +172,3 @@ def test_what_is_kept_of_many_modifiers_is_of_each():
     there = properties.of(obj).replaced_modifiers
     assert [kept.as_pointer() for _modifier, kept in pairs] == [kept.as_pointer() for kept in there]
     assert [kept.name for kept in there] == [modifier.name for modifier in obj.modifiers]
-
-
-@pytest.mark.parametrize("place", ["in front", "behind"])
-def test_a_chain_with_a_modifier_that_has_no_armature_follows_the_pose(place):
-    obj, armature = scenes.make_arm()
-    obj.modifiers.new("None", "ARMATURE")
-    if place == "in front":
-        obj.modifiers.move(1, 0)
-    scenes.add_sinew(obj)
-    assert_follows(obj)
-    # Set by hand: no frame event then corrects the evaluation's result.
-    bone = armature.pose.bones[1]
-    bone.rotation_mode, bone.rotation_euler = "XYZ", (0.5, 0.4, 0.3)
-    bpy.context.view_layer.update()
-    got = scenes.final_points(obj)
-    properties.of(obj).enabled = False
-    assert scenes.worst(got, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)

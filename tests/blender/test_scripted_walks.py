@@ -181,6 +181,10 @@ CASES = {
     "a second one moved away": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add_modifier Arm CAST 0.9; "
     "add Arm; move_modifier Arm 'Armature 1' 'Cast 2'; frame 11; move_modifier Arm 'Armature 1' 'Cast 2'; "
     "frame 6; remove Arm",
+    "chained to one without an armature": "add_modifier Arm ARMATURE 'Other Rig' 0.9; "
+    "delete_armature 'Other Rig'; clear_animation Rig; add Arm; frame 6; pose Rig lower; update; frame 11",
+    "the same in front": "add_modifier Arm ARMATURE 'Other Rig' 0.9 0.1; delete_armature 'Other Rig'; "
+    "clear_animation Rig; add Arm; frame 6; pose Rig lower; update; frame 11",
     "in front and back, keyed": "add_modifier Arm SOLIDIFY 0.9; key_visibility Arm 1 6 1.0; add Arm dq; "
     "move_modifier Arm 'Solidify 1' Armature; update; move_modifier Arm 'Solidify 1' Armature; frame 11",
     "a multi modifier chained while off": "armature_options Arm multi; add Arm; enabled Arm; "
