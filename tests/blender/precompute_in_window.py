@@ -32,10 +32,10 @@ def plan() -> str:
     return "none" if state is None else state.plan.state.value
 
 
-def off_modifier(method: str = "lbs") -> float:
+def off_modifier() -> float:
     depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
     rig = bpy.data.objects["Hero Rig"]
-    expected = window_scene.blender_points(hero(), rig, method, depsgraph)
+    expected = window_scene.blender_points(hero(), rig, "lbs", depsgraph)
     return window_scene.worst(window_scene.shown_points(hero(), depsgraph), expected)
 
 

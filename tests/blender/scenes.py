@@ -194,10 +194,15 @@ def save(path: Path) -> Path:
     return path
 
 
-def reopened(path: Path, name: str = "Arm") -> bpy.types.Object | None:
-    """The object of this name, after the file was saved there and opened again."""
-    bpy.ops.wm.open_mainfile(filepath=str(save(path)))
-    return bpy.data.objects.get(name)
+def opened(path: Path | str) -> bpy.types.Object | None:
+    """Opens a file; returns its arm, if it has one of make_arm()'s name."""
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.data.objects.get("Arm")
+
+
+def reopened(path: Path) -> bpy.types.Object | None:
+    """The same, after the current file was saved there."""
+    return opened(save(path))
 
 
 def enter(obj: bpy.types.Object, mode: str) -> None:

@@ -42,8 +42,6 @@ else:
 assert not hasattr(bpy.types.Object, "sinew")
 arrays, uvs, materials = {}, [], []
 scene = bpy.context.scene
-for name in sys.argv[4:]:
-    bpy.data.objects[name].hide_viewport = False
 for obj in [o for o in scene.objects if o.type == "MESH" and len(o.data.vertices) > 50]:
     per_frame = []
     for frame in frames:
@@ -62,10 +60,10 @@ np.savez(result, uvs=np.array(uvs), materials=np.array(materials), names=np.arra
 """
 
 
-def read_elsewhere(path, frames, tmp_path, hidden=()):
-    """World points [frames, vertices, 3] by name, in a process without Sinew; of `hidden` objects, too."""
+def read_elsewhere(path, frames, tmp_path):
+    """World points [frames, vertices, 3] by name, in a process without Sinew."""
     result = tmp_path / "read.npz"
-    checked(without_sinew.run(READ, path, ",".join(map(str, frames)), result, *hidden), 0)
+    checked(without_sinew.run(READ, path, ",".join(map(str, frames)), result), 0)
     with np.load(result) as arrays:
         points = {str(name): arrays[str(number)] for number, name in enumerate(arrays["names"])}
         return points | {"uvs": arrays["uvs"], "materials": arrays["materials"]}
@@ -197,8 +195,7 @@ def test_the_armature_modifier_stays_for_the_way_back(arm, tmp_path):
     obj.hide_viewport = obj.hide_render = True
     scenes.save(path)
     run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", tmp_path / "out")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "arm.blend"))
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.opened(tmp_path / "out" / "arm.blend")
     assert (obj.hide_viewport, obj.hide_render) == (True, True)
     assert not properties.has_sinew(obj)
     assert [m.type for m in obj.modifiers] == ["MESH_CACHE", "ARMATURE"]

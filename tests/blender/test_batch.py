@@ -78,14 +78,14 @@ def command_of(process: psutil.Process) -> list[str]:
         return []
 
 
-def wait_for_work(process: subprocess.Popen, but: int | None = None, seconds: float = 3.0) -> psutil.Process:
-    """The first Blender, except the one with the id `but`, that has been busy for this long: starting
-    takes less."""
+def wait_for_work(process: subprocess.Popen, but: int | None = None) -> psutil.Process:
+    """The first Blender, except the one with the id `but`, that has been busy for 3 s: starting takes
+    less."""
     end = time.monotonic() + 120
     while time.monotonic() < end:
         for blender in blenders_of(process):
             try:
-                if blender.pid != but and sum(blender.cpu_times()[:2]) > seconds:
+                if blender.pid != but and sum(blender.cpu_times()[:2]) > 3.0:
                     return blender
             except psutil.Error:
                 continue

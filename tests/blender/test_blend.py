@@ -27,10 +27,10 @@ CLOSE = 2e-5
 MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
 
 
-def make_legs(modes=("QUATERNION",), name="Legs"):
+def make_legs(modes=("QUATERNION",)):
     """The rig of walks.py in Blender, with alternating rotation modes."""
     rig = walks.rig()
-    armature = scenes.added(name, bpy.data.armatures.new(name))
+    armature = scenes.added("Legs", bpy.data.armatures.new("Legs"))
     bpy.context.view_layer.objects.active = armature
     armature.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -51,7 +51,7 @@ def make_legs(modes=("QUATERNION",), name="Legs"):
     return armature
 
 
-def key_clip(armature, clip, first=1):
+def key_clip(armature, clip):
     """A clip keyed by Blender itself, as an action with its name."""
     armature.animation_data_create().action = None
     if armature.animation_data.action is None:
@@ -67,17 +67,17 @@ def key_clip(armature, clip, first=1):
                 bone.rotation_mode, "rotation_euler"
             )
             for path in ("location", rotation, "scale"):
-                bone.keyframe_insert(path, frame=first + frame)
+                bone.keyframe_insert(path, frame=1 + frame)
     action = armature.animation_data.action
     action.name = clip.name
     action.use_fake_user = True
     return action
 
 
-def make_walks(modes=("QUATERNION",), run_start=0.3):
+def make_walks(modes=("QUATERNION",)):
     armature = make_legs(modes)
     bpy.context.scene.frame_start = 1
-    pair = walks.walk("WALK"), walks.walk("RUN", 30, 1.1, 0.2, start=run_start)
+    pair = walks.walk("WALK"), walks.walk("RUN", 30, 1.1, 0.2, start=0.3)
     return armature, [key_clip(armature, clip) for clip in pair], pair
 
 

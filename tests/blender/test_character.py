@@ -88,7 +88,7 @@ def test_every_shared_setting_goes_to_all_and_only_by_the_character(armature):
     own.method = "qv"
     assert methods() == ["lbs", "lbs", "qv", "lbs", "lbs"], "a script sets one mesh"
     shared().method = "log"
-    shared().scale_rule = _items("scale_rule")[-1]
+    shared().scale_rule = _scale_rules()[-1]
     shared().leave_small = False
     shared().mix.method = "lbs"
     shared().mix.group = "bone.1"
@@ -98,15 +98,15 @@ def test_every_shared_setting_goes_to_all_and_only_by_the_character(armature):
     for obj in meshes():
         settings = properties.of(obj)
         assert (settings.method, settings.mix.method, settings.mix.group) == ("log", "lbs", "bone.1")
-        assert settings.scale_rule == _items("scale_rule")[-1] != _items("scale_rule")[0]
+        assert settings.scale_rule == _scale_rules()[-1] != _scale_rules()[0]
         assert settings.leave_small is False
         assert (settings.delta_mush.enabled, settings.delta_mush.iterations) == (True, 7)
         assert settings.bulge_limit.strength == 0.25
         assert not settings.error
 
 
-def _items(name: str) -> list[str]:
-    return [item.identifier for item in properties.SinewSettings.bl_rna.properties[name].enum_items]
+def _scale_rules() -> list[str]:
+    return [item.identifier for item in properties.SinewSettings.bl_rna.properties["scale_rule"].enum_items]
 
 
 def test_all_that_a_mesh_is_set_to_is_set_for_a_character():

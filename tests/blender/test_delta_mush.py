@@ -221,8 +221,7 @@ def test_a_saved_file_has_corrective_smooth_on(tmp_path):
     saved = target.objects[0]
     assert saved.modifiers["Smooth"].show_viewport
     assert saved.modifiers["Smooth"].show_render
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.opened(path)
     assert not obj.modifiers["Smooth"].show_viewport
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     attach.remove(obj)

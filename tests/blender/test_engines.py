@@ -14,9 +14,9 @@ from sinew_addon.io import armature_io
 FRAME = 8
 
 
-def make_crowded(bones: int = 10) -> tuple[bpy.types.Object, bpy.types.Object]:
+def make_crowded() -> tuple[bpy.types.Object, bpy.types.Object]:
     """An arm whose every vertex follows all of its bones."""
-    obj, armature = scenes.make_arm(bones=bones)
+    obj, armature = scenes.make_arm(bones=10)
     rng = np.random.default_rng(5)
     for group in obj.vertex_groups:
         for vertex in range(len(obj.data.vertices)):

@@ -92,9 +92,9 @@ def world_shapes(obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
     return np.array(shapes)
 
 
-def numbers_in(file: read_glb.File, mesh: int = 0) -> np.ndarray:
+def numbers_in(file: read_glb.File) -> np.ndarray:
     """Values of the vertices in Blender."""
-    primitives = file.header["meshes"][mesh]["primitives"]
+    primitives = file.header["meshes"][0]["primitives"]
     return np.concatenate([file.array(p["attributes"]["_NUMBER"])[:, 0] for p in primitives]).astype(int)
 
 

@@ -94,7 +94,7 @@ def test_colours_follow_frames_poses_and_methods():
     for frame in (1, 6, 11):
         bpy.context.scene.frame_set(frame)
         seen.append(shown_colours(obj))
-        evaluate_expected = expected_at(obj, "lbs", "stretch")
+        evaluate_expected = expected_at(obj, "lbs")
         np.testing.assert_allclose(seen[-1], evaluate_expected, atol=3e-3)
     assert np.ptp(seen[0], axis=0).max() < 1e-3
     assert np.abs(seen[1] - seen[0]).max() > 0.05
@@ -104,17 +104,16 @@ def test_colours_follow_frames_poses_and_methods():
     bpy.context.view_layer.update()
     bpy.context.view_layer.update()
     posed = shown_colours(obj)
-    np.testing.assert_allclose(posed, expected_at(obj, "lbs", "stretch"), atol=3e-3)
+    np.testing.assert_allclose(posed, expected_at(obj, "lbs"), atol=3e-3)
     assert np.abs(posed - seen[2]).max() > 0.05
     properties.of(obj).method = "dq"
-    np.testing.assert_allclose(shown_colours(obj), expected_at(obj, "dq", "stretch"), atol=3e-3)
+    np.testing.assert_allclose(shown_colours(obj), expected_at(obj, "dq"), atol=3e-3)
     assert np.abs(shown_colours(obj) - posed).max() > 0.05
 
 
-def expected_at(obj: bpy.types.Object, method: str, quantity: str) -> np.ndarray:
+def expected_at(obj: bpy.types.Object, method: str) -> np.ndarray:
     """For the current pose, from the final points; with a fixed range up to 2."""
     assert properties.of(obj).method == method
-    assert quantity == "stretch"
     points, rest = (p.astype(np.float64) for p in (scenes.final_points(obj), scenes.rest_points(obj)))
     longest, shortest = np.ones((2, len(points)))
     for edge in obj.data.edges:
@@ -123,7 +122,7 @@ def expected_at(obj: bpy.types.Object, method: str, quantity: str) -> np.ndarray
         for vertex in (a, b):
             longest[vertex], shortest[vertex] = max(longest[vertex], ratio), min(shortest[vertex], ratio)
     values = np.where(longest * shortest >= 1.0, longest, shortest)
-    return linear(HeatScale.fixed(METRICS[quantity], 2.0, 1.0, 1.0).colours(values))
+    return linear(HeatScale.fixed(METRICS["stretch"], 2.0, 1.0, 1.0).colours(values))
 
 
 @pytest.mark.parametrize("quantity", ["stretch", "bulge", "distance"])

@@ -46,13 +46,13 @@ def make_rig(modes: tuple[str, ...] = ("QUATERNION", "ZXY", "AXIS_ANGLE"), name:
     return armature
 
 
-def key_random_poses(armature, frames=KEYS, interpolation="LINEAR", seed=1, most=2.2) -> None:
-    """Keys location, rotation and scale of every bone; rotations are at most `most` radians from rest."""
+def key_random_poses(armature, interpolation="LINEAR", seed=1) -> None:
+    """Keys location, rotation and scale of every bone; rotations are at most 2.2 radians from rest."""
     random = np.random.default_rng(seed)
-    for frame in frames:
+    for frame in KEYS:
         for bone in armature.pose.bones:
             axis = random.normal(size=3)
-            turn = Quaternion(axis / np.linalg.norm(axis), random.uniform(0.2, 0.5 * most))
+            turn = Quaternion(axis / np.linalg.norm(axis), random.uniform(0.2, 1.1))
             set_rotation(bone, turn)
             bone.location = random.uniform(-1.0, 1.0, 3)
             bone.scale = random.uniform(0.6, 1.5, 3)

@@ -37,10 +37,10 @@ def by_two_modifiers(obj: bpy.types.Object) -> np.ndarray:
     return expected
 
 
-def mixed(obj: bpy.types.Object, method: str = "lbs", second: str = "dq") -> None:
-    scenes.add_sinew(obj, method)
+def mixed(obj: bpy.types.Object) -> None:
+    scenes.add_sinew(obj, "lbs")
     mix = properties.of(obj).mix
-    mix.method, mix.group = second, GROUP
+    mix.method, mix.group = "dq", GROUP
 
 
 def plain(_obj: bpy.types.Object) -> None:

@@ -59,11 +59,11 @@ def neighbour() -> Iterator[Callable]:
         take_off()
 
 
-def assert_equals_modifier(obj: bpy.types.Object, preserve_volume: bool = True) -> None:
+def assert_equals_modifier(obj: bpy.types.Object) -> None:
     got = scenes.shapes(obj, FRAMES)
     assert not properties.of(obj).error
     properties.of(obj).enabled = False
-    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume)
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
     properties.of(obj).enabled = True
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 

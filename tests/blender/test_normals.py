@@ -56,7 +56,7 @@ def give_points(mesh: bpy.types.Mesh, points: np.ndarray) -> None:
     mesh.update()
 
 
-def assert_as_blender(mesh: bpy.types.Mesh, near: float = NEAR) -> None:
+def assert_as_blender(mesh: bpy.types.Mesh) -> None:
     """Compares every domain, with the object's points.
 
     With custom normals of corners, Blender uses their mean for each vertex and face.
@@ -67,7 +67,7 @@ def assert_as_blender(mesh: bpy.types.Mesh, near: float = NEAR) -> None:
     for domain in ("corner",) if mesh.has_custom_normals else COLLECTIONS:
         got, expected = normals.compute(points, domain), by_blender(mesh, domain)
         assert np.isfinite(got).all()
-        np.testing.assert_allclose(got, expected, rtol=0, atol=near, err_msg=domain)
+        np.testing.assert_allclose(got, expected, rtol=0, atol=NEAR, err_msg=domain)
 
 
 def make_mesh(points: np.ndarray, faces: list[list[int]], edges: list[tuple] = ()) -> bpy.types.Mesh:
@@ -77,10 +77,10 @@ def make_mesh(points: np.ndarray, faces: list[list[int]], edges: list[tuple] = (
     return mesh
 
 
-def random_mesh(seed: int, size: int = 22) -> bpy.types.Mesh:
+def random_mesh(seed: int) -> bpy.types.Mesh:
     """Triangles, quads and larger polygons, some of them flipped, with holes, edges of three faces, and
     edges and vertices without faces."""
-    rng = np.random.default_rng(seed)
+    rng, size = np.random.default_rng(seed), 22
     x, y = np.mgrid[:size, :size]
     points = np.stack([x, y, rng.normal(size=x.shape)], axis=-1).reshape(-1, 3)
     points = list(points + rng.normal(0, 0.2, points.shape))
@@ -126,9 +126,9 @@ def test_random_meshes(share):
         assert_as_blender(mesh)
 
 
-def tilt(mesh: bpy.types.Mesh, by: float, seed: int = 2) -> None:
+def tilt(mesh: bpy.types.Mesh, by: float) -> None:
     """Gives it custom normals: its own, mixed with random ones."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(2)
     normals = by_blender(mesh, "corner")
     normals = normals + by * rng.normal(size=normals.shape)
     mesh.normals_split_custom_set((normals / np.linalg.norm(normals, axis=1, keepdims=True)).tolist())

@@ -371,8 +371,7 @@ def test_a_file_has_it(gate, tmp_path):
     for waits in (True, False):
         precomputations.waits = waits
         forget_made()
-        bpy.ops.wm.open_mainfile(filepath=path)
-        obj = bpy.data.objects["Arm"]
+        obj = scenes.opened(path)
         assert plan_of(obj).state is State.IN_DEPSGRAPH
         assert scenes.worst(scenes.final_points(obj), points) == 0.0
         assert gate.count == 1
@@ -420,8 +419,7 @@ def test_another_method_saves_none_of_it(tmp_path):
 
 def test_data_of_another_mesh_is_not_taken(gate, tmp_path):
     _points, path = saved(tmp_path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.opened(path)
     attach.remove(obj)
     session.forget()
     other = {"0" * 32: np.zeros((len(obj.data.vertices), 3), np.float32)}
@@ -506,8 +504,7 @@ def test_reskin_puts_it_into_the_file(gate, tmp_path):
     scenes.make_arm(bones=3)
     path = scenes.save(tmp_path / "plain.blend")
     run_sinew("reskin", path, "--method", "cor", "--frames", "none", "--out", tmp_path / "out")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "plain.blend"))
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.opened(tmp_path / "out" / "plain.blend")
     bpy.context.scene.frame_set(FRAME)
     assert len(stored_vertex_data.read(obj.data)) == 1
     assert plan_of(obj).state is State.IN_DEPSGRAPH

@@ -88,8 +88,7 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
     assert facts["drivers"] == []
     if hasattr(bpy.types, "GeometryNodeWarning"):
         assert node_group.NEEDS_SINEW in facts["warnings"]
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.opened(path)
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
     assert not [text for text in bpy.data.texts if text.get(note.MARK)]
     attach.remove(obj)
@@ -244,8 +243,7 @@ def test_an_error_is_not_saved_as_the_artists_choice(tmp_path, monkeypatch):
     assert "disk on fire" in properties.of(obj).error
     save(tmp_path / "saved.blend")
     monkeypatch.undo()
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    obj = bpy.data.objects["Arm"]
+    obj = scenes.opened(tmp_path / "saved.blend")
     assert (properties.of(obj).enabled, properties.of(obj).error) == (True, "")
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 

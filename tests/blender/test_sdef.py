@@ -18,10 +18,10 @@ sys.path.append(str(REPOSITORY / "tests" / "python"))
 import reference
 
 
-def make_model(bones: int = 3) -> tuple[bpy.types.Object, bpy.types.Object]:
+def make_model() -> tuple[bpy.types.Object, bpy.types.Object]:
     """An arm whose vertices of two bones are spherical, except every seventh. For every third the groups
     are stored in reverse order."""
-    obj, armature = scenes.make_arm(bones=bones)
+    obj, armature = scenes.make_arm(bones=3)
     rng = np.random.default_rng(1)
     obj.shape_key_add(name="Basis")
     keys = [obj.shape_key_add(name=name) for name in sdef.KEYS]

@@ -85,10 +85,10 @@ def world_rest(obj):
     return np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
 
 
-def played_gltf(path, frames=FRAMES, action=None):
+def played_gltf(path, action=None):
     names = [each.name for each in GLTF2().load(str(path)).animations]
     name = action or next((n for n in names if n.endswith("Helpers")), names[0])
-    return other_gltf.points_at(path, np.array(frames) / bpy.context.scene.render.fps, name)
+    return other_gltf.points_at(path, np.array(FRAMES) / bpy.context.scene.render.fps, name)
 
 
 SLOW = {"marks": pytest.mark.slow}

@@ -39,8 +39,8 @@ def painted_arm(name: str) -> bpy.types.Object:
     return obj
 
 
-def baked_arm(name: str = "Baked") -> bpy.types.Object:
-    obj = painted_arm(name)
+def baked_arm() -> bpy.types.Object:
+    obj = painted_arm("Baked")
     scenes.add_sinew(obj, "dq")
     assert bpy.ops.sinew.bake(kind="bones", frames="1,6,11", helpers=2) == {"FINISHED"}
     return obj

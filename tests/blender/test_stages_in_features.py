@@ -210,7 +210,6 @@ def test_points_and_job_files_take_it(arm, stage, tmp_path):
         f'method = "dq"\n[[objects]]\nmatch = "A*"\nset = {json.dumps(list(STAGES[stage]))}\n'
     )
     run_sinew("reskin", "--job", job, "--no-pictures")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "copies" / "arm.blend"))
-    copy = bpy.data.objects["Arm"]
+    copy = scenes.opened(tmp_path / "copies" / "arm.blend")
     assert scenes.worst(scenes.shapes(copy, FRAMES), shapes) <= 1e-6
     assert properties.of(copy).method == "dq"

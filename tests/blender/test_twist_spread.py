@@ -21,7 +21,7 @@ def spread(obj: bpy.types.Object, **values: object) -> None:
     stage.enabled = True
 
 
-def assert_spread(obj: bpy.types.Object, before: np.ndarray, least: float = 0.005) -> None:
+def assert_spread(obj: bpy.types.Object, before: np.ndarray) -> None:
     """before: float32 [vertices, 3], the shape without the stage"""
     found, state = scenes.final_points(obj), session.state_of(obj)
     values = {"twist_spread": stage_settings.values_of(properties.of(obj), "twist_spread")}
@@ -29,7 +29,7 @@ def assert_spread(obj: bpy.types.Object, before: np.ndarray, least: float = 0.00
     expected = fuzz_reference.stages_after(
         state.bound.skin_stack, before, shown.rest_points, shown.frames, values
     )
-    assert np.abs(expected - before).max() > least
+    assert np.abs(expected - before).max() > 0.005
     assert scenes.worst(found, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 

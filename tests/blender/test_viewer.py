@@ -40,10 +40,10 @@ def write_page(path, *options):
     return page
 
 
-def points_of(path, method, name="Arm"):
+def points_of(path, method):
     out = path.with_name(f"{method}.npz")
     run_sinew("points", path, "--method", method, "--frames", ",".join(map(str, FRAMES)), "--out", out)
-    return np.load(out)[name]
+    return np.load(out)["Arm"]
 
 
 def assert_has_points(page, expected, method, obj):
