@@ -312,6 +312,12 @@ def follow_icons(obj: bpy.types.Object) -> None:
             for (modifier, replaced), was_on in zip(pairs, before.modifiers, strict=True)
         )
         is_unknown = is_any_gone or nodes is None or is_animated(obj, nodes, f"show_{name}")
+        # Sinew's icon is still off where an animation has come to one that is off.
+        is_unknown |= any(
+            is_visibility_animated(obj, modifier)
+            and not (replaced.visibility_is_keyed or getattr(replaced, f"show_{name}"))
+            for modifier, replaced in pairs
+        )
         now = Icons(before.sinew if is_unknown else getattr(nodes, f"show_{name}"), modifiers)
         if now == before:
             continue

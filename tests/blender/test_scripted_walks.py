@@ -150,6 +150,10 @@ CASES = {
     "pose Rig lower; update; frame 3",
     "keys while Sinew is off, saved": "add Arm; enabled Arm; key_visibility Arm 3 7 0.0; frame 5; save_copy; "
     "frame 8",
+    "a driver of one that was off in the viewport": "toggle_modifier Arm Armature 0.9; add Arm dq; "
+    "drive_visibility Arm Rig Armature; frame 6; method Arm dq; frame 8; remove Arm",
+    "keys of one that was off in the viewport": "toggle_modifier Arm Armature 0.9; add Arm dq; "
+    "key_visibility Arm Armature 2 7 0.0; frame 4; method Arm dq; frame 9; remove Arm",
     "a keyed modifier renamed while it is off": "key_visibility Arm 3 9 0.0; add Arm; rename_modifier Arm; "
     "frame 11; frame 6",
     "a driver while Sinew is on": "add Arm dq; frame 8; drive_visibility Arm Rig Armature; frame 6",
