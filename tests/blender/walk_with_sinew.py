@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import bpy
@@ -376,11 +376,15 @@ class SinewSide(Side):
                 "stages": self._stages(obj),
                 "parameters": stage_settings.method_values(obj.sinew, METHODS),
                 "error": obj.sinew.error,
-                "run": [replaced.name for replaced in obj.sinew.replaced_modifiers],
+                "run": [each.name for each in self._run(obj)],
             }
             for obj in bpy.data.objects
             if self.has_sinew(obj) and not self.may_react(obj)
         }
+
+    def _run(self, obj: bpy.types.Object) -> Iterable:
+        # While Sinew is off, it does not follow the stack, which still says whose character the object is.
+        return obj.sinew.replaced_modifiers if obj.sinew.enabled else stack.armature_modifiers(obj)
 
     def copies(self) -> list[tuple[bpy.types.Object, str, str]]:
         """The copies of comparisons: object, original's name, method."""
