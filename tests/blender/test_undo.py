@@ -155,15 +155,19 @@ def test_undo_that_takes_another_object_for_the_object(helper):
     def take(*_args):
         found = bpy.data.objects["Arm"]
         settings = properties.of(found)
-        group = settings.replaced_modifiers[0] if helper == "armature" else settings
-        nodes, taken = stack.sinew_modifier(found), getattr(group, helper)
+        groups = {"armature": settings.replaced_modifiers[0], "copied": settings.identity}
+        group = groups.get(helper, settings.storage)
+        nodes, before = stack.sinew_modifier(found), getattr(group, helper)
         for name in ("Points", "Upstream"):
-            if node_group.get_input(nodes, name) == taken:
+            if node_group.get_input(nodes, name) == before:
                 node_group.set_inputs(nodes, {name: found})
         setattr(group, helper, found)
+        taken.append(found)
 
+    taken = []
     with scenes.handler("undo_post", take, first=True):
         bpy.ops.ed.undo()
+    assert taken, "nothing is tested"
     arm = bpy.data.objects["Arm"]
     assert scenes.worst(scenes.final_points(arm), shape) <= 1e-6
     np.testing.assert_array_equal(scenes.rest_points(arm), mesh)
