@@ -256,7 +256,9 @@ class SINEW_OT_rebind(OnSinewObjects, OfOneMesh, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
-        result = _for_each(self, objects, lambda obj: session.rebind(obj, context), "Rebound")
+        with updates_suspended():
+            result = _for_each(self, objects, session.read_again, "Rebound")
+        session.refresh(context)
         failed = [properties.of(obj).error for obj in objects if properties.of(obj).error]
         if failed:
             self.report({"ERROR"}, failed[0])
