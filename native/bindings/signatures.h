@@ -64,7 +64,7 @@ inline constexpr const char* kBoneCount =
 
 }  // namespace sinew::bindings
 
-template <sinew::bindings::Text type>
-struct pybind11::detail::handle_type_name<sinew::bindings::Typed<type>> {
-    static constexpr auto name = const_name(type.characters);
+template <sinew::bindings::Text text>  // not `type`, which is a class of pybind11
+struct pybind11::detail::handle_type_name<sinew::bindings::Typed<text>> {
+    static constexpr auto name = const_name(text.characters);
 };
