@@ -22,9 +22,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from pathlib import Path
 
 WRIST = Path(__file__).resolve().parents[1] / "blend_files" / "wrist.blend"
+# Options by what a batch does with each file.
+WORK = {"bare": ("--frames", "none", "--no-pictures"), "compared": ("--no-pictures",), "drawn": ()}
 SINEW = [sys.executable, "-c", "from sinew_addon.cli import run; run()"]
 
 OPEN_AND_SAVE = """
@@ -117,25 +120,12 @@ def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str,
     folder.mkdir()
     for index in range(files):
         shutil.copy(source, folder / f"{index:03d}.blend")
-    bare = ("--frames", "none", "--no-pictures")
-    compared = ("--no-pictures",)
-    runs: dict[str, list] = {
-        "plain": [],
-        "bare": [],
-        "bare, 2 jobs": [],
-        "compared": [],
-        "compared, 2 jobs": [],
-        "drawn": [],
-        "drawn, 2 jobs": [],
-    }
+    runs: dict[str, list] = defaultdict(list)
     for _ in range(repetitions):
         runs["plain"].append(plain(folder))
-        runs["bare"].append(batch(folder, *bare, "--jobs", "1"))
-        runs["bare, 2 jobs"].append(batch(folder, *bare, "--jobs", "2"))
-        runs["compared"].append(batch(folder, *compared, "--jobs", "1"))
-        runs["compared, 2 jobs"].append(batch(folder, *compared, "--jobs", "2"))
-        runs["drawn"].append(batch(folder, "--jobs", "1"))
-        runs["drawn, 2 jobs"].append(batch(folder, "--jobs", "2"))
+        for name, options in WORK.items():
+            runs[name].append(batch(folder, *options, "--jobs", "1"))
+            runs[f"{name}, 2 jobs"].append(batch(folder, *options, "--jobs", "2"))
     shutil.rmtree(folder)
 
     def least(name: str, step: str) -> float:

@@ -4,8 +4,6 @@ remaining errors, how smoothly bones move; docs/ik.svg."""
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from pathlib import Path
 
@@ -14,7 +12,6 @@ import common
 import matplotlib
 import numpy as np
 import sinew
-import sinew_addon
 from sinew import affine, quat
 from sinew_addon.core import ik as core
 from sinew_addon.io import ik_io
@@ -213,7 +210,6 @@ def draw(spreads: dict, motions: dict) -> None:
 def main() -> None:
     arguments = common.options(__doc__, "ik", "shorter runs, no picture").parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
-    sinew_addon.register()
     facts = common.begin("inverse kinematics", blender=bpy.app.version_string)
     spreads, motions = {}, {}
     columns = ("bones", "solver", "us, least", "median", "quartiles", "", "median left", "most left")
@@ -236,14 +232,8 @@ def main() -> None:
     common.write(arguments.name, machine=facts, microseconds=spreads, animated=motions)
     if not arguments.quick:
         draw(spreads, motions)
-    _end()
-
-
-def _end() -> None:
-    sinew_addon.unregister()
-    sys.stdout.flush()
-    os._exit(0)
 
 
 if __name__ == "__main__":
-    main()
+    with common.registered():
+        main()

@@ -7,7 +7,6 @@ Processor times: everything runs on one thread, and longer runs share it with ot
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -16,10 +15,10 @@ import bpy
 import common
 import numpy as np
 import sinew
-import sinew_addon
 from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 from sinew import interpolate, quat_vec
+from sinew_addon.core.steps import result_of
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
 import walks
@@ -129,7 +128,6 @@ def whole(seconds: float) -> dict:
     from sinew_addon.core.motion.align import align
     from sinew_addon.core.motion.root import grounded
     from sinew_addon.features.blend import blend_actions
-    from sinew_addon.io import clips
 
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
     placed = [grounded(clip, 0, walks.UP).clip for clip in (walk, run)]
@@ -138,7 +136,7 @@ def whole(seconds: float) -> dict:
 
     def make() -> None:
         steps = blend_actions.make(armature, chosen, (1, 1), blend.Settings())
-        bpy.data.actions.remove(clips.finished(steps).action)
+        bpy.data.actions.remove(result_of(steps).action)
 
     return common.alternate(
         {
@@ -169,13 +167,12 @@ def _in_blender(pair: tuple) -> tuple:
         if rig.parents[row] >= 0:
             bone.parent = armature.data.edit_bones[rig.names[rig.parents[row]]]
     bpy.ops.object.mode_set(mode="OBJECT")
-    return armature, [clips.finished(clips.write(armature, clip, clip.name, 1.0, set())) for clip in pair]
+    return armature, [result_of(clips.write(armature, clip, clip.name, 1.0, set())) for clip in pair]
 
 
 def main() -> None:
     arguments = common.options(__doc__, "motion", "shorter runs").parse_args()
     seconds = 0.1 if arguments.quick else 1.5
-    sinew_addon.register()
     versions = {"numpy": np.__version__, "sinew": sinew.__version__, "scipy": common.version_of("scipy")}
     facts = common.begin("motion blending", bpy=bpy.app.version_string, **versions)
     spreads, parts = times(seconds), whole(seconds)
@@ -189,9 +186,8 @@ def main() -> None:
     for name, spread in parts.items():
         print(f"{name:26}{spread['least'] * 1e3:10.2f}{spread['median'] * 1e3:10.2f} (median)")
     common.write(arguments.name, machine=facts, bones=BONES, frames=FRAMES, seconds=spreads, parts=parts)
-    sys.stdout.flush()
-    os._exit(0)
 
 
 if __name__ == "__main__":
-    main()
+    with common.registered():
+        main()

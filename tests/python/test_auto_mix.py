@@ -7,6 +7,7 @@ from sinew_addon.core import auto_mix
 from sinew_addon.core.auto_mix import VertexErrors
 from sinew_addon.core.influences import Influences
 from sinew_addon.core.metrics import FrameOfRig, Gauge
+from sinew_addon.core.steps import result_of
 from sinew_addon.core.surface import Surface
 from tube import Tube
 
@@ -21,12 +22,10 @@ def errors(first, second, thickness=RADIUS, apart=1.0):
 
 
 def run(points, triangles, found, smoothing=SMOOTHING):
-    steps = auto_mix.shares(points, triangles, found, smoothing)
-    while True:
-        try:
-            assert next(steps) == 1.0
-        except StopIteration as end:
-            return end.value
+    progress = []
+    shares = result_of(auto_mix.shares(points, triangles, found, smoothing), progress.append)
+    assert set(progress) <= {1.0}
+    return shares
 
 
 def by_gradients(points, triangles, found, smoothing):

@@ -25,6 +25,7 @@ from sinew_addon.core.flex.report import junit, lines, markdown, of_file
 from sinew_addon.core.flex.verdict import OWN, Pose, judge
 from sinew_addon.core.flex.weights import WeightCheck
 from sinew_addon.core.metrics import FrameOfRig
+from sinew_addon.core.steps import result_of
 from sinew_addon.core.surface import Surface, coincident_vertices, components
 from test_battery import figure
 from test_metrics import LENGTH, RADIUS, Tube, influences_of
@@ -75,11 +76,10 @@ class Bent:
         steps = judge(
             self.character, [Pose("bent", (1,), lambda: self)], [OWN, *methods], limits, no_crossings
         )
-        while True:
-            try:
-                assert 0.0 < next(steps) <= 1.0
-            except StopIteration as end:
-                return end.value
+        shares = []
+        verdict = result_of(steps, shares.append)
+        assert shares == [1.0]
+        return verdict
 
 
 def no_crossings(_points, _triangles):

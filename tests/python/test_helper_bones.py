@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from rigs import about
 from sinew_addon.core import helper_bones, simplex
+from sinew_addon.core import steps as core_steps
 from sinew_addon.core.helper_bones import HelperOptions, Motion, Report, Wanted
 from sinew_addon.core.influences import Influences
 from tube import Tube
@@ -28,13 +29,10 @@ def solved(motion, wanted, solver=helper_bones.Solver):
 def result_of(steps):
     """What a generator of shares that are done returns."""
     shares = []
-    while True:
-        try:
-            shares.append(next(steps))
-        except StopIteration as stop:
-            assert shares == sorted(shares)
-            assert shares[-1] == 1.0
-            return stop.value
+    result = core_steps.result_of(steps, shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    return result
 
 
 def influences_of_tube():
