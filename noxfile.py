@@ -259,7 +259,7 @@ def job(name: str, *requires: str) -> Callable[[Callable[[nox.Session], None]], 
     return add
 
 
-# Of 3x3 matrices, which the oracles take the logarithms of, threads make four times the work.
+# Of small matrices, which the oracles solve and decompose, threads make more work than they save.
 ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
 
 

@@ -12,15 +12,8 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::deformed;
-using test::kTolerance;
-using test::largest_error;
-using test::Random;
-using test::Scene;
-using test::scene_of_shared_bones;
 
 std::vector<BoneSegment<float>> segments_of(const Scene& scene) {
     Random random(99);
@@ -52,7 +45,7 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const std::vector<Bo
     }
     std::vector<Vec3<double>> result;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-        const auto influences = test::normalised_influences_of<double>(scene, vertex);
+        const auto influences = normalised_influences_of<double>(scene, vertex);
         const double apart = BulgeLimitStage::rest_distance<double>(form, rest_segments, influences,
                                                                     Vec3<double>(scene.rest_points[vertex]));
         result.push_back(BulgeLimitStage::deform_vertex<double>(form, bones, influences, apart, strength,
@@ -61,9 +54,9 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const std::vector<Bo
     return result;
 }
 
-class LimitBulge : public test::OnEachTarget {};
+class LimitBulge : public OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, LimitBulge, testing::ValuesIn(simd_targets()), test::name_of_target);
+INSTANTIATE_TEST_SUITE_P(every, LimitBulge, testing::ValuesIn(simd_targets()), name_of_target);
 
 TEST_P(LimitBulge, kernel_agrees_with_the_definition) {
     for (const std::uint32_t seed : {1u, 2u, 3u}) {
@@ -117,4 +110,4 @@ TEST(BulgeLimit, options_become_valid_and_points_of_another_number_stay) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -13,12 +13,8 @@
 #include "sinew/base/simd.h"
 #include "sinew/deformer.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::kTolerance;
-using test::Random;
-using test::Scene;
 
 /// A scene, and the rows of its vertices, whose neighbourhoods have an extent.
 struct Bound {
@@ -39,12 +35,12 @@ Bound bound_scene(std::uint32_t seed, std::size_t bones, std::size_t of_vertex, 
     Bound bound;
     Scene& scene = bound.scene;
     for (std::size_t bone = 0; bone < bones; ++bone) {
-        const Quat<double> rotation = test::about(random.vector(1.0), random.uniform(-50.0, 50.0));
+        const Quat<double> rotation = about(random.vector(1.0), random.uniform(-50.0, 50.0));
         Affine<double> motion = to_affine(QuatVec<double>{rotation, random.vector(1.0)});
         if (bone == 0) motion.translation *= farthest;
         const auto rest = to_affine(random.motion(1.0));
         if (is_scaled && bone % 2 == 1) {
-            motion = motion * rest * test::scaling<double>({0.7, 1.5, 1.0}) * inverse(rest);
+            motion = motion * rest * scaling<double>({0.7, 1.5, 1.0}) * inverse(rest);
         }
         scene.rest_bones.push_back(cast<float>(rest));
         scene.posed_from_rest.push_back(cast<float>(motion));
@@ -90,7 +86,7 @@ double error_of(const Bound& bound, double variant, const DeformOptions& space =
     const double parameters[] = {variant};
     DeformOptions options = space;
     options.parameters = parameters;
-    const auto points = test::deformed(Deformer(data, Ddm::info), scene, options);
+    const auto points = deformed(Deformer(data, Ddm::info), scene, options);
     std::vector<Ddm::Bone<double>> bones;
     for (std::size_t bone = 0; bone < scene.posed_from_rest.size(); ++bone) {
         bones.push_back(
@@ -98,14 +94,14 @@ double error_of(const Bound& bound, double variant, const DeformOptions& space =
     }
     std::vector<Vec3<double>> expected;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-        const auto influences = test::normalised_influences_of<double>(scene, vertex);
+        const auto influences = normalised_influences_of<double>(scene, vertex);
         const std::vector<double> own(
             bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex]),
             bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex + 1]));
         expected.push_back(Ddm::deform_vertex<double>(
             bones, influences, Vec3<double>(scene.rest_points[vertex]), own, parameters));
     }
-    return test::largest_error(points, expected);
+    return largest_error(points, expected);
 }
 
 class DdmKernels : public testing::TestWithParam<std::tuple<std::string_view, double>> {
@@ -154,6 +150,6 @@ TEST_P(DdmKernels, take_bones_that_the_moments_alone_name) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test
 
 #endif

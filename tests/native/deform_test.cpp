@@ -13,15 +13,8 @@
 #include "scene.h"
 #include "sinew/deformer.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::deformed;
-using test::distance;
-using test::random_scene;
-using test::same_bits;
-using test::scaling;
-using test::Scene;
 
 class Deform : public testing::TestWithParam<MethodInfo> {
 protected:
@@ -131,7 +124,7 @@ TEST_P(Deform, moved_deformers_go_on) {
 }
 
 TEST(Deformer, refuses_more_influences_of_a_vertex_than_the_limit) {
-    if (test::kRunsSlowly) GTEST_SKIP();
+    if (kRunsSlowly) GTEST_SKIP();
     const auto with_influences = [](std::size_t count) {
         Scene scene;
         scene.add_vertex({0, 0, 0}, std::vector<Influence<float>>(count, {0, 1.0f}));
@@ -142,4 +135,4 @@ TEST(Deformer, refuses_more_influences_of_a_vertex_than_the_limit) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -11,15 +11,8 @@
 #include "sinew/base/simd.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::distance;
-using test::Mesh;
-using test::Random;
-using test::random_mesh;
-using test::same_bits;
-using test::sheet;
 
 std::vector<Vec3<float>> bent(const Mesh& mesh, std::uint32_t seed) {
     Random random(seed);
@@ -130,9 +123,9 @@ std::vector<Vec3<float>> mushed(const DeltaMush& mush, std::vector<Vec3<float>> 
     return points;
 }
 
-class Mushes : public test::OnEachTarget {};
+class Mushes : public OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, Mushes, testing::ValuesIn(simd_targets()), test::name_of_target);
+INSTANTIATE_TEST_SUITE_P(every, Mushes, testing::ValuesIn(simd_targets()), name_of_target);
 
 TEST_P(Mushes, agree_with_the_definition_in_double) {
     const Mesh mesh = random_mesh(1, 20);
@@ -244,4 +237,4 @@ TEST(DeltaMush, has_no_NaN_where_faces_are_degenerate) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -14,20 +14,8 @@
 #include "sinew/base/x86_support.h"
 #include "sinew/skeleton/continued_rotations.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::about;
-using test::deformed;
-using test::distance;
-using test::in_double;
-using test::influences_of;
-using test::kTolerance;
-using test::Random;
-using test::random_scene;
-using test::same_bits;
-using test::scaling;
-using test::Scene;
 
 /// `sets` sets of 1 to `most` bones, each with `vertices` vertices that are not adjacent in the mesh.
 Scene scene_of_sets(std::uint32_t seed, std::size_t sets, std::size_t vertices, std::size_t most, bool scaled,
@@ -248,7 +236,7 @@ TEST_P(Kernels, agree_for_many_influences) {
 // A bone that is far away and has little weight must not cost a vertex the digits of the others: in single
 // precision and for any order of bones, the error is at most four times that of a plain sum.
 TEST_P(Kernels, round_as_a_plain_sum_does_for_bones_of_unlike_size) {
-    if (test::kRunsSlowly) GTEST_SKIP();
+    if (kRunsSlowly) GTEST_SKIP();
     std::uint32_t seed = 100;
     // First moments are stored as products that were rounded.
     const double times = method().rows_by_bone ? 8.0 : 4.0;
@@ -259,7 +247,7 @@ TEST_P(Kernels, round_as_a_plain_sum_does_for_bones_of_unlike_size) {
                     const Scene scene =
                         scene_of_unlike_bones(++seed, 800 / vertices, vertices, farthest, scaled, spread);
                     const auto ours = errors(method(), scene);
-                    const auto plain = errors_of(test::by_skinning<float>(method(), scene), method(), scene);
+                    const auto plain = errors_of(by_skinning<float>(method(), scene), method(), scene);
                     // The highest errors may come from signs that are nearly a tie, where both choices are
                     // equally good.
                     for (const double part : {0.5, 0.9, 0.98}) {
@@ -395,4 +383,4 @@ TEST(SimdTargets, one_is_in_use) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

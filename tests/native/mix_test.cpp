@@ -11,18 +11,8 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::about;
-using test::deformed;
-using test::distance;
-using test::in_double;
-using test::kTolerance;
-using test::Random;
-using test::random_scene;
-using test::same_bits;
-using test::Scene;
 
 /// Long runs of 0 and of 1, as painted weights have them, and values in between.
 std::vector<float> painted(std::uint32_t seed, std::size_t vertices) {
@@ -62,7 +52,7 @@ protected:
 };
 
 std::span<const MethodInfo> second_methods() {
-    return std::span(kMethods).first(test::kRunsSlowly ? 1 : kMethodCount);
+    return std::span(kMethods).first(kRunsSlowly ? 1 : kMethodCount);
 }
 
 INSTANTIATE_TEST_SUITE_P(every, Mixes,
@@ -146,4 +136,4 @@ TEST(Mix, weights_beyond_0_to_1_are_clamped) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

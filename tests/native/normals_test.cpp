@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects normals of whole meshes on each instruction set and on threads: all have the same bits, which
-// tests/python/test_normals.py compares with the definition.
+// tests/blender/test_normals.py compares with Blender's.
 #include "sinew/normals.h"
 
 #include <algorithm>
@@ -12,13 +12,8 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::Mesh;
-using test::Random;
-using test::random_mesh;
-using test::same_bits;
 
 using Point = Vec3<double>;
 
@@ -82,9 +77,9 @@ Mesh mesh_with_large_faces() {
     return mesh;
 }
 
-class NormalKernels : public test::OnEachTarget {};
+class NormalKernels : public OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, NormalKernels, testing::ValuesIn(simd_targets()), test::name_of_target);
+INSTANTIATE_TEST_SUITE_P(every, NormalKernels, testing::ValuesIn(simd_targets()), name_of_target);
 
 TEST_P(NormalKernels, have_the_bits_of_any_other) {
     const Mesh mesh = mesh_with_large_faces();
@@ -161,4 +156,4 @@ TEST(Normals, write_nothing_where_sizes_do_not_fit) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

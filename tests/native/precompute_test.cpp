@@ -10,11 +10,8 @@
 #include "sinew/methods/ddm/direct_delta_mush.h"
 #endif
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::Random;
-using test::Scene;
 
 /// A sheet with four of seven bones for each vertex, more than are solved together.
 struct Sheet {
@@ -100,4 +97,4 @@ TEST(DirectDeltaMush, of_a_mesh_without_vertices_has_no_rows) {
 #endif
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -139,12 +139,8 @@ extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) {
 }
 #endif
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::about;
-using test::random_scene;
-using test::Scene;
 
 TEST(Counting, sees_what_there_is) {
     const int before = allocations;
@@ -247,7 +243,7 @@ TEST(Stages, allocate_nothing_once_rest_points_were_set) {
 // That of aligned data, too: whoever replaces operator new has all memory of the library.
 TEST(Memory, comes_from_operator_new) {
     const Scene scene = random_scene(6, 2000, 1.0);
-    const test::Mesh mesh = test::sheet(50);
+    const Mesh mesh = sheet(50);
     const auto work = [&] {
         auto points = scene.rest_points;
         const Binding binding(scene.data());
@@ -279,7 +275,7 @@ TEST(Memory, comes_from_operator_new) {
 #endif
 
 TEST(DeltaMush, and_normals_allocate_nothing_once_they_are_made) {
-    test::Mesh mesh = test::sheet(150);
+    Mesh mesh = sheet(150);
     const Scene scene = random_scene(2, 20000, 1.0);
     std::vector<std::uint8_t> sharp(mesh.edges.size() / 2);
     sharp[7] = 1;
@@ -357,4 +353,4 @@ TEST(InverseKinematics, allocates_nothing_and_locks_nothing) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -9,16 +9,8 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::deformed;
-using test::in_double;
-using test::kTolerance;
-using test::largest_error;
-using test::Random;
-using test::random_scene;
-using test::Scene;
 
 constexpr double kNlerp[] = {0.0};
 constexpr double kSlerp[] = {1.0};
@@ -44,9 +36,9 @@ Scene scene_of_pairs(std::uint32_t seed, bool scaled) {
     return scene;
 }
 
-using EveryTarget = test::OnEachTarget;
+using EveryTarget = OnEachTarget;
 
-INSTANTIATE_TEST_SUITE_P(Sdef, EveryTarget, testing::ValuesIn(simd_targets()), test::name_of_target);
+INSTANTIATE_TEST_SUITE_P(Sdef, EveryTarget, testing::ValuesIn(simd_targets()), name_of_target);
 
 TEST_P(EveryTarget, kernel_agrees_with_the_definition) {
     for (const bool scaled : {false, true}) {
@@ -79,4 +71,4 @@ TEST(Parameters, those_not_given_or_out_of_range_have_valid_values) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

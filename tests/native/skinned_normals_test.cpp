@@ -5,13 +5,8 @@
 
 #include "scene.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::Random;
-using test::random_scene;
-using test::same_bits;
-using test::Scene;
 
 struct Frames {
     std::vector<Vec3<float>> normals;
@@ -88,4 +83,4 @@ TEST(SkinnedNormals, flattened_to_a_line_are_0) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Protects the memory of averages and splines, for sanitizers; tests/python/exact_*.py has the oracles.
+// Protects the memory of averages, splines and inverse kinematics, for sanitizers; tests/python has the oracles.
 #include <array>
 #include <vector>
 
 #include "sinew/fit/average.h"
+#include "sinew/ik/solver.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/skeleton/keyframes.h"
 #include "support.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::about;
-using test::distance;
-using test::Random;
 
 template <class T>
 class Average : public testing::Test {};
@@ -66,5 +63,39 @@ TYPED_TEST(Spline, half_turns_between_keys_are_finite) {
     }
 }
 
+TEST(IkSolver, takes_limits_poles_and_trees_and_solves_nothing_where_sizes_do_not_fit) {
+    Random random(5);
+    const std::vector<std::int32_t> parents{-1, 0, 1, 2, 1, 4};
+    for (std::size_t i = 0; i < 50; ++i) {
+        std::vector<BoneLimits> limits(parents.size());
+        std::vector<DualQuat<double>> rest;
+        std::vector<Quat<double>> rotations;
+        for (BoneLimits& of_bone : limits) {
+            for (AxisLimit& limit : of_bone) {
+                limit = {.is_locked = random.index(3) == 0,
+                         .is_limited = random.index(2) == 0,
+                         .min = -random.uniform(0.1, 2.5),
+                         .max = random.uniform(0.1, 2.5)};
+            }
+            rest.push_back(to_dual_quat(random.motion(1.0)));
+            rotations.push_back(random.rotation());
+        }
+        const std::vector<IkEffector> all{{.bone = 3, .rotation_weight = 0.5, .has_pole = true}, {.bone = 5}};
+        const std::span effectors = std::span(all).first(1 + i % 2);
+        const std::vector<Vec3<double>> tips(effectors.size(), {0, 1, 0}), poles(effectors.size(), {0, 0, 5});
+        const std::vector goals(effectors.size(), to_dual_quat(random.motion(2.0)));
+        const IkSolver solver(Skeleton(parents), limits, effectors);
+        EXPECT_TRUE(solver.solve({{}, rest, tips, goals, poles}, rotations));
+        for (const Quat<double>& q : rotations) EXPECT_NEAR(glm::length(q), 1.0, 1e-9);
+        const auto solved = rotations;
+        const auto fewer = std::span(rest).first(1);
+        EXPECT_FALSE(solver.solve({{}, fewer, tips, goals, poles}, rotations));
+        EXPECT_FALSE(solver.solve({{}, rest, {}, goals, poles}, rotations));
+        EXPECT_FALSE(solver.solve({{}, rest, tips, {}, poles}, rotations));
+        EXPECT_FALSE(solver.solve({{}, rest, tips, goals, poles}, std::span(rotations).first(1)));
+        EXPECT_EQ(rotations, solved);
+    }
+}
+
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -15,16 +15,8 @@
 #include "sinew/transform/convert.h"
 #include "sinew/transform/split_scale.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::deformed;
-using test::kBones;
-using test::kTolerance;
-using test::largest_error;
-using test::Random;
-using test::Scene;
-using test::scene_of_shared_bones;
 
 /// Bones 0, 2, 4 ... share the twist of the next, or their own.
 std::vector<TwistBone> twists_of(const Scene& scene) {
@@ -76,7 +68,7 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
     const TwistSpread spread(Binding(scene.data()), data);
     std::vector<Vec3<double>> result;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-        const auto influences = test::normalised_influences_of<double>(scene, vertex);
+        const auto influences = normalised_influences_of<double>(scene, vertex);
         const Vec3<double> rest(scene.rest_points[vertex]);
         Vec3<double> point(points[vertex]);
         for (std::size_t i = data.twists.size(); i-- > 0;) {
@@ -132,9 +124,9 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
     return result;
 }
 
-class SpreadTwists : public test::OnEachTarget {};
+class SpreadTwists : public OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, SpreadTwists, testing::ValuesIn(simd_targets()), test::name_of_target);
+INSTANTIATE_TEST_SUITE_P(every, SpreadTwists, testing::ValuesIn(simd_targets()), name_of_target);
 
 TEST_P(SpreadTwists, kernel_agrees_with_the_definition) {
     for (const std::uint32_t seed : {1u, 2u, 3u}) {
@@ -217,4 +209,4 @@ TEST(TwistSpread, options_become_valid_and_wrong_sizes_change_nothing) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

@@ -13,15 +13,8 @@
 #include "scene.h"
 #include "sinew/sinew.h"
 
-namespace sinew {
+namespace sinew::test {
 namespace {
-
-using test::deformed;
-using test::Random;
-using test::random_mesh;
-using test::same_bits;
-using test::Scene;
-using test::scene_of_shared_bones;
 
 /// As in a vertex buffer of an engine.
 struct Vertex {
@@ -56,9 +49,9 @@ private:
     std::vector<Vertex> vertices_;
 };
 
-class VertexBuffers : public test::OnEachTarget {};
+class VertexBuffers : public OnEachTarget {};
 
-INSTANTIATE_TEST_SUITE_P(every, VertexBuffers, testing::ValuesIn(simd_targets()), test::name_of_target);
+INSTANTIATE_TEST_SUITE_P(every, VertexBuffers, testing::ValuesIn(simd_targets()), name_of_target);
 
 TEST_P(VertexBuffers, take_points_of_each_method_and_mix) {
     const Scene scene = scene_of_shared_bones(3);
@@ -111,7 +104,7 @@ TEST_P(VertexBuffers, are_changed_by_stages) {
     for (Vec3<float>& point : points) point *= 1.3f;
     std::vector<BoneSegment<float>> segments;
     std::vector<TwistBone> twists;
-    for (std::int32_t bone = 0; bone < test::kBones; ++bone) {
+    for (std::int32_t bone = 0; bone < kBones; ++bone) {
         const Vec3<float> head = scene.rest_bones[static_cast<std::size_t>(bone)].translation;
         const Vec3<float> tail = head + Vec3<float>(0.1f, 0.5f, 0.2f);
         segments.push_back({head, tail});
@@ -126,7 +119,7 @@ TEST_P(VertexBuffers, are_changed_by_stages) {
     EXPECT_TRUE(limit.apply(buffer[&Vertex::point], scene.posed_from_rest));
     EXPECT_TRUE(same_bits(buffer.written(&Vertex::point), points));
 
-    const test::Mesh mesh = random_mesh(3, 700);
+    const Mesh mesh = random_mesh(3, 700);
     const DeltaMush mush({mesh.offsets, mesh.corners, mesh.edges}, mesh.rest_points, {});
     points = mesh.rest_points;
     for (Vec3<float>& point : points) point.x = std::cos(3.0f * point.y);
@@ -172,7 +165,7 @@ private:
 };
 
 TEST(JobSystem, does_the_work_of_the_threads) {
-    const Scene scene = test::random_scene(8, 20000, 1.0);
+    const Scene scene = random_scene(8, 20000, 1.0);
     const Deformer deformer(scene.data(), Dq::info);
     const std::vector<Vec3<float>> alone = deformed(deformer, scene, {.threads = 1});
     {
@@ -193,4 +186,4 @@ TEST(JobSystem, does_the_work_of_the_threads) {
 }
 
 }  // namespace
-}  // namespace sinew
+}  // namespace sinew::test

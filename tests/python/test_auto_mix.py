@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shares of Auto-Mix: the solution of its functional, smooth, between 0 and 1, equal at seams."""
+"""Protects the shares of Auto-Mix: its functional's solution, smooth, between 0 and 1, equal at seams."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The battery of poses: joints bend by the stated angles, as limbs do, whatever a rig calls them."""
+"""Protects the battery of poses: joints bend by the stated angles, as limbs do, whatever a rig calls them."""
 
 import math
 import re

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flex without Blender: measures of a tube in closed form, the surface's graph against scipy, tables and
-reports."""
+"""Protects Flex without Blender: measures of a tube in closed form, the surface's graph against scipy, tables
+and reports."""
 
 import math
 import re

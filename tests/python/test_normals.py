@@ -1,36 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects sinew.Normals: compared with float64 numpy."""
+"""Protects domains of sinew.Normals, degenerate faces and missing edges. The oracle is Blender, in
+tests/blender/test_normals.py."""
 
 import numpy as np
 import pytest
 import sinew
-from test_delta_mush import arrays_of, bent, mesh_of
 
-
-def sharp_of(mesh, edges=0.2, faces=0.1, seed=3):
-    """{argument of Normals: flags}"""
-    rng = np.random.default_rng(seed)
-    return {"sharp_edges": rng.random(len(mesh[2])) < edges, "sharp_faces": rng.random(len(mesh[1])) < faces}
-
-
-def normals_of(mesh, **sharp):
-    points, offsets, corners, edges = arrays_of(mesh)
-    return sinew.Normals(len(points), offsets, corners, edges, **sharp)
+# A bent sheet: a quad and two triangles.
+POINTS = np.float32([[0, 0, 0], [1, 0, 0.5], [2, 0, 0], [0, 1, 0], [1, 1, 0.7], [2, 1, -0.2]])
+SIZES, CORNERS = [4, 3, 3], [0, 1, 4, 3, 1, 2, 4, 2, 5, 4]
+FACES = 6, np.cumsum([0, *SIZES]), CORNERS
+EDGES = [[0, 1], [1, 4], [3, 4], [0, 3], [1, 2], [2, 4], [2, 5], [4, 5]]
 
 
 def test_its_domain_is_the_smallest_that_suffices():
-    mesh = mesh_of(2)
-    points = bent(mesh[0])
-    flat = {"sharp_faces": np.ones(len(mesh[1]), bool)}
-    for sharp, domain in (({}, "vertex"), (sharp_of(mesh), "corner"), (flat, "face")):
-        normals = normals_of(mesh, **sharp)
+    flat, sharp = {"sharp_faces": [True] * 3}, {"sharp_edges": [True] + [False] * 7}
+    for flags, domain in (({}, "vertex"), (sharp, "corner"), (flat, "face")):
+        normals = sinew.Normals(*FACES, EDGES, **flags)
         assert normals.domain == domain
-        np.testing.assert_array_equal(normals.compute(points), normals.compute(points, domain))
-    corners = normals_of(mesh).compute(points, "corner")
-    np.testing.assert_array_equal(corners, normals_of(mesh).compute(points)[np.concatenate(mesh[1])])
-    corners = normals_of(mesh, **flat).compute(points, "corner")
-    sizes = [len(face) for face in mesh[1]]
-    np.testing.assert_array_equal(corners, np.repeat(normals.compute(points), sizes, axis=0))
+        np.testing.assert_array_equal(normals.compute(POINTS), normals.compute(POINTS, domain))
+    corners = sinew.Normals(*FACES, EDGES).compute(POINTS, "corner")
+    np.testing.assert_array_equal(corners, sinew.Normals(*FACES, EDGES).compute(POINTS)[CORNERS])
+    corners = sinew.Normals(*FACES, EDGES, **flat).compute(POINTS, "corner")
+    np.testing.assert_array_equal(corners, np.repeat(normals.compute(POINTS), SIZES, axis=0))
 
 
 def test_degenerate_faces_have_defined_normals():
@@ -48,11 +40,9 @@ def test_degenerate_faces_have_defined_normals():
 
 
 def test_edges_are_needed_only_for_sharp_meshes():
-    mesh = mesh_of(2)
-    points, offsets, corners, edges = arrays_of(mesh)
-    normals = sinew.Normals(len(points), offsets, corners)
-    np.testing.assert_array_equal(normals.compute(points), normals_of(mesh).compute(points))
-    flat = np.arange(len(mesh[1])) == 4
+    smooth = sinew.Normals(*FACES)
+    np.testing.assert_array_equal(smooth.compute(POINTS), sinew.Normals(*FACES, EDGES).compute(POINTS))
+    one = {"sharp_faces": [False, True, False]}
     with pytest.raises(ValueError, match="edges: expected every edge of each face"):
-        sinew.Normals(len(points), offsets, corners, sharp_faces=flat)
-    assert sinew.Normals(len(points), offsets, corners, edges, sharp_faces=flat).domain == "corner"
+        sinew.Normals(*FACES, **one)
+    assert sinew.Normals(*FACES, EDGES, **one).domain == "corner"

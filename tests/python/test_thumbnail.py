@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small pictures show the surface that is nearest, where it is, lit from the upper left."""
+"""Protects small pictures: they show the surface that is nearest, where it is, lit from the upper left."""
 
 import numpy as np
 from sinew_addon.core import thumbnail
