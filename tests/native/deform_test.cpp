@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Protects what only C++ can ask of a Deformer: poses of too few bones, sizes that do not fit, moves, and new
-// rest points beside a frame. tests/python/test_deformer.py has the rest.
+// Protects what only C++ can ask of a Deformer: poses of too few bones, sizes and parameters that do not fit,
+// moves, and new rest points beside a frame. tests/python/test_deformer.py has the rest.
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -121,6 +122,22 @@ TEST_P(Deform, moved_deformers_go_on) {
     EXPECT_TRUE(same_bits(deformed(second, scene)[7], expected[7]));
     first = std::move(second);
     EXPECT_TRUE(same_bits(deformed(first, scene)[7], expected[7]));
+}
+
+TEST(Parameters, those_not_given_or_out_of_range_have_valid_values) {
+    const Scene scene = random_scene(22, 200, 1.0);
+    const Deformer deformer(scene.data(), Sdef::info);
+    const auto by = [&](std::initializer_list<double> values) {
+        return deformed(deformer, scene, {{}, 0, std::span(values.begin(), values.size())});
+    };
+    const auto nlerp = by({0.0});
+    const auto slerp = by({1.0});
+    EXPECT_TRUE(nlerp != slerp);
+    EXPECT_TRUE(deformed(deformer, scene) == nlerp);
+    EXPECT_TRUE(by({}) == nlerp);
+    EXPECT_TRUE(by({-5.0}) == nlerp);
+    EXPECT_TRUE(by({std::nan("")}) == nlerp);
+    EXPECT_TRUE(by({99.0, 3.0}) == slerp);
 }
 
 TEST(Deformer, refuses_more_influences_of_a_vertex_than_the_limit) {

@@ -57,8 +57,8 @@ Scene reordered(const Scene& scene, const std::vector<std::size_t>& order) {
 
 /// The distance of each of `points` from the method's definition in double, ascending.
 std::vector<double> errors_of(const std::vector<Vec3<float>>& points, const MethodInfo& method,
-                              const Scene& scene) {
-    const auto expected = in_double(method, scene);
+                              const Scene& scene, std::span<const double> parameters = {}) {
+    const auto expected = in_double(method, scene, parameters);
     std::vector<double> result;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         result.push_back(distance(Vec3<double>(points[vertex]), expected[vertex]));
@@ -68,7 +68,8 @@ std::vector<double> errors_of(const std::vector<Vec3<float>>& points, const Meth
 }
 
 std::vector<double> errors(const MethodInfo& method, const Scene& scene, const DeformOptions& options = {}) {
-    return errors_of(deformed(Deformer(scene.data(), method), scene, options), method, scene);
+    const auto points = deformed(Deformer(scene.data(), method), scene, options);
+    return errors_of(points, method, scene, options.parameters);
 }
 
 /// `sets` sets of `vertices` vertices. Each has bones at distances of up to `farthest`, in any order, with
@@ -128,6 +129,21 @@ TEST_P(Kernels, agree_for_sets_of_every_size) {
         for (const bool scaled : {false, true}) {
             const Scene scene = scene_of_sets(static_cast<std::uint32_t>(vertices), 12, vertices, 8, scaled);
             EXPECT_LT(errors(method(), scene).back(), kTolerance) << vertices << (scaled ? " scaled" : "");
+        }
+    }
+}
+
+// Those of signs have their own test.
+TEST_P(Kernels, agree_for_each_choice_of_a_parameter) {
+    const bool has_choices = !method().parameters.empty() && method().parameters[0].id != "signs";
+    if (!has_choices) GTEST_SKIP();
+    for (std::size_t i = 0; i < method().parameters[0].choices.size(); ++i) {
+        const double choice = static_cast<double>(i);
+        for (const bool scaled : {false, true}) {
+            // Most vertices have two bones, as sdef wants them.
+            const Scene scene = scene_of_sets(10, 30, 20, 2, scaled);
+            const double error = errors(method(), scene, {.parameters = std::span(&choice, 1)}).back();
+            EXPECT_LT(error, 4.0 * kTolerance) << i << (scaled ? " scaled" : "");
         }
     }
 }
