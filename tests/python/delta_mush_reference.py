@@ -24,7 +24,7 @@ def boundary_of(faces, edges):
     return sorted({v for edge, number in count.items() if number == 1 for v in edge})
 
 
-def amount(rest, edges, factor, radius, smooth_type, most=1000):
+def amount(rest, edges, factor, radius, smooth_type):
     """The number of iterations, and the factor of each vertex, that spread a detail to the width
     `radius`: n iterations with the factor f spread it by h sqrt(n f / 2), with h the root mean square of
     a vertex's edges; half of that squared if neighbours are weighted by length."""
@@ -38,7 +38,7 @@ def amount(rest, edges, factor, radius, smooth_type, most=1000):
         return 0, factors
     wanted = (4.0 if smooth_type == "length_weighted" else 2.0) * radius**2
     # All except the shortest tenth.
-    iterations = int(np.clip(np.ceil(wanted / (factor * found[int(0.1 * len(found))])), 1, most))
+    iterations = int(np.clip(np.ceil(wanted / (factor * found[int(0.1 * len(found))])), 1, 1000))
     some = squared > 0.0
     factors[some] = np.minimum(wanted / (iterations * squared[some]), factor)
     return iterations, factors

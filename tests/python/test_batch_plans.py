@@ -303,11 +303,11 @@ def test_the_keys_and_the_settings_are_the_same():
     assert {field.name for field in fields(ObjectRule)} == {"match", "method", "scale", "set"}
 
 
-def saved(folder, name="a.blend"):
+def saved(folder):
     """A copy that was saved but not renamed, and its record."""
     unfinished = folder / ".1.unfinished.blend"
     unfinished.write_bytes(b"a copy")
-    return {"unfinished": unfinished.name, "written": stamp(unfinished), "source": name}
+    return {"unfinished": unfinished.name, "written": stamp(unfinished), "source": "a.blend"}
 
 
 def test_a_killed_run_is_finished_by_the_next(tmp_path):

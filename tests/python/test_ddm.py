@@ -124,12 +124,12 @@ def near_rig(seed, scaled=False, most_influences=6):
     return rig.with_motions(motions), rows.astype(np.float32)
 
 
-def assert_agrees(points, rig, rows, parameters, tolerance=1e-5):
+def assert_agrees(points, rig, rows, parameters):
     data = {"ddm": rows}
     expected, margins = reference.deform("ddm", *rig.mesh, rig.transforms, rig.rest_bones, data, parameters)
     sure = margins > 1e-3
     assert sure.mean() > 0.7
-    assert np.linalg.norm(points - expected, axis=1)[sure].max() < tolerance
+    assert np.linalg.norm(points - expected, axis=1)[sure].max() < 1e-5
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

@@ -72,10 +72,9 @@ class Bent:
         region = Region(self.character, 1)
         return region, region.measure(self.frame, self.points("lbs"), no_crossings, set())
 
-    def verdict(self, *methods, limits=LIMITS):
-        steps = judge(
-            self.character, [Pose("bent", (1,), lambda: self)], [OWN, *methods], limits, no_crossings
-        )
+    def verdict(self, *methods):
+        poses = [Pose("bent", (1,), lambda: self)]
+        steps = judge(self.character, poses, [OWN, *methods], LIMITS, no_crossings)
         shares = []
         verdict = result_of(steps, shares.append)
         assert shares == [1.0]

@@ -22,8 +22,8 @@ SEGMENTS = np.array([[[0, 0, 0], [0, 0, 2]], [[0, 0, 2], [0, 0, 4]]], dtype=np.f
 DIAMETER = 1.0
 
 
-def solved(motion, wanted, solver=helper_bones.Solver):
-    return result_of(helper_bones.solve(motion, wanted, solver))
+def solved(motion, wanted):
+    return result_of(helper_bones.solve(motion, wanted))
 
 
 def result_of(steps):

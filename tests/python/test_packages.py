@@ -87,9 +87,6 @@ def test_a_wheel_is_whole_and_always_the_same(tmp_path):
     assert {n for n in installed if not compiled.fullmatch(n)} == ours - {f"sinew/{module.name}"}
 
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
-
 MODULE = Path(sinew._native.__file__)
 METADATA = b"Metadata-Version: 2.1\nName: sinew-skinning\nVersion: 1.2.3\n\nText\n"
 
@@ -172,7 +169,7 @@ def test_modules_with_an_unclear_list_are_refused(module, said, tmp_path):
     assert not package_path.with_suffix(".cdx.json").exists()
 
 
-ADDON = Path(__file__).resolve().parents[2] / "addon"
+ADDON = ROOT / "addon"
 
 
 def test_the_wheel_has_every_module(tmp_path):

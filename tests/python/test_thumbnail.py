@@ -17,13 +17,13 @@ def square(size, y, turned=False):
     return points, [triangle[::-1] if turned else triangle for triangle in triangles]
 
 
-def drawn(*parts, size=16):
+def drawn(*parts):
     points, triangles = [], []
     for own, faces in parts:
         triangles += [tuple(corner + len(points) for corner in face) for face in faces]
         points += own
     surface = Surface(len(points), np.array(triangles, np.int32), np.empty((0, 2), np.int32))
-    return thumbnail.draw(Shape(surface, np.array(points, float)), FRONT, size)
+    return thumbnail.draw(Shape(surface, np.array(points, float)), FRONT, 16)
 
 
 def test_what_is_seen_is_where_it_is():

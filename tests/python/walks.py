@@ -140,12 +140,12 @@ def walk(
     return Clip(name, own, Poses(rigid, np.ones((*rigid.shape[:2], 3))), float(period))
 
 
-def random_clip(rng: np.random.Generator, name: str, frames: int = 12, most: float = 1.2) -> Clip:
+def random_clip(rng: np.random.Generator, name: str) -> Clip:
     """Every bone rotated and moved smoothly; not cyclic."""
-    own = rig()
+    own, frames = rig(), 12
     time = np.linspace(0.0, 1.0, frames + 1)[:, None, None]
     bones = len(own.names)
-    twists = 0.4 * most * rng.normal(size=(bones, 6)) * np.sin(2 * time + rng.uniform(0, 6, (bones, 6)))
+    twists = 0.48 * rng.normal(size=(bones, 6)) * np.sin(2 * time + rng.uniform(0, 6, (bones, 6)))
     rigid = np.concatenate(
         [
             quat_vec.from_twist(np.pad(twists[..., :3], ((0, 0), (0, 0), (0, 3))))[..., :4],
