@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import sinew
 import trimesh
+import tube as tube_of_tests
 from rigs import about, random_motion, transform
 from sinew_addon.core.flex.limits import LIMITS
 from sinew_addon.core.influences import Influences
@@ -38,23 +39,18 @@ class Tube:
     bone's weight increases linearly from 0 to 1 from one end to the other."""
 
     def __init__(self):
-        x = np.repeat(np.linspace(-LENGTH / 2, LENGTH / 2, RINGS), SIDES)
-        angle = np.tile(2 * np.pi * np.arange(SIDES) / SIDES, RINGS)
-        self.angle = angle
-        around = np.stack([x, RADIUS * np.cos(angle), RADIUS * np.sin(angle)], axis=1)
+        open_tube = tube_of_tests.Tube(RINGS, SIDES)
+        x, y, z = open_tube.points.T
+        around = 0.5 * np.stack([z - 2.0, x, y], axis=1)
         self.rest = np.concatenate([around, [[-LENGTH / 2, 0, 0], [LENGTH / 2, 0, 0]]])
-        first, last = len(around), len(around) + 1
-        triangles, edges = [], []
-        for ring in range(RINGS - 1):
-            for side in range(SIDES):
-                a, b = ring * SIDES + side, ring * SIDES + (side + 1) % SIDES
-                triangles += [(a, b, b + SIDES), (a, b + SIDES, a + SIDES)]
-                edges.append((a, a + SIDES))
-        for side in range(SIDES):
-            beside, top = (side + 1) % SIDES, (RINGS - 1) * SIDES
-            triangles += [(first, beside, side), (last, top + side, top + beside)]
+        first, last, top = len(around), len(around) + 1, (RINGS - 1) * SIDES
+        side = np.arange(SIDES)
+        beside = (side + 1) % SIDES
+        lids = [(np.full(SIDES, first), beside, side), (np.full(SIDES, last), top + side, top + beside)]
+        triangles = np.concatenate([open_tube.triangles, *(np.stack(lid, axis=1) for lid in lids)])
         # Only edges along the tube: their stretch is known.
-        self.surface = Surface(len(self.rest), np.array(triangles, np.int32), np.array(edges, np.int32))
+        edges = open_tube.quads[:, [0, 3]]
+        self.surface = Surface(len(self.rest), triangles.astype(np.int32), edges.astype(np.int32))
         second = self.rest[:, 0] / LENGTH + 0.5
         self.second = second
         self.influences = influences_of(np.stack([1.0 - second, second], axis=1))
