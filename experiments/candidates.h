@@ -22,6 +22,20 @@ namespace experiments {
 using Rigid = sinew::QuatVec<double>;
 using Weights = std::array<float, 3>;
 
+/// Linear blends of matrices that libraries add and multiply by numbers.
+template <class Matrix>
+struct BySums {
+    using Transform = Matrix;
+
+    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
+    static Transform linear(const Transform& a, const Transform& b, float t) {
+        return (1.0f - t) * a + t * b;
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        return weights[0] * transforms[0] + weights[1] * transforms[1] + weights[2] * transforms[2];
+    }
+};
+
 /// "Standard matrix math on 4x4 matrices" (Smith 2013, section 3.4.3): all sixteen numbers, three loops.
 struct Plain4x4 {
     struct Transform {
@@ -86,69 +100,67 @@ struct Plain4x4 {
 /// Four numbers in one register, with the vector extension of GCC and Clang.
 using Lanes = float __attribute__((vector_size(16)));
 
-/// A 4x4 matrix in four registers, one for each column: the loops of Plain4x4 vectorised by hand.
-struct Lanes4x4 {
+/// A matrix in so many registers.
+template <int kCount>
+struct InRegisters {
     struct Transform {
-        Lanes columns[4];
+        Lanes lanes[kCount];
     };
     using Point = glm::vec3;
 
-    static Transform make(const Rigid& rigid) {
-        const Plain4x4::Transform m = Plain4x4::make(rigid);
-        Transform result;
-        for (int column = 0; column < 4; ++column) {
-            for (int row = 0; row < 4; ++row) result.columns[column][row] = m.rows[row][column];
-        }
-        return result;
-    }
-    static Lanes times(const Transform& a, const Lanes& v) {
-        return a.columns[0] * v[0] + a.columns[1] * v[1] + a.columns[2] * v[2] + a.columns[3] * v[3];
-    }
-    static Transform compose(const Transform& a, const Transform& b) {
-        return {
-            {times(a, b.columns[0]), times(a, b.columns[1]), times(a, b.columns[2]), times(a, b.columns[3])}};
-    }
-    static Point apply(const Transform& a, const Point& point) {
-        const Lanes moved =
-            a.columns[0] * point.x + a.columns[1] * point.y + a.columns[2] * point.z + a.columns[3];
-        return {moved[0], moved[1], moved[2]};
-    }
     static Transform linear(const Transform& a, const Transform& b, float t) {
         Transform between;
-        for (int i = 0; i < 4; ++i) between.columns[i] = (1.0f - t) * a.columns[i] + t * b.columns[i];
+        for (int i = 0; i < kCount; ++i) between.lanes[i] = (1.0f - t) * a.lanes[i] + t * b.lanes[i];
         return between;
     }
     static Transform blend(const Transform* transforms, const Weights& weights) {
         Transform sum;
-        for (int i = 0; i < 4; ++i) {
-            sum.columns[i] = weights[0] * transforms[0].columns[i] + weights[1] * transforms[1].columns[i] +
-                             weights[2] * transforms[2].columns[i];
+        for (int i = 0; i < kCount; ++i) {
+            sum.lanes[i] = weights[0] * transforms[0].lanes[i] + weights[1] * transforms[1].lanes[i] +
+                           weights[2] * transforms[2].lanes[i];
         }
         return sum;
     }
 };
 
-/// A 3x4 matrix in three registers, one for each row.
-struct Lanes3x4 {
-    struct Transform {
-        Lanes rows[3];
-    };
-    using Point = glm::vec3;
+/// A 4x4 matrix in four registers, one for each column: the loops of Plain4x4 vectorised by hand.
+struct Lanes4x4 : InRegisters<4> {
+    static Transform make(const Rigid& rigid) {
+        const Plain4x4::Transform m = Plain4x4::make(rigid);
+        Transform result;
+        for (int column = 0; column < 4; ++column) {
+            for (int row = 0; row < 4; ++row) result.lanes[column][row] = m.rows[row][column];
+        }
+        return result;
+    }
+    static Lanes times(const Transform& a, const Lanes& v) {
+        return a.lanes[0] * v[0] + a.lanes[1] * v[1] + a.lanes[2] * v[2] + a.lanes[3] * v[3];
+    }
+    static Transform compose(const Transform& a, const Transform& b) {
+        return {{times(a, b.lanes[0]), times(a, b.lanes[1]), times(a, b.lanes[2]), times(a, b.lanes[3])}};
+    }
+    static Point apply(const Transform& a, const Point& point) {
+        const Lanes moved = a.lanes[0] * point.x + a.lanes[1] * point.y + a.lanes[2] * point.z + a.lanes[3];
+        return {moved[0], moved[1], moved[2]};
+    }
+};
 
+/// A 3x4 matrix in three registers, one for each row.
+struct Lanes3x4 : InRegisters<3> {
     static Transform make(const Rigid& rigid) {
         const Plain4x4::Transform m = Plain4x4::make(rigid);
         Transform result;
         for (int row = 0; row < 3; ++row) {
-            for (int column = 0; column < 4; ++column) result.rows[row][column] = m.rows[row][column];
+            for (int column = 0; column < 4; ++column) result.lanes[row][column] = m.rows[row][column];
         }
         return result;
     }
     static Transform compose(const Transform& a, const Transform& b) {
         Transform product;
         for (int i = 0; i < 3; ++i) {
-            const Lanes& row = a.rows[i];
+            const Lanes& row = a.lanes[i];
             const Lanes moved = {0.0f, 0.0f, 0.0f, row[3]};
-            product.rows[i] = row[0] * b.rows[0] + row[1] * b.rows[1] + row[2] * b.rows[2] + moved;
+            product.lanes[i] = row[0] * b.lanes[0] + row[1] * b.lanes[1] + row[2] * b.lanes[2] + moved;
         }
         return product;
     }
@@ -156,20 +168,7 @@ struct Lanes3x4 {
         const auto along = [&](const Lanes& row) {
             return row[0] * point.x + row[1] * point.y + row[2] * point.z + row[3];
         };
-        return {along(a.rows[0]), along(a.rows[1]), along(a.rows[2])};
-    }
-    static Transform linear(const Transform& a, const Transform& b, float t) {
-        Transform between;
-        for (int i = 0; i < 3; ++i) between.rows[i] = (1.0f - t) * a.rows[i] + t * b.rows[i];
-        return between;
-    }
-    static Transform blend(const Transform* transforms, const Weights& weights) {
-        Transform sum;
-        for (int i = 0; i < 3; ++i) {
-            sum.rows[i] = weights[0] * transforms[0].rows[i] + weights[1] * transforms[1].rows[i] +
-                          weights[2] * transforms[2].rows[i];
-        }
-        return sum;
+        return {along(a.lanes[0]), along(a.lanes[1]), along(a.lanes[2])};
     }
 };
 
@@ -184,8 +183,7 @@ struct Ours {
     static Point apply(const Transform& a, const Point& point) { return sinew::transform_point(a, point); }
 };
 
-struct Glm4x4 {
-    using Transform = glm::mat4;
+struct Glm4x4 : BySums<glm::mat4> {
     using Point = glm::vec3;
 
     static Transform make(const Rigid& rigid) {
@@ -194,15 +192,8 @@ struct Glm4x4 {
         m[3] = glm::vec4(glm::vec3(a.translation), 1.0f);
         return m;
     }
-    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
     static Point apply(const Transform& a, const Point& point) {
         return glm::vec3(a * glm::vec4(point, 1.0f));
-    }
-    static Transform linear(const Transform& a, const Transform& b, float t) {
-        return (1.0f - t) * a + t * b;
-    }
-    static Transform blend(const Transform* transforms, const Weights& weights) {
-        return weights[0] * transforms[0] + weights[1] * transforms[1] + weights[2] * transforms[2];
     }
 };
 
@@ -283,24 +274,16 @@ struct GlmDualQuat {
     }
 };
 
-struct Eigen4x4 {
-    using Transform = Eigen::Matrix4f;
+struct Eigen4x4 : BySums<Eigen::Matrix4f> {
     using Point = Eigen::Vector3f;
 
     static Transform make(const Rigid& rigid) {
         const Plain4x4::Transform m = Plain4x4::make(rigid);
         return Eigen::Map<const Eigen::Matrix<float, 4, 4, Eigen::RowMajor>>(&m.rows[0][0]);
     }
-    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
     static Point apply(const Transform& a, const Point& point) {
         const Eigen::Vector4f moved = a * point.homogeneous();
         return moved.head<3>();
-    }
-    static Transform linear(const Transform& a, const Transform& b, float t) {
-        return (1.0f - t) * a + t * b;
-    }
-    static Transform blend(const Transform* transforms, const Weights& weights) {
-        return weights[0] * transforms[0] + weights[1] * transforms[1] + weights[2] * transforms[2];
     }
 };
 

@@ -49,39 +49,30 @@ def planned(inputs, out="out", listed=()):
     }
 
 
+HEROES = {"chars/hero.blend": "out/hero.blend", "chars/old/hero.blend": "out/old/hero.blend"}
+ALL = {name: f"out/{name}" for name in ("a.blend", "take/b[1].blend", *HEROES)}
+
+
 @pytest.mark.parametrize(
     ("inputs", "expected"),
     [
         (["a.blend"], {"a.blend": "out/a.blend"}),
         (["take/b[1].blend"], {"take/b[1].blend": "out/b[1].blend"}),
         (["chars/fox.glb"], {"chars/fox.glb": "out/fox.blend"}),
-        (
-            ["chars"],
-            {"chars/hero.blend": "out/hero.blend", "chars/old/hero.blend": "out/old/hero.blend"},
-        ),
-        (
-            ["chars/**/*.blend"],
-            {"chars/hero.blend": "out/hero.blend", "chars/old/hero.blend": "out/old/hero.blend"},
-        ),
+        (["chars"], HEROES),
+        (["chars/**/*.blend"], HEROES),
         (["ch*/old/*.blend"], {"chars/old/hero.blend": "out/chars/old/hero.blend"}),
-        (["a.blend", "./a.blend", "."], None),
+        # Given twice and also by its folder; processed once.
+        (["a.blend", "./a.blend", "."], ALL),
     ],
 )
 def test_inputs(studio, inputs, expected):
-    found = planned(inputs)
-    if expected is None:
-        # Given twice and also by its folder; processed once.
-        assert sorted(found) == ["a.blend", "chars/hero.blend", "chars/old/hero.blend", "take/b[1].blend"]
-    else:
-        assert found == expected
+    assert planned(inputs) == expected
 
 
 def test_a_list_keeps_folders_below_the_common_one(studio):
     lines = ["chars/hero.blend\n", "\n", f"{studio}/chars/old/hero.blend\r\n"]
-    assert planned(["-"], listed=lines) == {
-        "chars/hero.blend": "out/hero.blend",
-        "chars/old/hero.blend": "out/old/hero.blend",
-    }
+    assert planned(["-"], listed=lines) == HEROES
     assert planned(["-"], listed=["a.blend\n", "chars/hero.blend\n"]) == {
         "a.blend": "out/a.blend",
         "chars/hero.blend": "out/chars/hero.blend",
@@ -150,6 +141,7 @@ method = "lbs"
 exclude = [
     "Proxy*",  # said for all
 ]
+scale = "3.x"
 
 [[objects]]
 match = "Face"
@@ -159,10 +151,12 @@ method = "dq"
 match = ["hero*.blend", "old/*.blend"]
 method = "dq"
 exclude = []
+scale = "none"
 
 [[files.objects]]
 match = "Face*"
 method = "lbs"
+scale = "4.0"
 """
 
 
@@ -175,16 +169,12 @@ def test_settings_of_files(tmp_path):
     job = read(tmp_path, JOB)
     assert job.inputs == (str(tmp_path / "chars"),)
     assert job.out == str(tmp_path / "done")
-    plain = job.settings_of(Path("/x/a.blend"), Settings())
-    none = {"scale": None, "set": []}
-    face = {"match": "Face", "method": "dq"}
-    assert plain.as_task() == none | {
-        "method": "lbs", "include": [], "exclude": ["Proxy*"], "objects": [face]
-    }  # fmt: skip
-    hero = job.settings_of(Path("/x/hero 1.blend"), Settings())
-    assert hero.as_task() == none | {
-        "method": "dq", "include": [], "exclude": [], "objects": [face, {"match": "Face*", "method": "lbs"}]
-    }  # fmt: skip
+    plain = job.settings_of(Path("/x/a.blend"), Settings()).as_task()
+    face, of_hero = {"match": "Face", "method": "dq"}, {"match": "Face*", "method": "lbs", "scale": "4.0"}
+    of_all = {"include": [], "set": []}
+    assert plain == of_all | {"method": "lbs", "scale": "3.x", "exclude": ["Proxy*"], "objects": [face]}
+    hero = job.settings_of(Path("/x/hero 1.blend"), Settings()).as_task()
+    assert hero == of_all | {"method": "dq", "scale": "none", "exclude": [], "objects": [face, of_hero]}
     assert job.settings_of(Path("/x/old/a.blend"), Settings()).method == "dq"
     # The command line applies to all files, a rule to its own.
     given = Settings(method="dq", include=("Body",))
@@ -205,68 +195,33 @@ def test_a_byte_order_mark_is_no_key(tmp_path):
     assert read(tmp_path, "\ufeff" + JOB).settings.method == "lbs"
 
 
-SCALES = """\
-scale = "3.x"
-
-[[objects]]
-match = "Cape"
-scale = "none"
-
-[[files]]
-match = "hero.blend"
-scale = "none"
-
-[[files.objects]]
-match = "Face"
-scale = "4.0"
-"""
-
-
-def test_scale_of_files_and_objects(tmp_path):
-    job = read(tmp_path, SCALES)
-    assert job.settings_of(Path("/x/a.blend"), Settings()).scale == "3.x"
-    hero = job.settings_of(Path("/x/hero.blend"), Settings())
-    assert hero.scale == "none"
-    assert hero.as_task()["objects"] == [
-        {"match": "Cape", "scale": "none"},
-        {"match": "Face", "scale": "4.0"},
-    ]
-
-
 @pytest.mark.parametrize(
-    ("job", "old", "new", "line", "sentence"),
+    ("old", "new", "line", "sentence"),
     [
+        ('method = "lbs"\nexclude', 'method = "best"\nexclude', 4, "expected one of lbs, dq, got 'best'"),
+        ('out = "done"', "out = 3", 3, "out: expected text in quotes, got 3"),
+        ('out = "done"', 'output = "done"', 3, "output: no such key; expected one of inputs"),
+        ('"Proxy*",', "7,", 5, "exclude: expected a list such as"),
+        ('"3.x"', '"2.79"', 8, "scale: expected one of 4.0, 3.x, none, got '2.79'"),
+        ('match = "Face"\n', "", 10, "match is missing"),
+        ('method = "dq"\n\n[[files]]', "[[files]]", 10, "these objects have no settings"),
+        ('method = "dq"\nexclude', 'methd = "dq"\nexclude', 16, "methd: no such key"),
+        ('match = "Face*"\nmethod = "lbs"', 'match = "Face*"\nmethod = "dqs"', 22, "got 'dqs'"),
+        ('match = "Face*"\n', "match = []\n", 21, "match: expected text in quotes"),
+        ('match = ["hero*.blend", "old/*.blend"]', 'match = "."', 15, "match: expected paths such as"),
         (
-            JOB,
-            'method = "lbs"\nexclude',
-            'method = "best"\nexclude',
-            4,
-            "expected one of lbs, dq, got 'best'",
-        ),
-        (JOB, 'out = "done"', "out = 3", 3, "out: expected text in quotes, got 3"),
-        (JOB, 'out = "done"', 'output = "done"', 3, "output: no such key; expected one of inputs"),
-        (JOB, '"Proxy*",', "7,", 5, "exclude: expected a list such as"),
-        (JOB, 'match = "Face"\n', "", 9, "match is missing"),
-        (JOB, 'method = "dq"\nexclude', 'methd = "dq"\nexclude', 15, "methd: no such key"),
-        (JOB, 'match = "Face*"\nmethod = "lbs"', 'match = "Face*"\nmethod = "dqs"', 20, "got 'dqs'"),
-        (JOB, 'match = "Face*"\n', "match = []\n", 19, "match: expected text in quotes"),
-        (JOB, 'match = ["hero*.blend", "old/*.blend"]', 'match = "."', 14, "match: expected paths such as"),
-        (
-            JOB,
             "[[files.objects]]",
             "[files.objects]",
-            18,
+            20,
             r"objects: expected entries that begin with \[\[files.objects",
         ),
-        (SCALES, '"3.x"', '"2.79"', 1, "scale: expected one of 4.0, 3.x, none, got '2.79'"),
-        (SCALES, 'scale = "none"\n\n[[files]]', "[[files]]", 3, "these objects have no settings"),
-        (SCALES, '"4.0"', "4.0", 13, "scale: expected text in quotes, got 4.0"),
+        ('"4.0"', "4.0", 23, "scale: expected text in quotes, got 4.0"),
     ],
 )
-def test_errors_have_a_line(tmp_path, job, old, new, line, sentence):
-    assert job.count(old) == 1
+def test_errors_have_a_line(tmp_path, old, new, line, sentence):
+    assert JOB.count(old) == 1
     with pytest.raises(WrongUse, match=rf"job\.toml:{line}: .*{sentence}"):
-        read(tmp_path, job.replace(old, new))
+        read(tmp_path, JOB.replace(old, new))
 
 
 def test_parameters_of_files_and_objects(tmp_path):
