@@ -20,7 +20,7 @@ ROUNDS = 12
 
 
 def edits(obj: bpy.types.Object) -> dict[str, Callable[[int], None]]:
-    """Functions of a count that edit one object, by name; all that need no Sinew."""
+    """Edits of one object that need no Sinew: by name, functions of a running number."""
     armature, view_layer = obj.modifiers["Armature"].object, bpy.context.view_layer
 
     def add_empty(_count: int) -> None:

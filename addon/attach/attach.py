@@ -312,7 +312,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
             for (modifier, replaced), was_on in zip(pairs, before.modifiers, strict=True)
         )
         is_unknown = is_any_gone or nodes is None or is_animated(obj, nodes, f"show_{name}")
-        # Sinew's icon is still off where an animation has come to one that is off.
+        # Where an Armature modifier that was off is animated now, Sinew's icon is off until it is set below.
         is_unknown |= any(
             is_visibility_animated(obj, modifier)
             and not (replaced.visibility_is_keyed or getattr(replaced, f"show_{name}"))

@@ -249,7 +249,7 @@ def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Called when one of an object's Sinew settings was changed: its shape may differ, and what prevented it
     may be gone."""
     if plan_of(obj).state is State.REFUSED:
-        _forget_if_whole(obj)
+        _forget_unless_bare(obj)
     refresh(context, obj)
     # Blender then touches the object's mesh. In a window that is a separate evaluation; a script may change
     # weights before it.
@@ -257,7 +257,7 @@ def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
         expect_mesh_update(obj)
 
 
-def _forget_if_whole(obj: bpy.types.Object) -> None:
+def _forget_unless_bare(obj: bpy.types.Object) -> None:
     """Forgets the object, so that the next event reads it. Without an Armature modifier it stays refused:
     unknown, it would lose Sinew, and with it its settings."""
     if stack.armature_modifier(obj) is not None:
@@ -267,18 +267,11 @@ def _forget_if_whole(obj: bpy.types.Object) -> None:
 def read_again(obj: bpy.types.Object) -> None:
     """Has the next refresh() read mesh, weights and bones of the object again, also after an error, and
     switches it on. The caller suspends updates meanwhile."""
-    _forget_if_whole(obj)
+    _forget_unless_bare(obj)
     precomputations.stopped.clear()
     settings = properties.of(obj)
     if not settings.enabled:
         settings.enabled = True
-
-
-def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Reads the object again, as read_again(), at once."""
-    with updates_suspended():
-        read_again(obj)
-    refresh(context, obj)
 
 
 # --- Reactions to an evaluation
@@ -305,6 +298,7 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
             state.needs_recheck |= changes.lost
         for obj in objects_with_sinew(changes):
             _update(obj, depsgraph, changes)
+        # Undo would free what it refers to.
         normals.users_of_all.cache_clear()
         _find_pairs(objects_with_sinew(Changes()))
         for obj, state in current.pairs:

@@ -163,7 +163,7 @@ class _Event:
             return skinned.shown.frames is not None and after_update.shape(obj, skinned, depsgraph)
 
     def _may_be_other(self, skinned: SkinnedObject) -> bool:
-        """Whether the object itself may not be as it was when its plan was applied."""
+        """Whether the object, or what is around it, may not be as it was when its plan was applied."""
         obj, changes = self.obj, self.changes
         if changes.structure:
             # Of undo steps and of other depsgraphs not all is listed.

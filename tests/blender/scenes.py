@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
 from sinew_addon.attach import attach, stack
+from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.deform import session
 
 # Documented tolerance against the Armature modifier, relative to the bounding box's diagonal.
@@ -160,6 +161,13 @@ def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume:
 
 def add_sinew(obj: bpy.types.Object, method: str | None = None) -> None:
     attach.add(obj, method)
+    session.refresh(bpy.context)
+
+
+def rebind(obj: bpy.types.Object) -> None:
+    """As the panel's Rebind, of one object that need not be selected."""
+    with updates_suspended():
+        session.read_again(obj)
     session.refresh(bpy.context)
 
 

@@ -129,7 +129,7 @@ def test_a_driver_that_gives_no_method_is_said_so():
     variable.targets[0].id, variable.targets[0].data_path = obj, '["number"]'
     for number, error in ((1, ""), (999, "the driver of its method")):
         obj["number"] = number
-        session.rebind(obj, bpy.context)
+        scenes.rebind(obj)
         bpy.context.scene.frame_set(11)
         bpy.context.view_layer.update()
         assert error in properties.of(obj).error

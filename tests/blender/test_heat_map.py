@@ -282,7 +282,7 @@ def test_colours_wait_for_a_point_buffer_that_is_empty():
     pairs = session.states_of([obj], depsgraph)
     properties.of(obj).storage.point_buffer.data.clear_geometry()
     heat_map.update(pairs, depsgraph)
-    session.rebind(obj, bpy.context)
+    scenes.rebind(obj)
     bpy.context.view_layer.update()
     assert np.array_equal(shown_colours(obj), before)
 

@@ -131,5 +131,5 @@ def test_while_sinew_is_at_work():
     assert session.state_of(obj).bound.facts.warnings == ()
     obj.modifiers["Armature"].vertex_group = ""
     bpy.context.view_layer.update()
-    session.rebind(obj, bpy.context)
+    scenes.rebind(obj)
     assert any(GROUP in warning for warning in session.state_of(obj).bound.facts.warnings)

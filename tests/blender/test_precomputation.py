@@ -197,7 +197,7 @@ def test_a_render_waits_also_for_what_was_stopped(gate, in_window, rendered_poin
     points = rendered_points(obj)
     forget_made()
     precomputations.waits = True
-    session.rebind(obj, bpy.context)
+    scenes.rebind(obj)
     assert scenes.worst(points, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
@@ -238,7 +238,7 @@ def test_while_weights_are_painted_the_old_centres_serve(gate, route):
     assert scenes.worst(by_old, by_new) > 1e-4
     forget_made()
     precomputations.waits = True
-    session.rebind(obj, bpy.context)
+    scenes.rebind(obj)
     assert scenes.worst(by_new, scenes.final_points(obj)) == 0.0
 
 
@@ -303,7 +303,7 @@ def test_a_keyed_method_is_asked_for_when_it_comes(gate, route):
     session.refresh(bpy.context)
     gate.count = 0
     forget_made()
-    session.rebind(obj, bpy.context)
+    scenes.rebind(obj)
     precomputations.waits = False
     bpy.context.scene.frame_set(FRAME)
     look_until_done()

@@ -154,8 +154,8 @@ def test_that_mmd_tools_deforms_it_too_is_said():
     obj = make_model()[0]
     scenes.add_sinew(obj, "sdef")
     key = obj.shape_key_add(name="mmd_sdef_skinning", from_mix=False)
-    session.rebind(obj, bpy.context)
+    scenes.rebind(obj)
     assert any("unbind its SDEF" in text for text in session.state_of(obj).bound.facts.warnings)
     key.mute = True
-    session.rebind(obj, bpy.context)
+    scenes.rebind(obj)
     assert not any("unbind" in text for text in session.state_of(obj).bound.facts.warnings)

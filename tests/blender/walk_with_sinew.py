@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import routes
+import scenes
 import sinew
 import sinew_addon
 from sinew_addon.attach import attach, other_tools, properties, stack, stage_settings, undeformed
@@ -196,7 +197,7 @@ class SinewSide(Side):
             raise ValueError(f"{obj.name}: nothing says that Sinew can not be in front of {modifier.name}")
 
     def rebind(self, obj: bpy.types.Object) -> None:
-        session.rebind(obj, bpy.context)
+        scenes.rebind(obj)
 
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
         setattr(obj.sinew, name, value)
