@@ -128,8 +128,9 @@ class FrameOfRig:
         for bones, at_rest, posed in rigs:
             rest_axes.append(bone_axes(bones, at_rest))
             posed_axes.append(bone_axes(bones, posed))
-            # An armature of zero scale moves nothing that could be measured.
-            motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
+            # An armature whose scale is zero or no number moves nothing that could be measured.
+            is_finite = np.isfinite(at_rest).all(axis=(1, 2), keepdims=True)
+            motions.append(posed[:, :3, :3] @ np.linalg.pinv(np.where(is_finite, at_rest, 0.0)[:, :3, :3]))
         return cls(rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
 
     @cached_property

@@ -494,9 +494,13 @@ def _follow_removal(obj: bpy.types.Object, plan: Plan, changes: Changes) -> bool
 def _remove_groups_taken_apart(changes: Changes) -> None:
     """Removes node groups that were changed: their objects then get new ones, or an error where that happens
     again and again."""
-    for group in node_group.taken_apart() if changes.node_groups and may_change_file() else ():
-        log.warning("The node group %s is Sinew's own: it was changed, and is made again", group.name)
-        bpy.data.node_groups.remove(group)
+    if not (changes.node_groups and may_change_file()):
+        return
+    # A group that had a removed one inside is then changed, too.
+    while groups := node_group.taken_apart():
+        for group in groups:
+            log.warning("The node group %s is Sinew's own: it was changed, and is made again", group.name)
+            bpy.data.node_groups.remove(group)
 
 
 def _adopt_copied_modifiers(changes: Changes) -> None:

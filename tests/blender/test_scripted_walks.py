@@ -36,6 +36,9 @@ CASES = {
     "frame 6; leave_mode; frame 11",
     "a linked duplicate made single": "add Arm; duplicate Arm; frame 3; swap_mesh 'object 1'; frame 6; "
     "remove_all",
+    "nodes inside those of a heat map": "add Leg dq; heat Leg bulge; add Arm lbs; delete_points Arm nodes",
+    "a heat map of a rig without size": "add Leg 0.9 cor; heat Leg bulge; no_size 'Other Rig' 2 4; "
+    "no_size 'Other Rig' 3 4; no_size Leg 2 4",
     "hair of another beside a heat map": "add_shape_key Box; hair Box; add_modifier Box SOLIDIFY 0.9; "
     "add Arm dq; heat Arm; save_and_load; view_layer; delete_modifier Box 'Solidify 3'; "
     "shape_key_value Box 0.9 0.9",
