@@ -279,6 +279,8 @@ CASES = {
     "undo; frame 4; redo; frame 11",
     "applied and undone": "+add Arm dq; +frame 6; +apply_modifier Arm; frame 11; undo; frame 4; redo; "
     "frame 9",
+    "drivers of what was applied": "drive_visibility Leg 'Other Rig' Armature; add Leg; apply_modifier Leg; "
+    "copy_modifiers Sleeve Leg; frame 5",
     "applied at rest": "add Arm dq; apply_modifier Arm; frame 11; remove_all",
     "converted and undone": "+add Arm dq; +frame 6; +convert_to_mesh Arm; frame 11; undo; frame 4",
     "an armature deleted and undone": "+add Arm; +add Leg; +frame 6; +delete_armature Rig; frame 11; undo; "
