@@ -1561,7 +1561,13 @@ def apply_modifier(w: Walker, r: random.Random) -> None:
     w.before_evaluation()
     # A window has evaluated newly appended objects.
     bpy.context.view_layer.update()
+    paths = [
+        m.path_from_id(f"show_{where}") for m in armature_modifiers(obj) for where in ("viewport", "render")
+    ]
     w.side.apply(obj)
+    # Blender leaves drivers of what it applies, though not of what it removes.
+    for path in paths:
+        obj.driver_remove(path)
     obj.data.name, obj.data[SHAPED] = w.new_name("mesh"), True
 
 

@@ -412,11 +412,7 @@ class BlenderSide(Side):
             if not is_shown:
                 # By its own choice, not by Sinew's method.
                 modifier.use_deform_preserve_volume = modifier.show_expanded
-            paths = [modifier.path_from_id(f"show_{where}") for where in ("viewport", "render")]
             bpy.ops.object.modifier_apply(modifier=modifier.name)
-            # Blender leaves drivers of what it applied, though not of what it removes, as Sinew does.
-            for path in paths if is_shown else ():
-                obj.driver_remove(path)
         if is_shown:
             obj.pass_index = 0
         else:
