@@ -30,6 +30,15 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
     return pack_mix(mesh, weights);
 }
 
+/// Copies the points of the vertices in blocks [begin, end).
+void copy_points(const PackedMesh& mesh, std::span<const Vec3<float>> from, Strided<Vec3<float>> to,
+                 std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+        for (const std::int32_t vertex : std::span(mesh.vertices[b].lane).first(mesh.blocks[b].vertices))
+            to[vertex] = from[static_cast<std::size_t>(vertex)];
+    }
+}
+
 }  // namespace
 
 struct Deformer::State {
@@ -118,6 +127,9 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     const PackedBinding& packed = *state_->packed;
     if (points.size() != packed.vertex_count) return false;
     const PaletteStore::Reading reading(state_->palettes);
+    const std::span<Vec3<float>> deformed =
+        points.is_contiguous() ? std::span(points.data(), points.size()) : reading.points(points.size());
+    if (deformed.size() != points.size()) return false;
     const Bones bones{packed.mesh.used_bones,   packed.stretched_bones, posed_from_rest,  packed.rest_bones,
                       options.bones_from_model, &state_->sets,          options.rotations};
     const SpaceRows rows(options.bones_from_model);
@@ -137,7 +149,7 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
                      &palette,
                      rows.spaces(),
                      parameters[k].data(),
-                     points};
+                     deformed};
     }
     parallel_for_blocks(packed.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {
         if (state_->mix) {
@@ -145,6 +157,7 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         } else {
             state_->kernels[0]->deform[target_in_use()](frames[0], begin, end);
         }
+        if (!points.is_contiguous()) copy_points(packed.mesh, deformed, points, begin, end);
     });
     return true;
 }

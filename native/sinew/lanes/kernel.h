@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "sinew/base/strided.h"
 #include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
@@ -48,7 +47,7 @@ struct Frame {
     const Palette* palette;
     Spaces spaces;
     const double* parameters;  // [MethodInfo::parameters] valid_value() of each
-    Strided<Vec3<float>> points;
+    std::span<Vec3<float>> points;
 };
 
 /// How the library deforms whole meshes with one method: five functions. Registered in methods/NAME/NAME.cpp by

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "hwy/highway.h"
+#include "sinew/base/strided.h"
 #include "sinew/lanes/kernel.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -351,47 +352,8 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>*
 
 #endif
 
-/// Stores each point by itself.
-///
-/// to_point  returns where that of a lane is
-///
-/// Not inlined into store_points, whose stack frame would grow for every block.
-template <class D, class ToPoint>
-HWY_NOINLINE void store_apart(D d, Vec<D> x, Vec<D> y, Vec<D> z, const ToPoint& to_point) {
-    alignas(64) float rows[3][hn::MaxLanes(D())];
-    hn::Store(x, d, rows[0]);
-    hn::Store(y, d, rows[1]);
-    hn::Store(z, d, rows[2]);
-    for (std::size_t i = 0; i < hn::Lanes(d); ++i) to_point(i) = {rows[0][i], rows[1][i], rows[2][i]};
-}
-
-/// The inverse of store_apart().
-template <class D, class ToPoint>
-HWY_NOINLINE Points<D> load_apart(D d, const ToPoint& to_point) {
-    alignas(64) float rows[3][hn::MaxLanes(D())];
-    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-        const Vec3<float>& point = to_point(i);
-        rows[0][i] = point.x, rows[1][i] = point.y, rows[2][i] = point.z;
-    }
-    return {hn::Load(d, rows[0]), hn::Load(d, rows[1]), hn::Load(d, rows[2])};
-}
-
-/// Elements from `i` on.
-template <class D>
-HWY_INLINE Points<D> load_at(D d, const Strided<const Vec3<float>>& from, std::size_t i) {
-    if (from.is_contiguous()) return load_consecutive(d, &from[i].x);
-    return load_apart(
-        d, [ from, i ](std::size_t k) -> auto& { return from[i + k]; });
-}
-
-template <class D>
-HWY_INLINE void store_at(D d, const Points<D>& p, const Strided<Vec3<float>>& to, std::size_t i) {
-    if (to.is_contiguous()) return store_consecutive(d, p, &to[i].x);
-    store_apart(
-        d, p.x, p.y, p.z, [ to, i ](std::size_t k) -> auto& { return to[i + k]; });
-}
-
-/// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it again.
+/// Writes lanes [lane, lane + N) of block `b`, to points with nothing between them. Lanes that repeat the last vertex
+/// write it again.
 template <class D>
 HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::size_t lane,
                              const Points<D>& p) {
@@ -400,12 +362,6 @@ HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::si
     if constexpr (hn::MaxLanes(D()) == 1) {
         store_consecutive(d, p, &to.points[*vertices].x);
     } else {
-        if (HWY_UNLIKELY(!to.points.is_contiguous())) {
-            // A copy: of what a function refers to, the compiler would reload the members.
-            return store_apart(
-                d, p.x, p.y, p.z,
-                [ vertices, points = to.points ](std::size_t i) -> auto& { return points[vertices[i]]; });
-        }
         Vec3<float>* const points = to.points.data();
         if (block.consecutive) return store_consecutive(d, p, &points[block.output + lane].x);
 #if HWY_TARGET == HWY_AVX3

@@ -251,7 +251,12 @@ private:
     /// Fills PackedMesh::pairs. Takes linear time, as a mesh may have as many sets of bones as vertices.
     void list_bone_pairs() {
         std::unordered_set<std::uint64_t> pairs;
+        const Block* before = nullptr;
         for (const Block& block : mesh_.blocks) {
+            if (block.influences == 0) continue;
+            const bool is_as_before = before != nullptr && block.first_bone == before->first_bone;
+            before = &block;
+            if (is_as_before) continue;
             const std::size_t sets = block.own_bones ? block.vertices : 1;
             for (std::size_t i = 0; i < sets; ++i) {
                 const auto bones =

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "sinew/base/strided.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "sinew/base/strided.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
 
