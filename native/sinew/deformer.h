@@ -67,8 +67,8 @@ public:
     /// Writes the deformed points, model space.
     ///
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
-    /// points           [vertices], in a vertex buffer, too: the first such call of a thread allocates a copy, and
-    ///                  returns false where there is no memory for it
+    /// points           [vertices], in a vertex buffer, too. The first such call of a thread allocates memory for a
+    ///                  copy, and returns false if there is none
     ///
     /// A vertex without influences, or with only weights of 0, stays at rest.
     [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,

@@ -37,7 +37,7 @@ class ComparingEngine(bpy.types.RenderEngine):
         )
         self.end_result(result)
         if depsgraph.scene.frame_current == self.stops_at:
-            # What an engine's error does, Esc does: a simulated key stops no render.
+            # Blender then stops as by Esc. A simulated Esc stops no render.
             self.report({"ERROR"}, "stopped")
 
 

@@ -12,8 +12,8 @@
 
 namespace sinew {
 
-/// What each thread that deforms a mesh writes: palettes, and points. Also a readers-writer lock for the mesh: many threads may deform,
-/// or one may change the rest points.
+/// What each thread that deforms a mesh writes: palettes, and points. Also a readers-writer lock for the mesh: many
+/// threads may deform, or one may change the rest points.
 ///
 /// The first thread's palettes are allocated with the mesh, those of another when more threads than ever before
 /// deform at once. A thread waits only while kMax others deform this very mesh, while its rest points are being
