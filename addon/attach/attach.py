@@ -109,9 +109,11 @@ def check_behind(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
             )
 
 
-def add(obj: bpy.types.Object, method: str | None = None) -> None:
+def add(obj: bpy.types.Object, method: str | None = None, is_shown: bool = True) -> None:
     """Puts Sinew on an object. It deforms after the next session.refresh(). Without `method`, each Armature
     modifier keeps its own method.
+
+    is_shown  it deforms also where the Armature modifiers are off in both views
 
     Raises SinewError, and changes nothing, where that is not possible.
     """
@@ -122,13 +124,15 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
         return
     check_can_add(obj)
     with updates_suspended():
-        _add(obj, method)
+        _add(obj, method, is_shown)
 
 
-def _add(obj: bpy.types.Object, method: str | None) -> None:
+def _add(obj: bpy.types.Object, method: str | None, is_shown: bool) -> None:
     active, before = obj.modifiers.active, {modifier.name for modifier in obj.modifiers}
     try:
         _replace_modifiers(obj, method)
+        if is_shown and not stack.visibility_is_animated(obj):
+            _begin_with_icons(obj)
     except Exception as error:
         parent_type = properties.of(obj).before.parent_type
         properties.clear(obj)
@@ -164,8 +168,6 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
         replaced.armature = modifier.object
         if method is None and method_of(modifier) != settings.method:
             replaced.method = method_of(modifier)
-    if not stack.visibility_is_animated(obj):
-        _begin_with_icons(obj)
 
 
 def _begin_with_icons(obj: bpy.types.Object) -> None:
@@ -527,11 +529,18 @@ def _replaced_modifier(
     replaced_modifiers = properties.of(obj).replaced_modifiers
     found = next((s for s in replaced_modifiers if stack.modifier_of(obj, s) == modifier), None)
     if found is None:
+        situation, nodes = Situation(properties.of(obj).stack.situation), sinew_modifier(obj)
+        is_alone = situation is Situation.ALONE
+        known = [(stack.modifier_of(obj, each), each) for each in replaced_modifiers]
+        known = [pair for pair in known if pair[0] is not None]
+        for name in VIEWS if situation.is_by_sinew and known else ():
+            view = _view(obj, known, name)
+            if view.deformer is Deformer.NOTHING and not view.hidden and getattr(modifier, f"show_{name}"):
+                # Sinew's icon was off as nothing deformed it, which ends.
+                _show_in(nodes, name, True)
         found = replaced_modifiers.add()
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
         found.visibility_is_keyed = is_visibility_animated(obj, modifier)
-        is_alone = Situation(properties.of(obj).stack.situation) is Situation.ALONE
-        nodes = sinew_modifier(obj)
         for name in () if found.visibility_is_keyed else VIEWS:
             if getattr(properties.of(obj).stack, f"hidden_{name}"):
                 # Whoever added it while Sinew is hidden means it to deform.

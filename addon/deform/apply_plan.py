@@ -130,9 +130,9 @@ def apply_driver(obj: bpy.types.Object, bound: Bound, wanted: Plan) -> None:
     pose_driver.ensure(obj, list(dict.fromkeys(poses)), wanted.is_in_depsgraph)
 
 
-def apply_saved(obj: bpy.types.Object) -> None:
+def apply_saved(obj: bpy.types.Object, plan: Plan) -> None:
     """Prepares an object for a Blender without Sinew: its Armature modifiers deform, with the shape nearest
-    to Sinew's. apply_resumed() reverses this."""
+    to Sinew's, or where an error prevents Sinew with the same as now. apply_resumed() reverses this."""
     settings = properties.of(obj)
     if not (settings.replaces_modifiers or settings.enabled):
         return
@@ -140,7 +140,7 @@ def apply_saved(obj: bpy.types.Object) -> None:
     attach.switch(obj, on=False)
     # What was set for a mode may not be the nearest.
     attach.restore_volume(obj)
-    if attach.deforms(obj):
+    if attach.deforms(obj) and plan.state is not State.REFUSED:
         attach.use_nearest_volume(obj)
 
 
@@ -213,7 +213,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
     if origin is None or attach.armature_of(obj) is None:
         return True
     try:
-        attach.add(obj, properties.of(origin).method)
+        # Where keys had the original's modifiers off, the copy's are off.
+        attach.add(obj, properties.of(origin).method, attach.was_off(origin))
     except SinewError as error:
         log.error("%s", error)
         return True

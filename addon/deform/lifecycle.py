@@ -141,7 +141,7 @@ def prepare_for_save() -> None:
     with updates_suspended():
         for obj in objects:
             with _logging_failure("A Blender without Sinew will not show it posed", obj):
-                apply_plan.apply_saved(obj)
+                apply_plan.apply_saved(obj, session.plan_of(obj))
                 overrides.store(obj)
         with _logging_failure("What the methods need is not in the file, and is computed again"):
             precomputing.store_in_meshes([(obj, session.state_of(obj)) for obj in objects])

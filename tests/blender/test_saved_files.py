@@ -215,10 +215,10 @@ def test_what_fails_for_an_object_while_saving_is_in_its_panel(tmp_path, monkeyp
     expected = scenes.shapes(obj, FRAMES)
     prepare = apply_plan.apply_saved
 
-    def fail_for_one(each):
+    def fail_for_one(each, plan):
         if each == obj:
             raise RuntimeError("disk on fire")
-        return prepare(each)
+        return prepare(each, plan)
 
     monkeypatch.setattr(apply_plan, "apply_saved", fail_for_one)
     save(tmp_path / "saved.blend")

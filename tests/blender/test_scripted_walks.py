@@ -70,6 +70,8 @@ CASES = {
     "save_and_load; frame 9; remove_all",
     "a comparison saved of what changes in front": "add_modifier Arm SUBSURF; add Arm; compare Arm 2 lbs dq; "
     "save_and_load; frame 6; end_comparison; remove_all",
+    "a method keyed beside a comparison": "key_object Arm 2 9; add Arm 0.9 qv; compare Arm 1; "
+    "key_method Arm 1 8 dq lbs; frame 5; remove Arm; add Arm 0.9 log; frame 6; end_comparison; remove_all",
     # Armatures
     "a deleted armature": "add Arm; add Leg; delete_armature Rig; frame 6; says Arm 'armature was deleted'; "
     "frame 11; remove Arm; frame 6",
@@ -129,6 +131,8 @@ CASES = {
     "remove Box",
     "copied modifiers with keys": "key_visibility Arm 2 9 0.0; add Arm dq; frame 6; copy_modifiers Arm Box; "
     "remove Box; frame 11",
+    "copied modifiers that keys hide": "duplicate Sleeve; key_visibility 'object 1' Armature 3 8; "
+    "add 'object 1'; frame 5; copy_modifiers 'object 1' Sleeve; frame 8; method Sleeve dq; remove Sleeve",
     "copied modifiers with a mix": "add Arm; stages Arm 1; copy_modifiers Arm Box; frame 6; frame 11",
     "decimated while its weights are painted": "add_modifier Arm DECIMATE; add Arm dq; frame 8; "
     "paint_weights Arm smooth 0.9; frame 6; leave_mode; frame 8",
@@ -136,6 +140,8 @@ CASES = {
     "frame 6; leave_mode; frame 8",
     "absolute keys in weight paint": "key_visibility Arm 1 5 1.0; add_shape_key Arm; add Arm dq; "
     "sculpt_mode Arm 0.9; absolute_shape_keys Arm; paint_weights Arm smooth 0.9; leave_mode; frame 6",
+    "saved behind a simulation": "add Arm dq; hair Arm FACE; move_modifier Arm 'Hair 1' Armature; frame 4; "
+    "save; save_and_load; move_modifier Arm Armature 'Hair 1'; frame 6; save",
     "saved with its nodes taken apart": "add Arm dq; frame 6; ~delete_points Arm links; save; frame 8; "
     "frame 9",
     # Keys of visibility
@@ -176,6 +182,8 @@ CASES = {
     "delete_modifier Arm 'Armature 1' 0.1 0.1; frame 11",
     "a third added": "add_modifier Arm ARMATURE 'Other Rig' 0.9; add Arm; frame 6; "
     "add_modifier Arm ARMATURE Rig 0.9 0.9; frame 11; remove Arm; frame 6",
+    "a second one where the first is off in the viewport": "toggle_modifier Arm Armature 0.9; add Arm dq; "
+    "add_modifier Arm Rig ARMATURE; frame 9; remove Arm",
     "chained ones swapped": "add_modifier Arm ARMATURE 'Other Rig' 0.9 0.1; add Arm; frame 6; "
     "move_modifier Arm Armature 'Armature 1'; frame 11; move_modifier Arm Armature 'Armature 1'; frame 6; "
     "remove Arm",

@@ -40,8 +40,9 @@ TOLERANCE = 1e-5
 ROUTES = {"evaluation": "fast", "update": "safe"}
 # Steps in one file: as many as a failing walk can reasonably be reduced from.
 EPISODE = 120
-# A time limit for steps that hang.
+# Time limits in seconds: for steps that hang, and for Blender to start, which a busy machine delays.
 LIMIT = 60.0
+START_LIMIT = 600.0
 # After these, a comparison's copies still show what their originals show: they do not follow changes of an
 # original's modifiers and stages.
 FOLLOWED = {
@@ -182,12 +183,12 @@ class Side:
         except BrokenPipeError:
             raise EndedError(self.last_words()) from None
 
-    def receive(self) -> dict:
+    def receive(self, limit: float = LIMIT) -> dict:
         import select
 
-        ready, _w, _x = select.select([self.process.stdout], [], [], LIMIT)
+        ready, _w, _x = select.select([self.process.stdout], [], [], limit)
         if not ready:
-            raise EndedError(f"{self.role}: no answer in {LIMIT:.0f} s")
+            raise EndedError(f"{self.role}: no answer in {limit:.0f} s")
         try:
             return pickle.load(self.process.stdout)
         except (EOFError, pickle.UnpicklingError):
@@ -231,7 +232,7 @@ class Pair:
         """What a Blender without Sinew shows of a file."""
         if self.reader is None:
             self.reader = Side("blender", ROUTES[self.route])
-            self.reader.receive()
+            self.reader.receive(START_LIMIT)
         self.reader.send(what="open", path=str(path))
         return self.reader.receive()
 
@@ -240,7 +241,7 @@ class Pair:
             # Without buffering in Python: select does not see what is in a buffer.
             self.sides = (Side("sinew", ROUTES[self.route]), Side("blender", ROUTES[self.route]))
             for side in self.sides:
-                self.blender = side.receive()["blender"]
+                self.blender = side.receive(START_LIMIT)["blender"]
         return self.sides
 
 

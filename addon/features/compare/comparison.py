@@ -188,6 +188,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     original = properties.of(obj) if properties.has_sinew(obj) else None
     replaced = corrective_smooth.replaced_modifier(obj) if original is not None else None
     smooth = replaced.name if replaced is not None else None
+    _use_own_actions(copy)
     _take_sinew_off(copy)
     for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:
         copy.modifiers.remove(modifier)
@@ -214,7 +215,6 @@ def _take_sinew_off(copy: bpy.types.Object) -> None:
     """Makes a copy like its original before Sinew was added."""
     if not properties.has_sinew(copy):
         return
-    _use_own_actions(copy)
     # The referenced objects belong to the original.
     storage = properties.of(copy).storage
     storage.point_buffer = storage.upstream_proxy = None
@@ -227,14 +227,11 @@ def _take_sinew_off(copy: bpy.types.Object) -> None:
 
 
 def _use_own_actions(copy: bpy.types.Object) -> None:
-    """Gives the copy its own actions, so that keys of Sinew's settings can be removed: each copy keeps its
-    method."""
+    """Gives the copy its own actions, without keys of the original's settings now or later: each copy keeps
+    its method."""
     animation = copy.animation_data
-    if animation is None:
-        return
-    for player in players(animation):
-        curves = actions.all_curves(player.action, actions.slot_of(player))
-        if any(curve.data_path.startswith("sinew.") for curve in curves):
+    for player in players(animation) if animation is not None else ():
+        if player.action is not None:
             handle = actions.handle_of(actions.slot_of(player))
             actions.play_by_handle(player, player.action.copy(), handle)
             player.action[ACTION_MARK] = True
