@@ -126,6 +126,8 @@ def apply_driver(obj: bpy.types.Object, bound: Bound, wanted: Plan) -> None:
         )
         if replaced.armature is not None
         for path in armature_io.paths_to_wait_for(replaced.armature, stage.deformer.moving_bones)
+        # One that moves no vertex collapses all of them where it has no size.
+        or [pose_driver.WORLD_MATRIX]
     ]
     pose_driver.ensure(obj, list(dict.fromkeys(poses)), wanted.is_in_depsgraph)
 

@@ -54,6 +54,8 @@ CASES = {
     "weights": "add Arm; frame 11; weights Arm upper; frame 6; weights Arm lower; weights Arm hand 0.1; "
     "update",
     "without size": "add Arm; no_size Arm 0 6 1 11; no_size Rig 1 6 1 11; no_size Arm 2 6 1 11; frame 11",
+    "without size, of an armature that moves no vertex": "add Arm dq; armature_options Arm groups; "
+    "no_size Rig 1 1",
     "without size, by dq": "add Arm dq; no_size Arm 1 6 1 11; no_size Rig 0 6 1 11; no_size Rig 3 6 1 11; "
     "frame 11",
     "without size, in a parent": "add Arm; parent Arm Rig OBJECT; no_size Rig 1 6 1 11; "

@@ -285,6 +285,8 @@ class Child:
                 any(".show_" in path for path in animated)
                 or len(modifiers) != 1
                 or method not in ("blender", *self.sides.OF_BLENDER)
+                # As after Add, its copies deform nevertheless.
+                or (method != "blender" and not (modifiers[0].show_viewport or modifiers[0].show_render))
                 or (method != "blender" and self.side.stages(obj))
                 or (method != "blender" and self.has_other_scale(obj))
                 or obj.data.is_editmode

@@ -919,10 +919,12 @@ _KEEP_COLLAPSED = {"ARMATURE", "SUBSURF", "MIRROR", "TRIANGULATE", "MASK"}
 
 def _is_collapsed_once(obj: bpy.types.Object) -> bool:
     """Whether one transform of the mesh and its armatures has no inverse. Where two have none, or one nearly
-    has none, rounding decides the shape. Where one is hidden, its transform may be an earlier one."""
-    armatures = (modifier.object for modifier in armature_modifiers(obj))
-    all_of = [obj, *(each for each in armatures if each is not None)]
-    if not all(each.visible_get() for each in all_of):
+    has none, rounding decides the shape. Where one is hidden, its transform may be an earlier one. Inverse
+    kinematics of an armature without size gives bones matrices that transform nothing."""
+    armatures = [modifier.object for modifier in armature_modifiers(obj) if modifier.object is not None]
+    all_of = [obj, *armatures]
+    are_affine = all(bone.matrix[3][3] == 1.0 for each in armatures for bone in each.pose.bones)
+    if not (are_affine and all(each.visible_get() for each in all_of)):
         return False
     sizes = [abs(each.matrix_world.determinant()) for each in all_of]
     return sorted(size for size in sizes if size < 1e-6) == [0.0]

@@ -193,7 +193,8 @@ class SinewSide(Side):
                 said = ""
             except SinewError as error:
                 said = str(error)
-        if f"in front of {modifier.name} Blender permits" not in said:
+        sentences = (f"in front of {modifier.name} Blender permits", "its armature was deleted")
+        if not any(sentence in said for sentence in sentences):
             raise ValueError(f"{obj.name}: nothing says that Sinew can not be in front of {modifier.name}")
 
     def rebind(self, obj: bpy.types.Object) -> None:
