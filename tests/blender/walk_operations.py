@@ -1187,7 +1187,7 @@ def remesh(w: Walker, r: random.Random) -> None:
     """Another mesh without weights."""
     obj = w.editable(r)
     is_plain = w.users(obj.data) == 1 and obj.data.shape_keys is None
-    w.skip_if(not is_plain or w.compared or not w.select(obj))
+    w.skip_if(not is_plain or w.compared or bool(obj.data.get(SHAPED)) or not w.select(obj))
     obj.data.remesh_voxel_size = 0.15
     bpy.ops.object.voxel_remesh()
 
@@ -1302,7 +1302,7 @@ KINDS = (
 # After these modifiers, the result depends on the last bit of the shape.
 IN_FRONT = ("DECIMATE", "VERTEX_WEIGHT_EDIT")
 # For a mesh whose own shape was set from a deformed one, so that its last bits differ between the sides:
-# Decimate makes other faces of it (also without Sinew, if a mesh changes by rounding).
+# Decimate makes other faces of it (also without Sinew, if a mesh changes by rounding), and Remesh other weights.
 SHAPED = "shaped"
 
 
