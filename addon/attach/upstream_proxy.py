@@ -12,7 +12,7 @@ from ..core.errors import SinewError
 from ..core.influences import GroupWeights
 from ..io import mesh_compare
 from ..io.actions import animated_paths
-from . import properties, references, stack
+from . import node_group, properties, references, stack
 
 # A Multi Modifier directly behind one of these mixes with what it got, not with what it made.
 _MIXED_BY_MULTI_MODIFIERS = {"LATTICE", "MESH_DEFORM"}
@@ -217,12 +217,18 @@ def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy
     is_other = not isinstance(evaluated, bpy.types.Object) or evaluated.sinew.identity.token != token
     if is_other or not evaluated.is_evaluated:
         return None
-    # For a hidden object Blender may need only the transform, as a constraint's target: then it does not
-    # evaluate the upstream modifiers, and the mesh is their input.
     is_plain = evaluated.data == proxy.data.evaluated_get(depsgraph)
-    if is_plain and not obj.visible_get(view_layer=depsgraph.view_layer):
-        return None
-    return evaluated.data
+    return None if is_plain and not _is_requested(obj, depsgraph) else evaluated.data
+
+
+def _is_requested(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether Sinew's modifier needed the proxy's mesh in an evaluation. Blender may need only the transform,
+    as a constraint's target: then it does not evaluate the upstream modifiers, and the mesh is their
+    input."""
+    nodes = stack.sinew_modifier(obj.evaluated_get(depsgraph))
+    is_on = nodes is not None and (nodes.show_render if depsgraph.mode == "RENDER" else nodes.show_viewport)
+    is_visible = obj.visible_get(view_layer=depsgraph.view_layer)
+    return is_on and is_visible and node_group.get_input(nodes, "Upstream") is not None
 
 
 def known_weights(obj: bpy.types.Object) -> GroupWeights | None:

@@ -473,20 +473,24 @@ class SkinStack:
                 if not self.skin_stages[behind].multi or behind in starts:
                     break
                 starts[behind] = result
-            start, back = starts.get(number, result), frame.model_from_bones
+            start, back, mask = starts.get(number, result), frame.model_from_bones, skin_stage.mask
             if back is not None:
-                result = start = np.zeros_like(result)
+                start = np.zeros_like(result)
                 before = self._frames[number] if number < len(self._frames) else None
                 changed |= before is None or not are_equal(back, before.model_from_bones)
             is_end = skin_stage.deformer is self._end
             changed |= skin_stage.deformer.deform(start, frame, out if is_end else None)
-            if skin_stage.mask is not None:
-                result = result + skin_stage.mask[:, None] * (skin_stage.deformer.points - result)
+            moved = skin_stage.deformer.points
+            if back is not None:
+                if mask is not None and number not in starts:
+                    # As in Blender, only a vertex without any share is not brought to the origin.
+                    moved, mask = mask[:, None] * moved, mask > 0.0
+                moved = transformed(moved, back).astype(np.float32)
+            if mask is not None:
+                result = result + mask[:, None] * (moved - result)
             elif not is_end:
                 # A copy, as the next skin stage compares its input with the last one: the array must not be
                 # overwritten.
-                result = skin_stage.deformer.points.copy()
-            if back is not None:
-                result = transformed(result, back).astype(np.float32)
+                result = moved.copy()
         self._points = result
         return changed

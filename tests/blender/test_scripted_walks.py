@@ -56,6 +56,7 @@ CASES = {
     "without size": "add Arm; no_size Arm 0 6 1 11; no_size Rig 1 6 1 11; no_size Arm 2 6 1 11; frame 11",
     "without size, of an armature that moves no vertex": "add Arm dq; armature_options Arm groups; "
     "no_size Rig 1 1",
+    "without size, masked": "armature_options Sleeve Armature mask lower; add Sleeve; no_size Rig 1 3",
     "without size, by dq": "add Arm dq; no_size Arm 1 6 1 11; no_size Rig 0 6 1 11; no_size Rig 3 6 1 11; "
     "frame 11",
     "without size, in a parent": "add Arm; parent Arm Rig OBJECT; no_size Rig 1 6 1 11; "
@@ -110,6 +111,8 @@ CASES = {
     },
     "its sockets, while it is hidden": "add Arm dq; frame 11; hide Arm viewport; "
     "~delete_points Arm sockets; ~touch Arm; ik_chain Rig hand; hide Arm viewport; frame 6",
+    "its sockets, while another is edited": "add Arm; add_modifier Arm DECIMATE; duplicate Arm 0.9 0.9; "
+    "edit_mesh 'object 2' move 0.9; ~subframe 10 0.4; +delete_points Arm sockets; leave_mode; frame 5",
     "the same with a heat map, hidden": "add Arm dq; heat Arm; frame 11; hide Arm viewport; "
     "~delete_points Arm sockets; ~touch Arm; ik_chain Rig hand; hide Arm viewport; frame 6",
     "registered again at another frame": "add Arm dq; frame 8; restart 11; frame 3; frame 11",
@@ -218,6 +221,8 @@ CASES = {
     "render 0.9",
     "weights that change": "add_modifier Arm VERTEX_WEIGHT_EDIT lower; add Arm; frame 6; weights Arm lower; "
     "frame 11",
+    "weights that change, after a render by the Armature modifier": "add Arm dq; frame 11; "
+    "add_modifier Arm VERTEX_WEIGHT_EDIT lower; icons Arm 2 Sinew render Armature render; frame 5",
     "its vertex groups change": "add_modifier Arm SUBSURF; add Arm 0.9 log; frame 6; rename_bone Rig lower; "
     "frame 8; groups Arm rename upper; frame 9; groups Arm bone 'group 3' upper; groups Arm move; frame 4",
     "nodes": "add_modifier Arm NODES; add Arm; frame 6; move_vertices Arm; frame 11; remove_all",

@@ -1302,7 +1302,7 @@ KINDS = (
 # After these modifiers, the result depends on the last bit of the shape.
 IN_FRONT = ("DECIMATE", "VERTEX_WEIGHT_EDIT")
 # For a mesh whose own shape was set from a deformed one, so that its last bits differ between the sides:
-# Decimate makes other faces of it (also without Sinew, if a mesh changes by rounding), and Remesh other weights.
+# Decimate makes other faces of it (also without Sinew, if a mesh changes by rounding), Remesh other weights.
 SHAPED = "shaped"
 
 
