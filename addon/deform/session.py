@@ -22,6 +22,7 @@ from ..attach import (
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
 from ..core.errors import SinewError
+from ..core.icons import Deformer
 from ..core.precompute import precomputations
 from . import after_update, apply_plan, events, undo
 from .bound import uid
@@ -352,12 +353,14 @@ def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
 
 
 def waiting() -> set[tuple[int, int]]:
-    """Returns the objects that wait for Blender to evaluate their upstream proxy, each by its session_uid and
-    that of the proxy, which may be made anew meanwhile."""
+    """Returns the objects that wait until Blender evaluates their upstream proxy for the viewport, each by
+    its session_uid and that of the proxy, which may be made anew meanwhile."""
     return {
         (obj.session_uid, uid(properties.of(obj).storage.upstream_proxy))
         for obj in objects_with_sinew(Changes())
-        if plan_of(obj).state is State.WAITING_UPSTREAM and properties.of(obj).replaces_modifiers
+        if plan_of(obj).state is State.WAITING_UPSTREAM
+        and plan_of(obj).viewport is Deformer.SINEW
+        and properties.of(obj).replaces_modifiers
     }
 
 

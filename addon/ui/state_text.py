@@ -47,7 +47,9 @@ def sentence_of(obj: bpy.types.Object) -> str:
             text = "Off, and so is {modifiers} in the viewport"
         return tr(text, modifiers=replaced)
     method = tr(properties.method_label(settings.method))
-    if plan.uses_builtin or plan.state in (State.WAITING, State.WAITING_UPSTREAM):
+    # What is switched off in one view may wait until the other is evaluated.
+    is_waiting = plan.state is State.WAITING_UPSTREAM and not plan.view_reasons
+    if plan.uses_builtin or plan.state is State.WAITING or is_waiting:
         until = tr("{modifiers} deforms it until the next frame", modifiers=replaced)
         return ". ".join((method, *map(tr, reasons_of(obj) or (until,))))
     text = tr("{method} in the place of {modifiers}", method=method, modifiers=replaced)
