@@ -11,16 +11,7 @@ from rigs import LINEAR, about
 from sinew_addon.core import pose_helpers, pose_samples
 from sinew_addon.core.helper_bones import Motion, Wanted
 from sinew_addon.core.pose_samples import Joints
-from test_helper_bones import (
-    POSES,
-    SEGMENTS,
-    TUBE,
-    errors_of,
-    influences_of_tube,
-    motion_by,
-    played,
-    result_of,
-)
+from test_helper_bones import INFLUENCES, POSES, SEGMENTS, TUBE, errors_of, motion_by, played, result_of
 
 # Bones are along z, with Y along each bone.
 REST = np.tile(np.identity(4), (2, 1, 1))
@@ -43,7 +34,7 @@ def random_motion(method, count, seed, size=1.0):
     points = [deformer.deform((b @ REST).astype(np.float32), rest_inverses=inverses) for b in bones]
     rest = TUBE.points.astype(np.float32)[None]
     moved = np.array(bones)[:, :, :3]
-    return Motion(rest, np.array(points, dtype=np.float32), moved, influences_of_tube(), SEGMENTS)
+    return Motion(rest, np.array(points, dtype=np.float32), moved, INFLUENCES, SEGMENTS)
 
 
 def solved(motion, wanted):

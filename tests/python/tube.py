@@ -3,7 +3,7 @@
 
 import numpy as np
 import sinew
-from rigs import LINEAR, about, transform, translation
+from rigs import LINEAR, about, influences, transform, translation
 
 # The radius of ddm's smoothing.
 RADIUS = 0.26
@@ -26,13 +26,7 @@ class Tube:
 
     @property
     def mesh(self):
-        shared = self.weights > 0.0
-        return (
-            self.points.astype(np.float32),
-            np.concatenate([[0], np.cumsum(shared.sum(axis=1))]).astype(np.int32),
-            np.nonzero(shared)[1].astype(np.int32),
-            self.weights[shared].astype(np.float32),
-        )
+        return self.points.astype(np.float32), *influences(self.weights)
 
     def centres(self, **options):
         return sinew.centres_of_rotation(*self.mesh, self.triangles, **options).result()
