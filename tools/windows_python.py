@@ -102,7 +102,7 @@ def make(folder: Path) -> None:
 
 
 def make_once(folder: Path, make: Callable[[Path], None]) -> None:
-    """Has a folder filled if it is missing; it is there when it is whole."""
+    """Has a folder filled that is missing; it gets its name once it is whole."""
     if not folder.exists():
         BUILD.mkdir(parents=True, exist_ok=True)
         unfinished = Path(tempfile.mkdtemp(dir=BUILD))

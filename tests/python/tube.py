@@ -10,14 +10,15 @@ RADIUS = 0.26
 
 
 class Tube:
-    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over 1 unit."""
+    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over a length `over` about
+    `middle`."""
 
-    def __init__(self, rings=81, around=32):
+    def __init__(self, rings=81, around=32, middle=2.0, over=1.0):
         self.rings, self.around = rings, around
         along = np.repeat(np.linspace(0.0, 4.0, rings), around)
         angle = np.tile(np.linspace(0.0, 2.0 * np.pi, around, endpoint=False), rings)
         self.points = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), along])
-        t = np.clip(along - 1.5, 0.0, 1.0)
+        t = np.clip((along - middle) / over + 0.5, 0.0, 1.0)
         self.weights = np.column_stack([1.0 - t * t * (3.0 - 2.0 * t), t * t * (3.0 - 2.0 * t)])
         ring, i = np.divmod(np.arange((rings - 1) * around), around)
         near, far = ring * around + i, ring * around + (i + 1) % around
