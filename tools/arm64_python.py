@@ -21,21 +21,10 @@ from windows_python import VERSION, make_once, pip
 ROOT = BUILD / f"arm64-python{VERSION}"
 PACKAGES = ROOT / "usr/lib/python3/dist-packages"
 QEMU = "qemu-aarch64-static"
-OF_DEBIAN = (
-    *("python{0}-minimal", "libpython{0}-minimal", "libpython{0}-stdlib"),
-    *(
-        "libc6",
-        "libgcc-s1",
-        "libstdc++6",
-        "libexpat1",
-        "zlib1g",
-        "libssl3",
-        "libffi8",
-        "libbz2-1.0",
-        "liblzma5",
-    ),
-    *("libsqlite3-0", "libuuid1", "libcrypt1", "libncursesw6", "libtinfo6", "libreadline8"),
-)
+OF_DEBIAN = """
+python{0}-minimal libpython{0}-minimal libpython{0}-stdlib libc6 libgcc-s1 libstdc++6 libexpat1 zlib1g libssl3
+libffi8 libbz2-1.0 liblzma5 libsqlite3-0 libuuid1 libcrypt1 libncursesw6 libtinfo6 libreadline8
+"""
 # An own configuration of apt, with its own architecture, lists and cache.
 APT_CONFIG = """\
 APT::Architecture "arm64";
@@ -76,7 +65,7 @@ def make(root: Path) -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         apt_get(folder, "update")
-        apt_get(folder, "download", *(name.format(VERSION) for name in OF_DEBIAN))
+        apt_get(folder, "download", *OF_DEBIAN.format(VERSION).split())
         for package in sorted((folder / "debs").glob("*.deb")):
             subprocess.run(["dpkg-deb", "--extract", package, root], check=True)
     (root / "usr/lib/python3/dist-packages").mkdir(parents=True, exist_ok=True)
