@@ -31,7 +31,7 @@ from test_metrics import LENGTH, RADIUS, Tube, influences_of
 
 
 class Bent(Tube):
-    """Its second bone is rotated about one of the axes."""
+    """A tube whose second bone is rotated about one of the axes."""
 
     def __init__(self, axis, degrees, shares=None):
         super().__init__()

@@ -10,8 +10,8 @@ RADIUS = 0.26
 
 
 class Tube:
-    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over a length `over` about
-    `middle`."""
+    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over the length `over`
+    about `middle`."""
 
     def __init__(self, rings=81, around=32, middle=2.0, over=1.0):
         self.rings, self.around = rings, around
