@@ -7,7 +7,6 @@ a computation for another mesh, and so on, in one process.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import statistics
 import time
@@ -59,8 +58,7 @@ def measure(scene: frames.Scene, start: Callable[[], sinew.Precomputation], runs
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--name", help="writes bench/results/NAME.json")
+    parser = common.options(__doc__, "")
     parser.add_argument("--runs", type=int, default=5)
     arguments = parser.parse_args()
     versions = {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}

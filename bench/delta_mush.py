@@ -41,30 +41,32 @@ def make_sheet(order: str) -> bpy.types.Object:
     return make_limb(points, faces)
 
 
-def least_of_rounds(candidates: dict[str, Callable[[], None]]) -> dict[str, float]:
-    """The minimum time of a frame for each of {name: function that sets the object up for it}, seconds."""
+def added(use: Callable[[str | None, int], None]) -> dict[str, float]:
+    """The seconds that each case adds to a frame, by minimum times.
+
+    use  sets the object up for a kind of smoothing and its iterations; None: for a frame without
+    """
+    candidates = {"none": (None, 0)} | {f"{kind} {n}": (kind, n) for kind, n in CASES}
     least = dict.fromkeys(candidates, math.inf)
     for _round in range(ROUNDS):
-        for name, set_up in candidates.items():
-            set_up()
+        for name, case in candidates.items():
+            use(*case)
             bpy.context.scene.frame_set(1)
             least[name] = min(least[name], least_frame())
-    return least
+    return {name: seconds - least["none"] for name, seconds in least.items() if name != "none"}
 
 
 def of_blender(obj: bpy.types.Object) -> dict[str, float]:
     smooth = obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH")
 
-    def use(kind: str | None, iterations: int = 0) -> None:
+    def use(kind: str | None, iterations: int) -> None:
         smooth.show_viewport = kind is not None
         if kind is not None:
             smooth.smooth_type, smooth.iterations = kind.upper(), iterations
 
-    candidates = {"none": lambda: use(None)}
-    candidates |= {f"{kind} {n}": lambda kind=kind, n=n: use(kind, n) for kind, n in CASES}
-    least = least_of_rounds(candidates)
+    found = added(use)
     obj.modifiers.remove(smooth)
-    return {name: seconds - least["none"] for name, seconds in least.items() if name != "none"}
+    return found
 
 
 def of_sinew(obj: bpy.types.Object) -> dict[str, float]:
@@ -72,15 +74,12 @@ def of_sinew(obj: bpy.types.Object) -> dict[str, float]:
     session.refresh(bpy.context)
     stage = properties.of(obj).delta_mush
 
-    def use(kind: str | None, iterations: int = 0) -> None:
+    def use(kind: str | None, iterations: int) -> None:
         stage.enabled = kind is not None
         if kind is not None:
             stage.smooth_type, stage.iterations = kind, iterations
 
-    candidates = {"none": lambda: use(None)}
-    candidates |= {f"{kind} {n}": lambda kind=kind, n=n: use(kind, n) for kind, n in CASES}
-    least = least_of_rounds(candidates)
-    return {name: seconds - least["none"] for name, seconds in least.items() if name != "none"}
+    return added(use)
 
 
 def of_library(obj: bpy.types.Object) -> dict[str, float]:

@@ -39,11 +39,12 @@ Bound& bound(const Shape& shape) {
 
 Scene& scene_of(const Shape& shape) { return bound(shape).scene; }
 
-void ours(benchmark::State& state, const MethodInfo& method, const Shape& shape, std::size_t threads) {
+void ours(benchmark::State& state, const MethodInfo& method, const Shape& shape,
+          const DeformOptions& options) {
     Scene& scene = scene_of(shape);
     const Deformer& deformer = bound(shape).deformer(method);
     for (auto _ : state) {
-        (void)deformer.deform(scene.pose, {{}, threads}, scene.points);
+        (void)deformer.deform(scene.pose, options, scene.points);
         benchmark::ClobberMemory();
     }
 }
@@ -148,18 +149,13 @@ void register_all() {
             for_each_method([&]<class Method>(Method) {
                 const std::string of = "/" + std::string(Method::info.name) + scene;
                 for (const std::size_t threads : {1, 2}) {
-                    add("sinew" + std::to_string(threads) + of,
-                        [=](benchmark::State& s) { ours(s, Method::info, shape, threads); });
+                    add("sinew" + std::to_string(threads) + of, [=](benchmark::State& s) {
+                        ours(s, Method::info, shape, {{}, threads});
+                    });
                 }
                 for (const Variant& variant : variants_of(Method::info)) {
-                    add("sinew1/" + variant.name + scene, [=](benchmark::State& s) {
-                        const Deformer& deformer = bound(shape).deformer(Method::info);
-                        Scene& own = scene_of(shape);
-                        for (auto _ : s) {
-                            (void)deformer.deform(own.pose, variant.options(), own.points);
-                            benchmark::ClobberMemory();
-                        }
-                    });
+                    add("sinew1/" + variant.name + scene,
+                        [=](benchmark::State& s) { ours(s, Method::info, shape, variant.options()); });
                 }
                 if constexpr (HasPlainLoops<Method>) {
                     add("glm" + of, [=](benchmark::State& s) {
@@ -185,7 +181,9 @@ void register_all() {
     const auto add_cost = [](const std::string& influences, const Shape& shape) {
         for (const MethodInfo& method : kMethods) {
             add("cost/" + std::string(method.name) + "/" + influences + "/" + std::to_string(shape.bones),
-                [=](benchmark::State& s) { ours(s, method, shape, 1); });
+                [=](benchmark::State& s) {
+                    ours(s, method, shape, {{}, 1});
+                });
         }
     };
     for (const std::size_t bones : {10, 30, 100, 300, 1000}) {

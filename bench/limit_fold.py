@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -22,11 +23,14 @@ from sinew_addon.core.vectors import transformed
 from sinew_addon.features.suggest.crossings import crossing_triangles
 from sinew_addon.io import armature_io, mesh_io
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+from rigs import influences
+from tube import Tube
+
 MARGIN = 0.2  # of the distance from the plane at rest: how near to it a vertex may come
 JOINTS = {"elbow": ("lowerarm_l", (0.0, -1.0, 0.0)), "knee": ("calf_l", (0.0, 1.0, 0.0))}
 DEGREES = 90.0, 120.0, 140.0, 155.0
 FRAMES = 16, 32
-RINGS, AROUND = 81, 32  # of the tube
 
 
 @dataclass
@@ -61,10 +65,7 @@ class Skin:
         return int((~joined.any(axis=(1, 2))).sum())
 
     def deformed(self, method: str, motions: np.ndarray) -> np.ndarray:
-        used = self.weights > 0
-        offsets = np.concatenate([[0], np.cumsum(used.sum(axis=1))]).astype(np.int32)
-        bones, weights = np.nonzero(used)[1].astype(np.int32), self.weights[used].astype(np.float32)
-        deformer = sinew.Deformer(self.points, offsets, bones, weights, method)
+        deformer = sinew.Deformer(self.points, *influences(self.weights), method)
         return deformer.deform(motions).astype(float)
 
     def kept_apart(self, posed: np.ndarray, bone: int, motions: np.ndarray, every: bool) -> np.ndarray:
@@ -91,15 +92,8 @@ def unit(v: np.ndarray) -> np.ndarray:
 
 
 def tube() -> Skin:
-    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over 1 unit."""
-    z = np.repeat(np.linspace(0.0, 4.0, RINGS), AROUND)
-    angle = np.tile(np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), RINGS)
-    t = np.clip(z - 1.5, 0.0, 1.0)
-    share = t * t * (3.0 - 2.0 * t)
-    ring, i = np.divmod(np.arange((RINGS - 1) * AROUND), AROUND)
-    near, far = ring * AROUND + i, ring * AROUND + (i + 1) % AROUND
-    corners = [near, far, far + AROUND], [near, far + AROUND, near + AROUND]
-    triangles = np.concatenate(corners, axis=1).T
+    """That of the tests, with bones along z."""
+    made = Tube()
     rest = np.tile(sinew.affine.from_axis_angle([1.0, 0.0, 0.0], np.pi / 2), (2, 1, 1))
     rest[1, 2, 3] = 2.0
     bones = replace(
@@ -111,8 +105,7 @@ def tube() -> Skin:
         segments=np.ones(2, int),
         parents=np.array([-1, 0]),
     )
-    points = np.stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), z], axis=1).astype(np.float32)
-    return Skin(bones, points, triangles, np.stack([1.0 - share, share], axis=1))
+    return Skin(bones, made.points.astype(np.float32), made.triangles, made.weights)
 
 
 def mesh() -> bpy.types.Object:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import platform
 from importlib import metadata
 
@@ -35,18 +36,9 @@ class Scene:
         away = self.bones + 0.5 - along[:, None]
         weights = np.exp(-(away**2)) + 0.02 + 0.05 * random.random((vertices, INFLUENCES))
         self.weights = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
-        axis = np.array([1, 2, 0.5]) / np.linalg.norm([1, 2, 0.5])
-        x, y, z = axis
-        skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        bend = np.eye(3) + np.sin(0.05) * skew + (1 - np.cos(0.05)) * skew @ skew
-        pose, matrix = [], np.eye(4)
-        for bone in range(bone_count):
-            head = np.array([0, 0, bone])
-            step = np.eye(4)
-            step[:3, :3], step[:3, 3] = bend, head - bend @ head
-            matrix = matrix @ step
-            pose.append(matrix)
-        self.pose = np.array(pose, dtype=np.float32)
+        heads = np.arange(float(bone_count))[:, None] * [0, 0, 1]
+        bends = sinew.affine.from_screw_about([1, 2, 0.5], heads, 0.05, 0.0)
+        self.pose = np.array(list(itertools.accumulate(bends, np.matmul)), dtype=np.float32)
 
     def deformer(self, method: str) -> sinew.Deformer:
         count = len(self.rest)

@@ -8,7 +8,6 @@ programs hardly increase them.
 
 from __future__ import annotations
 
-import argparse
 import time
 
 import common
@@ -45,8 +44,7 @@ def influences(points: np.ndarray, along: int) -> tuple[np.ndarray, np.ndarray, 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--name", help="writes bench/results/NAME.json")
+    parser = common.options(__doc__, "")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--runs", type=int, default=3)
     arguments = parser.parse_args()

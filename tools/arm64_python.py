@@ -3,39 +3,28 @@
 """Makes a Python for Linux on arm64, to be run by qemu, from Debian's packages, for tests.
 
 The packages, of the release of this Debian, are unpacked into a folder; nothing is installed on the machine.
-Python packages are installed next to it, as wheels for arm64. Prints the path of a script that runs it.
+Python packages are installed next to it, as wheels for arm64. A script runs it.
 Needs Debian's own Python, since that has the same version.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 from cross_build import BUILD
-from windows_python import pip
+from windows_python import VERSION, make_once, pip
 
+ROOT = BUILD / f"arm64-python{VERSION}"
+PACKAGES = ROOT / "usr/lib/python3/dist-packages"
 QEMU = "qemu-aarch64-static"
-PACKAGES = (
-    *("python{0}-minimal", "libpython{0}-minimal", "libpython{0}-stdlib"),
-    *(
-        "libc6",
-        "libgcc-s1",
-        "libstdc++6",
-        "libexpat1",
-        "zlib1g",
-        "libssl3",
-        "libffi8",
-        "libbz2-1.0",
-        "liblzma5",
-    ),
-    *("libsqlite3-0", "libuuid1", "libcrypt1", "libncursesw6", "libtinfo6", "libreadline8"),
-)
+OF_DEBIAN = """
+python{0}-minimal libpython{0}-minimal libpython{0}-stdlib libc6 libgcc-s1 libstdc++6 libexpat1 zlib1g libssl3
+libffi8 libbz2-1.0 liblzma5 libsqlite3-0 libuuid1 libcrypt1 libncursesw6 libtinfo6 libreadline8
+"""
 # An own configuration of apt, with its own architecture, lists and cache.
 APT_CONFIG = """\
 APT::Architecture "arm64";
@@ -72,41 +61,30 @@ def apt_get(folder: Path, *words: str) -> None:
         raise SystemExit(f"arm64_python: apt-get {words[0]} failed:\n{done.stderr}")
 
 
-def make(version: str, root: Path) -> None:
+def make(root: Path) -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         apt_get(folder, "update")
-        apt_get(folder, "download", *(name.format(version) for name in PACKAGES))
+        apt_get(folder, "download", *OF_DEBIAN.format(VERSION).split())
         for package in sorted((folder / "debs").glob("*.deb")):
             subprocess.run(["dpkg-deb", "--extract", package, root], check=True)
     (root / "usr/lib/python3/dist-packages").mkdir(parents=True, exist_ok=True)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("packages", nargs="*", help="requirements, or wheels for Linux on arm64")
-    parser.add_argument("--no-deps", action="store_true", help="these packages alone")
-    options = parser.parse_args()
+def python() -> Path:
+    """The path of the script."""
     if not shutil.which(QEMU):
         raise SystemExit(f"arm64_python: {QEMU} is not here.")
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    root = BUILD / f"arm64-python{version}"
-    if not root.exists():
-        unfinished = Path(tempfile.mkdtemp(dir=BUILD))
-        make(version, unfinished)
-        unfinished.rename(root)
-    script = root / "python"
-    script.write_text(SCRIPT.format(root=root, qemu=QEMU, version=version))
+    make_once(ROOT, make)
+    script = ROOT / "python"
+    script.write_text(SCRIPT.format(root=ROOT, qemu=QEMU, version=VERSION))
     script.chmod(0o755)
-    if options.packages:
-        systems = [f"--platform=manylinux_2_{minor}_aarch64" for minor in (28, 27, 17)]
-        systems += ["--platform=manylinux2014_aarch64", "--python-version", version]
-        target = root / "usr/lib/python3/dist-packages"
-        words = ["--upgrade", "--no-compile", "--quiet", "--only-binary=:all:", *systems]
-        words += ["--no-deps"] if options.no_deps else []
-        pip("install", "--target", target, *words, *options.packages)
-    print(script)
+    return script
 
 
-if __name__ == "__main__":
-    main()
+def install(*words: str | Path) -> None:
+    """words: requirements, or wheels for Linux on arm64, and options of pip"""
+    systems = [f"--platform=manylinux_2_{minor}_aarch64" for minor in (28, 27, 17)]
+    systems += ["--platform=manylinux2014_aarch64", "--python-version", VERSION]
+    options = ["--upgrade", "--no-compile", "--quiet", "--only-binary=:all:", *systems]
+    pip("install", "--target", PACKAGES, *options, *words)

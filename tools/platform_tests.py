@@ -17,8 +17,11 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
+import arm64_python
+import windows_python
 from cross_build import BUILD, ROOT, build_tests, build_wheels, python_of
 from platforms import PLATFORMS, Platform
 
@@ -104,11 +107,6 @@ def run(words: Sequence[str | Path], limit: int) -> int:
     return status
 
 
-def output_of(*words: str | Path) -> Path:
-    done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
-    return Path(done.stdout.splitlines()[-1])
-
-
 def requirements() -> list[str]:
     """The requirements of the extension and of its tests, without Sinew and Blender."""
     lines = (ROOT / "requirements/tests.in").read_text().splitlines()
@@ -116,22 +114,15 @@ def requirements() -> list[str]:
 
 
 class Emulated:
-    """The Python of a platform. `tool` creates it, prints its path and installs packages."""
+    """The Python of a platform. `maker` makes it and installs packages."""
 
     def __init__(self, platform: Platform) -> None:
         self.platform = platform
-        is_windows = platform.is_windows
-        self.tool = ROOT / "tools" / ("windows_python.py" if is_windows else "arm64_python.py")
-        self._python: Path | None = None
+        self.maker = windows_python if platform.is_windows else arm64_python
 
-    @property
+    @cached_property
     def python(self) -> Path:
-        if self._python is None:
-            self._python = output_of(sys.executable, self.tool)
-        return self._python
-
-    def install(self, *packages: str | Path) -> None:
-        output_of(sys.executable, self.tool, *packages)
+        return self.maker.python()
 
     def set_up_python(self) -> None:
         (wheel,) = build_wheels(
@@ -140,17 +131,12 @@ class Emulated:
         wanted = [*requirements(), *([NUMPY] if self.platform.is_windows else [])]
         stamp = self.python.parent / "requirements"
         if not stamp.exists() or stamp.read_text() != " ".join(wanted):
-            self.install(*wanted)
+            self.maker.install(*wanted)
             stamp.write_text(" ".join(wanted))
-        self.install("--no-deps", wheel)
-        site = self.site_packages()
-        link = site / "sinew_addon"
+        self.maker.install("--no-deps", wheel)
+        link = self.maker.PACKAGES / "sinew_addon"
         if not link.is_symlink():
             link.symlink_to(ROOT / "addon", target_is_directory=True)
-
-    def site_packages(self) -> Path:
-        place = "Lib/site-packages" if self.platform.is_windows else "usr/lib/python3/dist-packages"
-        return self.python.parent / place
 
     def pytest(self, limit: int, *options: str) -> int:
         words: list[str | Path] = ["wine"] if self.platform.is_windows else []
@@ -180,8 +166,8 @@ def python_tests(emulated: Emulated, options: Sequence[str]) -> int:
 
 def blender_tests(emulated: Emulated, options: Sequence[str]) -> int:
     emulated.set_up_python()
-    if not (emulated.site_packages() / "bpy").is_dir():
-        emulated.install(BPY)
+    if not (emulated.maker.PACKAGES / "bpy").is_dir():
+        emulated.maker.install(BPY)
     if options:
         return emulated.pytest(LIMITS["blender"], *options)
     # Each in its own process, so that one can not affect the others.

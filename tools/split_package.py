@@ -45,10 +45,6 @@ def run(*words: str | Path) -> None:
         raise SystemExit(f"split: Blender refuses {words[-1]}:\n{done.stdout}{done.stderr}".rstrip())
 
 
-def validate(package: Path) -> None:
-    run("validate", package)
-
-
 def files_in(package: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(package) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
@@ -67,7 +63,7 @@ def split(package: Path, out: Path) -> list[Path]:
         split_files = {path: files_in(path) for path in sorted(made.glob("*.zip"))}
         for path, files in split_files.items():
             write_zip(path, files)
-            validate(path)
+            run("validate", path)
         for path, files in split_files.items():
             write_zip(out / path.name, files)
     return [out / path.name for path in split_files]
@@ -88,7 +84,7 @@ def main() -> None:
     parser.add_argument("--repository", type=Path, help="make the folder that has the packages a repository")
     options = parser.parse_args()
     for package in options.packages:
-        validate(package)
+        run("validate", package)
         for path in split(package, options.out) if options.out else []:
             print(path)
     if folder := options.out or options.repository:

@@ -5,7 +5,8 @@ in code."""
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 
 import bpy
@@ -45,117 +46,92 @@ TYPES = (
 )
 
 
-def shown() -> dict[str, str]:
-    """Each text, and one position in the code where it occurs."""
-    found: dict[str, str] = {}
-    for source in (_of_classes(), _of_data(), _of_lists(), _of_limits(), _of_code(), _of_phrases()):
-        for text, where in source:
-            # Texts without letters are the same in all languages.
-            if any(letter.isalpha() for letter in text):
-                found.setdefault(text, where)
-    return found
+def shown() -> list[str]:
+    """Each text once."""
+    sources = (_of_classes(), _of_data(), _of_lists(), _of_code(), _of_phrases())
+    # Texts without letters are the same in all languages.
+    return list(dict.fromkeys(text for text in chain(*sources) if any(map(str.isalpha, text))))
 
 
-def _of_classes() -> Iterator[tuple[str, str]]:
+def _of_classes() -> Iterator[str]:
     parts = (*registration._parts(), *registration._features())
     for cls in (cls for part in parts for cls in part.classes):
         base = next(each for each in TYPES if issubclass(cls, each))
         rna = cls.bl_rna
         if base is bpy.types.Operator:
             rna = getattr(bpy.ops.sinew, cls.bl_idname.partition(".")[2]).get_rna_type()
-            yield rna.name, cls.__name__
-            yield rna.description, cls.__name__
+            yield rna.name
+            yield rna.description
         # For a panel of presets, Blender writes the name of the last chosen one into bl_label.
         if not issubclass(cls, PresetPanel):
-            yield getattr(cls, "bl_label", ""), cls.__name__
-        yield getattr(cls, "bl_description", None) or "", cls.__name__
+            yield getattr(cls, "bl_label", "")
+        yield getattr(cls, "bl_description", None) or ""
         for prop in rna.properties:
             if prop.identifier not in base.bl_rna.properties:
-                yield from _of_property(prop, f"{cls.__name__}.{prop.identifier}")
+                yield from _of_property(prop)
 
 
-def _of_data() -> Iterator[tuple[str, str]]:
+def _of_data() -> Iterator[str]:
     """Properties that Sinew adds to Blender's own types."""
     for cls in bpy.types.ID.__subclasses__():
         for prop in cls.bl_rna.properties:
             if prop.identifier.startswith("sinew"):
-                yield from _of_property(prop, f"{cls.__name__}.{prop.identifier}")
+                yield from _of_property(prop)
 
 
-def _of_property(prop: bpy.types.Property, where: str) -> Iterator[tuple[str, str]]:
+def _of_property(prop: bpy.types.Property) -> Iterator[str]:
     if prop.is_hidden:
         return
     # Without a name it has the name in the code, which is never drawn.
     if prop.name != prop.identifier:
-        yield prop.name, where
-    yield prop.description, where
+        yield prop.name
+    yield prop.description
     for item in prop.enum_items if prop.type == "ENUM" else ():
-        yield item.name, where
-        yield item.description, where
+        yield item.name
+        yield item.description
 
 
-def _of_lists() -> Iterator[tuple[str, str]]:
+def _of_lists() -> Iterator[str]:
     """Texts that are drawn from lists."""
-    for owner in (*METHODS.values(), *sinew.stages()):
-        yield owner.label, owner.name
-        yield owner.description, owner.name
-    for method in METHODS.values():
-        yield method.group, method.name
-    for metric in metrics.METRICS.values():
-        yield metric.label, "METRICS"
-        yield metric.text, "METRICS"
-    for criterion in suggestion.CRITERIA:
-        yield criterion.label, "CRITERIA"
-        yield criterion.text, "CRITERIA"
-        yield criterion.praise, "CRITERIA"
-    for candidate in (*recommendation.METHODS, *recommendation.STAGES):
-        yield candidate.why, "recommendation"
-    for pose in battery.FIGURE:
-        yield pose, "battery"
-    for mend in mending.ALL.values():
-        yield mend.label, "mending"
-        yield mend.description, "mending"
-    for cause in (*CAUSES.values(), NORMALS):
-        yield cause, "CAUSES"
-    for provider in PROVIDERS.values():
-        yield provider.what, "PROVIDERS"
-    for text in heat_panel._WORST.values():
-        yield text, "heat_panel"
-    for entry in menus.entries():
-        yield entry.text, "menus"
+    yield from _of_each((*METHODS.values(), *sinew.stages()), "label", "description")
+    yield from _of_each(METHODS.values(), "group")
+    yield from _of_each(metrics.METRICS.values(), "label", "text")
+    yield from _of_each(suggestion.CRITERIA, "label", "text", "praise")
+    yield from _of_each((*recommendation.METHODS, *recommendation.STAGES), "why")
+    yield from battery.FIGURE
+    yield from _of_each(mending.ALL.values(), "label", "description")
+    yield from (*CAUSES.values(), NORMALS)
+    yield from _of_each(PROVIDERS.values(), "what")
+    yield from heat_panel._WORST.values()
+    yield from _of_each(menus.entries(), "text")
+    yield from _of_each(limits.LIMITS.values(), "label", "meaning", "advice", "unit")
 
 
-def _of_limits() -> Iterator[tuple[str, str]]:
-    for limit in limits.LIMITS.values():
-        for text in (limit.label, limit.meaning, limit.advice, limit.unit):
-            yield text, "LIMITS"
+def _of_each(owners: Iterable[object], *names: str) -> Iterator[str]:
+    return (getattr(owner, name) for owner in owners for name in names)
 
 
-def _of_code() -> Iterator[tuple[str, str]]:
-    for path, node in _drawing_code():
-        for shown in _shown_by(node):
-            for text in _constants(shown):
-                yield text, f"{path.relative_to(ADDON)}:{node.lineno}"
-        if path.stem.endswith("_panel"):
-            for text in _row_of(node):
-                yield text, f"{path.relative_to(ADDON)}:{node.lineno}"
+def _of_code() -> Iterator[str]:
+    for path, node in chain(*(_nodes(ADDON / folder) for folder in SHOWING)):
+        if "pages" not in path.parts:
+            for expression in _shown_by(node):
+                yield from _constants(expression)
+            if path.stem.endswith("_panel"):
+                yield from _row_of(node)
 
 
-def _of_phrases() -> Iterator[tuple[str, str]]:
+def _of_phrases() -> Iterator[str]:
     """Sentences that are made by code below the panels."""
-    for path in sorted(ADDON.rglob("*.py")):
+    for _path, node in _nodes(ADDON):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "phrase":
+            yield from _constants(node.args[0])
+
+
+def _nodes(folder: Path) -> Iterator[tuple[Path, ast.AST]]:
+    """All parts of the code in a folder, with their files."""
+    for path in sorted(folder.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "phrase":
-                for text in _constants(node.args[0]):
-                    yield text, f"{path.relative_to(ADDON)}:{node.lineno}"
-
-
-def _drawing_code() -> Iterator[tuple[Path, ast.AST]]:
-    for folder in SHOWING:
-        for path in sorted((ADDON / folder).rglob("*.py")):
-            if "pages" not in path.parts:
-                for node in ast.walk(ast.parse(path.read_text())):
-                    yield path, node
+            yield path, node
 
 
 def _shown_by(node: ast.AST) -> Iterator[ast.expr]:
@@ -189,12 +165,5 @@ def _constants(node: ast.expr) -> Iterator[str]:
 
 def literals() -> set[str]:
     """All strings in the code, to find texts that are made below the panels."""
-    found = set()
-    for path in ADDON.rglob("*.py"):
-        tree = ast.parse(path.read_text())
-        found |= {
-            node.value
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        }
-    return found
+    constants = (node for _path, node in _nodes(ADDON) if isinstance(node, ast.Constant))
+    return {node.value for node in constants if isinstance(node.value, str)}

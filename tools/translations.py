@@ -28,7 +28,7 @@ def main() -> None:
     shown, literals = found.shown(), found.literals()
     for language, translated in LANGUAGES.items():
         # Some texts are made below the panels.
-        texts = {**shown, **{text: "" for text in translated if text in literals}}
+        texts = dict.fromkeys([*shown, *(text for text in translated if text in literals)])
         entries = [f'msgid {json.dumps(text, ensure_ascii=False)}\nmsgstr ""\n' for text in texts]
         with tempfile.TemporaryDirectory() as folder:
             template = Path(folder, "sinew.pot")

@@ -6,24 +6,28 @@ python3xx.dll and the compiled part of the standard library come from a wheel of
 for the programs that it packs. The rest of the standard library is the same on all systems, and is copied
 from this Python. python.exe is a program of one line. python3.dll, with which modules for any Python are
 linked, such as psutil's, forwards its names. Packages are installed next to it, as wheels for Windows.
-Prints the path of python.exe.
 """
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 from cross_build import BUILD, compilers, environment, exported_names, import_library, python_of
 from cross_build import collect_python_headers as collect_headers
 from platforms import PLATFORMS
 
+VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
+FOLDER = BUILD / f"windows-python{VERSION}"
+PACKAGES = FOLDER / "Lib/site-packages"
+# Of pip, to get what Windows needs.
+WHEELS = ["--quiet", "--only-binary=:all:", "--platform", "win_amd64", "--python-version", VERSION]
 SOURCE = "panda3d==1.10.16"
 PROGRAM = """\
 #include <wchar.h>
@@ -49,15 +53,11 @@ def pip(*words: str | Path) -> None:
         raise SystemExit(f"windows_python: pip {words[0]} failed:\n{done.stdout}{done.stderr}")
 
 
-def for_windows(version: str) -> list[str]:
-    return ["--quiet", "--only-binary=:all:", "--platform", "win_amd64", "--python-version", version]
-
-
-def unpack_compiled(version: str, folder: Path) -> None:
+def unpack_compiled(folder: Path) -> None:
     """Unpacks python3xx.dll into the folder, and extension modules with the libraries that they load into
     its DLLs."""
     with tempfile.TemporaryDirectory() as place:
-        pip("download", "--no-deps", *for_windows(version), "--dest", place, SOURCE)
+        pip("download", "--no-deps", *WHEELS, "--dest", place, SOURCE)
         (wheel,) = Path(place).glob("*.whl")
         with zipfile.ZipFile(wheel) as archive:
             for name in archive.namelist():
@@ -91,8 +91,8 @@ def link_forwarder(folder: Path) -> None:
     subprocess.run([*words, empty, definition, "-o", folder / "python3.dll"], env=environment(), check=True)
 
 
-def make(version: str, folder: Path) -> None:
-    unpack_compiled(version, folder)
+def make(folder: Path) -> None:
+    unpack_compiled(folder)
     shutil.copytree(
         sysconfig.get_path("stdlib"), folder / "Lib", ignore=shutil.ignore_patterns(*LEFT_OUT), symlinks=False
     )
@@ -101,33 +101,21 @@ def make(version: str, folder: Path) -> None:
     link_forwarder(folder)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("packages", nargs="*", help="requirements, or wheels for Windows")
-    parser.add_argument("--no-deps", action="store_true", help="these packages alone")
-    options = parser.parse_args()
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    folder = BUILD / f"windows-python{version}"
-    if not (folder / "python.exe").exists():
+def make_once(folder: Path, make: Callable[[Path], None]) -> None:
+    """Has a folder filled that is missing; it gets its name once it is whole."""
+    if not folder.exists():
         BUILD.mkdir(parents=True, exist_ok=True)
         unfinished = Path(tempfile.mkdtemp(dir=BUILD))
-        make(version, unfinished)
-        shutil.rmtree(folder, ignore_errors=True)
+        make(unfinished)
         unfinished.rename(folder)
-    if options.packages:
-        target = folder / "Lib/site-packages"
-        pip(
-            "install",
-            "--upgrade",
-            "--no-compile",
-            "--target",
-            target,
-            *for_windows(version),
-            *(["--no-deps"] if options.no_deps else []),
-            *options.packages,
-        )
-    print(folder / "python.exe")
 
 
-if __name__ == "__main__":
-    main()
+def python() -> Path:
+    """The path of python.exe."""
+    make_once(FOLDER, make)
+    return FOLDER / "python.exe"
+
+
+def install(*words: str | Path) -> None:
+    """words: requirements, or wheels for Windows, and options of pip"""
+    pip("install", "--upgrade", "--no-compile", "--target", PACKAGES, *WHEELS, *words)

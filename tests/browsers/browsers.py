@@ -153,17 +153,8 @@ class Firefox(Browser):
         lines = [f'user_pref("{name}", {value});' for name, value in settings.items()]
         (profile / "user.js").write_text("\n".join(lines) + "\n", encoding="utf-8")
         reading, writing = os.pipe()
-        words = [
-            self.program(1),
-            "-displayfd",
-            str(writing),
-            "-screen",
-            "0",
-            "1600x1200x24",
-            "-nolisten",
-            "tcp",
-        ]
-        self._run(stack, words, pass_fds=[writing])
+        screen = f"-displayfd {writing} -screen 0 1600x1200x24 -nolisten tcp"
+        self._run(stack, [self.program(1), *screen.split()], pass_fds=[writing])
         os.close(writing)
         with os.fdopen(reading) as pipe:
             display = pipe.readline().strip()

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pages made by the command of the everyday environment, and what reads them: imported by name."""
+"""Pages made by the command of the everyday environment, and browsers that show them."""
 
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import browsers
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-sys.path += [str(REPOSITORY / folder) for folder in ("shaders", "tests/golden", "tests/shaders")]
 SINEW = REPOSITORY / ".venv" / "bin" / "sinew"
 # The wrist with a shape key that swells a part of it.
 ADD_KEY = """

@@ -65,9 +65,14 @@ def values_of(matrix):
     }
 
 
-def write(mesh, results, path, influences):
-    """A .glb with a mesh for each result, by the name of its array, at rest; the pose is a second later."""
+def write(mesh, path, influences):
+    """A .glb with a mesh for each result that a file can have, by the name of its array, at rest; the pose is
+    a second later. Returns these results."""
     case, made = mesh.case, Writer()
+    results = [result for result in mesh.results if result["array"] != "turned"]
+    if case["segments"].max() > 1:
+        # Segments of a bendy bone are no joints' own.
+        results = [result for result in results if "bulge_limit" not in result["stages"]]
     rest, posed, parents, count = case["rest"], case["posed"], case["parents"].tolist(), len(case["rest"])
     # glTF wants weights of sum 1. A joint of its own, the last, has the vertices that stay.
     sums = mesh.weights.sum(axis=1, keepdims=True)
@@ -135,6 +140,7 @@ def write(mesh, results, path, influences):
     made.header |= {"scene": 0, "scenes": [{"nodes": roots + list(range(count + 1, len(nodes)))}]}
     made.header["animations"] = [{"name": "pose", "channels": channels, "samplers": samplers}]
     made.write(path)
+    return results
 
 
 @pytest.fixture(scope="module")
@@ -182,12 +188,8 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 def test_points_and_normals_are_golden(browser, site, case, how, influences):
     folder, address = site
     mesh = Mesh(GOLDEN / f"{case}.npz")
-    results = [result for result in mesh.results if result["array"] != "turned"]
-    if mesh.case["segments"].max() > 1:
-        # Segments of a bendy bone are no joints' own.
-        results = [result for result in results if "bulge_limit" not in result["stages"]]
     file = folder / "human.glb"
-    write(mesh, results, file, influences)
+    results = write(mesh, file, influences)
     browser.open(f"{address}/three.html?{how}")
     said = browser.wait("window.sinew ? 'drawn' : document.getElementById('message').textContent")
     assert said == "drawn", said

@@ -64,12 +64,8 @@ def test_nothing_of_a_checkout_is_in_reach():
     assert not any((Path(folder) / "blender_manifest.toml").exists() for folder in sys.path)
     assert not any((folder / ".git").exists() for folder in (HERE, *HERE.parents))
     assert not list(Path(sys.prefix).rglob("__editable__*"))
-    assert importlib.util.find_spec("sinew_addon") is not None
-    assert "reskin" in [found.name for found in pkgutil.iter_modules([_package("commands")])]
-
-
-def _package(name: str) -> str:
-    return str(Path(importlib.util.find_spec("sinew_addon").origin).parent / name)
+    commands = Path(importlib.util.find_spec("sinew_addon").origin).parent / "commands"
+    assert "reskin" in [found.name for found in pkgutil.iter_modules([str(commands)])]
 
 
 def test_methods():

@@ -105,9 +105,7 @@ TEST_P(Mixes, keep_the_rest_pose_to_the_bit) {
     scene.posed_from_rest.assign(scene.posed_from_rest.size(), {});
     const auto weights = painted(6, scene.rest_points.size());
     const auto points = deformed(Deformer(Binding(scene.data()), first(), MixData{second(), weights}), scene);
-    for (std::size_t v = 0; v < points.size(); ++v) {
-        ASSERT_TRUE(same_bits(points[v], scene.rest_points[v]));
-    }
+    EXPECT_TRUE(same_bits(points, scene.rest_points));
 }
 
 TEST_P(Mixes, threads_change_no_bit) {

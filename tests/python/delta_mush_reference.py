@@ -2,13 +2,8 @@
 """The stage `delta_mush` in float64 numpy: Blender's Corrective Smooth (Mancewicz, Derksen, Rijpkema, Wilson
 2014), one vertex or corner at a time, as the golden set defines it, for any mesh and options."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "golden"))
-from stages import EPSILON, angle, smoothed
+from reference import stages
 
 
 def corners_of(faces):
@@ -53,10 +48,10 @@ def frame(before, at, after, precision=np.float64):
     """The axes of a corner, as columns, and its weight. precision: of the directions of its edges. At the tip
     of a needle they are nearly opposite, and the axes come from their difference."""
     a, b = (unit(edge).astype(precision).astype(np.float64) for edge in (before - at, at - after))
-    if (np.abs(a - b) <= EPSILON).all():
+    if (np.abs(a - b) <= stages.EPSILON).all():
         return np.eye(3), 0.0
     z, x = unit(np.cross(a, b)), unit(a + b)
-    return np.column_stack([x, np.cross(z, x), z]), angle(a @ b)
+    return np.column_stack([x, np.cross(z, x), z]), stages.angle(a @ b)
 
 
 def delta_mush(  # noqa: PLR0913 - as the library's
@@ -84,8 +79,8 @@ def delta_mush(  # noqa: PLR0913 - as the library's
         factors = factors * np.clip(np.asarray(weights, np.float64), 0.0, 1.0)
     if pin_boundary:
         factors[boundary_of(faces, edges)] = 0.0
-    rest_smoothed = smoothed(rest, edges, factors, iterations, smooth_type) - rounding
-    result = smoothed(points, edges, factors, iterations, smooth_type) + rounding
+    rest_smoothed = stages.smoothed(rest, edges, factors, iterations, smooth_type) - rounding
+    result = stages.smoothed(points, edges, factors, iterations, smooth_type) + rounding
     details, weight_sums = np.zeros_like(result), np.zeros(len(result))
     precision = np.float32 if np.any(rounding) else np.float64
     for at, before, after in corners_of(faces):

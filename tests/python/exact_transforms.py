@@ -395,7 +395,8 @@ def split_scale(_name, function):
 def signs(*of):
     def check(_name, function):
         cases = motions(16)
-        np.testing.assert_array_equal(function(cases.dual_quat), cases.dual_quat * np.array(of))
+        given = cases.dual_quat[:, : len(of)]
+        np.testing.assert_array_equal(function(given), given * np.array(of))
 
     return check
 
@@ -467,11 +468,6 @@ def unit_quaternions(*seeds):
 @values
 def quat_compose():
     return unit_quaternions(8, 9), rounded(e.product(motions(8).exact.q, motions(9).exact.q)), 1.0
-
-
-def quat_conjugate(_name, function):
-    (q,) = unit_quaternions(6)
-    np.testing.assert_array_equal(function(q), q * np.array([1.0, -1, -1, -1]))
 
 
 @values
@@ -687,7 +683,7 @@ CHECKS = {
     "quat.to_rotation_vector": to_rotation_vector,
     "quat.to_rotation_matrix": to_rotation_matrix,
     "quat.compose": quat_compose,
-    "quat.conjugate": quat_conjugate,
+    "quat.conjugate": signs(1, -1, -1, -1),
     "quat.norm": quat_norm,
     "quat.normalized": quat_normalized,
     "quat.rotate": quat_rotate,

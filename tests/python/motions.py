@@ -2,10 +2,7 @@
 """Random transforms in the three layouts, from scipy, with which sinew's mathematics is compared."""
 
 import numpy as np
-import sinew
 from scipy.spatial.transform import RigidTransform, Rotation
-
-LAYOUTS = {"affine": sinew.affine, "quat_vec": sinew.quat_vec, "dual_quat": sinew.dual_quat}
 
 LAYOUT_OF = {
     "matrix_linear": "affine",

@@ -12,6 +12,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parents[1] / "golden"))
 import methods
 import skin
+import stages  # noqa: F401 - for the references of stages
 
 
 def nearest_rotation(matrix):

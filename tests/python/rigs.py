@@ -42,6 +42,13 @@ def random_motion(rng, extent=1.0):
     return matrix
 
 
+def influences(weights):
+    """Offsets, bones and weights of the influences, from weights [vertices, bones]."""
+    weighted = weights > 0.0
+    offsets = np.concatenate([[0], np.cumsum(weighted.sum(axis=1))]).astype(np.int32)
+    return offsets, np.nonzero(weighted)[1].astype(np.int32), weights[weighted].astype(np.float32)
+
+
 def transform(matrix, points):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 

@@ -85,10 +85,7 @@ SEGMENTS = np.float32([[0, 0, 0], [0, 0, 2]]), np.float32([[0, 0, 2], [0, 0, 4]]
 def elbow(offset):
     """The tube, its deformed points and its bones. The middle of the weights' ramp is `offset` away from
     where the bones meet."""
-    made = Tube()
-    ramp = np.clip(made.points[:, 2] - 1.5 - offset, 0.0, 1.0)
-    share = ramp * ramp * (3.0 - 2.0 * ramp)
-    made.weights = np.column_stack([1.0 - share, share])
+    made = Tube(middle=2.0 + offset)
     return made, *made.deformed("dq", (1, 0, 0), 90)
 
 

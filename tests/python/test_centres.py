@@ -111,8 +111,7 @@ every_precomputation = pytest.mark.parametrize("start", START.values(), ids=STAR
 # Takes so long that it is always cancelled first.
 LONG = """
 import sys
-import numpy as np, sinew
-from rigs import lets_others_run
+import sinew
 from tube import Tube
 tube = Tube(2001, 256)
 run = sinew.centres_of_rotation(*tube.mesh, tube.triangles, exact=True)

@@ -2,7 +2,6 @@
 """Protects the deformer: its methods compared with float64 reference code, its threads, forks."""
 
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -135,25 +134,20 @@ def test_finite_for_whatever_is_finite(method, size):
     assert np.isfinite(deformer.deform(motions.astype(np.float32))).all()
 
 
-def change_by_space(method, rig, other_from_space):
-    """The largest distance by which points change if rest points, rest bones and motions are given in
-    another space and the result is mapped back."""
-    _, margins = rig.reference(method)
-    back = np.linalg.inv(other_from_space)
-    other = rig.with_motions(
-        other_from_space @ rig.transforms.astype(np.float64) @ back,
-        rest_points=transform(other_from_space, rig.rest_points.astype(np.float64)).astype(np.float32),
-        rest_bones=(other_from_space @ rig.rest_bones.astype(np.float64)).astype(np.float32),
-        centres=transform(other_from_space, rig.centres.astype(np.float64)).astype(np.float32),
-    )
-    points = transform(back, other.deform(method).astype(np.float64))
-    return np.linalg.norm(points - rig.deform(method), axis=1)[margins > NO_TIE].max()
-
-
 @every_method
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
 def test_another_origin_changes_only_qv(method, scaled):
-    change = change_by_space(method, random_rig(30, scaled=scaled), translation([3.0, -2.0, 1.0]))
+    rig, other_from_model = random_rig(30, scaled=scaled), translation([3.0, -2.0, 1.0])
+    _, margins = rig.reference(method)
+    back = np.linalg.inv(other_from_model)
+    other = rig.with_motions(
+        other_from_model @ rig.transforms.astype(np.float64) @ back,
+        rest_points=transform(other_from_model, rig.rest_points.astype(np.float64)).astype(np.float32),
+        rest_bones=(other_from_model @ rig.rest_bones.astype(np.float64)).astype(np.float32),
+        centres=transform(other_from_model, rig.centres.astype(np.float64)).astype(np.float32),
+    )
+    points = transform(back, other.deform(method).astype(np.float64))
+    change = np.linalg.norm(points - rig.deform(method), axis=1)[margins > NO_TIE].max()
     if method == "qv":
         assert change > 0.1
     else:
@@ -262,8 +256,6 @@ def test_missing_vertex_data_is_never_taken_for_linear_blending(method):
             sinew.Deformer(sinew.Binding(*rig.mesh), *arguments)
     linear = sinew.Deformer(sinew.Binding(*rig.mesh, vertex_data={method: None}), method)
     np.testing.assert_allclose(linear.deform(rig.transforms), rig.deform("lbs"), atol=4 * TOLERANCE)
-    again = pickle.loads(pickle.dumps(linear))
-    np.testing.assert_array_equal(again.deform(rig.transforms), linear.deform(rig.transforms))
 
 
 @every_method

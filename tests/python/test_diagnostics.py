@@ -2,6 +2,7 @@
 """Protects diagnostics: they find planted faults and no others; what they report about dual quaternions is
 true."""
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -9,28 +10,11 @@ import pytest
 import reference
 from rigs import about, random_rig
 from sinew_addon.core.diagnostics import PoseCheck, check_weights
-from sinew_addon.core.envelopes import Envelopes
 from sinew_addon.core.influences import GroupWeights, Influences, entries_of_bones
 from sinew_addon.core.rig import Bones, Weighting
 from sinew_addon.core.vectors import rotations_of
 
 NAMES = ("root", "arm", "hand", "finger", "thumb", "tip")
-
-
-def bones_called(names):
-    count = len(names)
-    zeros, no_vectors = np.zeros(count, np.float32), np.zeros((count, 3), np.float32)
-    return Bones(
-        names,
-        np.ones(count, bool),
-        np.tile(np.eye(4, dtype=np.float32), (count, 1, 1)),
-        np.ones(count, np.float32),
-        np.ones(count, np.int32),
-        np.zeros(count, bool),
-        np.full(count, -1, np.int32),
-        Envelopes(no_vectors, no_vectors, zeros, zeros, zeros, zeros, np.zeros(count, bool)),
-        np.arange(-1, count - 1, dtype=np.int32),
-    )
 
 
 def findings_of(groups, group_names=NAMES):
@@ -40,7 +24,7 @@ def findings_of(groups, group_names=NAMES):
         np.array([group for entries in groups for group, _weight in entries], np.int32),
         np.array([weight for entries in groups for _group, weight in entries], np.float32),
     )
-    bones = bones_called(NAMES)
+    bones = replace(Bones.none(), names=NAMES, deform=np.ones(len(NAMES), bool))
     entries = entries_of_bones(weights, bones.of_groups(list(group_names)))
     weighting = Weighting(bones, entries, use_envelopes=False)
     found = check_weights(weighting, np.zeros((len(groups), 3)), weights, group_names)

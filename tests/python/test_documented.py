@@ -61,18 +61,15 @@ WHOLE = [command for command in COMMANDS if command.whole]
 def test_every_command_of_sinew_is_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     parser, modules = cli.make_parser()
+    (subparsers,) = (action.choices for action in parser._actions if action.choices)
     for command in COMMANDS:
         assert command.words[1] in modules, command
-        help_of_it = subparser(parser, command.words[1]).format_help()
+        help_of_it = subparsers[command.words[1]].format_help()
         for word in command.words[2:]:
             if word.startswith("--"):
                 assert word.partition("=")[0] in help_of_it, command
         if command.whole:
             parser.parse_args(command.words[1:])
-
-
-def subparser(parser, name):
-    return next(a for a in parser._actions if a.choices and name in a.choices).choices[name]
 
 
 def test_every_subcommand_is_documented():

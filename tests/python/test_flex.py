@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-import sinew
+from rigs import about
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
@@ -24,23 +24,20 @@ from sinew_addon.core.flex.measures import BENT, RINGS, SHORT, Region
 from sinew_addon.core.flex.report import junit, lines, markdown, of_file
 from sinew_addon.core.flex.verdict import OWN, Pose, judge
 from sinew_addon.core.flex.weights import WeightCheck
-from sinew_addon.core.metrics import FrameOfRig
 from sinew_addon.core.steps import result_of
 from sinew_addon.core.surface import Surface, coincident_vertices, components
 from test_battery import figure
 from test_metrics import LENGTH, RADIUS, Tube, influences_of
 
 
-class Bent:
-    """A tube along X; its second bone, from the middle on, is rotated about one of the axes."""
+class Bent(Tube):
+    """A tube whose second bone is rotated about one of the axes."""
 
     def __init__(self, axis, degrees, shares=None):
-        self.tube = tube = Tube()
-        shares = tube.second if shares is None else shares
-        self.shares = shares
-        self.influences = influences_of(np.stack([1.0 - shares, shares], axis=1))
-        self.motion = np.eye(4)
-        self.motion[:3, :3] = battery._about(np.eye(3)[axis], math.radians(degrees))
+        super().__init__()
+        self.shares = self.second if shares is None else shares
+        self.influences = influences_of(np.stack([1.0 - self.shares, self.shares], axis=1))
+        self.motion = about(np.eye(3)[axis], degrees)
 
     @property
     def character(self):
@@ -50,23 +47,15 @@ class Bent:
         rest[0, 0, 3] = -LENGTH / 2
         skeleton = Skeleton.of(rest, np.full(2, LENGTH / 2), np.array([-1, 0]))
         skeleton = replace(skeleton, names=("first", "second"))
-        tube = self.tube
-        count = len(tube.rest)
-        return Character(tube.surface, tube.rest, self.influences, np.arange(2), skeleton, [("Tube", count)])
+        meshes = [("Tube", len(self.rest))]
+        return Character(self.surface, self.rest, self.influences, np.arange(2), skeleton, meshes)
 
     @property
     def frame(self):
-        heads = np.array([[-LENGTH / 2, 0.0, 0.0], [0.0, 0.0, 0.0]])
-        axes = np.stack([heads, heads + np.array([LENGTH / 2, 0.0, 0.0])], axis=1)
-        posed = axes.copy()
-        posed[1] = posed[1] @ self.motion[:3, :3].T
-        return FrameOfRig(self.tube.rest, axes, posed, np.stack([np.eye(3), self.motion[:3, :3]]))
+        return self.frame_of(self.motion)
 
     def points(self, method):
-        method = "lbs" if method == OWN else method
-        bones = np.stack([np.eye(4), self.motion]).astype(np.float32)
-        mesh = self.tube.rest.astype(np.float32), self.influences.offsets, self.influences.bones
-        return sinew.Deformer(*mesh, self.influences.weights, method).deform(bones).astype(np.float64)
+        return self.deform("lbs" if method == OWN else method, self.motion).astype(np.float64)
 
     def measured(self):
         region = Region(self.character, 1)
@@ -111,7 +100,7 @@ def test_a_twist_loses_the_radius_and_the_volume_of_the_formula(degrees):
 def test_hard_weights_stretch_the_edges_between_the_bones():
     hard = Bent(2, 100.0, (Tube().rest[:, 0] > 0.0).astype(float))
     region, found = hard.measured()
-    rest, points, edges = hard.tube.rest, hard.points("lbs"), hard.tube.surface.edges
+    rest, points, edges = hard.rest, hard.points("lbs"), hard.surface.edges
     over = edges[hard.shares[edges].min(axis=1) != hard.shares[edges].max(axis=1)]
     before, after = (np.linalg.norm(p[over[:, 0]] - p[over[:, 1]], axis=1) for p in (rest, points))
     grown = (after - before) / np.maximum(before, SHORT * region.girth)
@@ -150,7 +139,7 @@ def test_what_is_not_finite_is_torn():
 def test_vertices_without_weights_are_counted_at_the_nearest_bone():
     bent = Bent(2, 60.0)
     weights = np.stack([1.0 - bent.shares, bent.shares], axis=1)
-    bare = np.flatnonzero(bent.tube.rest[:, 0] > 0.9)
+    bare = np.flatnonzero(bent.rest[:, 0] > 0.9)
     weights[bare] = 0.0
     bent.influences = influences_of(weights)
     values = [each for each in WeightCheck(bent.character).values() if each.name == "unweighted"]
@@ -160,7 +149,7 @@ def test_vertices_without_weights_are_counted_at_the_nearest_bone():
 
 def test_a_vertex_far_over_the_surface_bleeds_as_far_as_it_is():
     bent = Bent(2, 60.0)
-    x = bent.tube.rest[:, 0]
+    x = bent.rest[:, 0]
     shares = np.clip((x + 0.1) / 0.2, 0.0, 1.0)
     far = int(np.flatnonzero(x < -0.9)[0])
     shares[far] = 0.4

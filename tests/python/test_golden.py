@@ -2,17 +2,14 @@
 """Protects the golden set: its reader reproduces it, and so does the library."""
 
 import itertools
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sinew
+import skin as reader
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
-sys.path.append(str(FOLDER))
-import skin as reader  # noqa: E402
-
 CASES = sorted(FOLDER.glob("*.npz"))
 ORACLES = [("lbs", "linear"), ("dq", "preserve_volume")]
 TOLERANCE = 1e-5

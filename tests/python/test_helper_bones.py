@@ -15,6 +15,7 @@ from sinew_addon.core.influences import Influences
 from tube import Tube
 
 TUBE = Tube(29, 12)
+INFLUENCES = Influences(*TUBE.mesh[1:])
 POSES = [((1, 0, 0), angle) for angle in range(0, 131, 13)]
 POSES += [((0, 0, 1), angle) for angle in range(17, 171, 17)]
 SEGMENTS = np.array([[[0, 0, 0], [0, 0, 2]], [[0, 0, 2], [0, 0, 4]]], dtype=np.float64)
@@ -35,18 +36,13 @@ def result_of(steps):
     return result
 
 
-def influences_of_tube():
-    _points, offsets, bones, weights = TUBE.mesh
-    return Influences(offsets, bones, weights)
-
-
 def motion_by(method):
     shapes = [TUBE.deformed(method, *pose) for pose in POSES]
     return Motion(
         TUBE.points.astype(np.float32)[None],
         np.array([points for points, _bones in shapes], dtype=np.float32),
         np.array([bones[:, :3] for _points, bones in shapes]),
-        influences_of_tube(),
+        INFLUENCES,
         SEGMENTS,
     )
 
@@ -134,7 +130,7 @@ def test_motions_of_known_helper_bones_are_found(moving):
         rest[: frames if moving else 1].astype(np.float32),
         targets.astype(np.float32),
         motions[:, :2],
-        influences_of_tube(),
+        INFLUENCES,
         SEGMENTS,
     )
     solution = solved(motion, Wanted(1))

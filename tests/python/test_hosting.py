@@ -8,19 +8,16 @@ from __future__ import annotations
 import re
 import shlex
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 import yaml
+from blenders import BLENDERS
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tools"))
-from blenders import BLENDERS  # noqa: E402
-
 WORKFLOWS = ROOT / ".github" / "workflows"
 
 every_workflow = pytest.mark.parametrize("path", sorted(WORKFLOWS.glob("*.yml")), ids=lambda path: path.stem)
@@ -33,19 +30,14 @@ def load(path: Path) -> dict:
     return workflow
 
 
-def scripts_of(workflow: dict) -> list[str]:
-    return [
-        step["run"] for job in workflow["jobs"].values() for step in job.get("steps", []) if "run" in step
-    ]
-
-
 @every_workflow
 def test_commands_and_files_that_it_names_are_there(path):
     workflow = load(path)
     helped = subprocess.run(["bash", ROOT / "dev", "help"], capture_output=True, text=True, check=True).stdout
     commands = set(re.findall(r"^\./dev (\w+)", helped, re.MULTILINE))
-    lines = "\n".join(scripts_of(workflow)).splitlines()
+    lines = []
     for job in workflow["jobs"].values():
+        lines += [line for step in job.get("steps", []) for line in step.get("run", "").splitlines()]
         lines += [job.get("env", {}).get(f"CIBW_TEST_{name}", "") for name in ("COMMAND", "SOURCES")]
     for words in (shlex.split(line, comments=True) for line in lines):
         assert "./dev" not in words or words[words.index("./dev") + 1] in commands, words

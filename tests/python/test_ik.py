@@ -63,6 +63,13 @@ def chain(count, **limits):
     return ik.Solver(line_of(count), [ik.Effector(count - 1)], **limits)
 
 
+def solved(solver, lengths, goals, **given):
+    """The solution for a chain of bones of these lengths, and the position of its end."""
+    rest = rest_of(lengths)
+    found = solver.solve(rest, [[0, lengths[-1], 0]], goals, **given)
+    return found, tips_of(rest, turned_by(found.rotations), lengths)[-1]
+
+
 def test_two_bones_by_the_law_of_cosines():
     rng = np.random.default_rng(1)
     solver = chain(2)
@@ -95,14 +102,8 @@ def test_chains_without_limits_reach_where_scipy_does():
             return tips_of(rest, Rotation.from_rotvec(vectors.reshape(-1, 3)), lengths)[-1] - goal
 
         theirs = np.linalg.norm(least_squares(error, start.ravel(), xtol=1e-12, ftol=1e-12).fun)
-        solver = chain(count)
-        found = solver.solve(
-            rest,
-            [[0, lengths[-1], 0]],
-            at(goal),
-            rotations=quaternions_of(start),
-        )
-        distance = np.linalg.norm(tips_of(rest, turned_by(found.rotations), lengths)[-1] - goal)
+        found, tip = solved(chain(count), lengths, at(goal), rotations=quaternions_of(start))
+        distance = np.linalg.norm(tip - goal)
         assert distance == pytest.approx(found.distance, abs=1e-9 * total)
         # Folded to the end of its reach, a chain is at a minimum of the fourth order.
         assert distance <= theirs + 1.1e-6 * total
@@ -153,14 +154,12 @@ def test_chains_with_limits_come_as_near_as_scipy():
         bounds = (limits[..., 0][free], limits[..., 1][free])
         theirs = np.linalg.norm(least_squares(error, start[free], bounds=bounds, xtol=1e-12).fun)
         solver = chain(count, locked=locked, limits=limits)
-        found = solver.solve(
-            rest, [[0, lengths[-1], 0]], at(goal), rotations=begun.as_quat(scalar_first=True)
-        )
+        found, tip = solved(solver, lengths, at(goal), rotations=begun.as_quat(scalar_first=True))
         angles = ik.swing_twist_angles(found.rotations)
         assert (np.abs(angles[locked]) < 1e-7).all()
         assert (angles >= limits[..., 0] - 1e-7)[free].all()
         assert (angles <= limits[..., 1] + 1e-7)[free].all()
-        ours = np.linalg.norm(tips_of(rest, turned_by(found.rotations), lengths)[-1] - goal)
+        ours = np.linalg.norm(tip - goal)
         nearer += ours < theirs - 1e-4 * total
         farther += ours > theirs + 1e-4 * total
         as_near += abs(ours - theirs) <= 1e-4 * total
@@ -187,13 +186,8 @@ def test_wanted_rotations_against_scipy():
 
         theirs = least_squares(error, start.ravel(), xtol=1e-12, ftol=1e-12).cost
         solver = ik.Solver(line_of(count), [ik.Effector(count - 1, 1.0, 0.3)])
-        found = solver.solve(
-            rest,
-            [[0, lengths[-1], 0]],
-            at(goal, wanted.as_quat(scalar_first=True)),
-            rotations=quaternions_of(start),
-            iterations=500,
-        )
+        goals, given = at(goal, wanted.as_quat(scalar_first=True)), quaternions_of(start)
+        found, _tip = solved(solver, lengths, goals, rotations=given, iterations=500)
         vectors = turned_by(found.rotations).as_rotvec()
         ours = 0.5 * (error(vectors.ravel()) ** 2).sum()
         assert ours <= theirs + 1e-6
@@ -249,17 +243,16 @@ def test_limits_are_never_violated_and_nearly_always_what_is_reachable_is_reache
     rng, reached = np.random.default_rng(5), 0
     for _ in range(400):
         lengths = rng.uniform(0.5, 1.5, rng.integers(2, 11))
-        count, rest, tips = len(lengths), rest_of(lengths), [[0, lengths[-1], 0]]
+        count = len(lengths)
         locked, limits = random_limits(rng, count)
         solver = chain(count, locked=locked, limits=limits)
         # A solve without a step limits its start.
         start = quaternions_of(rng.uniform(-1.5, 1.5, (count, 3)))
-        posed = solver.solve(rest, tips, at([0, 0, 0]), rotations=start, iterations=0).rotations
-        goal = tips_of(rest, turned_by(posed), lengths)[-1]
+        posed, goal = solved(solver, lengths, at([0, 0, 0]), rotations=start, iterations=0)
         start = quaternions_of(rng.uniform(-0.3, 0.3, (count, 3)))
-        found = solver.solve(rest, tips, at(goal), rotations=start, iterations=200)
-        for rotations in (posed, found.rotations):
-            assert beyond(locked, limits, rotations) < 1e-7
+        found, _tip = solved(solver, lengths, at(goal), rotations=start, iterations=200)
+        for each in (posed, found):
+            assert beyond(locked, limits, each.rotations) < 1e-7
         reached += found.is_reached
     assert reached >= 390
 
@@ -307,14 +300,13 @@ def test_poles_choose_the_plane_and_the_side_of_the_bend():
 
 @pytest.mark.parametrize("goal", [0.3, 1.0, 2.0, -0.5, -2.0])
 def test_a_straight_chain_bends_to_a_goal_on_its_line(goal):
-    rest, knee = rest_of([1, 1, 1]), np.full((3, 3, 2), (-np.inf, np.inf))
+    knee = np.full((3, 3, 2), (-np.inf, np.inf))
     # Bends only to one side.
     knee[1:, 0] = 0.0, 2.6
     locked = np.zeros((3, 3), bool)
     locked[1:, 1:] = True
     for solver in (chain(3), chain(3, locked=locked, limits=knee)):
-        found = solver.solve(rest, [[0, 1, 0]], at([0, goal, 0]), iterations=5000)
-        tip = tips_of(rest, turned_by(found.rotations), [1, 1, 1])[-1]
+        found, tip = solved(solver, [1, 1, 1], at([0, goal, 0]), iterations=5000)
         assert np.linalg.norm(tip - (0, goal, 0)) < 3e-6
     assert beyond(locked, knee, found.rotations) < 1e-7
 
@@ -323,9 +315,7 @@ def test_a_straight_chain_bends_to_a_goal_on_its_line(goal):
 @pytest.mark.parametrize("goal", [(0, 0, 0), (0, 0.4, 0), (1, 1, 0), (1e9, 0, 0)])
 def test_degenerate_chains_come_as_near_as_they_can(lengths, goal):
     solver, total = ik.Solver(line_of(3), [ik.Effector(2, has_pole=True)]), sum(lengths)
-    found = solver.solve(
-        rest_of(lengths), [[0, lengths[-1], 0]], at(goal), poles=[[0, 5, 0]], iterations=2000
-    )
+    found, _tip = solved(solver, lengths, at(goal), poles=[[0, 5, 0]], iterations=2000)
     np.testing.assert_allclose(np.linalg.norm(found.rotations, axis=1), 1.0, atol=1e-9)
     apart = np.linalg.norm(goal)
     least = max(apart - total, 2.0 * max(lengths) - total - apart, 0.0)
@@ -371,9 +361,7 @@ def test_stiff_bones_rotate_less():
     for stiffness in (0.0, 0.9):
         start = quaternions_of([[0.2, 0, 0]] * 3)
         solver = chain(3, stiffness=[[stiffness] * 3, [0] * 3, [0] * 3])
-        found = solver.solve(
-            rest_of([1, 1, 1]), [[0, 1, 0]], at([0.5, 2, 1]), rotations=start, iterations=5000
-        )
+        found, _tip = solved(solver, [1, 1, 1], at([0.5, 2, 1]), rotations=start, iterations=5000)
         assert found.is_reached
         turns.append((turned_by(start[0]).inv() * turned_by(found.rotations[0])).magnitude())
     assert turns[1] < 0.7 * turns[0]

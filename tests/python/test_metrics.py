@@ -12,7 +12,7 @@ import pytest
 import sinew
 import trimesh
 import tube as tube_of_tests
-from rigs import about, random_motion, transform
+from rigs import about, influences, random_motion, transform
 from sinew_addon.core.flex.limits import LIMITS
 from sinew_addon.core.influences import Influences
 from sinew_addon.core.metrics import METRICS, FrameOfRig, Gauge, Measured, Shape, volume
@@ -27,11 +27,8 @@ def surface_of(mesh):
 
 
 def influences_of(weights):
-    """weights [vertices, bones]; None: 0."""
-    weighted = weights > 0.0
-    offsets = np.concatenate([[0], np.cumsum(weighted.sum(axis=1))]).astype(np.int32)
-    vertices, bones = np.nonzero(weighted)
-    return Influences(offsets, bones.astype(np.int32), weights[vertices, bones].astype(np.float32))
+    """weights [vertices, bones]"""
+    return Influences(*influences(weights))
 
 
 class Tube:
@@ -65,13 +62,16 @@ class Tube:
         )
         return deformer.deform(np.stack([IDENTITY, motion]).astype(np.float32))
 
-    def measure(self, method, motion, other=None):
+    def frame_of(self, motion):
         head, tail = LENGTH / 2 * np.array([[-1, 0, 0], [1, 0, 0]])
         rest_axes = np.array([[head, [0, 0, 0]], [[0, 0, 0], tail]])
         posed_axes = rest_axes.copy()
         posed_axes[1] = transform(motion, rest_axes[1])
+        return FrameOfRig(self.rest, rest_axes, posed_axes, np.stack([IDENTITY, motion])[:, :3, :3])
+
+    def measure(self, method, motion, other=None):
         gauge = Gauge(self.surface, self.influences)
-        gauge.set_frame(FrameOfRig(self.rest, rest_axes, posed_axes, np.stack([IDENTITY, motion])[:, :3, :3]))
+        gauge.set_frame(self.frame_of(motion))
         return gauge.measure(self.deform(method, motion), other)
 
 

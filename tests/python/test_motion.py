@@ -18,10 +18,7 @@ from sinew_addon.core.motion.clip import Clip
 from sinew_addon.core.motion.root import grounded, main_root
 
 UP = walks.UP
-
-
-def matrices(rigid):
-    return quat_vec.to_affine(rigid)
+matrices = quat_vec.to_affine
 
 
 def apart(a, b):

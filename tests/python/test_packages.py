@@ -16,16 +16,14 @@ import sysconfig
 import zipfile
 from pathlib import Path
 
+import cross_build
+import package
 import pytest
+import sbom
 import sinew._native
+from platforms import PLATFORMS
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
-import cross_build  # noqa: E402
-import package  # noqa: E402
-import sbom  # noqa: E402
-from platforms import PLATFORMS  # noqa: E402
-
 HEADERS = Path(sysconfig.get_path("include"))
 PYCONFIG = (ROOT / "cmake/python/pyconfig.h").read_text(encoding="utf-8")
 

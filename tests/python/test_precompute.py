@@ -3,24 +3,14 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import subprocess
 import sys
 import threading
-import types
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-# The package around these files imports bpy; the files do not.
-_CORE = Path(__file__).resolve().parents[2] / "addon" / "core"
-_PACKAGE = types.ModuleType("sinew_precompute_core")
-_PACKAGE.__path__ = [str(_CORE)]
-sys.modules["sinew_precompute_core"] = _PACKAGE
-file_cache = importlib.import_module("sinew_precompute_core.file_cache")
-precompute = importlib.import_module("sinew_precompute_core.precompute")
+from sinew_addon.core import file_cache, precompute
 
 RESULT = np.arange(12, dtype=np.float32).reshape(-1, 3)
 
@@ -199,11 +189,11 @@ def test_a_folder_that_can_not_be_made_is_no_error(tmp_path):
 
 
 WRITER = """
-import importlib, sys, types
-import numpy as np
-package = types.ModuleType("core"); package.__path__ = [sys.argv[1]]; sys.modules["core"] = package
+import sys
 from pathlib import Path
-cache = importlib.import_module("core.file_cache").FileCache(Path(sys.argv[2]), 40_000)
+import numpy as np
+from sinew_addon.core.file_cache import FileCache
+cache = FileCache(Path(sys.argv[1]), 40_000)
 for number in range(300):
     key = f"key{number % 7}"
     found = cache.load(key)
@@ -215,7 +205,7 @@ for number in range(300):
 def test_several_processes_share_the_folder(tmp_path):
     """No process ever reads a file that another has half written."""
     running = [
-        subprocess.Popen([sys.executable, "-c", WRITER, _CORE, tmp_path], stderr=subprocess.PIPE, text=True)
+        subprocess.Popen([sys.executable, "-c", WRITER, tmp_path], stderr=subprocess.PIPE, text=True)
         for _ in range(3)
     ]
     for process in running:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import re
 import shutil
 import subprocess
@@ -13,13 +12,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import release
 
 ROOT = Path(__file__).resolve().parents[2]
-_SPEC = importlib.util.spec_from_file_location("sinew_release", ROOT / "tools" / "release.py")
-release = importlib.util.module_from_spec(_SPEC)
-sys.modules[_SPEC.name] = release
-_SPEC.loader.exec_module(release)
-
 DATE = "2031-02-03"
 CHANGES = f"""# Changelog
 

@@ -56,7 +56,10 @@ def test_every_table_and_figure_has_what_the_json_has(made):
     assert list(content["tables"]) == TABLES
     assert list(content["figures"]) == FIGURES
     _head, *parts = re.split(r'<h3 id="([a-z]+-[\d.]+)">', page)
-    text = {name: html.unescape(re.sub(r"<[^>]*>", "|", part)) for name, part in batched(parts)}
+    text = {
+        name: html.unescape(re.sub(r"<[^>]*>", "|", part))
+        for name, part in zip(parts[::2], parts[1::2], strict=True)
+    }
     assert list(text) == [f"table-{number}" for number in TABLES] + [f"figure-{number}" for number in FIGURES]
     for number, table in content["tables"].items():
         wanted = [table["missing"]] if table["missing"] else [table["tolerance"], *table["notes"]]
@@ -73,10 +76,6 @@ def test_every_table_and_figure_has_what_the_json_has(made):
         wanted = [*figure["pictures"], *figure["notes"], *[fact["ours"] for fact in figure["facts"]]]
         assert all(each in text[f"figure-{number}"] for each in wanted)
     assert all(answer["question"] in html.unescape(page) for answer in content["answers"])
-
-
-def batched(parts):
-    return zip(parts[::2], parts[1::2], strict=True)
 
 
 def test_what_is_missing_says_how_to_get_it(made):

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import argparse
 import html
-import importlib
 import re
 import subprocess
-import sys
 from pathlib import Path
 from types import ModuleType
 
+import make_reference
 import pytest
 import sinew
 from sinew import _types
@@ -20,10 +19,6 @@ from sinew_addon import cli
 ROOT = Path(__file__).resolve().parents[2]
 # Installed by ./dev site and ./dev test.
 PYTHON = ROOT / ".venvs" / "site" / "bin" / "python"
-
-sys.path.insert(0, str(ROOT / "docs"))
-make_reference = importlib.import_module("make_reference")
-sys.path.remove(str(ROOT / "docs"))
 
 
 @pytest.fixture(scope="module")

@@ -5,24 +5,16 @@ refused as no rigid motion. exact_transforms.py has the oracles."""
 import numpy as np
 import pytest
 import sinew
-from motions import layout, rigid
+from motions import close, layout, rigid
 from scipy.spatial.transform import Rotation
 from sinew import quat
 
 EPSILON = {np.float32: 1e-6, np.float64: 1e-14}
 
 
-def close(got, wanted, tolerance=1e-14):
-    np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance)
-
-
-def of(rotation):
-    return rotation.as_quat(scalar_first=True)
-
-
 @pytest.mark.parametrize("size", [1e-300, 1e-30, 1.0, 1e20, 1e200])
 def test_lengths_of_any_size(size):
-    q = of(Rotation.random(rng=np.random.default_rng(2)))
+    q = Rotation.random(rng=np.random.default_rng(2)).as_quat(scalar_first=True)
     pair, pose = np.append(q, [1, 2, 3]), sinew.quat_vec.to_dual_quat(np.append(q, [1, 2, 3]))
     types = [np.float64] + [np.float32] * (1e-35 < size < 1e35)
     for dtype in types:
@@ -150,8 +142,8 @@ def test_scale_along_the_axes_is_found_again_and_rigid_motions_keep_their_bits()
     scale = along(TILTED, scaling(0.5, 3.0, 0.8))
     split = sinew.affine.split_scale(MOTION @ scale, TILTED)
     assert split.has_scale
-    close(split.rigid, MOTION)
-    close(split.scale, scale)
+    close(split.rigid, MOTION, 1e-14)
+    close(split.scale, scale, 1e-14)
     split = sinew.affine.split_scale(MOTION, TILTED)
     np.testing.assert_array_equal(split.rigid, MOTION)
     np.testing.assert_array_equal(split.scale, np.eye(4))
@@ -169,7 +161,7 @@ def test_axes_without_length_give_a_rotation(axis, zeros):
     good_split(MOTION @ along(bone, scale), bone)
     split = good_split(along(bone, scale), bone)
     if zeros == 7:
-        close((split.rigid @ bone)[:3, :3], np.eye(3))
+        close((split.rigid @ bone)[:3, :3], np.eye(3), 1e-14)
     for size in (1e-30, 1e-12, 1e-4, 1e4, -1.0):
         small = scaling(*(size if zeros >> k & 1 else 1.0 for k in range(3))).astype(np.float32)
         found = sinew.affine.split_scale(along(bone, small).astype(np.float32), bone.astype(np.float32))

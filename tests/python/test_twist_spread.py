@@ -119,10 +119,7 @@ JOINT = translation([0.0, 0.0, 2.0])
 
 def wrist(over=1.0, from_parent=False):
     """The tube, whose weights change over this length, and the stage."""
-    made = Tube()
-    ramp = np.clip((made.points[:, 2] - 2.0) / over + 0.5, 0.0, 1.0)
-    share = ramp * ramp * (3.0 - 2.0 * ramp)
-    made.weights = np.column_stack([1.0 - share, share])
+    made = Tube(over=over)
     bone = int(from_parent)
     spread = sinew.TwistSpread(
         sinew.Binding(*made.mesh),

@@ -3,21 +3,22 @@
 
 import numpy as np
 import sinew
-from rigs import LINEAR, about, transform, translation
+from rigs import LINEAR, about, influences, transform, translation
 
 # The radius of ddm's smoothing.
 RADIUS = 0.26
 
 
 class Tube:
-    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over 1 unit."""
+    """Length 4, radius 0.5, along z. Two bones meet in its middle; weights change over the length `over`
+    about `middle`."""
 
-    def __init__(self, rings=81, around=32):
+    def __init__(self, rings=81, around=32, middle=2.0, over=1.0):
         self.rings, self.around = rings, around
         along = np.repeat(np.linspace(0.0, 4.0, rings), around)
         angle = np.tile(np.linspace(0.0, 2.0 * np.pi, around, endpoint=False), rings)
         self.points = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), along])
-        t = np.clip(along - 1.5, 0.0, 1.0)
+        t = np.clip((along - middle) / over + 0.5, 0.0, 1.0)
         self.weights = np.column_stack([1.0 - t * t * (3.0 - 2.0 * t), t * t * (3.0 - 2.0 * t)])
         ring, i = np.divmod(np.arange((rings - 1) * around), around)
         near, far = ring * around + i, ring * around + (i + 1) % around
@@ -26,13 +27,7 @@ class Tube:
 
     @property
     def mesh(self):
-        shared = self.weights > 0.0
-        return (
-            self.points.astype(np.float32),
-            np.concatenate([[0], np.cumsum(shared.sum(axis=1))]).astype(np.int32),
-            np.nonzero(shared)[1].astype(np.int32),
-            self.weights[shared].astype(np.float32),
-        )
+        return self.points.astype(np.float32), *influences(self.weights)
 
     def centres(self, **options):
         return sinew.centres_of_rotation(*self.mesh, self.triangles, **options).result()

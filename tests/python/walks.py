@@ -92,10 +92,6 @@ def foot(phase: np.ndarray, stride: float, lift: float) -> tuple[np.ndarray, np.
     return np.where(swings, swing, on_ground), np.where(swings, lift * np.sin(np.pi * u) ** 2, 0.0)
 
 
-def phases_of(period: float, start: float) -> np.ndarray:
-    return start + np.arange(round(period) + 1) / period
-
-
 def walk(
     name: str = "walk",
     period: int = 20,
@@ -109,7 +105,7 @@ def walk(
     """One cycle of `period` frames from phase `start`. Its root moves by `stride` along -Y, or along an
     arc of `turn` radians. phases [samples]: for an uneven pace."""
     own = rig()
-    phases = phases_of(period, start) if phases is None else phases
+    phases = start + np.arange(period + 1) / period if phases is None else phases
     rigid = np.broadcast_to(quat_vec.identity(), (len(phases), len(own.names), 7)).copy()
 
     def rotate(bone: str, angle: np.ndarray, axis: tuple[float, ...] = (1.0, 0.0, 0.0)) -> None:

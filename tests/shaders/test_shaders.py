@@ -15,9 +15,9 @@ import pytest
 import skin as reader
 import stages as reader_stages
 from bone_buffer import add_segments, add_turns, add_twists, bone_buffer, fade, twist_angles
-from conftest import REPOSITORY
 from skinning import Skinning, deformed
 
+REPOSITORY = Path(__file__).resolve().parents[2]
 GOLDEN, SHADERS = REPOSITORY / "tests" / "golden", REPOSITORY / "shaders"
 METHODS = {"lbs": 0, "dq": 1, "cor": 2, "hierarchy": 4}
 FORMS = ["continuous", "kim_han"]
