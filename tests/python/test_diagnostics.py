@@ -40,6 +40,7 @@ def test_planted_faults_are_found_and_nothing_else():
     groups[7] = [(6, 1.0)]
     groups[11] = [(0, 0.00004), (1, 0.00005)]
     groups[13] = [(2, 0.005), (3, 0.002)]
+    groups[16] = [(bone, 0.25) for bone in range(4)]
     groups[17] = [(bone, 0.2) for bone in range(5)]
     groups[19] += [(7, 0.3)]
     groups[23] += [(7, 0.0)]
