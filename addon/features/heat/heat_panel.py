@@ -171,7 +171,7 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if subject is None:
             draw_text(self.layout, "Sinew deforms nothing here now", icon="INFO")
             return
-        other = live.measured_under_other(subject, settings.other, depsgraph)
+        other = live.measured_under_other(subject, settings.other)
         shown = {properties.of(obj).method for obj, _skinned in pairs}
         heads = ["", "At Rest", shown.pop() if len(shown) == 1 else "Shown"]
         if other is not None:
