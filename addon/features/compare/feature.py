@@ -137,8 +137,7 @@ def _right_of_view(context: bpy.types.Context) -> np.ndarray:
     return np.array(viewport.region_3d.view_matrix)[0, :3]
 
 
-class SINEW_OT_flip_comparison(bpy.types.Operator):
-    bl_idname = "sinew.flip_comparison"
+class SINEW_OT_flip_comparison(operators.Named, bpy.types.Operator):
     bl_label = "Flip Comparison"
     bl_description = "Show the other of the two copies that are compared, at the same place"
     # Only a view of the comparison: an undo step for each flip would push out the artist's own steps, and
@@ -146,13 +145,10 @@ class SINEW_OT_flip_comparison(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if comparison_state.of_scene(context.scene) is not None:
-            return True
-        cls.poll_message_set("Compare methods first")
-        return False
+    def refusal(cls, context: bpy.types.Context) -> str:
+        return "" if comparison_state.of_scene(context.scene) is not None else "Compare methods first"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         state = comparison_state.of_scene(context.scene)
         if state.arrangement != comparison_state.ONE_OF_TWO:
             state.arrangement = comparison_state.ONE_OF_TWO
@@ -160,7 +156,6 @@ class SINEW_OT_flip_comparison(bpy.types.Operator):
             state.shows_second = not state.shows_second
         (shown,) = comparison_state.shown_methods(state)
         self.report({"INFO"}, properties.method_label(shown))
-        return {"FINISHED"}
 
 
 class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):

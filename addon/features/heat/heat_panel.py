@@ -107,17 +107,15 @@ class SINEW_OT_fit_heat_range(_Scans, bpy.types.Operator):
         measures.of(context.scene).fix(worst_frames.scans[context.scene.session_uid].scale)
 
 
-class SINEW_OT_go_to_frame(bpy.types.Operator):
-    bl_idname = "sinew.go_to_frame"
+class SINEW_OT_go_to_frame(operators.Named, bpy.types.Operator):
     bl_label = "Go to Frame"
     bl_description = "Go to this frame"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     frame: bpy.props.FloatProperty(name="Frame", description="Of the scene")
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         characters.set_frame(context.scene, self.frame)
-        return {"FINISHED"}
 
 
 # What a frame's badness is measured by.
