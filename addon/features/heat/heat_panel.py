@@ -14,6 +14,7 @@ from ...deform import characters, session
 from ...io import units
 from ...ui import operators, sidebar, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.settings_layout import named
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import joined, tr
 from . import bake_error, live, measures, worst_frames
@@ -182,15 +183,11 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
         column.label(text="Compared with")
         column.prop(settings, "other", text="")
         for name, value in distances(context.scene, subject.measured):
-            split = column.split(factor=0.42)
-            split.label(text=name)
-            split.label(text=value)
+            named(column, name, factor=0.42).label(text=value)
 
 
 def _draw_row(layout: bpy.types.UILayout, texts: Sequence[str]) -> None:
-    split = layout.split(factor=0.35)
-    split.label(text=texts[0])
-    values = split.row(align=True)
+    values = named(layout, texts[0], factor=0.35)
     for text in texts[1:]:
         values.label(text=text)
 
