@@ -108,7 +108,7 @@ def film(armature, frames=FRAMES, name: str = "matrix") -> np.ndarray:
 
 
 def bake(armature, method="sclerp", path="straight", **settings) -> inbetween_bake.Baked:
-    baked = result_of(inbetween_bake.steps(armature, inbetween_bake.Settings(method, path, **settings)))
+    baked = result_of(inbetween_bake.steps(armature, method, path, **settings))
     bpy.context.view_layer.update()
     return baked
 

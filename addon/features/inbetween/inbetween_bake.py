@@ -14,22 +14,6 @@ from ..action_copy import action_copy
 from . import keyed_poses
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How in-betweens are made.
-
-    method  of core.METHODS
-    path    core.STRAIGHT or core.SPLINE
-    step    frames from one key to the next
-    only    the bones that move by the method; None: all
-    """
-
-    method: str
-    path: str = core.STRAIGHT
-    step: int = 1
-    only: Collection[str] | None = None
-
-
 @dataclass
 class Baked:
     """What steps() did to an armature, by bone: `bones` were keyed, `left` keep their curves for the reason
@@ -45,17 +29,28 @@ class Baked:
         return [*kept, *(f"{bone} {core.TOO_FAR[path]}" for bone in sorted(self.far))]
 
 
-def steps(armature: bpy.types.Object, settings: Settings) -> Generator[float, None, Baked]:
+def steps(
+    armature: bpy.types.Object,
+    method: str,
+    path: str = core.STRAIGHT,
+    step: int = 1,
+    only: Collection[str] | None = None,
+) -> Generator[float, None, Baked]:
     """Has the armature play a copy of its action, in which the bones move by a method between the keyed
     poses, with keys at every `step` frames and linear interpolation; yields the progress.
 
     The keyed poses stay, also those between whole frames; in-betweens are keys of type Breakdown. If closed
     before the end, everything is as before. Raises SinewError where there is nothing to do.
+
+    method  of core.METHODS
+    path    core.STRAIGHT or core.SPLINE
+    step    frames from one key to the next
+    only    the bones that move by the method; None: all
     """
-    with action_copy.playing(armature, core.METHODS[settings.method].label):
-        groups, left = keyed_poses.read(armature, settings.only)
+    with action_copy.playing(armature, core.METHODS[method].label):
+        groups, left = keyed_poses.read(armature, only)
         baked = Baked(armature, left=left)
-        wanted = [_times(group, settings.step) for group in groups]
+        wanted = [_times(group, step) for group in groups]
         baked.bones = sum(len(group.rows) for group, times in zip(groups, wanted, strict=True) if len(times))
         if not baked.bones:
             reasons = [f"{bone} {reason}" for bone, reason in sorted(left.items())]
@@ -67,7 +62,7 @@ def steps(armature: bpy.types.Object, settings: Settings) -> Generator[float, No
         samples: list[np.ndarray] = []
         modes = np.array([bone.rotation_mode for bone in armature.pose.bones])
         for number, time in enumerate(times):
-            pose, far = keyed_poses.pose_at(armature, groups, float(time), settings.method, settings.path)
+            pose, far = keyed_poses.pose_at(armature, groups, float(time), method, path)
             # Rotation values close to the previous ones.
             samples.append(pose_io.closer(pose, modes, samples[-1]) if samples else pose)
             baked.far.update(far)
