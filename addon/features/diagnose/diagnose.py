@@ -106,16 +106,6 @@ def finding_of(obj: bpy.types.Object, name: str) -> tuple[Check, Finding]:
     return found, finding
 
 
-def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
-    """Enters edit mode with exactly the vertices of a finding selected. Returns their number.
-
-    Raises SinewError where that is not possible.
-    """
-    _found, finding = finding_of(obj, name)
-    select_vertices(obj, finding.vertices, context)
-    return len(finding.vertices)
-
-
 def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.types.Context) -> None:
     """Enters edit mode with exactly these vertices selected. Raises SinewError where that is not possible."""
     if obj.name not in context.view_layer.objects or not obj.visible_get():
