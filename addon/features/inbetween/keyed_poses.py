@@ -77,6 +77,7 @@ def read(
         times, mode = actions.key_times(curves), armature.pose.bones[name].rotation_mode
         gains = [actions.gains_of_a_round(curves, times, onwards) for onwards in (False, True)]
         bone = _Bone(rows[name], mode, pairs, times, actions.hold_still(curves, times), gains)
+        # Bones of one group have keys at the same times, which repeat alike.
         likeness = times.tobytes(), *(gain is None for gain in gains)
         found.setdefault(likeness, []).append(bone)
     return [_group(bones) for bones in found.values()], left
