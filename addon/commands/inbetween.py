@@ -66,10 +66,9 @@ def _inbetween(outcome: Inbetweened, args: argparse.Namespace) -> None:
     ]
     if not armatures:
         raise SinewError(f"{source}: no armature plays an action with keyed bones; nothing written")
-    settings = inbetween_bake.Settings(args.method, path, args.step)
     for armature in armatures:
         try:
-            baked = result_of(inbetween_bake.steps(armature, settings))
+            baked = result_of(inbetween_bake.steps(armature, args.method, path, args.step))
         except SinewError as error:
             outcome.left_out.append(str(error))
             continue

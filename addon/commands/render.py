@@ -132,9 +132,9 @@ def _draw(
     if left_out:
         raise SinewError(f"{args.file}: {left_out[0]}")
     characters.use_method_on(meshes, method)
-    studio: render.OwnLook | render.Studio
+    studio: render.Studio | None = None
     if args.own_look:
-        studio = render.OwnLook(scene, args.file)
+        render.use_own_look(scene, args.file)
         engine, views = scene.render.engine, []
     else:
         engine = render.chosen_engine(golden.engine if golden else args.engine or "auto")
@@ -153,8 +153,8 @@ def _draw(
     for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):
         characters.set_frame(scene, frame)
         path = args.out / picture_name(frame)
-        if isinstance(studio, render.OwnLook):
-            studio.picture(path)
+        if studio is None:
+            render.draw(scene, path)
         else:
             studio.picture(views[index], path)
 

@@ -173,19 +173,23 @@ def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:
     edited = bmesh.new()
     try:
         edited.from_mesh(mesh, face_normals=False, vertex_normals=False)
-        layer = edited.verts.layers.deform.active
-        if layer is None:
-            return GroupWeights.none(len(mesh.vertices))
-        vertices = list(map(itemgetter(layer), edited.verts))
-        counts = np.fromiter(map(len, vertices), np.int32, len(vertices))
-        entries = int(counts.sum())
-        groups = chain.from_iterable(map(bmesh.types.BMDeformVert.keys, vertices))
-        weights = chain.from_iterable(map(bmesh.types.BMDeformVert.values, vertices))
-        return GroupWeights(
-            counts, np.fromiter(groups, np.int32, entries), np.fromiter(weights, np.float32, entries)
-        )
+        return read_edited_weights(edited)
     finally:
         edited.free()
+
+
+def read_edited_weights(edited: bmesh.types.BMesh) -> GroupWeights:
+    layer = edited.verts.layers.deform.active
+    if layer is None:
+        return GroupWeights.none(len(edited.verts))
+    vertices = list(map(itemgetter(layer), edited.verts))
+    counts = np.fromiter(map(len, vertices), np.int32, len(vertices))
+    entries = int(counts.sum())
+    groups = chain.from_iterable(map(bmesh.types.BMDeformVert.keys, vertices))
+    weights = chain.from_iterable(map(bmesh.types.BMDeformVert.values, vertices))
+    return GroupWeights(
+        counts, np.fromiter(groups, np.int32, entries), np.fromiter(weights, np.float32, entries)
+    )
 
 
 def _read_groups_of(vertices: bpy.types.bpy_prop_collection) -> GroupWeights:

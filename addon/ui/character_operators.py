@@ -10,7 +10,7 @@ from ..attach.feature import Feature
 from ..core.errors import SinewError
 from ..deform import session
 from . import character
-from .operators import OnSinewObjects, sinew_targets
+from .operators import Named, OnSinewObjects, sinew_targets
 from .sidebar import Sidebar
 from .translations import tip, tr
 
@@ -40,11 +40,10 @@ class SINEW_OT_switch(OnSinewObjects, bpy.types.Operator):
         "Flip all meshes of the character between Sinew and Blender's Armature modifier, to compare the two"
     )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         shared = character.of(context.scene)
         shared.enabled = not shared.enabled
         self.report({"INFO"}, "Sinew is on" if shared.enabled else "Sinew is off")
-        return {"FINISHED"}
 
 
 class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
@@ -73,20 +72,16 @@ class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
                 properties.share(others[0], obj)
 
 
-class SINEW_OT_open_tab(bpy.types.Operator):
-    bl_idname = "sinew.open_tab"
+class SINEW_OT_open_tab(Named, bpy.types.Operator):
     bl_label = "Open the Sinew Tab"
     bl_description = "Show the tab Sinew in the sidebar of the 3D view"
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if _view3d(context) is not None:
-            return True
-        cls.poll_message_set(tr("This window has no 3D view"))
-        return False
+    def refusal(cls, context: bpy.types.Context) -> str:
+        return "This window has no 3D view" if _view3d(context) is None else ""
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         area = _view3d(context)
         area.spaces.active.show_region_ui = True
         if not bpy.app.background:
@@ -94,7 +89,6 @@ class SINEW_OT_open_tab(bpy.types.Operator):
             # A sidebar that was closed has no tabs before it is drawn.
             for seconds in (0.0, 0.1):
                 bpy.app.timers.register(lambda: _choose_tab(address), first_interval=seconds)
-        return {"FINISHED"}
 
 
 def _choose_tab(address: int) -> None:

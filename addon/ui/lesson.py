@@ -6,13 +6,14 @@ from pathlib import Path
 import bpy
 
 from ..attach.feature import Feature
+from ..core.errors import SinewError
+from .operators import Named
 from .translations import tr
 
 FILE = Path(__file__).resolve().parent.parent / "lesson.blend"
 
 
-class SINEW_OT_open_lesson(bpy.types.Operator):
-    bl_idname = "sinew.open_lesson"
+class SINEW_OT_open_lesson(Named, bpy.types.Operator):
     bl_label = "Open the Lesson"
     bl_description = "Open a file with an arm, a hand and a page that shows in ten minutes what Sinew does"
     bl_options = {"REGISTER"}
@@ -23,10 +24,9 @@ class SINEW_OT_open_lesson(bpy.types.Operator):
             return self.execute(context)
         return _open("INVOKE_DEFAULT")
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, _context: bpy.types.Context) -> set[str]:
         if bpy.data.is_dirty:
-            self.report({"ERROR"}, tr("Save this file first: the lesson takes its place"))
-            return {"CANCELLED"}
+            raise SinewError(tr("Save this file first: the lesson takes its place"))
         return _open("EXEC_DEFAULT")
 
 

@@ -95,11 +95,9 @@ def waits_for_render() -> str:
     return "Wait for the end of the render" if is_rendering_in_window() else ""
 
 
-class Acting:
+class Named:
     """A base class of operators, which Blender knows by the class's name. Subclasses have refusal(context),
     or run(context), which may raise SinewError, or both. run() returns what execute() does, or nothing."""
-
-    bl_options: ClassVar = {"REGISTER", "UNDO"}
 
     def __init_subclass__(cls) -> None:
         cls.bl_idname = cls.__name__.replace("SINEW_OT_", "sinew.")
@@ -111,7 +109,10 @@ class Acting:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = cls.refusal(context) or waits_for_render()
+        return cls._can_run(cls.refusal(context))
+
+    @classmethod
+    def _can_run(cls, reason: str) -> bool:
         if reason:
             cls.poll_message_set(tr(reason))
         return not reason
@@ -125,6 +126,16 @@ class Acting:
     def failed(self, error: SinewError) -> set[str]:
         self.report({"ERROR"}, str(error))
         return {"CANCELLED"}
+
+
+class Acting(Named):
+    """A base class of operators that wait for the end of a render."""
+
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return cls._can_run(cls.refusal(context) or waits_for_render())
 
 
 class OnSinewObjects(Acting):

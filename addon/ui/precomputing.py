@@ -11,7 +11,7 @@ from ..attach.subscribers import subscribers
 from ..core.precompute import precomputations
 from ..deform import precompute_watch, precomputing
 from ..deform.skinned_object import SkinnedObject
-from . import sidebar, stepped
+from . import operators, sidebar, stepped
 from .translations import tr
 
 # Seconds between checks whether there is still something to stop.
@@ -49,26 +49,22 @@ class SINEW_OT_watch_precomputation(bpy.types.Operator):
         stepped.clear_progress(context.workspace)
 
 
-class SINEW_OT_stop_precomputation(bpy.types.Operator):
-    bl_idname = "sinew.stop_precomputation"
+class SINEW_OT_stop_precomputation(operators.Named, bpy.types.Operator):
     bl_label = "Stop"
     bl_description = "Stop computing what the method needs; the Armature modifier's shape stays"
     bl_options = {"INTERNAL"}
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def run(self, _context: bpy.types.Context) -> None:
         precompute_watch.stop()
-        return {"FINISHED"}
 
 
-class SINEW_OT_precompute(bpy.types.Operator):
-    bl_idname = "sinew.precompute"
+class SINEW_OT_precompute(operators.Named, bpy.types.Operator):
     bl_label = "Compute"
     bl_description = "Compute what the method needs of this mesh"
     bl_options = {"INTERNAL"}
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def run(self, _context: bpy.types.Context) -> None:
         precompute_watch.resume()
-        return {"FINISHED"}
 
 
 def draw(layout: bpy.types.UILayout, pairs: Sequence[tuple[bpy.types.Object, SkinnedObject | None]]) -> None:

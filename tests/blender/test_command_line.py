@@ -289,7 +289,7 @@ def keyed_file(tmp_path):
     blender = bones_of(armatures[0], frames)
     expected = []
     for armature in armatures:
-        result_of(inbetween_bake.steps(armature, inbetween_bake.Settings("sclerp", "spline")))
+        result_of(inbetween_bake.steps(armature, "sclerp", "spline"))
         expected.append(bones_of(armature, frames))
         action_copy.restore(armature)
     assert np.abs(expected[0] - blender).max() > 0.01

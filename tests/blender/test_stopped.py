@@ -33,7 +33,7 @@ Steps = Iterator[float]
 def inbetweens(_folder: Path) -> Steps:
     armature = test_inbetween.make_rig()
     test_inbetween.key_random_poses(armature)
-    return inbetween_bake.steps(armature, inbetween_bake.Settings("sclerp"))
+    return inbetween_bake.steps(armature, "sclerp")
 
 
 def inverse_kinematics(_folder: Path) -> Steps:

@@ -105,7 +105,7 @@ def test_numbers_of_the_other_method_are_its_own():
     scene.frame_set(15)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     subject = live.measure(scenes.states_of(obj), "lbs", depsgraph)
-    measured, other = subject.measured, live.measured_under_other(subject, "lbs", depsgraph)
+    measured, other = subject.measured, live.measured_under_other(subject, "lbs")
     assert dict(heat_panel.distances(scene, measured))["Distance"].endswith(" cm")
     obj.sinew.method = "lbs"
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -113,10 +113,10 @@ def test_numbers_of_the_other_method_are_its_own():
     for name in ("volume_change", "stretch_max", "bulge_min", "bulge_max"):
         assert again.measured.entry(name) == pytest.approx(other.entry(name), rel=1e-6)
     # The other method is shown: there is nothing to compare with.
-    assert live.measured_under_other(again, "lbs", depsgraph) is None
+    assert live.measured_under_other(again, "lbs") is None
     assert {len(row) for row in heat_panel.rows(scene, again.measured, None)} == {3}
     armature = live.measure(scenes.states_of(obj), "blender", depsgraph)
-    assert live.measured_under_other(armature, "blender", depsgraph) is not None
+    assert live.measured_under_other(armature, "blender") is not None
 
 
 def test_measuring_twice_measures_once():
@@ -127,13 +127,13 @@ def test_measuring_twice_measures_once():
     first = live.measure(scenes.states_of(obj), "lbs", depsgraph).measured
     assert live.measure(scenes.states_of(obj), "lbs", depsgraph).measured is first
     subject = live.measure(scenes.states_of(obj), "lbs", depsgraph)
-    other = live.measured_under_other(subject, "lbs", depsgraph)
-    assert live.measured_under_other(subject, "lbs", depsgraph) is other
+    other = live.measured_under_other(subject, "lbs")
+    assert live.measured_under_other(subject, "lbs") is other
     bpy.context.scene.frame_set(9)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     second = live.measure(scenes.states_of(obj), "lbs", depsgraph)
     assert second.measured is not first
-    assert live.measured_under_other(second, "lbs", depsgraph) is not other
+    assert live.measured_under_other(second, "lbs") is not other
     gauge = second.gauge
     bpy.context.scene.frame_set(10)
     assert live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge is gauge

@@ -289,11 +289,11 @@ class SinewSide(Side):
 
     def add_corrective_key(self, obj: bpy.types.Object, bone: bpy.types.PoseBone | None) -> str:
         try:
-            made = corrective_key.add(obj, bpy.context.evaluated_depsgraph_get(), bone)
+            name, before, after = corrective_key.add(obj, bpy.context.evaluated_depsgraph_get(), bone)
         except SinewError as refused:
             return f"refused: {refused}"
         bpy.context.view_layer.update()
-        return f"{made.name}, {made.before:.3g} to {made.after:.3g}"
+        return f"{name}, {before:.3g} to {after:.3g}"
 
     def wait(self) -> None:
         """Does what timers of the window do: no object waits for a thread's computation, or for what

@@ -67,8 +67,8 @@ class AutoMix:
         found: VertexErrors | None = None
         with stepped.kept_frame(self.scene, armatures):
             for number, frame in enumerate(frames):
-                subject, depsgraph = measure_at(self.scene, self.objects, properties.BLENDER, frame)
-                measured = live.measured_of_mix(subject, second_method, depsgraph)
+                subject = measure_at(self.scene, self.objects, properties.BLENDER, frame)
+                measured = live.measured_of_mix(subject, second_method)
                 if found is None:
                     found, sources = VertexErrors(measured[0].rest_distances), self._sources(subject)
                 elif len(found.thickness) != subject.gauge.surface.vertex_count:

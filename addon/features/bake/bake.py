@@ -18,16 +18,10 @@ from ...io import files
 from ...io.actions import curves_of
 from . import bake_export, bake_state, shape_animation
 from .bake_bones import BoneBake
-from .bake_state import Started, take_off
+from .bake_state import Started, state_of, take_off
 from .bake_vat import VatBake
 
 SHAPE_KEYS = "shape-keys"
-
-
-def points_of(obj: bpy.types.Object) -> np.ndarray:
-    """Returns the points that Sinew gives its modifier at the current frame, float32 [vertices, 3]; the array
-    is written again at the next."""
-    return bake_state.state_of(obj).points
 
 
 class ShapeKeys:
@@ -44,6 +38,7 @@ class ShapeKeys:
         self.samples: list[np.ndarray] = []
 
     def take(self, points: np.ndarray) -> None:
+        # The next frame is written to the same array.
         self.samples.append(points.copy())
 
     def end(self) -> None:
@@ -68,7 +63,7 @@ class Cache:
     """A point cache, and a Mesh Cache modifier in place of Sinew's that plays it."""
 
     def __init__(self, obj: bpy.types.Object, frames: Sequence[float], path: Path, kind: str) -> None:
-        vertices = len(points_of(obj))
+        vertices = len(state_of(obj).points)
         bake.check_space(path.parent, 12 * vertices * len(frames))
         render = bpy.context.scene.render
         self.obj, self.frames, self.kind, self.vertices = obj, frames, kind, vertices
@@ -135,7 +130,7 @@ class Bake(Started):
         with self.whole_or_nothing(), characters.kept_frame(scene):
             characters.set_frame(scene, frames[0])
             for obj in meshes:
-                points_of(obj)
+                state_of(obj)
                 if kind == SHAPE_KEYS:
                     self.bakes.append(ShapeKeys(obj, frames))
                 else:
@@ -150,7 +145,7 @@ class Bake(Started):
             for number, frame in enumerate(self.frames):
                 characters.set_frame(scene, frame)
                 for one in self.bakes:
-                    one.take(points_of(one.obj))
+                    one.take(state_of(one.obj).points)
                 yield (number + 1) / len(self.frames)
             for one in self.bakes:
                 one.end()

@@ -74,7 +74,7 @@ class SceneExport(Started):
             raise SinewError(f"This Blender is built without {kind}; bake to another kind")
         core.check_frames(kind, frames)
         self.meshes, self.kind, self.frames, self.path = meshes, kind, frames, path
-        self.carried = carried_by(meshes)
+        self.what, self.carried = str(path), carried_by(meshes)
         self.unfinished = self._prepare()
 
     def report_progress(self, share: float) -> None:
@@ -82,15 +82,8 @@ class SceneExport(Started):
         Callers may replace it by a function, which must not raise, as Blender ignores exceptions here."""
 
     @property
-    def what(self) -> str:
-        return str(self.path)
-
-    @property
     def files(self) -> list[tuple[Path, Path]]:
         return [(self.unfinished, self.path)]
-
-    def discard(self) -> None:
-        remove(self.unfinished)
 
     def sample(self) -> Generator[float, None, None]:
         first, last = int(self.frames[0]), int(self.frames[-1])

@@ -13,6 +13,7 @@ import bpy
 from ...attach import attach, corrective_smooth, properties
 from ...core import bake
 from ...core.errors import SinewError
+from ...core.output import remove
 from ...deform import session
 from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
@@ -45,6 +46,8 @@ class Started:
 
     def discard(self) -> None:
         """Removes what was written."""
+        for unfinished, _path in self.files:
+            remove(unfinished)
 
     @contextmanager
     def whole_or_nothing(self) -> Iterator[None]:

@@ -16,7 +16,7 @@ from ...core import bake as core
 from ...core import vat
 from ...core.arrays import read
 from ...core.errors import SinewError
-from ...core.output import remove, unfinished_path, writing
+from ...core.output import unfinished_path, writing
 from ...core.vectors import transformed
 from ...deform import characters
 from ...io import files, mesh_io
@@ -47,7 +47,7 @@ class VatBake(Started):
             bake_state.check_on(obj)
         self.meshes = [*meshes, *carried_by(list(meshes))]
         self.armatures = {armature for obj in meshes for armature in properties.of(obj).armatures}
-        self.frames, self.path, self.options = frames, path, options
+        self.frames, self.path, self.what, self.options = frames, path, str(path), options
         ending = ".png" if options.texels == vat.PNG else ".exr"
         self.textures = [path.with_name(f"{path.stem}_{what}{ending}") for what in ("positions", "normals")]
         for _unfinished, each in self.files:
@@ -59,17 +59,9 @@ class VatBake(Started):
         self._normals: list[np.ndarray] = []
 
     @property
-    def what(self) -> str:
-        return str(self.path)
-
-    @property
     def files(self) -> list[tuple[Path, Path]]:
         paths = self.path, *self.textures, self.path.with_suffix(".json")
         return [(unfinished_path(each), each) for each in paths]
-
-    def discard(self) -> None:
-        for unfinished, _path in self.files:
-            remove(unfinished)
 
     def sample(self) -> Generator[float, None, None]:
         scene = bpy.context.scene

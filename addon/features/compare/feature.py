@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Comparisons: a panel and its buttons, what a scene stores, labels in the 3D views."""
 
+from collections.abc import Generator
+
 import bpy
 import numpy as np
 
@@ -11,8 +13,9 @@ from ...deform import characters
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
+from ..pages import viewer
+from ..pages.save import SavesPage
 from . import comparison, comparison_labels, comparison_state, framing
-from .save_page import SINEW_OT_save_comparison
 
 
 def character(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -137,8 +140,7 @@ def _right_of_view(context: bpy.types.Context) -> np.ndarray:
     return np.array(viewport.region_3d.view_matrix)[0, :3]
 
 
-class SINEW_OT_flip_comparison(bpy.types.Operator):
-    bl_idname = "sinew.flip_comparison"
+class SINEW_OT_flip_comparison(operators.Named, bpy.types.Operator):
     bl_label = "Flip Comparison"
     bl_description = "Show the other of the two copies that are compared, at the same place"
     # Only a view of the comparison: an undo step for each flip would push out the artist's own steps, and
@@ -146,13 +148,10 @@ class SINEW_OT_flip_comparison(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if comparison_state.of_scene(context.scene) is not None:
-            return True
-        cls.poll_message_set("Compare methods first")
-        return False
+    def refusal(cls, context: bpy.types.Context) -> str:
+        return "" if comparison_state.of_scene(context.scene) is not None else "Compare methods first"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         state = comparison_state.of_scene(context.scene)
         if state.arrangement != comparison_state.ONE_OF_TWO:
             state.arrangement = comparison_state.ONE_OF_TWO
@@ -160,7 +159,6 @@ class SINEW_OT_flip_comparison(bpy.types.Operator):
             state.shows_second = not state.shows_second
         (shown,) = comparison_state.shown_methods(state)
         self.report({"INFO"}, properties.method_label(shown))
-        return {"FINISHED"}
 
 
 class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
@@ -174,6 +172,44 @@ class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         framing.give_back(context)
         comparison.end(context)
+
+
+class SINEW_OT_save_comparison(SavesPage, bpy.types.Operator):
+    bl_label = "Save as Page"
+    bl_description = (
+        "Save one HTML file in which the character turns and plays in any browser, under the methods that "
+        "are compared"
+    )
+    bl_options = {"REGISTER"}
+    saying = "Sinew reads the frames of the page"
+    usual_name = "comparison"
+
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
+
+    @classmethod
+    def refusal(cls, context: bpy.types.Context) -> str:
+        state = comparison_state.of_scene(context.scene)
+        is_any = state is not None and comparison.originals(state)
+        return "" if is_any else "Compare methods first"
+
+    def page(self, context: bpy.types.Context, title: str) -> Generator[float, None, str]:
+        scene = context.scene
+        state = comparison_state.of_scene(scene)
+        assert state is not None, "refusal() says so"
+        meshes = comparison.originals(state)
+        # A copy that is shown is evaluated.
+        copies = sorted(comparison_state.copies_of(state), key=lambda copy: copy.hide_get())
+        of_each = {
+            obj: [copy for copy in copies if properties.of(copy).identity.copied == obj]
+            for obj in meshes
+            if attach.armature_of(obj) is not None
+        }
+        attached = [obj for obj in meshes if obj not in of_each]
+        armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in of_each))
+        frames = stepped.frames_over(scene, armatures, self.over)
+        methods = comparison_state.methods_of(state)
+        with stepped.kept_frame(scene, armatures):
+            return (yield from viewer.page(scene, title, of_each, attached, methods, frames))
 
 
 class SINEW_PT_comparison(Sidebar, bpy.types.Panel):

@@ -3,7 +3,6 @@
 Sinew, or for an engine."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -20,22 +19,11 @@ from ...deform.skinned_object import SkinnedObject
 LEAST_TURN = 0.05
 
 
-@dataclass
-class Made:
-    """The result.
-
-    name           of the shape key
-    before, after  the largest distance of the Armature modifiers' shape from Sinew's, without and with it, in
-                   scene units
-    """
-
-    name: str
-    before: float
-    after: float
-
-
-def add(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, bone: bpy.types.PoseBone | None) -> Made:
-    """Adds the key, muted, as Sinew already shows this shape.
+def add(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, bone: bpy.types.PoseBone | None
+) -> tuple[str, float, float]:
+    """Adds the key, muted, as Sinew already shows this shape. Returns its name, and the largest distance of
+    the Armature modifiers' shape from Sinew's, without and with it, in scene units.
 
     bone  drives the key: its value is 0 where the bone is rotated relative to its parent as at rest, and 1 in
           the current pose; None: its value is 1
@@ -61,7 +49,7 @@ def add(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, bone: bpy.types.P
     key.mute, key.value = True, 1.0
     if bone is not None and turns is not None:
         _drive(key, bone, *turns)
-    return Made(key.name, before, float(left.max(initial=0.0)))
+    return key.name, before, float(left.max(initial=0.0))
 
 
 def _check(obj: bpy.types.Object) -> None:

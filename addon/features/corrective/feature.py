@@ -31,17 +31,17 @@ class SINEW_OT_corrective_key(OnSinewObjects, bpy.types.Operator):
             if not properties.of(obj).enabled:
                 continue
             try:
-                key = corrective_key.add(obj, context.evaluated_depsgraph_get(), bone)
+                key, *off = corrective_key.add(obj, context.evaluated_depsgraph_get(), bone)
             except SinewError as error:
                 self.report({"WARNING"}, str(error))
                 continue
             made += 1
-            before, after = (units.text(context.scene, "length", each) for each in (key.before, key.after))
+            before, after = (units.text(context.scene, "length", each) for each in off)
             text = tr(
                 "{name}: {key} is there, and muted; the Armature modifier is {before} off without it, "
                 "{after} with it",
                 name=obj.name,
-                key=key.name,
+                key=key,
                 before=before,
                 after=after,
             )

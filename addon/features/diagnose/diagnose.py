@@ -106,16 +106,6 @@ def finding_of(obj: bpy.types.Object, name: str) -> tuple[Check, Finding]:
     return found, finding
 
 
-def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
-    """Enters edit mode with exactly the vertices of a finding selected. Returns their number.
-
-    Raises SinewError where that is not possible.
-    """
-    _found, finding = finding_of(obj, name)
-    select_vertices(obj, finding.vertices, context)
-    return len(finding.vertices)
-
-
 def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.types.Context) -> None:
     """Enters edit mode with exactly these vertices selected. Raises SinewError where that is not possible."""
     if obj.name not in context.view_layer.objects or not obj.visible_get():
@@ -196,25 +186,13 @@ def _weights_equal(obj: bpy.types.Object, weights: GroupWeights) -> bool:
     if _vertex_count(obj) != len(weights.counts):
         return False
     if obj.mode == "EDIT":
-        return _edited_weights(obj.data).equals(weights)
+        # Before it is written back to the mesh.
+        return mesh_io.read_edited_weights(bmesh.from_edit_mesh(obj.data)).equals(weights)
     state = session.state_of(obj)
     if state is not None and not state.bound.source.from_upstream:
         # Sinew has read them already.
         return state.bound.source.weights.equals(weights)
     return mesh_io.read_group_weights(obj.data).equals(weights)
-
-
-def _edited_weights(mesh: bpy.types.Mesh) -> GroupWeights:
-    """Returns the weights of a mesh in edit mode, before it is written back."""
-    vertices = bmesh.from_edit_mesh(mesh).verts
-    layer = vertices.layers.deform.active
-    entries = [vertex[layer].items() if layer is not None else [] for vertex in vertices]
-    flat = [entry for own in entries for entry in own]
-    return GroupWeights(
-        np.array([len(own) for own in entries], dtype=np.int32),
-        np.array([group for group, _weight in flat], dtype=np.int32),
-        np.array([weight for _group, weight in flat], dtype=np.float32),
-    )
 
 
 def _on_evaluated(depsgraph: bpy.types.Depsgraph) -> None:

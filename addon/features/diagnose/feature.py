@@ -75,7 +75,10 @@ class SINEW_OT_select_finding(_OnFinding, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     def run(self, context: bpy.types.Context) -> None:
-        count = diagnose.select(self.mesh(context), self.finding, context)
+        obj = self.mesh(context)
+        _check, finding = diagnose.finding_of(obj, self.finding)
+        diagnose.select_vertices(obj, finding.vertices, context)
+        count = len(finding.vertices)
         self.report({"INFO"}, counted(count, "Selected {count} vertex", "Selected {count} vertices"))
 
 

@@ -143,13 +143,9 @@ class SINEW_OT_save_flex(SavesPage, bpy.types.Operator):
         return page.page(context.scene, title, objects, result)
 
 
-class SINEW_PT_flex(Sidebar, bpy.types.Panel):
+class SINEW_PT_flex(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Flex"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -20,7 +20,6 @@ from ...core.flex.limits import Table
 from ...core.flex.verdict import OWN, Pose, Verdict, judge
 from ...core.metrics import FrameOfRig
 from ...core.rig import Bones
-from ...deform import session
 from ...io import armature_io
 from ..heat import live
 from ..suggest.crossings import crossing_triangles
@@ -93,11 +92,8 @@ def flex(
 
     Raises SinewError where there is nothing to bend.
     """
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    subject = live.measure(session.states_of(objects, depsgraph), properties.BLENDER, depsgraph)
-    if subject is None:
-        raise SinewError("Nothing to bend: Sinew deforms none of the chosen meshes")
-    now = live.Moment.of(subject, depsgraph)
+    subject = live.measure_now(objects, properties.BLENDER, "bend")
+    now = live.Moment.of(subject)
     rigs = _rigs(now)
     own_methods = [own.get(part.obj) for part in subject.parts]
     poses: list[Pose] = []

@@ -4,7 +4,6 @@ Sinew is off such a mesh, so its colours are an attribute of the mesh itself whi
 then, as exporters would write them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -20,21 +19,9 @@ AFTER, BEFORE = measures.BAKE_ERRORS
 _ATTRIBUTES = {AFTER: ERRORS, BEFORE: ERRORS_BEFORE}
 
 
-@dataclass(frozen=True)
-class Summary:
-    """The errors of a mesh, in units of the scene.
-
-    squares  for each quantity, the sum over the vertices
-    most     the largest, before and after
-    """
-
-    squares: dict[str, float]
-    most: float
-
-
 # By the session_uid of the mesh and the number of its vertices: panels are drawn often, and each bake makes a
 # mesh.
-_summaries: dict[tuple[int, int], Summary] = {}
+_summaries: dict[tuple[int, int], dict[str, tuple[float, float]]] = {}
 
 
 def is_baked(obj: bpy.types.Object) -> bool:
@@ -53,25 +40,28 @@ def errors_of(mesh: bpy.types.Mesh, quantity: str, count: int) -> np.ndarray:
     return found
 
 
-def summary_of(mesh: bpy.types.Mesh) -> Summary:
+def summary_of(mesh: bpy.types.Mesh) -> dict[str, tuple[float, float]]:
+    """Returns for each quantity the sum of the squared errors, and the largest, in units of the scene."""
     key = mesh.session_uid, len(mesh.vertices)
     if key not in _summaries:
         errors = {name: errors_of(mesh, name, key[1]) for name in _ATTRIBUTES}
-        squares = {name: float(np.square(each, dtype=np.float64).sum()) for name, each in errors.items()}
-        _summaries[key] = Summary(squares, max(float(each.max(initial=0.0)) for each in errors.values()))
+        _summaries[key] = {
+            name: (float(np.square(each, dtype=np.float64).sum()), float(each.max(initial=0.0)))
+            for name, each in errors.items()
+        }
     return _summaries[key]
 
 
 def rms(objects: Sequence[bpy.types.Object], quantity: str) -> float:
     """Over the vertices of all."""
     count = sum(len(obj.data.vertices) for obj in objects)
-    squares = sum(summary_of(obj.data).squares[quantity] for obj in objects)
+    squares = sum(summary_of(obj.data)[quantity][0] for obj in objects)
     return float(np.sqrt(squares / max(count, 1)))
 
 
 def scale_of(settings: measures.SinewMeasures, objects: Sequence[bpy.types.Object]) -> HeatScale:
     """Returns one range for the errors before and after, so that the two can be compared."""
-    most = max(summary_of(obj.data).most for obj in objects)
+    most = max(most for obj in objects for _squares, most in summary_of(obj.data).values())
     return HeatScale.over_values(settings.metric, 0.0, most, 0.0)
 
 

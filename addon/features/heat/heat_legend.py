@@ -12,7 +12,7 @@ from ...io import units
 from . import bake_error
 
 WIDTH, BAR, MARGIN, GAP, FONT_SIZE = 420, 14, 24, 8, 12
-STEPS = 64
+STEPS, LABELS = 64, 5
 BACKGROUND, TEXT = (0.08, 0.08, 0.08, 0.75), (1.0, 1.0, 1.0, 1.0)
 
 
@@ -20,9 +20,9 @@ BACKGROUND, TEXT = (0.08, 0.08, 0.08, 0.75), (1.0, 1.0, 1.0, 1.0)
 contents: dict[int, tuple[HeatScale, str]] = {}
 
 
-def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str]:
+def labels(scale: HeatScale, scene: bpy.types.Scene) -> list[str]:
     """Returns the values at equal distances along the legend, with their unit."""
-    texts = [units.text(scene, scale.metric.unit, value) for value in scale.ticks(count)]
+    texts = [units.text(scene, scale.metric.unit, value) for value in scale.ticks(LABELS)]
     if scale.clipped:
         texts[-1] = f"\u2265 {texts[-1]}"
         if scale.low != 0.0:

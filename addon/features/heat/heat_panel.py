@@ -14,6 +14,7 @@ from ...deform import characters, session
 from ...io import units
 from ...ui import operators, sidebar, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.settings_layout import named
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import joined, tr
 from . import bake_error, live, measures, worst_frames
@@ -107,17 +108,15 @@ class SINEW_OT_fit_heat_range(_Scans, bpy.types.Operator):
         measures.of(context.scene).fix(worst_frames.scans[context.scene.session_uid].scale)
 
 
-class SINEW_OT_go_to_frame(bpy.types.Operator):
-    bl_idname = "sinew.go_to_frame"
+class SINEW_OT_go_to_frame(operators.Named, bpy.types.Operator):
     bl_label = "Go to Frame"
     bl_description = "Go to this frame"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     frame: bpy.props.FloatProperty(name="Frame", description="Of the scene")
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         characters.set_frame(context.scene, self.frame)
-        return {"FINISHED"}
 
 
 # What a frame's badness is measured by.
@@ -171,7 +170,7 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if subject is None:
             draw_text(self.layout, "Sinew deforms nothing here now", icon="INFO")
             return
-        other = live.measured_under_other(subject, settings.other, depsgraph)
+        other = live.measured_under_other(subject, settings.other)
         shown = {properties.of(obj).method for obj, _skinned in pairs}
         heads = ["", "At Rest", shown.pop() if len(shown) == 1 else "Shown"]
         if other is not None:
@@ -184,15 +183,11 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
         column.label(text="Compared with")
         column.prop(settings, "other", text="")
         for name, value in distances(context.scene, subject.measured):
-            split = column.split(factor=0.42)
-            split.label(text=name)
-            split.label(text=value)
+            named(column, name, factor=0.42).label(text=value)
 
 
 def _draw_row(layout: bpy.types.UILayout, texts: Sequence[str]) -> None:
-    split = layout.split(factor=0.35)
-    split.label(text=texts[0])
-    values = split.row(align=True)
+    values = named(layout, texts[0], factor=0.35)
     for text in texts[1:]:
         values.label(text=text)
 

@@ -6,7 +6,7 @@ Shapes are the results of skinning alone, in world space; several objects are me
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from ...attach import attach, corrective_smooth, properties, stage_settings, upstream_proxy
 from ...core import influences
+from ...core.errors import SinewError
 from ...core.metrics import FrameOfRig, Gauge, Measured, Pose, Shape
 from ...core.rig import Bones
 from ...core.skin_stack import SkinStack
@@ -22,7 +23,7 @@ from ...core.stages import StageValues
 from ...core.surface import Surface, joined
 from ...core.twist_spread import NOT_TOLD, TwistInputs
 from ...core.vectors import is_same_space, transformed, transformed_axes
-from ...deform import pose
+from ...deform import pose, session
 from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
 from ...io import armature_io, mesh_io, spaces
@@ -44,20 +45,72 @@ class Part:
     skin_stack: SkinStack
 
 
+@dataclass(frozen=True)
+class _Inputs:
+    """What the shape of an object depends on; it is deformed only when needed."""
+
+    part: Part
+    rest_points: np.ndarray
+    frames: pose.Frames
+    stages: StageValues
+
+    @classmethod
+    def shown(cls, part: Part) -> Self:
+        shown = part.skinned.shown
+        return cls(part, shown.rest_points, shown.frames, shown.stage_values)
+
+    def under(self, method: str | None) -> Self:
+        """method: as of Moment.points()"""
+        obj = self.part.obj
+        if method is None:
+            return self
+        if method == properties.BLENDER:
+            frames = pose.of_modifiers(obj, self.frames)
+            return replace(self, frames=frames, stages=corrective_smooth.stage_values(obj))
+        own = stage_settings.method_values(properties.of(obj), (method,))
+        frames = [frame and replace(frame, method=method, mix="", parameters=own) for frame in self.frames]
+        return replace(self, frames=frames)
+
+    def of_mix(self, second: str) -> Self:
+        """Under the first method of a mix or, where one is given, under the second. Armature modifiers with a
+        method of their own are not mixed."""
+        settings = properties.of(self.part.obj)
+        frames = [frame and replace(frame, mix="") for frame in self.frames]
+        if second:
+            own = stage_settings.method_values(settings, (second,))
+            frames = [
+                replace(frame, method=second, parameters=own)
+                if frame is not None and frame.method == settings.method
+                else frame
+                for frame in frames
+            ]
+        return replace(self, frames=frames)
+
+    def points(self) -> np.ndarray:
+        """float32 [vertices, 3], object space."""
+        self.part.skin_stack.deform(self.rest_points, self.frames, values=self.stages)
+        return self.part.skin_stack.points
+
+
 @dataclass
 class Subject:
     """Objects that are measured as one, with concatenated vertices.
 
-    stamp        the inputs of `measured`
-    rest         world points at rest, with their inputs in rest_made_from
-    under_other  the measures of the same frame under the method that distances are measured to, once needed
+    stamp              what `measured` was made from
+    inputs             of each part, of the same frame
+    worlds, armatures  world matrices of the parts, and of their first armatures
+    rest               world points at rest
+    under_other        the measures of the same frame under the method that distances are measured to, once
+                       needed
     """
 
     parts: list[Part]
     gauge: Gauge
     stamp: tuple | None = None
+    inputs: list[_Inputs] = field(default_factory=list)
+    worlds: list[np.ndarray] = field(default_factory=list)
+    armatures: list[np.ndarray] = field(default_factory=list)
     rest: np.ndarray | None = None
-    rest_made_from: tuple = ()
     measured: Measured | None = None
     under_other: Measured | None = None
 
@@ -98,14 +151,28 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
         *(matrix.tobytes() for matrix in (*worlds, *armatures)),
     )
     if stamp != subject.stamp:
-        _bring_rest(subject, worlds)
-        frames = [skinned.shown.frames for _obj, skinned in pairs]
-        subject.gauge.set_frame(_frame_of_rig(subject, armatures, subject.rest, frames))
+        inputs = [_Inputs.shown(part) for part in subject.parts]
+        if not _is_same_rest(subject, inputs, worlds):
+            subject.rest = _in_world([own.rest_points for own in inputs], worlds)
+        subject.inputs, subject.worlds, subject.armatures = inputs, worlds, armatures
+        subject.gauge.set_frame(_frame_of_rig(inputs, armatures, subject.rest))
         shape = _in_world([skinned.points for _obj, skinned in pairs], worlds)
-        others = [_Other.of(part, other) for part in subject.parts]
+        others = [own.under(other) for own in inputs]
         subject.measured = subject.gauge.measure(shape, lambda: _shape_of(others, worlds))
         subject.stamp = stamp
         subject.under_other = None
+    return subject
+
+
+def measure_now(objects: Sequence[bpy.types.Object], other: str, what: str) -> Subject:
+    """Measures objects in the scene as it is now. Raises SinewError where there is nothing to measure.
+
+    what  is to be done, in words
+    """
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    subject = measure(session.states_of(objects, depsgraph), other, depsgraph)
+    if subject is None:
+        raise SinewError(f"Nothing to {what}: Sinew deforms none of the chosen meshes")
     return subject
 
 
@@ -114,41 +181,33 @@ class Moment:
     """All that the shapes of one frame depend on but method and stages; or the same in a pose that no frame
     has. Measuring it changes nothing, and does not depend on the scene's frame.
 
-    rest_points, frames, stages  of each part
-    armatures                    world matrices of the first armature of each part
+    inputs     of each part
+    armatures  world matrices of the first armature of each part
     """
 
     subject: Subject
-    rest_points: list[np.ndarray]
-    frames: list[pose.Frames]
-    stages: list[StageValues]
+    inputs: list[_Inputs]
     worlds: list[np.ndarray]
     armatures: list[np.ndarray]
 
     @classmethod
-    def of(cls, subject: Subject, depsgraph: bpy.types.Depsgraph) -> Self:
-        """That of the last call of measure()."""
-        frames = []
-        for part in subject.parts:
-            inputs = _twists(part, depsgraph)
-            own = part.skinned.shown.frames
-            frames.append([frame and replace(frame, twists=inputs) for frame in own])
-        return cls(
-            subject,
-            [part.skinned.shown.rest_points for part in subject.parts],
-            frames,
-            [part.skinned.shown.stage_values for part in subject.parts],
-            [_world(part.obj, depsgraph) for part in subject.parts],
-            [_world(properties.of(part.obj).armature, depsgraph) for part in subject.parts],
-        )
+    def of(cls, subject: Subject) -> Self:
+        """That of the last call of measure(), with the scene as it is evaluated now."""
+        inputs, depsgraph = [], bpy.context.evaluated_depsgraph_get()
+        for shown in subject.inputs:
+            twists = _twists(shown.part, depsgraph)
+            frames = [frame and replace(frame, twists=twists) for frame in shown.frames]
+            inputs.append(replace(shown, frames=frames))
+        return cls(subject, inputs, subject.worlds, subject.armatures)
 
     def posed(self, poses: Callable[[Bones], np.ndarray]) -> Self:
         """Returns the same in other poses, which tell no turns.
 
         poses  returns float32 [bones + joints, 4, 4], armature space
         """
-        frames = [
-            [
+        inputs = []
+        for own in self.inputs:
+            frames = [
                 frame
                 and replace(
                     frame,
@@ -156,16 +215,15 @@ class Moment:
                     twists=tuple((*of_bone[:2], *NOT_TOLD) for of_bone in frame.twists),
                     turns=None,
                 )
-                for stage, frame in zip(part.skin_stack.skin_stages, own, strict=False)
+                for stage, frame in zip(own.part.skin_stack.skin_stages, own.frames, strict=False)
             ]
-            for part, own in zip(self.subject.parts, self.frames, strict=True)
-        ]
-        return replace(self, frames=frames)
+            inputs.append(replace(own, frames=frames))
+        return replace(self, inputs=inputs)
 
     @cached_property
     def pose(self) -> Pose:
-        rest = _in_world(self.rest_points, self.worlds)
-        return self.subject.gauge.pose_of(_frame_of_rig(self.subject, self.armatures, rest, self.frames))
+        rest = _in_world([own.rest_points for own in self.inputs], self.worlds)
+        return self.subject.gauge.pose_of(_frame_of_rig(self.inputs, self.armatures, rest))
 
     def points(self, methods: Sequence[str | None]) -> np.ndarray:
         """float64 [vertices, 3], world space.
@@ -173,17 +231,17 @@ class Moment:
         methods  of each part: one with the stages that are shown, None for the method that is shown, too, or
                  properties.BLENDER for the Armature modifiers
         """
-        own = zip(self.subject.parts, methods, self.rest_points, self.frames, self.stages, strict=True)
-        return _shape_of([_Other.under(*of_part) for of_part in own], self.worlds)
+        pairs = zip(self.inputs, methods, strict=True)
+        return _shape_of([own.under(method) for own, method in pairs], self.worlds)
 
     def measured(self, method: str, stages: StageValues | None = None) -> Measured:
         """Measures the shape under a method and stages; without a mix.
 
         stages  None: those that are shown
         """
-        count = len(self.subject.parts)
-        moment = self if stages is None else replace(self, stages=[stages] * count)
-        return Measured(self.pose, Shape(self.subject.gauge.surface, moment.points([method] * count)), None)
+        inputs = self.inputs if stages is None else [replace(own, stages=stages) for own in self.inputs]
+        points = replace(self, inputs=inputs).points([method] * len(inputs))
+        return Measured(self.pose, Shape(self.subject.gauge.surface, points), None)
 
 
 def _twists(part: Part, depsgraph: bpy.types.Depsgraph) -> TwistInputs:
@@ -194,28 +252,26 @@ def _twists(part: Part, depsgraph: bpy.types.Depsgraph) -> TwistInputs:
 
 
 def measured_of_mix(
-    subject: Subject, second_of: Callable[[bpy.types.Object], str], depsgraph: bpy.types.Depsgraph
+    subject: Subject, second_of: Callable[[bpy.types.Object], str]
 ) -> tuple[Measured, Measured]:
     """Measures the frame of the last call of measure() under each of the two methods of a mix alone.
 
     second_of  of an object: its second method
     """
-    worlds = [_world(part.obj, depsgraph) for part in subject.parts]
-    first = [_Other.of_mix(part, "") for part in subject.parts]
-    second = [_Other.of_mix(part, second_of(part.obj)) for part in subject.parts]
+    first = [own.of_mix("") for own in subject.inputs]
+    second = [own.of_mix(second_of(own.part.obj)) for own in subject.inputs]
     measure = subject.gauge.measure
-    return measure(_shape_of(first, worlds)), measure(_shape_of(second, worlds))
+    return measure(_shape_of(first, subject.worlds)), measure(_shape_of(second, subject.worlds))
 
 
-def measured_under_other(subject: Subject, other: str, depsgraph: bpy.types.Depsgraph) -> Measured | None:
+def measured_under_other(subject: Subject, other: str) -> Measured | None:
     """Measures the frame of the last call of measure() under the method given there, once per frame;
     distances are to the current shape. None where everything is shown under this method."""
-    shown = [frame for part in subject.parts for frame in part.skinned.shown.frames if frame is not None]
+    shown = [frame for own in subject.inputs for frame in own.frames if frame is not None]
     if all(frame.method == other and not frame.mix for frame in shown):
         return None
     if subject.under_other is None:
-        worlds = [_world(part.obj, depsgraph) for part in subject.parts]
-        shape = _shape_of([_Other.of(part, other) for part in subject.parts], worlds)
+        shape = _shape_of([own.under(other) for own in subject.inputs], subject.worlds)
         subject.under_other = subject.gauge.measure(shape, subject.measured.shape.points.T)
     return subject.under_other
 
@@ -247,7 +303,7 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         return None
     if old is not None and all(map(_is_alike, parts, old.parts)):
         for part, known in zip(parts, old.parts, strict=True):
-            known.bound = part.bound
+            known.skinned, known.bound = part.skinned, part.bound
         return old
     entries, bone_counts = [], []
     for part in parts:
@@ -287,75 +343,23 @@ def _modifiers_methods(obj: bpy.types.Object, other: str) -> tuple[str, ...]:
     return tuple(attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj))
 
 
-@dataclass
-class _Other:
-    """An object's current shape under another method, deformed only when needed."""
-
-    skin_stack: SkinStack
-    rest_points: np.ndarray
-    frames: pose.Frames
-    stage_values: StageValues
-
-    @classmethod
-    def of(cls, part: Part, other: str) -> Self:
-        shown = part.skinned.shown
-        return cls.under(part, other, shown.rest_points, shown.frames, shown.stage_values)
-
-    @classmethod
-    def under(
-        cls, part: Part, method: str | None, rest_points: np.ndarray, frames: pose.Frames, stages: StageValues
-    ) -> Self:
-        """method: as of Moment.points()"""
-        if method == properties.BLENDER:
-            frames, stages = pose.of_modifiers(part.obj, frames), corrective_smooth.stage_values(part.obj)
-        elif method is not None:
-            own = stage_settings.method_values(properties.of(part.obj), (method,))
-            frames = [frame and replace(frame, method=method, mix="", parameters=own) for frame in frames]
-        return cls(part.skin_stack, rest_points, frames, stages)
-
-    @classmethod
-    def of_mix(cls, part: Part, second: str) -> Self:
-        """Under the first method of a mix or, where one is given, under the second. Armature modifiers with a
-        method of their own are not mixed."""
-        shown, settings = part.skinned.shown, properties.of(part.obj)
-        frames = [frame and replace(frame, mix="") for frame in shown.frames]
-        if second:
-            own = stage_settings.method_values(settings, (second,))
-            frames = [
-                replace(frame, method=second, parameters=own)
-                if frame is not None and frame.method == settings.method
-                else frame
-                for frame in frames
-            ]
-        return cls(part.skin_stack, shown.rest_points, frames, shown.stage_values)
-
-    def points(self) -> np.ndarray:
-        """float32 [vertices, 3], object space."""
-        self.skin_stack.deform(self.rest_points, self.frames, values=self.stage_values)
-        return self.skin_stack.points
+def _shape_of(inputs: Sequence[_Inputs], worlds: Sequence[np.ndarray]) -> np.ndarray:
+    return _in_world([own.points() for own in inputs], worlds)
 
 
-def _shape_of(others: Sequence[_Other], worlds: Sequence[np.ndarray]) -> np.ndarray:
-    return _in_world([each.points() for each in others], worlds)
+def _is_same_rest(subject: Subject, inputs: list[_Inputs], worlds: list[np.ndarray]) -> bool:
+    """Whether nothing has moved the points at rest since the last frame."""
+    if subject.rest is None:
+        return False
+    pairs = zip(inputs, subject.inputs, strict=True)
+    same_shapes = all(own.rest_points is known.rest_points for own, known in pairs)
+    return same_shapes and all(map(np.array_equal, worlds, subject.worlds))
 
 
-def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
-    """Updates the world points at rest; the same array where nothing moved them."""
-    shapes = [part.skinned.shown.rest_points for part in subject.parts]
-    if subject.rest_made_from:
-        known_shapes, known_worlds = subject.rest_made_from
-        same_shapes = all(a is b for a, b in zip(shapes, known_shapes, strict=True))
-        if same_shapes and all(map(np.array_equal, worlds, known_worlds)):
-            return
-    subject.rest, subject.rest_made_from = _in_world(shapes, worlds), (shapes, worlds)
-
-
-def _frame_of_rig(
-    subject: Subject, armatures: list[np.ndarray], rest: np.ndarray, frames: Sequence[pose.Frames]
-) -> FrameOfRig:
+def _frame_of_rig(inputs: Sequence[_Inputs], armatures: list[np.ndarray], rest: np.ndarray) -> FrameOfRig:
     rigs = []
-    for part, armature, (frame, *_others) in zip(subject.parts, armatures, frames, strict=True):
-        bones = part.bound.first_deformer.bones
+    for own, armature in zip(inputs, armatures, strict=True):
+        bones, frame = own.part.bound.first_deformer.bones, own.frames[0]
         at_rest = armature @ bones.rest
         rigs.append((bones, at_rest, at_rest if frame is None else armature @ frame.pose))
     return FrameOfRig.of(rest, rigs)

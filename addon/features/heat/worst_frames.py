@@ -11,7 +11,7 @@ from ...core.comparison import LENGTHS, ROUNDING, peaks
 from ...core.errors import SinewError
 from ...core.heat import HeatScale
 from ...core.metrics import METRICS, Metric
-from ...deform import characters, session
+from ...deform import characters
 from ...ui import stepped
 from . import live
 
@@ -59,15 +59,10 @@ def check_measurable(objects: Sequence[bpy.types.Object]) -> None:
 
 def measure_at(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], other: str, frame: float
-) -> tuple[live.Subject, bpy.types.Depsgraph]:
-    """Goes to the frame and measures there, as live.measure(). Raises SinewError where there is nothing to
-    measure."""
+) -> live.Subject:
+    """Goes to the frame and measures there. Raises SinewError where there is nothing to measure."""
     characters.set_frame(scene, frame)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    subject = live.measure(session.states_of(objects, depsgraph), other, depsgraph)
-    if subject is None:
-        raise SinewError(f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes")
-    return subject, depsgraph
+    return live.measure_now(objects, other, f"measure at frame {frame}")
 
 
 def scan(
@@ -85,8 +80,7 @@ def scan(
     frames = stepped.frames_over(scene, armatures, over)
     with stepped.kept_frame(scene, armatures):
         for number, frame in enumerate(frames):
-            subject, _depsgraph = measure_at(scene, objects, other, frame)
-            measured = subject.measured
+            measured = measure_at(scene, objects, other, frame).measured
             values = measured.field(quantity)
             if len(values):
                 extremes += [float(values.min()), float(values.max())]

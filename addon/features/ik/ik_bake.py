@@ -20,7 +20,6 @@ class Baked:
     """The result of baking a tree: `errors` [frames], of the tips, in lengths of the chain."""
 
     tree: core.Tree
-    solution: core.ik.Solution
     errors: np.ndarray
 
 
@@ -85,7 +84,7 @@ def _bake(
         before = posed.parent if parent < 0 else matrices[:, parent]
         channels = spaces.channels_from_poses(bone.bone, matrices[:, number], before)
         _write_keys(armature, name, np.array([each.to_quaternion() for each in channels]), frames)
-    return Baked(tree, solution, core.tip_errors(tree, problem, matrices))
+    return Baked(tree, core.tip_errors(tree, problem, matrices))
 
 
 def _write_keys(

@@ -49,8 +49,8 @@ class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operato
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         armature = operators.armatures(context)[0]
-        settings = inbetween_bake.Settings(self.method, self.path, self.step, selected_bones(armature))
-        self._baked = yield from inbetween_bake.steps(armature, settings)
+        only = selected_bones(armature)
+        self._baked = yield from inbetween_bake.steps(armature, self.method, self.path, self.step, only)
 
     def run(self, context: bpy.types.Context) -> None:
         baked = self._baked

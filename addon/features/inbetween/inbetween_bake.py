@@ -14,26 +14,10 @@ from ..action_copy import action_copy
 from . import keyed_poses
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How in-betweens are made.
-
-    method  of core.METHODS
-    path    core.STRAIGHT or core.SPLINE
-    step    frames from one key to the next
-    only    the bones that move by the method; None: all
-    """
-
-    method: str
-    path: str = core.STRAIGHT
-    step: int = 1
-    only: Collection[str] | None = None
-
-
 @dataclass
 class Baked:
     """What steps() did to an armature, by bone: `bones` were keyed, `left` keep their curves for the reason
-    given, `far` are those of `keyed_poses.Pose.far`."""
+    given, `far` are those of `keyed_poses.pose_at()`."""
 
     armature: bpy.types.Object
     bones: int = 0
@@ -45,22 +29,31 @@ class Baked:
         return [*kept, *(f"{bone} {core.TOO_FAR[path]}" for bone in sorted(self.far))]
 
 
-def steps(armature: bpy.types.Object, settings: Settings) -> Generator[float, None, Baked]:
+def steps(
+    armature: bpy.types.Object,
+    method: str,
+    path: str = core.STRAIGHT,
+    step: int = 1,
+    only: Collection[str] | None = None,
+) -> Generator[float, None, Baked]:
     """Has the armature play a copy of its action, in which the bones move by a method between the keyed
     poses, with keys at every `step` frames and linear interpolation; yields the progress.
 
     The keyed poses stay, also those between whole frames; in-betweens are keys of type Breakdown. If closed
     before the end, everything is as before. Raises SinewError where there is nothing to do.
+
+    method  of core.METHODS
+    path    core.STRAIGHT or core.SPLINE
+    step    frames from one key to the next
+    only    the bones that move by the method; None: all
     """
-    with action_copy.playing(armature, core.METHODS[settings.method].label):
-        poses = keyed_poses.read(armature, settings.only)
-        baked = Baked(armature, left=poses.left)
-        wanted = [_times(group, settings.step) for group in poses.groups]
-        baked.bones = sum(
-            len(group.rows) for group, times in zip(poses.groups, wanted, strict=True) if len(times)
-        )
+    with action_copy.playing(armature, core.METHODS[method].label):
+        groups, left = keyed_poses.read(armature, only)
+        baked = Baked(armature, left=left)
+        wanted = [_times(group, step) for group in groups]
+        baked.bones = sum(len(group.rows) for group, times in zip(groups, wanted, strict=True) if len(times))
         if not baked.bones:
-            reasons = [f"{bone} {reason}" for bone, reason in sorted(poses.left.items())]
+            reasons = [f"{bone} {reason}" for bone, reason in sorted(left.items())]
             raise SinewError(
                 f"{armature.name}: no bone has two keyed poses here; "
                 f"{reasons[0] if reasons else 'key some poses'}"
@@ -69,12 +62,12 @@ def steps(armature: bpy.types.Object, settings: Settings) -> Generator[float, No
         samples: list[np.ndarray] = []
         modes = np.array([bone.rotation_mode for bone in armature.pose.bones])
         for number, time in enumerate(times):
-            pose = keyed_poses.pose_at(armature, poses, float(time), settings.method, settings.path)
+            pose, far = keyed_poses.pose_at(armature, groups, float(time), method, path)
             # Rotation values close to the previous ones.
-            samples.append(pose_io.closer(pose.channels, modes, samples[-1]) if samples else pose.channels)
-            baked.far.update(pose.far)
+            samples.append(pose_io.closer(pose, modes, samples[-1]) if samples else pose)
+            baked.far.update(far)
             yield (number + 1) / len(times)
-        for group, own_times in zip(poses.groups, wanted, strict=True):
+        for group, own_times in zip(groups, wanted, strict=True):
             values = np.array(samples)[np.searchsorted(times, own_times)]
             for curve, bone, column in zip(group.curves, group.bones, group.columns, strict=True):
                 if len(own_times):

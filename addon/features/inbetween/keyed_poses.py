@@ -3,7 +3,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -35,32 +35,8 @@ class Group:
     bones: np.ndarray
     columns: np.ndarray
     still: np.ndarray
-    gains: tuple[np.ndarray | None, np.ndarray | None]
+    gains: list[np.ndarray | None]
     poses: dict[int, np.ndarray] = field(default_factory=dict)
-
-
-@dataclass
-class KeyedPoses:
-    """What was read of a slot for an armature; valid until the action changes.
-
-    left  bones that keep their curves, each with the reason
-    """
-
-    groups: list[Group]
-    left: dict[str, str]
-
-
-@dataclass
-class Pose:
-    """The pose of an armature's bones at a time.
-
-    channels  float32 [bones, 10], as from pose_io.read_channels()
-    far       bones whose keys are too far apart: the method does not define a unique result, or the angles
-              mean a longer way than it takes
-    """
-
-    channels: np.ndarray
-    far: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -79,8 +55,11 @@ class Span:
     times: np.ndarray
 
 
-def read(armature: bpy.types.Object, only: Collection[str] | None = None) -> KeyedPoses:
-    """Reads the keyed poses of the action that an armature plays, of all bones or only of some."""
+def read(
+    armature: bpy.types.Object, only: Collection[str] | None = None
+) -> tuple[list[Group], dict[str, str]]:
+    """Reads the keyed poses of the action that an armature plays, of all bones or only of some; valid until
+    the action changes. Returns also the bones that keep their curves, each with the reason."""
     action, slot = actions.playing(armature)
     rotations = pose_io.rotation_properties(armature.pose.bones)
     rows = {name: row for row, name in enumerate(rotations)}
@@ -90,13 +69,18 @@ def read(armature: bpy.types.Object, only: Collection[str] | None = None) -> Key
         pairs = [pair for pair in pairs if actions.plays(pair[1], rotations.get(name))]
         if not pairs or (only is not None and name not in only):
             continue
-        reason = actions.reason_against([curve for curve, _channel in pairs])
+        curves = [curve for curve, _channel in pairs]
+        reason = actions.reason_against(curves)
         if reason is not None:
             left[name] = reason
             continue
-        bone = _Bone.read(armature.pose.bones[name], rows[name], pairs)
-        found.setdefault(bone.likeness, []).append(bone)
-    return KeyedPoses([_group(bones) for bones in found.values()], left)
+        times, mode = actions.key_times(curves), armature.pose.bones[name].rotation_mode
+        gains = [actions.gains_of_a_round(curves, times, onwards) for onwards in (False, True)]
+        bone = _Bone(rows[name], mode, pairs, times, actions.hold_still(curves, times), gains)
+        # Bones of one group have keys at the same times, which repeat alike.
+        likeness = times.tobytes(), *(gain is None for gain in gains)
+        found.setdefault(likeness, []).append(bone)
+    return [_group(bones) for bones in found.values()], left
 
 
 class _Bone(NamedTuple):
@@ -107,21 +91,7 @@ class _Bone(NamedTuple):
     pairs: list[tuple[bpy.types.FCurve, actions.Channel]]
     times: np.ndarray
     still: np.ndarray
-    gains: tuple[np.ndarray | None, np.ndarray | None]
-
-    @classmethod
-    def read(
-        cls, bone: bpy.types.PoseBone, row: int, pairs: list[tuple[bpy.types.FCurve, actions.Channel]]
-    ) -> Self:
-        curves = [curve for curve, _channel in pairs]
-        times = actions.key_times(curves)
-        before, after = (actions.gains_of_a_round(curves, times, onwards) for onwards in (False, True))
-        return cls(row, bone.rotation_mode, pairs, times, actions.hold_still(curves, times), (before, after))
-
-    @property
-    def likeness(self) -> tuple:
-        """Equal for bones of one group."""
-        return (self.times.tobytes(), *(gain is None for gain in self.gains))
+    gains: list[np.ndarray | None]
 
 
 def _group(bones: list[_Bone]) -> Group:
@@ -144,27 +114,31 @@ def _group(bones: list[_Bone]) -> Group:
         bones=np.array(owners),
         columns=np.array(columns),
         still=np.array([bone.still for bone in bones]).T,
-        gains=(gains[0], gains[1]),
+        gains=gains,
     )
 
 
-def pose_at(armature: bpy.types.Object, poses: KeyedPoses, time: float, method: str, path: str) -> Pose:
-    """Returns the pose at `time`; at keys, and before the first and after the last, that of Blender's curves.
+def pose_at(
+    armature: bpy.types.Object, groups: list[Group], time: float, method: str, path: str
+) -> tuple[np.ndarray, list[str]]:
+    """Returns the pose at `time`, float32 [bones, 10], as from pose_io.read_channels(); at keys, and before
+    the first and after the last, that of Blender's curves. Returns also the bones whose keys are too far
+    apart: the method does not define a unique result, or the angles mean a longer way than it takes.
 
-    poses   from read()
+    groups  from read()
     method  of core.METHODS
     """
-    channels = pose_io.read_channels(armature.pose.bones)
-    pose, names = Pose(channels), armature.pose.bones.keys()
-    for group in poses.groups:
+    channels, far = pose_io.read_channels(armature.pose.bones), []
+    names = armature.pose.bones.keys()
+    for group in groups:
         values = [curve.evaluate(time) for curve in group.curves]
         channels[group.rows[group.bones], group.columns] = values
         span = span_at(group, time)
         if span is not None:
             found, is_far = _between(group, span, channels[group.rows], method, path)
             channels[group.rows] = np.where(group.keyed, found, channels[group.rows])
-            pose.far += [names[row] for row in group.rows[is_far]]
-    return pose
+            far += [names[row] for row in group.rows[is_far]]
+    return channels, far
 
 
 def span_at(group: Group, time: float) -> Span | None:

@@ -76,7 +76,7 @@ class Studio:
         if halved:
             # Dither makes a file larger by half.
             scene.render.dither_intensity = 0.0
-        self._show_clay()
+        self._show(heat=False)
 
     def painted(
         self, meshes: Sequence[bpy.types.Object], colours: Sequence[np.ndarray]
@@ -95,29 +95,27 @@ class Studio:
         for obj, copy in zip(meshes, copies, strict=True):
             obj.hide_render = True
             self.scene.collection.objects.link(copy)
-        self._show_heat()
+        self._show(heat=True)
         try:
             yield
         finally:
-            self._show_clay()
+            self._show(heat=False)
             for obj, copy in zip(meshes, copies, strict=True):
                 obj.hide_render = False
                 mesh = copy.data
                 bpy.data.objects.remove(copy)
                 bpy.data.meshes.remove(mesh)
 
-    def _show_clay(self) -> None:
-        if self.engine == "workbench":
-            self._shade("SINGLE", light="Default", gloss=True)
-        else:
-            self._override(self._clay)
-
-    def _show_heat(self) -> None:
-        if self.engine == "workbench":
-            # Colours have to be legible, so it uses the most even of Blender's lights, without gloss.
-            self._shade("VERTEX", light="paint.sl", gloss=False)
-        else:
-            self._override(self._heat)
+    def _show(self, heat: bool) -> None:
+        """Shows colours of a heat map, or clay."""
+        if self.engine != "workbench":
+            for layer in self.scene.view_layers:
+                layer.material_override = self._heat if heat else self._clay
+            return
+        shading = self.scene.display.shading
+        # Colours have to be legible, so they get the most even of Blender's lights, without gloss.
+        shading.color_type, shading.studio_light = ("VERTEX", "paint.sl") if heat else ("SINGLE", "Default")
+        shading.show_specular_highlight = shading.show_cavity = not heat
 
     def picture(self, view: View, path: Path) -> None:
         """Renders the region of `view` to the PNG `path`."""
@@ -134,35 +132,17 @@ class Studio:
         camera.data.clip_end = 2 * view.depth
         render = self.scene.render
         render.resolution_x, render.resolution_y = view.pixels(self._size)
-        _render(self.scene, path)
-
-    def _shade(self, colour: str, light: str, gloss: bool) -> None:
-        shading = self.scene.display.shading
-        shading.color_type, shading.studio_light = colour, light
-        shading.show_specular_highlight = shading.show_cavity = gloss
-
-    def _override(self, material: bpy.types.Material) -> None:
-        for layer in self.scene.view_layers:
-            layer.material_override = material
+        draw(self.scene, path)
 
 
-class OwnLook:
-    """Renders with the file's own camera and settings."""
-
-    def __init__(self, scene: bpy.types.Scene, path: Path) -> None:
-        if scene.camera is None:
-            raise SinewError(
-                f"{path}: has no camera to look through; leave --own-look away for clay pictures"
-            )
-        self._scene = scene
-        _prepare_png(scene)
-
-    def picture(self, path: Path) -> None:
-        """Renders to the PNG `path`."""
-        _render(self._scene, path)
+def use_own_look(scene: bpy.types.Scene, path: Path) -> None:
+    """Has draw() use the file's own camera and settings. Raises SinewError where it has no camera."""
+    if scene.camera is None:
+        raise SinewError(f"{path}: has no camera to look through; leave --own-look away for clay pictures")
+    _prepare_png(scene)
 
 
-def _render(scene: bpy.types.Scene, path: Path) -> None:
+def draw(scene: bpy.types.Scene, path: Path) -> None:
     """Renders the current frame to the PNG `path`; raises SinewError where it cannot be written."""
     with scratch_folder() as folder:
         # Not to `path` itself: Blender replaces each # and {} in it.

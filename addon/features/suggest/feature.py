@@ -79,8 +79,7 @@ class SINEW_OT_use_recommended(OnSinewObjects, bpy.types.Operator):
         _use(context, choice)
 
 
-class SINEW_OT_suggestions_by(bpy.types.Operator):
-    bl_idname = "sinew.suggestions_by"
+class SINEW_OT_suggestions_by(operators.Named, bpy.types.Operator):
     bl_label = "Suggestions by Measure"
     bl_description = "Show the best methods at each measure, or all methods in the order of one"
     bl_options = {"INTERNAL"}
@@ -94,9 +93,8 @@ class SINEW_OT_suggestions_by(bpy.types.Operator):
         ),
     )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, _context: bpy.types.Context) -> None:
         _View.measure = self.measure
-        return {"FINISHED"}
 
 
 class _View:

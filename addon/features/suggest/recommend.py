@@ -17,7 +17,7 @@ from ...core.phrases import phrase
 from ...core.recommendation import Choice
 from ...core.rig import Bones
 from ...core.steps import as_part, result_of
-from ...deform import characters, session
+from ...deform import characters
 from ...io import armature_io
 from ...ui import stepped
 from ..heat import live
@@ -57,11 +57,8 @@ def search(
     check_measurable(objects)
     named = yield from _in_frames(scene, objects, over)
     if not named:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        subject = live.measure(session.states_of(objects, depsgraph), properties.BLENDER, depsgraph)
-        if subject is None:
-            raise SinewError("Nothing to measure: Sinew deforms none of the chosen meshes")
-        named = _in_battery(live.Moment.of(subject, depsgraph))
+        now = live.measure_now(objects, properties.BLENDER, "measure")
+        named = _in_battery(live.Moment.of(now))
     moments = [_with_crossings(name, moment, k, len(named)) for k, (name, moment) in enumerate(named)]
     if not moments:
         return Choice("lbs")
@@ -139,8 +136,7 @@ def _in_frames(
     moments, angles = [], []
     with stepped.kept_frame(scene, armatures):
         for place in places:
-            subject, depsgraph = measure_at(scene, objects, properties.BLENDER, frames[place])
-            moment = live.Moment.of(subject, depsgraph)
+            moment = live.Moment.of(measure_at(scene, objects, properties.BLENDER, frames[place]))
             moments.append((phrase("frame {frame}", frame=frames[place]), moment))
             angles.append(_angles(moment))
             yield LOOKING * len(moments) / len(places)
@@ -156,8 +152,8 @@ def _in_frames(
 def _angles(moment: live.Moment) -> np.ndarray:
     """float64: by how much bones that move vertices are bent, in all parts."""
     found = []
-    for part, (frame, *_others) in zip(moment.subject.parts, moment.frames, strict=True):
-        deformer = part.bound.first_deformer
+    for own in moment.inputs:
+        deformer, frame = own.part.bound.first_deformer, own.frames[0]
         moving = np.isin(deformer.bones.names, deformer.moving_bones)
         angles = np.zeros(len(moving)) if frame is None else battery.bend_angles(deformer.bones, frame.pose)
         found.append(np.where(moving, angles, 0.0))

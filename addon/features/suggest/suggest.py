@@ -42,10 +42,10 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     moments: dict[float, live.Moment] = {}
     with stepped.kept_frame(scene, armatures):
         for frame in frames:
-            subject, depsgraph = measure_at(scene, objects, properties.BLENDER, frame)
+            subject = measure_at(scene, objects, properties.BLENDER, frame)
             at_rest = crossings(subject.gauge.rest) if frame in counted else None
             suggestion.diagonal = subject.measured.rest.diagonal
-            moments[frame] = moment = live.Moment.of(subject, depsgraph)
+            moments[frame] = moment = live.Moment.of(subject)
             for number, method in enumerate(suggestion.methods, start=1):
                 measured = _measured(method, moment, choice)
                 _add(suggestion, method, frame, measured, choice)
