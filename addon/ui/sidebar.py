@@ -37,6 +37,22 @@ def redraw() -> None:
                     region.tag_redraw()
 
 
+def uncovered(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float]:
+    """Returns the range, in pixels from the left edge of a view's region, that neither toolbar nor sidebar
+    covers. Artists flip both to the other edge."""
+    left, right = 0.0, float(region.width)
+    for other in area.regions:
+        begin, width = other.x - region.x, other.width
+        # Those that do not overlap the view lie beside it.
+        if other.type not in ("TOOLS", "UI") or width <= 1 or not -width < begin < region.width:
+            continue
+        if 2 * begin + width < region.width:
+            left = max(left, begin + width)
+        else:
+            right = min(right, begin)
+    return left, right
+
+
 def characters() -> int:
     """The number of characters that fit the width of the region that is drawn."""
     context = bpy.context

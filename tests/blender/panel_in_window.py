@@ -448,6 +448,23 @@ def modifiers() -> Iterator[None]:
     yield from window.wait(4)
     region = next(region for region in view.regions if region.type == "UI")
     check("its tab", (view.spaces[0].show_region_ui, region.active_panel_category), (True, "Sinew"))
+    yield from flipped_sidebar(view, region)
+
+
+def flipped_sidebar(view: bpy.types.Area, sidebar: bpy.types.Region) -> Iterator[None]:
+    """The heat map's legend, and the view that shows a comparison, keep to what it leaves free."""
+    from bl_ext.user_default.sinew.ui.sidebar import uncovered
+
+    main = next(region for region in view.regions if region.type == "WINDOW")
+    ends = []
+    for _way in range(2):
+        ends.append(uncovered(view, main))
+        with bpy.context.temp_override(window=main_window(), area=view, region=sidebar):
+            bpy.ops.screen.region_flip()
+        yield from window.wait()
+    (left, right), (left_then, right_then) = ends
+    check("free beside the sidebar", right, main.width - sidebar.width)
+    check("and when it is flipped", (left_then - left >= sidebar.width, right_then), (True, main.width))
 
 
 def bake_error() -> Iterator[None]:

@@ -8,6 +8,7 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
+from ...ui.sidebar import uncovered
 from . import comparison, comparison_state
 
 # Share of the view's height, on each side.
@@ -76,14 +77,10 @@ def _are_visible(
 ) -> bool:
     """Whether all points are where neither toolbar nor sidebar covers the view."""
     margin = MARGIN * region.height
-    left, right = margin, region.width - margin
-    for other in area.regions:
-        if other.type == "UI" and other.width > 1 and other.x > region.x:
-            right = min(right, other.x - region.x - margin)
-        elif other.type == "TOOLS" and other.width > 1:
-            left = max(left, other.x + other.width - region.x + margin)
+    left, right = uncovered(area, region)
+    lowest, highest = (left + margin, margin), (right - margin, region.height - margin)
     for point in points:
         place = location_3d_to_region_2d(region, view, Vector(point))
-        if place is None or not (left <= place.x <= right and margin <= place.y <= region.height - margin):
+        if place is None or not all(a <= b <= c for a, b, c in zip(lowest, place, highest, strict=True)):
             return False
     return True

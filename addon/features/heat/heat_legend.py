@@ -9,6 +9,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ...core.heat import HeatScale
 from ...io import units
+from ...ui.sidebar import uncovered
 from . import bake_error
 
 WIDTH, BAR, MARGIN, GAP, FONT_SIZE = 420, 14, 24, 8, 12
@@ -37,7 +38,7 @@ def draw() -> None:
         return
     scale, title = content
     size = context.preferences.system.ui_scale
-    left, right = _visible(context)
+    left, right = uncovered(context.area, context.region)
     width = min(WIDTH * size, right - left - 2 * MARGIN * size)
     x, y = (left + right - width) / 2, MARGIN * size
     blf.size(0, FONT_SIZE * size)
@@ -55,22 +56,6 @@ def draw() -> None:
         _write(text, x + share * (width - wide) if is_end else x + share * width - wide / 2, y)
     _bar(scale, x, y + line, width, BAR * size)
     _write(title, x, y + line + (BAR + GAP) * size)
-
-
-def _visible(context: bpy.types.Context) -> tuple[float, float]:
-    """Returns the range, in pixels from the view's left edge, that neither toolbar nor sidebar covers."""
-    left, right = 0.0, float(context.region.width)
-    for region in context.area.regions:
-        if (
-            region.width > 1
-            and region.x < context.region.x + right
-            and context.preferences.system.use_region_overlap
-        ):
-            if region.type == "TOOLS":
-                left = max(left, region.x + region.width - context.region.x)
-            elif region.type == "UI":
-                right = min(right, region.x - context.region.x)
-    return left, right
 
 
 def _write(text: str, x: float, y: float) -> None:
