@@ -10,7 +10,7 @@ vertex mapping" in Blender's developer documentation and its change 110758, whos
 
 import numpy as np
 
-from .influences import Influences
+from .influences import Influences, offsets_of, owners_of
 
 # The curved mapping's smoothing: its width at the middle plane, how fast the correction towards the ideal
 # slope grows, and how sharply it ends.
@@ -42,7 +42,7 @@ def spread_over_joints(
                   line
     """
     counts = influences.counts
-    vertices = np.repeat(np.arange(len(counts)), counts)
+    vertices = owners_of(counts)
     bones = influences.bones
     bends = segments[bones] > 1
     bent = bones[bends]
@@ -70,8 +70,7 @@ def spread_over_joints(
     weights[bends, 0] = influences.weights[bends] * (1.0 - second_share)
     weights[bends, 1] = influences.weights[bends] * second_share
     kept = weights.ravel() > 0.0
-    offsets = np.zeros(len(counts) + 1, dtype=np.int32)
-    np.cumsum(np.bincount(np.repeat(vertices, 2)[kept], minlength=len(counts)), out=offsets[1:])
+    offsets = offsets_of(np.bincount(np.repeat(vertices, 2)[kept], minlength=len(counts)))
     return Influences(
         offsets, targets.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32)
     )

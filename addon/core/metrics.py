@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .influences import Influences
+from .influences import Influences, owners_of
 from .rig import Bones
 from .surface import Parts, Surface
 from .vectors import cross, distances_from_axes, dots, rotated, rotations_of
@@ -275,9 +275,8 @@ class Skin:
 
         int64 [vertices], the ring of each, -1 for none; int64 [rings, 2], the bones of each.
         """
-        count = self.surface.vertex_count
-        of_vertices = np.full(count, -1)
-        owners = np.repeat(np.arange(count), self.influences.counts)
+        of_vertices = np.full(self.surface.vertex_count, -1)
+        owners = owners_of(self.influences.counts)
         order = np.lexsort((-self.influences.weights, owners))
         first = self.starts[self.influences.counts[self.weighted] > 1]
         two = order[first[:, None] + np.arange(2)]
@@ -330,9 +329,8 @@ class Skin:
         bones, influences = bones[bones >= 0], self.influences
         of_bones = np.zeros(max(influences.bones.max(initial=-1), bones.max(initial=-1)) + 1)
         of_bones[bones] = of_limbs
-        owners = np.repeat(np.arange(self.surface.vertex_count), influences.counts)
         terms = influences.weights * of_bones[influences.bones]
-        return np.bincount(owners, terms, self.surface.vertex_count)
+        return np.bincount(owners_of(influences.counts), terms, self.surface.vertex_count)
 
     def rotated_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """float32 [3, triangles]: normals, of any length, rotated by the bones of their corners.

@@ -17,7 +17,7 @@ import numpy as np
 import sinew
 
 from . import parameters
-from .influences import Influences
+from .influences import Influences, owners_of
 from .metrics import Measured
 from .parameters import Value
 from .phrases import Phrase, phrase
@@ -234,7 +234,7 @@ def is_crude(influences: Influences, edges: np.ndarray) -> bool:
 
     edges  int [edges, 2]
     """
-    keys = np.repeat(np.arange(len(influences.counts)), influences.counts).astype(np.int64)
+    keys = owners_of(influences.counts).astype(np.int64)
     bones, weights = influences.bones, influences.weights
     count = int(bones.max(initial=0)) + 1
     order = np.argsort(keys * count + bones)
