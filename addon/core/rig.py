@@ -87,12 +87,12 @@ class Bones(OfArrays):
 
     @cached_property
     def _finder(self) -> TwistFinder:
-        return TwistFinder(self.names, self.deform, self.parents, self.rest, self.lengths, self.segments)
+        return TwistFinder(self)
 
     @cached_property
     def twists(self) -> Twists:
         """The bones that share the twist of another."""
-        return self._finder.find(self.first_joints, len(self.rest) - len(self.names))
+        return self._finder.find(self.owners[len(self.names) :])
 
     @cached_property
     def carriers(self) -> np.ndarray:
@@ -176,18 +176,8 @@ class Weighting:
 
     def influences_over_joints(self, points: np.ndarray) -> Influences:
         """Returns influences of bones and of the joints of bendy bones."""
-        influences, bones = self.influences(points), self.bones
-        if not bones.bend:
-            return influences
-        return spread_over_joints(
-            influences,
-            points,
-            bones.rest,
-            bones.lengths,
-            bones.segments,
-            bones.first_joints,
-            bones.curved,
-        )
+        influences = self.influences(points)
+        return spread_over_joints(influences, points, self.bones) if self.bones.bend else influences
 
 
 @dataclass(frozen=True)
