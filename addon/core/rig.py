@@ -153,9 +153,12 @@ class Weighting:
     use_envelopes: bool
 
     @cached_property
+    def _multiplies(self) -> bool:
+        return bool(self.bones.envelopes.multiply[self.entries.bones].any())
+
+    @cached_property
     def depends_on_points(self) -> bool:
-        multiply = bool(self.bones.envelopes.multiply[self.entries.bones].any())
-        return self.bones.bend or multiply or self.use_envelopes
+        return self.bones.bend or self._multiplies or self.use_envelopes
 
     @cached_property
     def _influences_of_groups(self) -> Influences:
@@ -165,10 +168,9 @@ class Weighting:
         """Returns influences of bones, for rest points float [vertices, 3]; in armature space if
         depends_on_points, otherwise in any space."""
         entries, envelopes = self.entries, self.bones.envelopes
-        multiply = envelopes.multiply[entries.bones].any() if envelopes.multiply.any() else False
-        if not multiply and not self.use_envelopes:
+        if not self._multiplies and not self.use_envelopes:
             return self._influences_of_groups
-        if multiply:
+        if self._multiplies:
             entries = multiply_by_envelopes(entries, envelopes, points)
         if self.use_envelopes:
             entries = fill_from_envelopes(entries, envelopes, self.bones.deform, points)
