@@ -175,19 +175,6 @@ class Summary:
         return getattr(self, f"{metric}_min"), getattr(self, f"{metric}_max")
 
 
-def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Returns the volume inside a triangle mesh, in cubed units of `points`; positive where faces point
-    outwards.
-
-    points     [vertices, 3]
-    triangles  int [triangles, 3]
-
-    It is the sum of signed tetrahedra (divergence theorem); holes are closed by fans to the mean of their
-    border.
-    """
-    return Shape(Surface(len(points), triangles, np.empty((0, 2), np.int32)), points).volume
-
-
 class Gauge:
     """Measures shapes of one mesh against its rest shape."""
 
@@ -451,7 +438,8 @@ class Shape:
 
     @cached_property
     def volume(self) -> float:
-        """In cubed units of the points; see volume()."""
+        """In cubed units of the points; positive where faces point outwards. The sum of signed tetrahedra
+        (divergence theorem); holes are closed by fans to the mean of their border."""
         if len(self.surface.triangles) == 0:
             return 0.0
         # Relative to the mean: far from the origin, the terms of a small mesh would be large and cancel.
