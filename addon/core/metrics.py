@@ -601,28 +601,23 @@ class Measured:
 
     def field(self, name: str) -> np.ndarray:
         """float64 [vertices]: one of METRICS at each vertex."""
-        surface = self.shape.surface
         if name == "distance":
             return self.distance
         if name == "bulge":
             return self.bulge
         if name == "stretch":
             return self._most_changed_edges()
-        numerators, denominators = (_sums(surface, values) for values in self._per_triangle(name))
-        return np.divide(
-            numerators,
-            denominators,
-            out=np.full(len(numerators), float(name == "area")),
-            where=denominators > 0.0,
-        )
-
-    def _per_triangle(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Numerators and denominators of a vertex's ratio, [triangles]."""
         if name == "area":
-            return self.shape.areas, self.rest.areas
+            return self._around_vertices(self.shape.areas, self.rest.areas, 1.0)
         if name == "flips":
-            return self.flipped.astype(np.float64), np.ones(len(self.flipped))
+            return self._around_vertices(self.flipped.astype(np.float64), np.ones(len(self.flipped)), 0.0)
         raise ValueError(f"field: expected one of {', '.join(METRICS)}, got {name!r}")
+
+    def _around_vertices(self, values: np.ndarray, wholes: np.ndarray, otherwise: float) -> np.ndarray:
+        """float64 [vertices]: the sum of [triangles] around each, as a part of that of `wholes`; `otherwise`
+        where that is 0."""
+        parts, sums = (_sums(self.shape.surface, each) for each in (values, wholes))
+        return np.divide(parts, sums, out=np.full(len(parts), otherwise), where=sums > 0.0)
 
     def _most_changed_edges(self) -> np.ndarray:
         around = self.shape.surface.edges_around
