@@ -10,6 +10,7 @@ import sinew
 
 from ..core import parameters
 from ..core.errors import WrongUse
+from ..core.frames import parse_frames
 from ..core.output import file_to_write, folder_to_write
 
 FILES = ".blend, .glb, .gltf or .fbx"
@@ -93,13 +94,23 @@ def add_files(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=FILES)
 
 
+def add_frames(
+    parser: argparse.ArgumentParser, text: str = "such as 1,12,40-48", required: bool = False
+) -> None:
+    parser.add_argument("--frames", type=parse_frames, required=required, help=text)
+
+
+def file_named(*endings: str) -> Callable[[str], Path]:
+    """The type of an argument that names a file to write, or to replace."""
+    return partial(file_to_write, endings=endings)
+
+
 def add_object(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--object", metavar="NAME", help="only this mesh")
 
 
 def add_viewer(parser: argparse.ArgumentParser, text: str) -> None:
-    page = partial(file_to_write, endings=(".html",))
-    parser.add_argument("--viewer", type=page, metavar="PAGE.html", help=text)
+    parser.add_argument("--viewer", type=file_named(".html"), metavar="PAGE.html", help=text)
 
 
 def check_viewer(page: Path | None, files: int) -> None:

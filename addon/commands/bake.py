@@ -4,24 +4,19 @@
 from __future__ import annotations
 
 import argparse
-import json
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core import interrupt
 from ..core.bake import FILES, KINDS
 from ..core.errors import SinewError, WrongUse, about
-from ..core.frames import parse_frames
 from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
 from ..core.vat import AXES, DEFAULT_VAT, TEXELS, VatOptions
 from ..jobs.inputs import Job, plan_jobs
-from .arguments import add_copies, add_method, add_set, count, percent
+from .arguments import add_copies, add_frames, add_method, add_set, count, percent
 from .console import Console
-from .outcome import Outcome, conclude, of_each
-
-if TYPE_CHECKING:
-    import bpy
+from .outcome import Outcome, conclude, of_each, use_method
 
 SUMMARY = "write what Sinew deforms as shape keys, point caches, Alembic, USD, helper bones or textures"
 HELP = """\
@@ -47,9 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_copies(parser)
     add_method(parser, "a method of `sinew methods`, for all meshes (default: each as the file has it)")
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
-    parser.add_argument(
-        "--frames", type=parse_frames, help="such as 1,12,40-48 (default: the scene's frames)"
-    )
+    add_frames(parser, "such as 1,12,40-48 (default: the scene's frames)")
     parser.add_argument("--step", type=count, default=1, metavar="N", help="every Nth of the frames")
     parser.add_argument(
         "--helpers",
@@ -116,7 +109,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
     outcomes = of_each(jobs, Baked, lambda outcome: _bake(outcome, args, console), args.overwrite, console)
     if args.json:
-        console.say(json.dumps([outcome.as_json() for outcome in outcomes], indent=2, ensure_ascii=False))
+        console.say_json([outcome.as_json() for outcome in outcomes])
         return 1 if any(outcome.failed for outcome in outcomes) else 0
     for outcome in outcomes:
         for report in outcome.bones:
@@ -129,7 +122,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _bake(outcome: Baked, args: argparse.Namespace, console: Console) -> None:
     import bpy
 
-    from ..attach import attach
+    from ..attach import attach, properties
     from ..deform import characters
     from ..features.bake import bake, bake_apart, bake_bones, bake_export
     from ..io import files
@@ -146,12 +139,14 @@ def _bake(outcome: Baked, args: argparse.Namespace, console: Console) -> None:
     chosen = sorted(set(args.frames or range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     # Hidden objects are baked as well, and hidden again in the copy.
     with characters.shown(meshes):
-        taken = []
-        for obj, error in zip(meshes, _use_method(meshes, args), strict=True):
-            if error is None:
-                taken.append(obj)
-            else:
-                outcome.left_out.append(str(error))
+        if args.method is not None:
+            characters.set_parameters(args.set)
+            taken, left_out = use_method(meshes, args.method)
+        else:
+            taken = [obj for obj in meshes if properties.has_sinew(obj) and properties.of(obj).enabled]
+            others = [obj.name for obj in meshes if obj not in taken]
+            left_out = [f"{name} is not deformed by Sinew; choose a method by --method" for name in others]
+        outcome.left_out += left_out
         console.note_on(source, characters.sentences())
         if not taken:
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
@@ -184,19 +179,3 @@ def _bake(outcome: Baked, args: argparse.Namespace, console: Console) -> None:
     outcome.meshes, outcome.frames = len(taken), len(chosen)
     if isinstance(started, bake_bones.BoneBake):
         outcome.bones, outcome.unit = started.reports, characters.length_unit(scene)
-
-
-def _use_method(meshes: list[bpy.types.Object], args: argparse.Namespace) -> list[SinewError | None]:
-    """Has the meshes deformed by the method chosen, or as they are. Returns an error for each that is not."""
-    from ..attach import properties
-    from ..deform import characters
-
-    if args.method is not None:
-        characters.set_parameters(args.set)
-        return characters.use_methods([(obj, args.method) for obj in meshes])
-    return [
-        None
-        if properties.has_sinew(obj) and properties.of(obj).enabled
-        else SinewError(f"{obj.name} is not deformed by Sinew; choose a method by --method")
-        for obj in meshes
-    ]

@@ -357,19 +357,17 @@ def _record_failure(journal: Journal, target: Path, record: dict, before: dict) 
 
 
 def _show_result(console: Console, progress: BatchProgress, task: dict, result: dict) -> None:
-    failed = "error" in result or bool(result["left_out"])
-    meshes = 0 if "error" in result else len(result["meshes"])
     if "error" in result:
-        line = None
         console.complain(result["error"])
-    elif "unchanged" in result:
-        line = f"{task['source']}: unchanged"
-    else:
-        line = f"{task['source']}: {meshes} mesh{'' if meshes == 1 else 'es'}"
-        line += f", {sum(result['seconds'].values()):.1f} s"
-    for reason in result.get("left_out", []) if "error" not in result else []:
+        progress.step(None, 0, failed=True)
+        return
+    meshes = len(result["meshes"])
+    what = "unchanged"
+    if "unchanged" not in result:
+        what = f"{meshes} mesh{'' if meshes == 1 else 'es'}, {sum(result['seconds'].values()):.1f} s"
+    for reason in result["left_out"]:
         console.complain(f"{task['source']}: left as it was: {reason}")
-    progress.step(line, meshes, failed)
+    progress.step(f"{task['source']}: {what}", meshes, failed=bool(result["left_out"]))
 
 
 def _row(job: Job, name: str, result: dict) -> dict:
@@ -400,10 +398,7 @@ def _conclude(console: Console, action: Action, rows: list[dict], summary: dict,
     complete = [row for row in rows if row["status"] != "failed" and not row["left_out"]]
     bad = [row for row in rows if row not in complete]
     if bad:
-        console.table(
-            ("file", "result"),
-            [(row["source"], _reason(row)) for row in bad],
-        )
+        console.table(("file", "result"), [(row["source"], _reason(row)) for row in bad])
     unchanged = f", {summary['unchanged']} of them before" if summary["unchanged"] else ""
     console.say(f"{len(complete)} of {len(rows)} files {action.done}{unchanged}")
     console.say(str(report))

@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from typing import TYPE_CHECKING
 
 from ..core.errors import SinewError, WrongUse
 from ..core.motion.blend import METHODS, Settings
-from ..core.output import file_to_write
 from ..core.steps import result_of
-from .arguments import add_file, count
+from .arguments import add_file, count, file_named
 from .console import Console
 
 if TYPE_CHECKING:
@@ -59,9 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--cycles", type=count, default=1, metavar="N", help="how often cycles go round (default: 1)"
     )
     parser.add_argument("--name", default="", help="of the new action")
-    parser.add_argument(
-        "--out", required=True, type=partial(file_to_write, endings=(".blend",)), metavar="NEW.blend"
-    )
+    parser.add_argument("--out", required=True, type=file_named(".blend"), metavar="NEW.blend")
     parser.add_argument("--overwrite", action="store_true", help="replace NEW.blend where it exists already")
 
 

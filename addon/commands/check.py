@@ -2,7 +2,6 @@
 """`sinew check`: checks whether files can be rendered, before they are sent to a render farm."""
 
 import argparse
-import json
 from contextlib import closing
 from pathlib import Path
 
@@ -47,7 +46,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             if not args.json:
                 console.say(line_of(reports[-1]))
     if args.json:
-        console.say(json.dumps(reports, indent=2, ensure_ascii=False))
+        console.say_json(reports)
     return 1 if any(report["problems"] for report in reports) else 0
 
 

@@ -11,13 +11,22 @@ from typing import TYPE_CHECKING
 from ..core.comparison import USUAL_METHODS, Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
-from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import folder_to_write, write_text
 from ..core.page import page, require_jinja
 from ..core.parameters import PRESETS
 from ..core.steps import result_of
-from .arguments import add_engine, add_files, add_object, add_set, add_viewer, check_viewer, count, pixels
+from .arguments import (
+    add_engine,
+    add_files,
+    add_frames,
+    add_object,
+    add_set,
+    add_viewer,
+    check_viewer,
+    count,
+    pixels,
+)
 from .console import Console
 
 if TYPE_CHECKING:
@@ -46,9 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METHOD",
         help="what distances are measured to (default: %(default)s, the file's Armature modifier)",
     )
-    parser.add_argument(
-        "--frames", type=parse_frames, help="such as 1,12,40-48 (default: the file's frame range)"
-    )
+    add_frames(parser, "such as 1,12,40-48 (default: the file's frame range)")
     add_object(parser)
     parser.add_argument(
         "--pictures",

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import re
 import sys
@@ -42,6 +43,9 @@ class Console:
         disk."""
         with self._writing_results():
             print(_shown(text) if self.out.isatty() else text, file=self.out, flush=True)
+
+    def say_json(self, value: object) -> None:
+        self.say(json.dumps(value, indent=2, ensure_ascii=False))
 
     def note(self, text: str) -> None:
         """Prints a note about the work on standard error."""

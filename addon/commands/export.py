@@ -4,17 +4,14 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
-from functools import partial
 from typing import TYPE_CHECKING
 
 from ..core.errors import SinewError, WrongUse
 from ..core.export_check import ENDINGS, FRAMES, Check
-from ..core.frames import parse_frames
-from ..core.output import file_to_write
-from .arguments import add_file, add_json, add_method, add_set, count, percent
+from .arguments import add_file, add_frames, add_json, add_method, add_set, count, file_named, percent
 from .console import Console
+from .outcome import use_method
 
 if TYPE_CHECKING:
     import bpy
@@ -32,19 +29,13 @@ has no known cause, or is larger than --at-most."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
-    parser.add_argument(
-        "--out", required=True, type=partial(file_to_write, endings=ENDINGS), metavar="OUT.glb"
-    )
+    parser.add_argument("--out", required=True, type=file_named(*ENDINGS), metavar="OUT.glb")
     add_method(parser, "a method of `sinew methods`, for all meshes (default: each as the file has it)")
     parser.add_argument(
         "--influences", type=count, default=4, metavar="N", help=".glb: of a vertex, at most (default: 4)"
     )
     parser.add_argument("--verify", action="store_true", help="say how far the file plays from what is seen")
-    parser.add_argument(
-        "--frames",
-        type=parse_frames,
-        help=f"to verify, such as 1,12 (default: {FRAMES} of the scene's)",
-    )
+    add_frames(parser, f"to verify, such as 1,12 (default: {FRAMES} of the scene's)")
     parser.add_argument(
         "--at-most",
         type=percent,
@@ -84,7 +75,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         said: dict[str, object] = {"file": str(args.out), "unit": unit, "errors": left_out}
         said |= {"bendy": [asdict(each) for each in written.bendy]}
         said |= {"meshes": [{**asdict(c), "explained": c.is_explained} for c in written.checks]}
-        console.say(json.dumps(said, indent=2, ensure_ascii=False))
+        console.say_json(said)
     else:
         for check in written.checks:
             for sentence in check.sentences(unit):
@@ -104,8 +95,7 @@ def _skinned(
     left_out: list[str] = []
     if args.method is not None:
         characters.set_parameters(args.set)
-        errors = characters.use_methods([(obj, args.method) for obj in meshes])
-        left_out = [str(error) for error in errors if error is not None]
+        _taken, left_out = use_method(meshes, args.method)
         console.note_on(args.file, characters.sentences())
     skinned = [obj for obj in meshes if properties.has_sinew(obj) and properties.of(obj).enabled]
     if not skinned:

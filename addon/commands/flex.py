@@ -15,12 +15,12 @@ from pathlib import Path
 from ..core.errors import WrongUse
 from ..core.flex.limits import Table, read_table
 from ..core.flex.report import Report, junit, lines, markdown, of_file
-from ..core.output import file_to_write, folder_to_write, write_text
+from ..core.output import folder_to_write, write_text
 from ..core.scratch import scratch_folder
 from ..jobs.inputs import files_of
 from ..jobs.journal import Journal, content_hash
 from . import batch
-from .arguments import add_json, add_object, add_viewer, check_viewer, methods
+from .arguments import add_json, add_object, add_viewer, check_viewer, file_named, methods
 from .console import BatchProgress, Console
 
 SUMMARY = "bend each joint of characters, and say which deform well"
@@ -52,8 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--junit", ".xml", "for the test pages of build servers"),
         ("--markdown", ".md", "for a pull request"),
     ):
-        file = partial(file_to_write, endings=(ending,))
-        parser.add_argument(option, type=file, metavar=f"FILE{ending}", help=f"also write a report {text}")
+        parser.add_argument(
+            option, type=file_named(ending), metavar=f"FILE{ending}", help=f"also write a report {text}"
+        )
     add_viewer(
         parser,
         "also write a page in which the character of the file turns, bent to each pose, with the faults as a "
@@ -97,7 +98,6 @@ def _run(args: argparse.Namespace, console: Console, tables: Sequence[Path], out
     limits = args.jobs, args.scheduler, args.timeout, args.memory
     is_here = len(tasks) == 1 and all(limit is None for limit in limits)
     run = workers.run_here if is_here else workers.run
-    text_of = partial(json.dumps, indent=2, ensure_ascii=False)
     results: dict[str, dict] = {}
     showing = batch.Showing(partial(_show, console, names), partial(_is_complete, args.viewer), "joints")
     if args.out is None:
@@ -111,9 +111,9 @@ def _run(args: argparse.Namespace, console: Console, tables: Sequence[Path], out
         for report in () if args.json else reports:
             console.say("\n".join(lines(report)))
     if args.json:
-        console.say(text_of(reports))
+        console.say_json(reports)
     if args.out is not None:
-        write_text(out / "report.json", text_of(reports))
+        write_text(out / "report.json", json.dumps(reports, indent=2, ensure_ascii=False))
     for target, text in ((args.junit, junit), (args.markdown, markdown)):
         if target is not None:
             write_text(target, text(reports))

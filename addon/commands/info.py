@@ -2,7 +2,6 @@
 """`sinew info`: facts and warnings of each armature-deformed mesh."""
 
 import argparse
-import json
 from pathlib import Path
 
 from ..core.errors import SinewError
@@ -34,7 +33,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             console.complain(error)
         reports.append(report)
     if args.json:
-        console.say(json.dumps(reports, indent=2, ensure_ascii=False))
+        console.say_json(reports)
     else:
         for report in reports:
             if "meshes" in report:

@@ -2,7 +2,6 @@
 """`sinew methods`: lists the methods, and the stages that may follow them."""
 
 import argparse
-import json
 import math
 
 import sinew
@@ -30,7 +29,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             "stages": [_facts(stage) for stage in stages],
             "presets": [{"name": name, "description": text} for name, text in PRESETS.items()],
         }
-        console.say(json.dumps(rows, indent=2))
+        console.say_json(rows)
     else:
         console.table(
             ("method", "group", "label", "when to use it", "parameters", "needs"),

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a command does to each of several files, each with an outcome of its own."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from ..core.errors import SinewError
 from ..jobs.inputs import Job
 from .console import Console
+
+if TYPE_CHECKING:
+    import bpy
 
 
 @dataclass
@@ -71,6 +76,15 @@ def of_each(
         outcome.complain(console)
         outcomes.append(outcome)
     return outcomes
+
+
+def use_method(meshes: Sequence[bpy.types.Object], method: str) -> tuple[list[bpy.types.Object], list[str]]:
+    """Has meshes deformed by a method. Returns those that are, and a sentence for each other."""
+    from ..deform import characters
+
+    errors = characters.use_methods([(obj, method) for obj in meshes])
+    taken = [obj for obj, error in zip(meshes, errors, strict=True) if error is None]
+    return taken, [str(error) for error in errors if error is not None]
 
 
 def conclude(

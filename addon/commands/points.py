@@ -4,18 +4,17 @@
 import argparse
 import zipfile
 from collections import Counter
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..core.errors import SinewError, about
-from ..core.frames import parse_frames
 from ..core.names import as_file_name
-from ..core.output import file_to_write, write_whole
+from ..core.output import write_whole
 from ..core.parameters import PRESETS
-from .arguments import add_file, add_method, add_object, add_set
+from .arguments import add_file, add_frames, add_method, add_object, add_set, file_named
 from .console import Console
+from .outcome import use_method
 
 SUMMARY = "write the deformed vertices of chosen frames"
 HELP = (
@@ -29,11 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     text = "a method of `sinew methods`, or blender for the Armature modifier"
     add_method(parser, text, required=True, read=str)
-    parser.add_argument("--frames", required=True, type=parse_frames, help="such as 1,12,40-48")
+    add_frames(parser, required=True)
     add_object(parser)
-    parser.add_argument(
-        "--out", required=True, type=partial(file_to_write, endings=(".npz",)), metavar="POINTS.npz"
-    )
+    parser.add_argument("--out", required=True, type=file_named(".npz"), metavar="POINTS.npz")
     add_set(parser)
 
 
@@ -52,15 +49,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
     with about(args.file):
         meshes = characters.deformed_meshes(bpy.context.scene, args.object)
 
-    failed = False
-    taken = []
-    errors = characters.use_methods([(obj, args.method) for obj in meshes])
-    for obj, reason in zip(meshes, errors, strict=True):
-        if reason is None:
-            taken.append(obj)
-        else:
-            failed = True
-            console.complain(f"{args.file}: left out: {reason}")
+    taken, left_out = use_method(meshes, args.method)
+    for reason in left_out:
+        console.complain(f"{args.file}: left out: {reason}")
     console.note_on(args.file, characters.sentences())
     if not taken:
         raise SinewError(f"{args.file}: no mesh that Sinew can deform")
@@ -82,7 +73,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for name, array in arrays.items():
         console.note(f"{name}: {array.shape[1]:,} vertices")
     console.say(str(args.out))
-    return 1 if failed else 0
+    return 1 if left_out else 0
 
 
 def _stack(name: str, per_frame: list[np.ndarray], frames: list[float]) -> np.ndarray:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..core.errors import SinewError, WrongUse
-from ..core.frames import parse_frames
 from ..core.golden import (
     SETTINGS,
     RenderSettings,
@@ -17,7 +16,7 @@ from ..core.golden import (
 )
 from ..core.output import folder_to_write, remove, write_text
 from ..core.parameters import PRESETS, Value, as_texts, parse
-from .arguments import add_engine, add_file, add_method, add_object, add_set, pixels
+from .arguments import add_engine, add_file, add_frames, add_method, add_object, add_set, pixels
 from .console import Console
 
 # In percent of the pixels; between Blender 4.2 and 5.2 on one machine, no pixel differs.
@@ -37,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     text = "a method of `sinew methods`, or blender for the Armature modifier"
     add_method(parser, text, read=str)
-    parser.add_argument("--frames", type=parse_frames, help="such as 1,12,40-48")
+    add_frames(parser)
     add_object(parser)
     parser.add_argument("--size", type=pixels, help="pixels of a picture's longer side (default: 640)")
     add_engine(parser, default=None)

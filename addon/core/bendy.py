@@ -8,9 +8,16 @@ Based on what Blender's Armature modifier does. For the curved mapping, on the d
 vertex mapping" in Blender's developer documentation and its change 110758, whose constants are used here.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from .influences import Influences
+from .influences import Influences, offsets_of, owners_of
+
+if TYPE_CHECKING:
+    from .rig import Bones
 
 # The curved mapping's smoothing: its width at the middle plane, how fast the correction towards the ideal
 # slope grows, and how sharply it ends.
@@ -21,28 +28,15 @@ _HALVINGS = 30
 _NOTHING, _BEYOND = 1e-7, 0.02
 
 
-def spread_over_joints(
-    influences: Influences,
-    points: np.ndarray,
-    rest: np.ndarray,
-    lengths: np.ndarray,
-    segments: np.ndarray,
-    first_joints: np.ndarray,
-    curved: np.ndarray,
-) -> Influences:
+def spread_over_joints(influences: Influences, points: np.ndarray, rig: Bones) -> Influences:
     """Returns the influences, with each influence of a bendy bone split between the two joints nearest to the
-    vertex.
+    vertex: along the bone's curve at rest, or along its straight line.
 
-    points        float [vertices, 3], rest points in armature space
-    rest          float [bones + joints, 4, 4], armature space, Y along the bone
-    lengths       float [bones]
-    segments      int [bones], 1 for a bone that does not bend
-    first_joints  int [bones], index of the bone's first joint; a bone's joints are consecutive
-    curved        bool [bones], vertices are mapped along the bone's curve at rest, not along its straight
-                  line
+    points  float [vertices, 3], rest points in armature space
     """
+    rest, segments, first_joints = rig.rest, rig.segments, rig.first_joints
     counts = influences.counts
-    vertices = np.repeat(np.arange(len(counts)), counts)
+    vertices = owners_of(counts)
     bones = influences.bones
     bends = segments[bones] > 1
     bent = bones[bends]
@@ -50,13 +44,13 @@ def spread_over_joints(
     share = np.empty(len(bent))
     for bone in np.unique(bent):
         of_bone = bent == bone
-        if curved[bone]:
+        if rig.curved[bone]:
             joints = rest[first_joints[bone] :][: segments[bone] + 1].astype(np.float64)
             share[of_bone] = share_along_curve(positions[of_bone], joints)
         else:
             bone_from_armature = np.linalg.inv(rest[bone].astype(np.float64))
             distances = positions[of_bone] @ bone_from_armature[1, :3] + bone_from_armature[1, 3]
-            share[of_bone] = distances / lengths[bone]
+            share[of_bone] = distances / rig.lengths[bone]
     along = np.clip(share, 0.0, 1.0) * segments[bent]
     joint = np.clip(np.floor(along).astype(np.int64), 0, segments[bent] - 1)
     second_share = np.clip(along - joint, 0.0, 1.0)
@@ -70,8 +64,7 @@ def spread_over_joints(
     weights[bends, 0] = influences.weights[bends] * (1.0 - second_share)
     weights[bends, 1] = influences.weights[bends] * second_share
     kept = weights.ravel() > 0.0
-    offsets = np.zeros(len(counts) + 1, dtype=np.int32)
-    np.cumsum(np.bincount(np.repeat(vertices, 2)[kept], minlength=len(counts)), out=offsets[1:])
+    offsets = offsets_of(np.bincount(np.repeat(vertices, 2)[kept], minlength=len(counts)))
     return Influences(
         offsets, targets.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32)
     )
@@ -82,7 +75,7 @@ def points_of_joints(joints: np.ndarray, rest: np.ndarray, length: float, is_cur
     mapped to this joint alone.
 
     joints, rest  float [segments + 1, 4, 4] and [4, 4], the joints and the bone at rest, Y along it
-    is_curved     as in spread_over_joints()
+    is_curved     vertices are mapped along the curve at rest, not along the straight line
     """
     segments = len(joints) - 1
     numbers = np.arange(segments + 1) / segments

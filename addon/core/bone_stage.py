@@ -3,7 +3,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import sinew
@@ -12,15 +12,19 @@ from .rig import Weighting
 from .scale_rule import IGNORED
 from .stage_mesh import StageMesh
 
+Native = TypeVar("Native", sinew.BulgeLimit, sinew.TwistSpread)
 
-class BoneStage(ABC):
+
+class BoneStage(ABC, Generic[Native]):
     """See core.stages.Stage. Uses the bones of the first Armature modifier that takes part."""
+
+    # From the first frame on.
+    _native: Native
 
     def __init__(self, mesh: StageMesh, mask: np.ndarray | None) -> None:
         self._mesh = mesh
         self._mask = mask
-        self._native: Any = None
-        # What the native stage is bound to.
+        # What the native stage is bound to; -1 before the first frame.
         self._modifier = -1
         self._rest_points: np.ndarray | None = None
         self._space: np.ndarray | None = None
@@ -30,7 +34,7 @@ class BoneStage(ABC):
     @abstractmethod
     def _make(
         self, binding: sinew.Binding, weighting: Weighting, space: np.ndarray, weights: np.ndarray | None
-    ) -> Any:
+    ) -> Native:
         """Returns the library's object for the stage, bound.
 
         space    float32 [4, 4], from object space to armature space
@@ -38,9 +42,7 @@ class BoneStage(ABC):
         """
 
     @abstractmethod
-    def _run(
-        self, native: Any, points: np.ndarray, motions: np.ndarray, values: Mapping[str, Any], frame: Any
-    ) -> None:
+    def _run(self, points: np.ndarray, motions: np.ndarray, values: Mapping[str, Any], frame: Any) -> None:
         """Applies it in place.
 
         motions  float32 [bones + joints, 4, 4], armature space
@@ -57,8 +59,8 @@ class BoneStage(ABC):
         motions = frame.pose.astype(np.float64) @ self._rest_inverses(modifier)
         if frame.scale_rule == IGNORED.name:
             motions = sinew.affine.split_scale(motions, bones.rest_axes.astype(np.float64)).rigid
-        native = self._bind(modifier, rest_points, frame.bones_from_model)
-        self._run(native, points, motions.astype(np.float32), values, frame)
+        self._bind(modifier, rest_points, frame.bones_from_model)
+        self._run(points, motions.astype(np.float32), values, frame)
 
     def _rest_inverses(self, modifier: int) -> np.ndarray:
         """Returns float64 [bones + joints, 4, 4]. Inverted only once: numpy's inversion uses its own threads,
@@ -68,7 +70,7 @@ class BoneStage(ABC):
             self._inverses[modifier] = np.linalg.inv(rest.astype(np.float64))
         return self._inverses[modifier]
 
-    def _bind(self, modifier: int, rest_points: np.ndarray, bones_from_model: np.ndarray) -> Any:
+    def _bind(self, modifier: int, rest_points: np.ndarray, bones_from_model: np.ndarray) -> None:
         weighting = self._mesh.weightings[modifier]
         is_same = (
             rest_points is self._rest_points
@@ -76,17 +78,12 @@ class BoneStage(ABC):
             and np.array_equal(bones_from_model, self._space)
         )
         space = bones_from_model.astype(np.float32)
-        if (
-            self._native is None
-            or modifier != self._modifier
-            or (weighting.depends_on_points and not is_same)
-        ):
+        if modifier != self._modifier or (weighting.depends_on_points and not is_same):
             binding = self._mesh.binding(modifier, rest_points, bones_from_model)
             self._native = self._make(binding, weighting, space, self._weights(modifier))
         elif not is_same:
             self._native.set_rest_points(rest_points, space)
         self._modifier, self._rest_points, self._space = modifier, rest_points, bones_from_model.copy()
-        return self._native
 
     def _weights(self, modifier: int) -> np.ndarray | None:
         """Returns the vertex group's weights, with 0 where the Armature modifier's own mask keeps a vertex

@@ -29,18 +29,11 @@ def segments(bones: Bones) -> tuple[np.ndarray, np.ndarray]:
     return heads, tails
 
 
-class BulgeLimit(BoneStage):
+class BulgeLimit(BoneStage[sinew.BulgeLimit]):
     def _make(
         self, binding: sinew.Binding, weighting: Weighting, space: np.ndarray, weights: np.ndarray | None
     ) -> sinew.BulgeLimit:
         return sinew.BulgeLimit(binding, *segments(weighting.bones), bones_from_model=space, weights=weights)
 
-    def _run(
-        self,
-        native: sinew.BulgeLimit,
-        points: np.ndarray,
-        motions: np.ndarray,
-        values: Mapping[str, Any],
-        frame: Any,
-    ) -> None:
-        native.apply(points, motions, points, strength=values["strength"], form=values["form"])
+    def _run(self, points: np.ndarray, motions: np.ndarray, values: Mapping[str, Any], frame: Any) -> None:
+        self._native.apply(points, motions, points, strength=values["strength"], form=values["form"])

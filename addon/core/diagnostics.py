@@ -8,7 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
-from .influences import SMALLEST_WEIGHT_SUM, GroupWeights, Influences
+from .influences import SMALLEST_WEIGHT_SUM, GroupWeights, Influences, owners_of
 from .phrases import phrase
 from .rig import Weighting
 from .vectors import dots
@@ -114,8 +114,7 @@ def check_weights(
     boneless = [name for name in weighting.bones.groups_without_bone(group_names) if name not in masks]
     if boneless:
         numbers = [number for number, name in enumerate(group_names) if name in boneless]
-        vertices = np.repeat(np.arange(len(weights.counts)), weights.counts)
-        affected = vertices[np.isin(weights.groups, numbers) & (weights.weights > 0.0)]
+        affected = owners_of(weights.counts)[np.isin(weights.groups, numbers) & (weights.weights > 0.0)]
         findings.append(
             Finding(
                 "boneless_groups",
@@ -166,7 +165,7 @@ class PoseCheck:
     def __init__(self, influences: Influences) -> None:
         """influences: over bones and joints of bendy bones, in stored order."""
         self._influences = influences
-        self._vertices = np.repeat(np.arange(len(influences.counts)), influences.counts)
+        self._vertices = owners_of(influences.counts)
         self._visible = self._visible_influences()
         self._last: tuple[np.ndarray, np.ndarray] | None = None
         self._seen: dict[str, tuple[np.ndarray, list[float]]] = {

@@ -13,6 +13,7 @@ import numpy as np
 from .influences import Influences
 from .phrases import Phrase, phrase
 from .played import Played, blended, padded
+from .vectors import unit
 
 # Of the diagonal: a smaller distance is rounding.
 EXPLAINED = 1e-5
@@ -299,8 +300,8 @@ class Comparison:
             assert moment.normals is not None
             motions = self._played.motions(moment.frame).copy()
             motions[:, :3, 3] = 0.0
-            skinned = _unit(blended(self._played.slots, self._played.weights, motions, normals)[rows])
-            shown = _unit(moment.normals[corners[rows]].astype(np.float64))
+            skinned = unit(blended(self._played.slots, self._played.weights, motions, normals)[rows])
+            shown = unit(moment.normals[corners[rows]].astype(np.float64))
             sines = np.linalg.norm(np.cross(skinned, shown), axis=1)
             found.append(np.degrees(np.arctan2(sines, (skinned * shown).sum(axis=1))))
         return Distance.of(found) if rows.any() else None
@@ -311,7 +312,7 @@ class Comparison:
         order = np.argsort(seen.corners, kind="stable")
         counts = np.bincount(seen.corners, minlength=int(self._vertices.max(initial=0)) + 1)
         starts = np.cumsum(counts) - counts
-        own = _unit(normals @ np.linalg.inv(self._object_from_file[:3, :3]))
+        own = unit(normals @ np.linalg.inv(self._object_from_file[:3, :3]))
         best, found = np.full(len(own), -np.inf), np.full(len(own), -1)
         for slot in range(int(counts.max(initial=0))):
             rows = np.flatnonzero(counts[self._vertices] > slot)
@@ -321,10 +322,6 @@ class Comparison:
             best[rows[better]], found[rows[better]] = likeness[better], corners[better]
         # Of vertices at one place that move alike, another may have been taken.
         return np.where(best > _SAME_NORMAL, found, -1)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-30)
 
 
 def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarray:

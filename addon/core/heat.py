@@ -27,10 +27,8 @@ BEYOND_OTHERS = 2.0
 def viridis(shares: np.ndarray) -> np.ndarray:
     """float64 [n, 3], sRGB in 0..1: dark violet at 0, green at 0.5, yellow at 1; clipped outside."""
     stops = np.frombuffer(_VIRIDIS, dtype=np.uint8).reshape(-1, 3) / 255.0
-    positions = np.clip(shares, 0.0, 1.0) * (len(stops) - 1)
-    first = np.minimum(positions.astype(np.intp), len(stops) - 2)
-    steps = np.diff(stops, axis=0)
-    return stops.take(first, axis=0) + (positions - first)[..., None] * steps.take(first, axis=0)
+    positions = np.linspace(0.0, 1.0, len(stops))
+    return np.stack([np.interp(shares, positions, channel) for channel in stops.T], axis=-1)
 
 
 # The two sides of the diverging map: lightness and chroma in Oklab at the ends and in the middle. Blue and

@@ -82,6 +82,13 @@ class Errors:
     rms: float
     worst: float
 
+    def times(self, unit: float) -> Errors:
+        return Errors(unit * self.rms, unit * self.worst)
+
+    @property
+    def texts(self) -> tuple[str, str]:
+        return f"{self.rms:.2g}", f"{self.worst:.2g}"
+
 
 @dataclass(frozen=True)
 class Blend:
@@ -189,17 +196,9 @@ class Report:
         unit    of armature space, in scene units
         unseen  before and after, over poses that the solution was not made from
         """
-
-        def scaled(errors: Errors) -> Errors:
-            return Errors(unit * errors.rms, unit * errors.worst)
-
         most = int((solution.weights > 0.0).sum(axis=1).max(initial=0))
-        report = cls(
-            armature, len(solution.parents), most, diagonal, scaled(solution.before), scaled(solution.after)
-        )
-        if unseen is None:
-            return report
-        return replace(report, unseen_before=scaled(unseen[0]), unseen_after=scaled(unseen[1]))
+        errors = (each.times(unit) for each in (solution.before, solution.after, *(unseen or ())))
+        return cls(armature, len(solution.parents), most, diagonal, *errors)
 
     def sentences(self, unit: str) -> list[Phrase]:
         """unit: the name of a scene unit."""
@@ -207,13 +206,7 @@ class Report:
         if self.segments is not None:
             said.insert(0, self.segments.sentence(unit))
         if self.unseen_before is not None and self.unseen_after is not None:
-            numbers = (
-                self.unseen_after.rms,
-                self.unseen_after.worst,
-                self.unseen_before.rms,
-                self.unseen_before.worst,
-            )
-            rms, worst, rms_before, worst_before = (f"{number:.2g}" for number in numbers)
+            (rms, worst), (rms_before, worst_before) = self.unseen_after.texts, self.unseen_before.texts
             said.append(
                 phrase(
                     "In other poses, which they were not made from: {rms} {unit} rms, {worst} at most; "
@@ -228,6 +221,7 @@ class Report:
         return said
 
     def _sentence(self, unit: str) -> Phrase:
+        (rms, worst), (rms_before, worst_before) = self.after.texts, self.before.texts
         size = self.diagonal or 1.0
         shares = (f"{100.0 * each / size:.2g}%" for each in (self.after.rms, self.after.worst))
         return phrase(
@@ -236,11 +230,11 @@ class Report:
             name=self.armature,
             count=self.helpers,
             unit=unit,
-            rms=f"{self.after.rms:.2g}",
-            worst=f"{self.after.worst:.2g}",
+            rms=rms,
+            worst=worst,
             shares=" / ".join(shares),
-            rms_before=f"{self.before.rms:.2g}",
-            worst_before=f"{self.before.worst:.2g}",
+            rms_before=rms_before,
+            worst_before=worst_before,
         )
 
 

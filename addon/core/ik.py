@@ -8,6 +8,7 @@ import numpy as np
 from sinew import affine, ik, quat, quat_vec
 
 from .errors import SinewError
+from .vectors import unit
 
 # The iterations of commands and the panel: Blender's own limit, which the solver never nearly reaches.
 ITERATIONS = 500
@@ -178,16 +179,12 @@ def _between(a: np.ndarray, b: np.ndarray, share: np.ndarray) -> np.ndarray:
 def _axes_of(matrices: np.ndarray) -> np.ndarray:
     """Rotations: y is normalised, x made perpendicular to it; the identity where a matrix has no axes."""
     axes = np.asarray(matrices, dtype=np.float64)[..., :3, :3]
-    y = _unit(axes[..., 1])
-    x = _unit(axes[..., 0])
-    x = _unit(x - (x * y).sum(axis=-1, keepdims=True) * y)
+    y = unit(axes[..., 1])
+    x = unit(axes[..., 0])
+    x = unit(x - (x * y).sum(axis=-1, keepdims=True) * y)
     result = np.stack([x, y, np.cross(x, y)], axis=-1)
     has_axes = np.abs(np.linalg.det(result) - 1.0) < 1e-6
     return np.where(has_axes[..., None, None], result, np.eye(3))
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
 
 
 def _rigid(axes: np.ndarray, heads: np.ndarray | float) -> np.ndarray:

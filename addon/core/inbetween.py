@@ -114,7 +114,7 @@ def straight(a: Poses, b: Poses, progress: np.ndarray, method: interpolate.Metho
     between = interpolate.between(
         in_layout_of(method, a.rigid), in_layout_of(method, b.rigid), progress, method
     )
-    return _inbetweens(between, a.scale + progress[:, None] * (b.scale - a.scale), method)
+    return inbetweens(between, a.scale + progress[:, None] * (b.scale - a.scale), method)
 
 
 def on_spline(keys: Poses, times: np.ndarray, at: float, method: interpolate.Method) -> Inbetweens:
@@ -134,7 +134,7 @@ def on_spline(keys: Poses, times: np.ndarray, at: float, method: interpolate.Met
     translations[..., 4:] = keys.scale
     roots = sinew.Skeleton(np.full(translations.shape[1], -1, dtype=np.int32))
     scale = roots.spline(translations, times, at, "qv_nlerp")[0][:, 4:]
-    return _inbetweens(blended, scale, method)
+    return inbetweens(blended, scale, method)
 
 
 def progress(now: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -171,14 +171,10 @@ def rigid_of(method: str, transforms: np.ndarray) -> np.ndarray:
     return transforms if method.startswith("qv_") else sinew.dual_quat.to_quat_vec(transforms)
 
 
-def axes_of(matrices: np.ndarray) -> np.ndarray:
-    """[.., 3]: the lengths of a matrix's axes: with the rotation, all of it that a bone can have, as it has
-    no shear."""
-    return np.linalg.norm(matrices[..., :3, :3], axis=-2)
-
-
-def _inbetweens(blended: interpolate.Blended, scale: np.ndarray, method: str) -> Inbetweens:
+def inbetweens(blended: interpolate.Blended, scale: np.ndarray, method: str) -> Inbetweens:
+    """The poses of blended transforms. Of a matrix that is not rigid, a bone can take the lengths of its axes
+    as scale, and no shear."""
     transforms = blended.transforms
     if method == "matrix_linear":
-        scale = scale * axes_of(transforms)
+        scale = scale * np.linalg.norm(transforms[..., :3, :3], axis=-2)
     return Inbetweens(Poses(rigid_of(method, transforms), scale), np.asarray(blended.is_defined))

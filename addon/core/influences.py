@@ -14,6 +14,21 @@ from .arrays import OfArrays
 SMALLEST_WEIGHT_SUM = np.float32(1e-4)
 
 
+def owners_of(counts: np.ndarray) -> np.ndarray:
+    """int [items]: the number of the list that each item is in, for lists of so many items."""
+    return np.repeat(np.arange(len(counts)), counts)
+
+
+def offsets_of(counts: np.ndarray) -> np.ndarray:
+    """int32 [lists + 1]: the first item of each list, then the end."""
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+
+
+def items_of(begins: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """int [items]: the numbers of the items of several lists, one list after another."""
+    return np.repeat(begins - (np.cumsum(counts) - counts), counts) + np.arange(counts.sum())
+
+
 @dataclass(frozen=True)
 class GroupWeights(OfArrays):
     """The vertex groups of a mesh as Blender stores them.
@@ -34,10 +49,9 @@ class GroupWeights(OfArrays):
 
     def of_group(self, group: int) -> np.ndarray:
         """float32 [vertices]: each vertex's weight in one group, 0 where it is not in the group."""
-        vertices = np.repeat(np.arange(len(self.counts)), self.counts)
         chosen = self.groups == group
         result = np.zeros(len(self.counts), dtype=np.float32)
-        result[vertices[chosen]] = self.weights[chosen]
+        result[owners_of(self.counts)[chosen]] = self.weights[chosen]
         return result
 
 
@@ -57,7 +71,7 @@ class Entries:
     @property
     def vertices(self) -> np.ndarray:
         """int [entries]: the vertex of each entry."""
-        return np.repeat(np.arange(len(self.counts)), self.counts)
+        return owners_of(self.counts)
 
     def influences(self) -> Influences:
         """The entries that deform: without those of weight 0, and without vertices whose weights have a sum
@@ -65,12 +79,10 @@ class Entries:
         vertices = self.vertices
         sums = np.bincount(vertices, weights=self.weights, minlength=len(self.counts))
         kept = (self.weights > 0) & (sums > SMALLEST_WEIGHT_SUM)[vertices]
-        offsets = np.zeros(len(self.counts) + 1, dtype=np.int32)
         if kept.all():
-            np.cumsum(self.counts, out=offsets[1:])
-            return Influences(offsets, self.bones, self.weights)
-        np.cumsum(np.bincount(vertices[kept], minlength=len(self.counts)), out=offsets[1:])
-        return Influences(offsets, self.bones[kept], self.weights[kept])
+            return Influences(offsets_of(self.counts), self.bones, self.weights)
+        counts = np.bincount(vertices[kept], minlength=len(self.counts))
+        return Influences(offsets_of(counts), self.bones[kept], self.weights[kept])
 
 
 @dataclass(frozen=True)
@@ -94,7 +106,7 @@ class Influences:
     def distance_from(self, other: Influences) -> float:
         """The largest difference of a weight; both have the same number of vertices."""
         bones = 1 + max(int(each.bones.max(initial=0)) for each in (self, other))
-        keys = [np.repeat(np.arange(len(e.counts)), e.counts) * bones + e.bones for e in (self, other)]
+        keys = [owners_of(each.counts) * bones + each.bones for each in (self, other)]
         found, at = np.unique(np.concatenate(keys), return_inverse=True)
         signed = np.concatenate([self.weights, -other.weights])
         return float(np.abs(np.bincount(at, signed, minlength=len(found))).max(initial=0.0))
@@ -103,7 +115,7 @@ class Influences:
         """int and float64 [vertices, slots]: bones and weights, the heaviest first and equal ones in their
         order, padded with -1 and 0."""
         counts = self.counts
-        vertices = np.repeat(np.arange(len(counts)), counts)
+        vertices = owners_of(counts)
         order = np.lexsort((-self.weights, vertices))
         slots = np.arange(len(vertices)) - np.repeat(self.offsets[:-1], counts)
         bones = np.full((len(counts), counts.max(initial=1)), -1)
@@ -119,9 +131,14 @@ class Influences:
     @classmethod
     def of_padded(cls, bones: np.ndarray, weights: np.ndarray, kept: np.ndarray) -> Influences:
         """Of bones and weights [vertices, slots] those that are `kept`, bool, in their order."""
-        offsets = np.zeros(len(bones) + 1, dtype=np.int32)
-        np.cumsum(kept.sum(axis=1), out=offsets[1:])
+        offsets = offsets_of(kept.sum(axis=1))
         return cls(offsets, bones[kept].astype(np.int32), weights[kept].astype(np.float32))
+
+    def of_vertices(self, vertices: np.ndarray) -> Influences:
+        """Those of some vertices, int [n], in this order."""
+        counts = self.counts[vertices]
+        items = items_of(self.offsets[vertices], counts)
+        return Influences(offsets_of(counts), self.bones[items], self.weights[items])
 
     def blended(self, motions: np.ndarray, points: np.ndarray) -> np.ndarray:
         """float64 [vertices, 3]: linear blend skinning. Vertices without influences stay.
@@ -130,7 +147,7 @@ class Influences:
         points   [vertices, 3]
         """
         counts = self.counts
-        vertices = np.repeat(np.arange(len(counts)), counts)
+        vertices = owners_of(counts)
         weights = self.weights.astype(np.float64)
         weights /= np.bincount(vertices, weights, minlength=len(counts))[vertices]
         result = points.astype(np.float64)
@@ -169,6 +186,5 @@ def entries_of_bones(groups: GroupWeights, bone_of_group: np.ndarray) -> Entries
     kept = bones >= 0
     if kept.all():
         return Entries(groups.counts, bones, groups.weights)
-    vertices = np.repeat(np.arange(len(groups.counts)), groups.counts)
-    counts = np.bincount(vertices[kept], minlength=len(groups.counts)).astype(np.int32)
+    counts = np.bincount(owners_of(groups.counts)[kept], minlength=len(groups.counts)).astype(np.int32)
     return Entries(counts, bones[kept], groups.weights[kept])

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .influences import Influences
+from .influences import Influences, owners_of
 from .rig import Bones
 from .surface import Parts, Surface
 from .vectors import cross, distances_from_axes, dots, rotated, rotations_of
@@ -175,19 +175,6 @@ class Summary:
         return getattr(self, f"{metric}_min"), getattr(self, f"{metric}_max")
 
 
-def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Returns the volume inside a triangle mesh, in cubed units of `points`; positive where faces point
-    outwards.
-
-    points     [vertices, 3]
-    triangles  int [triangles, 3]
-
-    It is the sum of signed tetrahedra (divergence theorem); holes are closed by fans to the mean of their
-    border.
-    """
-    return Shape(Surface(len(points), triangles, np.empty((0, 2), np.int32)), points).volume
-
-
 class Gauge:
     """Measures shapes of one mesh against its rest shape."""
 
@@ -275,9 +262,8 @@ class Skin:
 
         int64 [vertices], the ring of each, -1 for none; int64 [rings, 2], the bones of each.
         """
-        count = self.surface.vertex_count
-        of_vertices = np.full(count, -1)
-        owners = np.repeat(np.arange(count), self.influences.counts)
+        of_vertices = np.full(self.surface.vertex_count, -1)
+        owners = owners_of(self.influences.counts)
         order = np.lexsort((-self.influences.weights, owners))
         first = self.starts[self.influences.counts[self.weighted] > 1]
         two = order[first[:, None] + np.arange(2)]
@@ -330,9 +316,8 @@ class Skin:
         bones, influences = bones[bones >= 0], self.influences
         of_bones = np.zeros(max(influences.bones.max(initial=-1), bones.max(initial=-1)) + 1)
         of_bones[bones] = of_limbs
-        owners = np.repeat(np.arange(self.surface.vertex_count), influences.counts)
         terms = influences.weights * of_bones[influences.bones]
-        return np.bincount(owners, terms, self.surface.vertex_count)
+        return np.bincount(owners_of(influences.counts), terms, self.surface.vertex_count)
 
     def rotated_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """float32 [3, triangles]: normals, of any length, rotated by the bones of their corners.
@@ -453,7 +438,8 @@ class Shape:
 
     @cached_property
     def volume(self) -> float:
-        """In cubed units of the points; see volume()."""
+        """In cubed units of the points; positive where faces point outwards. The sum of signed tetrahedra
+        (divergence theorem); holes are closed by fans to the mean of their border."""
         if len(self.surface.triangles) == 0:
             return 0.0
         # Relative to the mean: far from the origin, the terms of a small mesh would be large and cancel.
@@ -615,28 +601,23 @@ class Measured:
 
     def field(self, name: str) -> np.ndarray:
         """float64 [vertices]: one of METRICS at each vertex."""
-        surface = self.shape.surface
         if name == "distance":
             return self.distance
         if name == "bulge":
             return self.bulge
         if name == "stretch":
             return self._most_changed_edges()
-        numerators, denominators = (_sums(surface, values) for values in self._per_triangle(name))
-        return np.divide(
-            numerators,
-            denominators,
-            out=np.full(len(numerators), float(name == "area")),
-            where=denominators > 0.0,
-        )
-
-    def _per_triangle(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Numerators and denominators of a vertex's ratio, [triangles]."""
         if name == "area":
-            return self.shape.areas, self.rest.areas
+            return self._around_vertices(self.shape.areas, self.rest.areas, 1.0)
         if name == "flips":
-            return self.flipped.astype(np.float64), np.ones(len(self.flipped))
+            return self._around_vertices(self.flipped.astype(np.float64), np.ones(len(self.flipped)), 0.0)
         raise ValueError(f"field: expected one of {', '.join(METRICS)}, got {name!r}")
+
+    def _around_vertices(self, values: np.ndarray, wholes: np.ndarray, otherwise: float) -> np.ndarray:
+        """float64 [vertices]: the sum of [triangles] around each, as a part of that of `wholes`; `otherwise`
+        where that is 0."""
+        parts, sums = (_sums(self.shape.surface, each) for each in (values, wholes))
+        return np.divide(parts, sums, out=np.full(len(parts), otherwise), where=sums > 0.0)
 
     def _most_changed_edges(self) -> np.ndarray:
         around = self.shape.surface.edges_around

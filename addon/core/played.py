@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import sinew
 
 from .errors import SinewError
 from .influences import Influences
@@ -134,11 +135,7 @@ def _matrix(node: dict[str, Any]) -> np.ndarray:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
     matrix = np.identity(4)
-    matrix[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
+    matrix[:3, :3] = sinew.quat.to_rotation_matrix((w, x, y, z))
     matrix[:3, :3] *= np.asarray(node.get("scale", (1.0, 1.0, 1.0)))
     matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
     return matrix
@@ -155,14 +152,8 @@ def _sampled(times: np.ndarray, values: np.ndarray, time: float, kind: str, is_r
     a, b = values[first].astype(np.float64), values[last].astype(np.float64)
     if not is_rotation:
         return a + share * (b - a)
-    cosine = float(a @ b)
-    b, cosine = (-b, -cosine) if cosine < 0.0 else (b, cosine)
-    angle = np.arccos(min(cosine, 1.0))
-    if angle > 1e-4:
-        a, b = np.sin((1.0 - share) * angle) * a, np.sin(share * angle) * b
-    else:
-        a, b = (1.0 - share) * a, share * b
-    return (a + b) / np.linalg.norm(a + b)
+    # Each number is computed alike, so w may be the last.
+    return sinew.quat.normalized(sinew.quat.slerp(a, b, share))
 
 
 class _GltfScene:

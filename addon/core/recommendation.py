@@ -17,7 +17,7 @@ import numpy as np
 import sinew
 
 from . import parameters
-from .influences import Influences
+from .influences import Influences, owners_of
 from .metrics import Measured
 from .parameters import Value
 from .phrases import Phrase, phrase
@@ -234,21 +234,11 @@ def is_crude(influences: Influences, edges: np.ndarray) -> bool:
 
     edges  int [edges, 2]
     """
-    keys = np.repeat(np.arange(len(influences.counts)), influences.counts).astype(np.int64)
-    bones, weights = influences.bones, influences.weights
-    count = int(bones.max(initial=0)) + 1
-    order = np.argsort(keys * count + bones)
-    known, values = (keys * count + bones)[order], weights[order]
-    jumps = np.zeros(len(edges))
-    for bone in np.unique(bones):
-        first, second = (_weights_at(known, values, edges[:, end] * count + bone) for end in (0, 1))
-        jumps += 0.5 * np.abs(first - second)
+    owners, jumps = owners_of(influences.counts), np.zeros(len(edges))
+    for bone in np.unique(influences.bones):
+        own = influences.bones == bone
+        weights = np.zeros(len(influences.counts))
+        weights[owners[own]] = influences.weights[own]
+        jumps += 0.5 * np.abs(np.diff(weights[edges], axis=1)[:, 0])
     # Each edge counts by how much changes over it.
     return bool((jumps * jumps).sum() > CRUDE * jumps.sum())
-
-
-def _weights_at(known: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    if not len(known):
-        return np.zeros(len(wanted))
-    at = np.searchsorted(known, wanted).clip(max=len(known) - 1)
-    return np.where(known[at] == wanted, values[at], 0.0)

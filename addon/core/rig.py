@@ -87,12 +87,12 @@ class Bones(OfArrays):
 
     @cached_property
     def _finder(self) -> TwistFinder:
-        return TwistFinder(self.names, self.deform, self.parents, self.rest, self.lengths, self.segments)
+        return TwistFinder(self)
 
     @cached_property
     def twists(self) -> Twists:
         """The bones that share the twist of another."""
-        return self._finder.find(self.first_joints, len(self.rest) - len(self.names))
+        return self._finder.find(self.owners[len(self.names) :])
 
     @cached_property
     def carriers(self) -> np.ndarray:
@@ -153,9 +153,12 @@ class Weighting:
     use_envelopes: bool
 
     @cached_property
+    def _multiplies(self) -> bool:
+        return bool(self.bones.envelopes.multiply[self.entries.bones].any())
+
+    @cached_property
     def depends_on_points(self) -> bool:
-        multiply = bool(self.bones.envelopes.multiply[self.entries.bones].any())
-        return self.bones.bend or multiply or self.use_envelopes
+        return self.bones.bend or self._multiplies or self.use_envelopes
 
     @cached_property
     def _influences_of_groups(self) -> Influences:
@@ -165,10 +168,9 @@ class Weighting:
         """Returns influences of bones, for rest points float [vertices, 3]; in armature space if
         depends_on_points, otherwise in any space."""
         entries, envelopes = self.entries, self.bones.envelopes
-        multiply = envelopes.multiply[entries.bones].any() if envelopes.multiply.any() else False
-        if not multiply and not self.use_envelopes:
+        if not self._multiplies and not self.use_envelopes:
             return self._influences_of_groups
-        if multiply:
+        if self._multiplies:
             entries = multiply_by_envelopes(entries, envelopes, points)
         if self.use_envelopes:
             entries = fill_from_envelopes(entries, envelopes, self.bones.deform, points)
@@ -176,18 +178,8 @@ class Weighting:
 
     def influences_over_joints(self, points: np.ndarray) -> Influences:
         """Returns influences of bones and of the joints of bendy bones."""
-        influences, bones = self.influences(points), self.bones
-        if not bones.bend:
-            return influences
-        return spread_over_joints(
-            influences,
-            points,
-            bones.rest,
-            bones.lengths,
-            bones.segments,
-            bones.first_joints,
-            bones.curved,
-        )
+        influences = self.influences(points)
+        return spread_over_joints(influences, points, self.bones) if self.bones.bend else influences
 
 
 @dataclass(frozen=True)

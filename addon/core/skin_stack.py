@@ -109,21 +109,20 @@ class SkinDeformer:
         return SkinDeformer(self.weighting, self.mix_weights, self.vertex_data)
 
     @cached_property
+    def _moving(self) -> np.ndarray:
+        if self.weighting.use_envelopes:
+            return np.flatnonzero(self.bones.deform)
+        return np.unique(self.weighting.entries.bones)
+
+    @cached_property
     def moving_bones(self) -> list[str]:
         """Names of the bones that can move a vertex."""
-        bones = np.unique(self.weighting.entries.bones)
-        if self.weighting.use_envelopes:
-            bones = np.flatnonzero(self.bones.deform)
-        return [self.bones.names[bone] for bone in bones]
+        return [self.bones.names[bone] for bone in self._moving]
 
     @property
     def bends(self) -> bool:
         """Whether one of these bends in segments."""
-        return self.bones.bend and any(
-            self.bones.segments[bone] > 1
-            for bone, name in enumerate(self.bones.names)
-            if name in self.moving_bones
-        )
+        return bool((self.bones.segments[self._moving] > 1).any())
 
     @property
     def points(self) -> np.ndarray:

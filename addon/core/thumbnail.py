@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .influences import items_of, owners_of
 from .metrics import Shape
 from .vectors import cross, dots
 from .views import View, camera_axes
@@ -72,8 +73,7 @@ def _covered(
     high = np.floor(points.max(axis=1)).clip(0, across - 1).astype(np.int64)
     wide, tall = np.maximum(high - low + 1, 0)
     counts = wide * tall
-    triangles = np.repeat(np.arange(len(counts)), counts)
-    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    triangles, number = owners_of(counts), items_of(np.zeros_like(counts), counts)
     x = low[0][triangles] + number % wide[triangles]
     y = low[1][triangles] + number // wide[triangles]
     (ax, bx, cx), (ay, by, cy) = points

@@ -24,7 +24,7 @@ def blend_of(method: str) -> Blend:
     return BLENDS.get(method, "rotations")
 
 
-class TwistSpread(BoneStage):
+class TwistSpread(BoneStage[sinew.TwistSpread]):
     def _make(
         self, binding: sinew.Binding, weighting: Weighting, space: np.ndarray, weights: np.ndarray | None
     ) -> sinew.TwistSpread:
@@ -41,18 +41,11 @@ class TwistSpread(BoneStage):
             mix=self._mesh.mix_weights,
         )
 
-    def _run(
-        self,
-        native: sinew.TwistSpread,
-        points: np.ndarray,
-        motions: np.ndarray,
-        values: Mapping[str, Any],
-        frame: Any,
-    ) -> None:
+    def _run(self, points: np.ndarray, motions: np.ndarray, values: Mapping[str, Any], frame: Any) -> None:
         inputs = np.array(frame.twists, np.float32).reshape(-1, 2 + len(NOT_TOLD))
-        is_told = len(inputs) == native.twist_count
+        is_told = len(inputs) == self._native.twist_count
         blend = blend_of(frame.method)
-        native.apply(
+        self._native.apply(
             points,
             motions,
             points,

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which bones share the twist of another, found from the bones' places, names and parents."""
 
+from __future__ import annotations
+
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .names import MADE_BONES
 from .phrases import phrase
+
+if TYPE_CHECKING:
+    from .rig import Bones
 
 # Words of bones' names, in the common rigs: Rigify, Mixamo, Unreal, MakeHuman, MikuMikuDance.
 UPPER = r"upper_?arm|up_?arm|thigh|up_?leg|upper_?leg|femur|humerus"
@@ -54,32 +59,19 @@ class Twists:
 
 
 class TwistFinder:
-    """Of bones as in rig.Bones."""
-
-    def __init__(
-        self,
-        names: Sequence[str],
-        deform: np.ndarray,
-        parents: np.ndarray,
-        rest: np.ndarray,
-        lengths: np.ndarray,
-        segments: np.ndarray,
-    ) -> None:
-        self._names, self._deform, self._parents = names, deform, parents
-        self._segments = segments
-        count = len(names)
-        self._heads = rest[:count, :3, 3].astype(np.float64)
-        self._axes = rest[:count, :3, 1].astype(np.float64)
-        self._lengths = lengths.astype(np.float64)
+    def __init__(self, bones: Bones) -> None:
+        self._names, self._deform, self._parents = bones.names, bones.deform, bones.parents
+        self._segments = bones.segments
+        rest = bones.rest[: len(bones.names)].astype(np.float64)
+        self._heads, self._axes = rest[:, :3, 3], rest[:, :3, 1]
+        self._lengths = bones.lengths.astype(np.float64)
         self._tails = self._heads + self._lengths[:, None] * self._axes
         self._left_out: list[str] = []
 
-    def find(self, first_joints: np.ndarray, joint_count: int) -> Twists:
+    def find(self, joints: np.ndarray) -> Twists:
+        """joints: int [joints], the bendy bone of each."""
         found = [row for bone in self._from_the_root() if (row := self._twist_of(bone)) is not None]
         rows = np.array(found, np.int32).reshape(-1, 4)
-        parents = np.concatenate([self._parents, np.full(joint_count, -1, np.int32)])
-        for bone in np.flatnonzero(self._segments > 1):
-            parents[first_joints[bone] : first_joints[bone] + self._segments[bone] + 1] = bone
         of = rows[:, 0]
         return Twists(
             rows,
@@ -87,7 +79,7 @@ class TwistFinder:
             self._tails[of].astype(np.float32),
             tuple(self._names[bone] for bone in of),
             tuple(self._names[bone] for bone in rows[:, 2]),
-            parents,
+            np.concatenate([self._parents, joints]).astype(np.int32),
             tuple(self._left_out),
         )
 

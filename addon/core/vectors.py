@@ -16,6 +16,11 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Vectors by rows, [.., k], made of length 1; 0 stays 0."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
+
+
 def distances_from_axes(points: np.ndarray, heads: np.ndarray, along: np.ndarray) -> np.ndarray:
     """float64 [n]: of points [3, n] from an axis each, from its head [3, n] along [3, n] to its tail."""
     from_head = points - heads

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import sinew
 
-from .influences import Influences
+from .influences import Influences, owners_of
 from .parameters import Value
 from .precompute import Start, precomputations
 from .rig import Weighting
@@ -266,7 +266,7 @@ class VertexData:
         if provider.welds and values.pop("weld"):
             entry.weld = weld(points, [influences])
         if entry.weld is not None:
-            points, influences = points[entry.weld.first], entry.weld.influences(influences)
+            points, influences = points[entry.weld.first], influences.of_vertices(entry.weld.first)
             triangles = entry.weld.triangles(triangles)
         entry.key = _key(method, provider.version, values, points, influences, triangles)
         arrays = (points, influences.offsets, influences.bones, influences.weights, triangles)
@@ -291,8 +291,7 @@ def _fits(method: sinew.Method, found: np.ndarray, points: np.ndarray, influence
     rows = len(found) if method.rows_by_bone else len(points)
     if found.shape != (rows, method.vertex_floats) or found.dtype != np.float32:
         return False
-    owners = np.repeat(np.arange(len(points)), np.diff(influences.offsets))
-    weighted = np.unique(owners[influences.weights > 0])
+    weighted = np.unique(owners_of(influences.counts)[influences.weights > 0])
     if not len(found):
         return not len(points) or not len(weighted)
     lowest, highest = points.min(axis=0), points.max(axis=0)

@@ -57,6 +57,7 @@ class Stages:
     form      of Limit Bulge
     twists    of the bones
     segments  float32 [bones, 3] each: heads and tails at rest, armature space
+    twist, bulge  those of the library, after bind()
     """
 
     names: list[str]
@@ -64,6 +65,15 @@ class Stages:
     form: Form
     twists: Twists
     segments: tuple[np.ndarray, np.ndarray]
+    twist: sinew.TwistSpread = field(init=False)
+    bulge: sinew.BulgeLimit = field(init=False)
+
+    def bind(self, binding: sinew.Binding, rest_bones: np.ndarray, mix: np.ndarray | None) -> None:
+        of, (spread, limited) = self.twists, self.amounts.T
+        self.twist = sinew.TwistSpread(
+            binding, of.rows, of.heads, of.tails, rest_bones, parents=of.parents, weights=spread, mix=mix
+        )
+        self.bulge = sinew.BulgeLimit(binding, *self.segments, weights=limited)
 
 
 @dataclass
@@ -112,21 +122,8 @@ class Part:
             vertex_data=data,
         )
         self._deformers: dict[str, sinew.Deformer] = {}
-        self._twist: sinew.TwistSpread | None = None
-        self._bulge: sinew.BulgeLimit | None = None
         if self.stages is not None:
-            twists, amounts = self.stages.twists, self.stages.amounts.T
-            self._twist = sinew.TwistSpread(
-                self._binding,
-                twists.rows,
-                twists.heads,
-                twists.tails,
-                self.rest_bones,
-                parents=twists.parents,
-                weights=amounts[0],
-                mix=None if self.mix is None else self.mix[2],
-            )
-            self._bulge = sinew.BulgeLimit(self._binding, *self.stages.segments, weights=amounts[1])
+            self.stages.bind(self._binding, self.rest_bones, None if self.mix is None else self.mix[2])
 
     def has(self, method: str) -> bool:
         wanted = {MIX: self.mix, "cor": self.centres}
@@ -148,9 +145,9 @@ class Part:
         turns   as sinew.Deformer.deform takes them
         """
         self._rests.append(self.rest if rest is None else rest)
-        for each in (*self._deformers.values(), self._twist, self._bulge):
-            if each is not None:
-                each.set_rest_points(self._rests[-1])
+        of_stages = () if self.stages is None else (self.stages.twist, self.stages.bulge)
+        for each in (*self._deformers.values(), *of_stages):
+            each.set_rest_points(self._rests[-1])
         # Not with numpy's product: see vectors.transformed().
         motions = np.einsum("bij,bjk->bik", posed.astype(np.float64), self._rest_inverses)
         split = sinew.affine.split_scale(motions, self.rest_bones.astype(np.float64))
@@ -160,7 +157,7 @@ class Part:
         buffer = of_motions(motions, rotations)
         if self.stages is not None:
             add_segments(buffer, *self.stages.segments)
-            self._add_twists(buffer, motions.astype(np.float32), twists)
+            self._add_twists(self.stages, buffer, motions.astype(np.float32), twists)
         self._palettes.append(buffer[self._used])
         self._posed, self._turns = posed, turns
         self._worlds.append(np.asarray(world, dtype=np.float64))
@@ -176,12 +173,12 @@ class Part:
         along = along_chain(of_axes, self.parents, mirrors, turns)
         return np.where((along * rotations).sum(axis=1, keepdims=True) < 0.0, -rotations, rotations)
 
-    def _add_twists(self, buffer: np.ndarray, motions: np.ndarray, twists: TwistInputs) -> None:
-        assert self._twist is not None
-        assert self.stages is not None
+    def _add_twists(
+        self, stages: Stages, buffer: np.ndarray, motions: np.ndarray, twists: TwistInputs
+    ) -> None:
         inputs = np.array(twists, np.float32).reshape(-1, 2 + len(NOT_TOLD))
         amounts, curves, channels = inputs[:, 0], inputs[:, 1], inputs[:, 2:]
-        of, angles = self.stages.twists, self._twist.angles(motions, channels)
+        of, angles = stages.twists, stages.twist.angles(motions, channels)
         add_twists(buffer, of.rows, amounts * angles, curves)
         rest = self.rest_bones.astype(np.float64)
         shorter, _swings = twist_angles(motions.astype(np.float64), rest, of.rows)
@@ -215,9 +212,9 @@ class Part:
             parents=self.parents,
             turns=self._turns,
         )
-        if is_own and self._twist is not None and self._bulge is not None and self.stages is not None:
+        if is_own and self.stages is not None:
             amounts, curves, channels = self._inputs
-            self._twist.apply(
+            self.stages.twist.apply(
                 points,
                 self._motions,
                 points,
@@ -227,7 +224,7 @@ class Part:
                 blend=blend_of(first),
                 mix_blend=blend_of(second),
             )
-            self._bulge.apply(points, self._motions, points, form=self.stages.form)
+            self.stages.bulge.apply(points, self._motions, points, form=self.stages.form)
         return transformed(points, self._worlds[-1])
 
     def world_rest(self) -> np.ndarray:

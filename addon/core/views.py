@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 # A little from the character's left and from above, relative to Blender's front view (-Y).
-VIEW_DIRECTION = np.array([0.45, -1.0, 0.22])
+VIEW_DIRECTION = np.array([0.45, -1.0, 0.22]) / np.linalg.norm([0.45, -1.0, 0.22])
 # The share of the mesh's diagonal that close-ups show.
 CLOSE_UP = 0.28
 
@@ -37,7 +37,7 @@ class View:
 
 def whole_view(extents: Sequence[np.ndarray]) -> View:
     """Returns a view from the front of everything within `extents`, each as seen_extent() returns it."""
-    direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+    direction = VIEW_DIRECTION
     low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)
     centre = (low + high) / 2
     right, up = camera_axes(direction)
@@ -51,8 +51,7 @@ def whole_view(extents: Sequence[np.ndarray]) -> View:
 def seen_extent(points: np.ndarray) -> np.ndarray:
     """float64 [2, 3]: the lowest and highest coordinates of `points` [n, 3] along the whole view's right, up
     and direction."""
-    direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
-    seen = points @ np.stack([*camera_axes(direction), direction], axis=1)
+    seen = points @ np.stack([*camera_axes(VIEW_DIRECTION), VIEW_DIRECTION], axis=1)
     return np.stack([seen.min(axis=0), seen.max(axis=0)])
 
 
@@ -81,20 +80,19 @@ def _clearest_direction(points: np.ndarray, radius: float) -> np.ndarray:
 
     `points` hide the origin where they are in front of the sphere of `radius` around it.
     """
-    front = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
     azimuth, elevation = np.meshgrid(np.linspace(0, 2 * np.pi, 16, endpoint=False), np.radians([10, 35, -15]))
     directions = np.stack(
         [np.sin(azimuth) * np.cos(elevation), -np.cos(azimuth) * np.cos(elevation), np.sin(elevation)],
         axis=-1,
     )
-    candidates = [front, *directions.reshape(-1, 3)]
+    candidates = [VIEW_DIRECTION, *directions.reshape(-1, 3)]
 
     def hidden(direction: np.ndarray) -> float:
         along = points @ direction
         across = np.linalg.norm(points - np.outer(along, direction), axis=1)
         return float(np.count_nonzero((along > 0.6 * radius) & (across < 0.6 * radius)))
 
-    return min(candidates, key=lambda direction: (hidden(direction), -float(direction @ front)))
+    return min(candidates, key=lambda direction: (hidden(direction), -float(direction @ VIEW_DIRECTION)))
 
 
 def camera_axes(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

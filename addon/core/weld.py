@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .influences import Influences
+from .influences import Influences, items_of, owners_of
 from .stage_mesh import Topology
 from .surface import coincident_vertices
 
@@ -26,7 +26,7 @@ class Weld:
         faces of fewer than three places."""
         counts = np.diff(topology.face_offsets)
         corners, edges = self.places[topology.corner_vertices], np.sort(self.places[topology.edges], axis=1)
-        faces, following = np.repeat(np.arange(len(counts)), counts), np.arange(1, len(corners) + 1)
+        faces, following = owners_of(counts), np.arange(1, len(corners) + 1)
         some = counts > 0
         following[topology.face_offsets[1:][some] - 1] = topology.face_offsets[:-1][some]
         kept = corners != corners[following]
@@ -41,27 +41,14 @@ class Weld:
         corners = self.places[triangles].astype(np.int32)
         return np.ascontiguousarray(corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)])
 
-    def influences(self, influences: Influences) -> Influences:
-        """Returns the influences of the places."""
-        counts = influences.counts[self.first]
-        items = _items(influences.offsets[self.first], counts)
-        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        return Influences(offsets, influences.bones[items], influences.weights[items])
-
     def rows_of_vertices(self, rows: np.ndarray) -> np.ndarray:
         """Returns the rows of all vertices, from rows of places that begin with the place, ascending."""
         of_place = rows[:, 0].astype(np.int64)
         begins = np.searchsorted(of_place, np.arange(len(self.first)))[self.places]
         counts = np.bincount(of_place, minlength=len(self.first))[self.places]
-        found = rows[_items(begins, counts)]
-        found[:, 0] = np.repeat(np.arange(len(self.places)), counts)
+        found = rows[items_of(begins, counts)]
+        found[:, 0] = owners_of(counts)
         return found
-
-
-def _items(begins: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Returns the numbers of the items of several lists, one list after another."""
-    places = np.cumsum(counts) - counts
-    return np.repeat(begins - places, counts) + np.arange(counts.sum())
 
 
 def weld(

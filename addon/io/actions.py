@@ -139,24 +139,18 @@ def _bone_property(path: str) -> tuple[str, str] | None:
 
 
 def bone_curves(
-    action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
+    action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None, muted: bool = True
 ) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
-    """Returns the curves that move bones, by bone."""
+    """Returns the curves that move bones, by bone.
+
+    muted  also those that are
+    """
     bones: dict[str, list[tuple[bpy.types.FCurve, Channel]]] = {}
     for curve in all_curves(action, slot):
         channel = channel_of(curve)
-        if channel is not None:
+        if channel is not None and (muted or not curve.mute):
             bones.setdefault(channel.bone, []).append((curve, channel))
     return bones
-
-
-def unmuted_curves(
-    action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
-) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
-    """Returns the curves that move bones, by bone, without muted ones."""
-    played = bone_curves(action, slot).items()
-    found = {bone: [pair for pair in pairs if not pair[0].mute] for bone, pairs in played}
-    return {bone: pairs for bone, pairs in found.items() if pairs}
 
 
 def key_times(curves: Sequence[bpy.types.FCurve]) -> np.ndarray:

@@ -117,7 +117,7 @@ def write(
 def _playing(armature: bpy.types.Object, action: bpy.types.Action) -> list[tuple[bpy.types.FCurve, str, int]]:
     """Returns the curves that move the armature's bones, each with the bone and the column of its channel."""
     rotations = pose_io.rotation_properties(armature.pose.bones)
-    found = actions.unmuted_curves(action, actions.slot_for(action, armature))
+    found = actions.bone_curves(action, actions.slot_for(action, armature), muted=False)
     return [
         (curve, bone, channel.column)
         for bone, pairs in found.items()

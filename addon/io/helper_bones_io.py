@@ -34,14 +34,14 @@ def add_bones(
     rig: bpy.types.Object,
     parents: Sequence[str],
     heads: np.ndarray,
-    hanging: Sequence[bool] | None = None,
+    hanging: bool = True,
     kind: str = HELPER,
     axes: np.ndarray | None = None,
 ) -> list[str]:
     """Gives an armature object a bone for each of the `parents`. Returns their names.
 
     heads    float [helpers, 3], armature space
-    hanging  whether each becomes the child of its parent, or else has none; None: all do
+    hanging  whether each becomes the child of its parent, or else has none
     kind     how their names begin; a CENTRE moves helpers, the others vertices
     axes     float [helpers, 4, 4], armature space; None: those of the parents
     """
@@ -55,8 +55,7 @@ def add_bones(
             placed = (parent.matrix if axes is None else Matrix(axes[number])).to_3x3().to_4x4()
             placed.translation = head
             bone.matrix = placed
-            is_child = hanging is None or hanging[number]
-            bone.parent, bone.use_connect = parent if is_child else None, False
+            bone.parent, bone.use_connect = parent if hanging else None, False
             bone.use_deform = kind != CENTRE
             # The motion is rigid except for the parent's size.
             bone.inherit_scale = "AVERAGE"
@@ -86,9 +85,7 @@ def add_segments(
             own = bones.rest[bone], float(bones.lengths[bone]), bool(bones.curved[bone])
             heads = points_of_joints(rest, *own)
         is_child = hanging is not None and hanging[number]
-        made = add_bones(
-            rig, [name] * len(joints), heads, [is_child] * len(joints), SEGMENT, bones.rest_axes[joints]
-        )
+        made = add_bones(rig, [name] * len(joints), heads, is_child, SEGMENT, bones.rest_axes[joints])
         names.update(zip(map(int, joints), made, strict=True))
         for segment in made if hanging is None else ():
             target = rig.pose.bones[segment].constraints.new("ARMATURE").targets.new()
@@ -137,7 +134,7 @@ def add_constraints(
     centred = [(name, blend) for name, blend in zip(names, blends, strict=True) if blend.is_centre]
     parents = [bones[blend.bones[blend.weights.argmax()]] for _name, blend in centred]
     heads = np.array([blend.head for _name, blend in centred])
-    centres = add_bones(rig, parents, heads, [False] * len(parents), CENTRE)
+    centres = add_bones(rig, parents, heads, False, CENTRE)
     for (name, blend), centre in zip(centred, centres, strict=True):
         _blend(rig, centre, blend, bones, preserve_volume=False)
         follow = rig.pose.bones[name].constraints.new("COPY_LOCATION")

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SinewError
-from ..core.played import Played
+from ..core.played import Played, of_sum_one
 
 
 def read_usd(path: Path) -> list[Played]:
@@ -43,8 +43,7 @@ def _mesh(prim: Any, skinning: Any, skeleton: Any, geom: Any, skel: Any, kept: o
     slots, weights = skinning.ComputeVaryingJointInfluences(len(rest))
     width = skinning.GetNumInfluencesPerComponent()
     slots = np.array(slots, dtype=np.int64).reshape(-1, width)
-    weights = np.array(weights, dtype=np.float64).reshape(-1, width)
-    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-30)
+    weights = of_sum_one(np.array(weights, dtype=np.float64).reshape(-1, width))
     order = skinning.GetJointOrder() or skeleton.GetJointOrder()
     bind, mapper = _matrix(skinning.GetGeomBindTransform()), skinning.GetJointMapper()
 

@@ -309,14 +309,8 @@ class _Reader:
 
 
 def _line_of(text: str, position: Position) -> int:
-    """Returns the line, from 1, where the value at `position` begins."""
-    return _line_where(text, lambda table: _has(table, position))
-
-
-def _line_where(text: str, is_true: Callable[[dict], bool]) -> int:
-    """Returns the line of the first statement that makes `is_true` hold. tomllib reports no positions, so
-    longer and longer beginnings of the file are parsed; the first one for which it holds ends with that
-    statement."""
+    """Returns the line, from 1, where the value at `position` begins. tomllib reports no positions, so longer
+    and longer beginnings of the file are parsed; the first one that has the value ends with its statement."""
     lines = text.splitlines()
     begin = 0
     for end in range(1, len(lines) + 1):
@@ -324,7 +318,7 @@ def _line_where(text: str, is_true: Callable[[dict], bool]) -> int:
             table = tomllib.loads("\n".join(lines[:end]))
         except tomllib.TOMLDecodeError:
             continue
-        if is_true(table):
+        if _has(table, position):
             break
         begin = end
     while not lines[begin].strip() or lines[begin].lstrip().startswith("#"):

@@ -13,7 +13,6 @@ import bpy
 import numpy as np
 import sinew
 from sinew_addon.attach import attach
-from sinew_addon.core.metrics import volume
 from sinew_addon.core.views import View, seen_extent, whole_view
 from sinew_addon.deform import characters
 from sinew_addon.features.pages.render import Studio
@@ -124,7 +123,7 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
     groups = mesh_io.read_group_weights(mesh.data)
     skin = meshes.Skin(
         rest=rest,
-        rest_volume=volume(rest, triangles),
+        rest_volume=meshes.volume(rest, triangles),
         triangles=triangles,
         counts=groups.counts,
         groups=groups.groups,

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import sinew
-from sinew_addon.core.metrics import volume
+from sinew_addon.core.metrics import Shape
+from sinew_addon.core.surface import Surface
 
 from .model import Fact, Figure, Picture
 
@@ -110,6 +111,11 @@ class Chain:
             used, corners = np.unique(corners, return_inverse=True)
             volumes.append(volume(points[used], corners.reshape(-1, 3)))
         return np.array(volumes)
+
+
+def volume(points: np.ndarray, triangles: np.ndarray) -> float:
+    """Inside a triangle mesh, [vertices, 3] and int [triangles, 3]."""
+    return Shape(Surface(len(points), triangles, np.empty((0, 2), np.int32)), points).volume
 
 
 def hierarchy_figures(

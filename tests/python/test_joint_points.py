@@ -4,12 +4,15 @@ the heaviest influences."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rigs import about
 from sinew_addon.core.bendy import points_of_joints, spread_over_joints
 from sinew_addon.core.helper_bones import Motion, Wanted
 from sinew_addon.core.influences import Influences
+from sinew_addon.core.rig import Bones
 from test_helper_bones import solved
 
 
@@ -35,15 +38,15 @@ def test_each_point_is_mapped_to_its_joint_alone(is_curved, segments):
         np.zeros(segments + 1, dtype=np.int32),
         np.ones(segments + 1, dtype=np.float32),
     )
-    spread = spread_over_joints(
-        one_each,
-        points,
-        np.concatenate([rest[None], joints]),
-        np.array([2.0]),
-        np.array([segments]),
-        np.array([1]),
-        np.array([is_curved]),
+    bone = replace(
+        Bones.none(),
+        rest=np.concatenate([rest[None], joints]),
+        lengths=np.array([2.0]),
+        segments=np.array([segments]),
+        first_joints=np.array([1]),
+        curved=np.array([is_curved]),
     )
+    spread = spread_over_joints(one_each, points, bone)
     bones, weights = spread.padded()
     assert np.array_equal(bones[:, 0], 1 + np.arange(segments + 1))
     assert (weights[:, 0] > 1.0 - 1e-5).all()

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..influences import Influences
+from ..influences import Influences, owners_of
 from ..metrics import Shape
 from ..surface import Surface
 from ..vectors import distances_from_axes
@@ -102,8 +102,7 @@ class Character:
     def weights(self) -> np.ndarray:
         """float32 [vertices, bones], the shares of bones: rows have a sum of 1, or of 0 without weights."""
         shape = (self.surface.vertex_count, len(self.skeleton.names))
-        owners = np.repeat(np.arange(shape[0]), self.influences.counts)
-        keys = owners * shape[1] + self.bone_of[self.influences.bones]
+        keys = owners_of(self.influences.counts) * shape[1] + self.bone_of[self.influences.bones]
         found = np.bincount(keys, self.influences.weights, shape[0] * shape[1]).reshape(shape)
         sums = found.sum(axis=1, keepdims=True)
         return np.divide(found, sums, out=np.zeros(shape), where=sums > 0.0).astype(np.float32)

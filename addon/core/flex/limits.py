@@ -5,7 +5,7 @@ from."""
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -212,15 +212,14 @@ def read_table(path: Path, table: Table) -> Table:
         raise WrongUse(f"{path}: can not be read: {error.strerror or error}") from None
     limits, joints = dict(table.limits), dict(table.joints)
     for name, values in content.items():
-        reader: Callable[[str, object], None] | None = {
-            "limits": lambda key, value: limits.update({key: _limit(limits, key, value)}),
-            "joints": lambda key, value: joints.update({key: _moves(key, value)}),
-        }.get(name)
-        if reader is None or not isinstance(values, dict):
+        if name not in ("limits", "joints") or not isinstance(values, dict):
             raise WrongUse(f"{path}: expected the tables [limits] and [joints], got {name}")
         for key, value in values.items():
             try:
-                reader(key, value)
+                if name == "limits":
+                    limits[key] = _limit(limits, key, value)
+                else:
+                    joints[key] = _moves(key, value)
             except ValueError as error:
                 raise WrongUse(f"{path}: {name}.{key}: {error}") from None
     return Table(limits, joints)

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..influences import Influences
 from ..metrics import LEAST_IN_RING, FrameOfRig, Gauge, Measured, Shape
 from ..surface import Surface
 from .character import Character
@@ -83,7 +82,7 @@ class Region:
 
     @cached_property
     def gauge(self) -> Gauge:
-        return Gauge(self.surface, _taken(self.character.influences, self.vertices))
+        return Gauge(self.surface, self.character.influences.of_vertices(self.vertices))
 
     @cached_property
     def rest(self) -> Shape:
@@ -205,12 +204,3 @@ def _spread(shape: Shape, ring: np.ndarray) -> float:
     points = shape.points[:, ring]
     offsets = points - points.mean(axis=1, keepdims=True)
     return float(np.sqrt((offsets * offsets).sum(axis=0).mean()))
-
-
-def _taken(influences: Influences, vertices: np.ndarray) -> Influences:
-    """The influences of some vertices."""
-    counts = influences.counts[vertices]
-    offsets = np.zeros(len(vertices) + 1, np.int32)
-    np.cumsum(counts, out=offsets[1:])
-    index = np.repeat(influences.offsets[vertices] - offsets[:-1], counts) + np.arange(offsets[-1])
-    return Influences(offsets, influences.bones[index], influences.weights[index])

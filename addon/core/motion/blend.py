@@ -7,13 +7,12 @@ clips' scales, with the same weights, as Blender stores a bone's scale separatel
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from sinew import interpolate, quat_vec
 
 from ..errors import WrongUse
-from ..inbetween import Method, Poses, axes_of, in_layout_of, rigid_of
+from ..inbetween import Method, Poses, in_layout_of, inbetweens, rigid_of
 from . import timing
 from .align import Warp, align, same_pace
 from .clip import Clip, Rig, common_rig
@@ -121,16 +120,15 @@ def blend(
         else timing.own_pace(placed, shares, cycles)
     )
     sampled = [clip.at(times) for clip, times in zip(placed, schedule.times.T, strict=True)]
-    result = _blended(sampled, schedule.weights, settings.method)
-    rigid = result.poses.rigid
+    poses, volume, undefined = _blended(sampled, schedule.weights, settings.method)
     if settings.root_motion != KEYED:
         ground = _ground(travels, schedule, reference, settings)
-        rigid = carried(rig, root, rigid, ground)
+        poses = poses._replace(rigid=carried(rig, root, poses.rigid, ground))
     return Blend(
         rig,
-        Poses(rigid, result.poses.scale),
-        result.volume,
-        result.undefined,
+        poses,
+        volume,
+        undefined,
         schedule,
         warps,
         rig.names[root] if settings.root_motion != KEYED else None,
@@ -195,20 +193,15 @@ def _of_all(
     return interpolate.blend(np.stack(inside, axis=axis), weights, method)
 
 
-class _Result(NamedTuple):
-    poses: Poses
-    volume: np.ndarray
-    undefined: np.ndarray
-
-
-def _blended(sampled: Sequence[Poses], weights: np.ndarray, method: interpolate.Method) -> _Result:
-    """Blends poses [frames, bones, ..] of clips by weights [frames, clips]."""
+def _blended(
+    sampled: Sequence[Poses], weights: np.ndarray, method: interpolate.Method
+) -> tuple[Poses, np.ndarray, np.ndarray]:
+    """Blends poses [frames, bones, ..] of clips by weights [frames, clips]. Returns them with `volume` and
+    `undefined` of Blend."""
     scale = np.einsum("fc,fcbk->fbk", weights, np.stack([poses.scale for poses in sampled], axis=1))
     blended = _of_all([poses.rigid for poses in sampled], weights[:, None], method)
     volume = np.ones(scale.shape[:2])
     if method == "matrix_linear":
         volume = np.linalg.det(blended.transforms[..., :3, :3])
-        # The scale that a bone can take from matrices that are not rigid.
-        scale = scale * axes_of(blended.transforms)
-    found = rigid_of(method, blended.transforms)
-    return _Result(Poses(found, scale), volume, ~np.asarray(blended.is_defined))
+    found = inbetweens(blended, scale, method)
+    return found.poses, volume, ~found.is_defined

@@ -39,12 +39,6 @@ class Rig:
                 posed[..., bone, :] = quat_vec.compose(posed[..., parent, :], posed[..., bone, :])
         return posed
 
-    def to_relative(self, armature: np.ndarray) -> np.ndarray:
-        """The inverse of to_armature()."""
-        above = armature[..., np.maximum(self.parents, 0), :]
-        above = np.where((self.parents >= 0)[:, None], above, quat_vec.identity())
-        return quat_vec.compose(quat_vec.inverse(quat_vec.compose(above, self.rest)), armature)
-
     def points(self, armature: np.ndarray) -> np.ndarray:
         """[.., bones, 2, 3]: heads and tails of bones as to_armature() returns them, unscaled."""
         ends = np.zeros((len(self.names), 2, 3))

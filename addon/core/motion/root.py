@@ -69,9 +69,8 @@ def ground_frames(rig: Rig, root: int, posed: np.ndarray, up: np.ndarray) -> np.
 
 def grounded(clip: Clip, root: int, up: np.ndarray, is_cyclic: bool | None = None) -> Grounded:
     """Returns the clip without its travel; it is a cycle if it closes then, or as `is_cyclic` says."""
-    rig = clip.rig
-    posed = rig.to_armature(clip.poses.rigid)
-    frames = ground_frames(rig, root, posed, up)
+    rig, relative = clip.rig, clip.poses.rigid
+    frames = ground_frames(rig, root, rig.to_armature(relative), up)
     whole = quat_vec.compose(frames[-1], quat_vec.inverse(frames[0]))
     twist = quat_vec.to_twist(whole)
     shares = np.linspace(0.0, 1.0, len(frames)) if len(frames) > 1 else np.zeros(1)
@@ -79,15 +78,13 @@ def grounded(clip: Clip, root: int, up: np.ndarray, is_cyclic: bool | None = Non
     # The mean sway of the root about the screw, which does not depend on the step where the cycle begins.
     around = quat_vec.compose(quat_vec.inverse(screws), frames)[: max(len(frames) - 1, 1)]
     middle = _mean_ground(around)
-    cycle = _carried(rig, root, posed, quat_vec.inverse(quat_vec.compose(screws, middle)))
+    rigid = carried(rig, root, relative, quat_vec.inverse(quat_vec.compose(screws, middle)))
     if is_cyclic is None:
-        is_cyclic = closes(rig, cycle[0], cycle[-1])
-    if is_cyclic:
-        placed = replace(clip, poses=Poses(cycle, clip.poses.scale), is_cyclic=True)
-        return Grounded(placed, middle, twist, None)
-    once = _carried(rig, root, posed, quat_vec.inverse(frames))
-    placed = replace(clip, poses=Poses(once, clip.poses.scale), is_cyclic=False)
-    return Grounded(placed, frames[0], None, frames)
+        is_cyclic = closes(rig, rigid[0], rigid[-1])
+    if not is_cyclic:
+        rigid = carried(rig, root, relative, quat_vec.inverse(frames))
+    placed = replace(clip, poses=Poses(rigid, clip.poses.scale), is_cyclic=is_cyclic)
+    return Grounded(placed, middle, twist, None) if is_cyclic else Grounded(placed, frames[0], None, frames)
 
 
 def as_keyed(clip: Clip, _root: int, _up: np.ndarray, is_cyclic: bool | None = None) -> Grounded:
@@ -100,7 +97,11 @@ def as_keyed(clip: Clip, _root: int, _up: np.ndarray, is_cyclic: bool | None = N
 def carried(rig: Rig, root: int, relative: np.ndarray, ground: np.ndarray) -> np.ndarray:
     """Returns poses [frames, bones, 7], with the root and its descendants carried by ground frames [frames,
     7]."""
-    return _carried(rig, root, rig.to_armature(relative), ground, relative)
+    posed, parent = rig.to_armature(relative), rig.parents[root]
+    above = quat_vec.compose(posed[:, parent], rig.rest[root]) if parent >= 0 else rig.rest[root]
+    found = relative.copy()
+    found[:, root] = quat_vec.compose(quat_vec.inverse(above), quat_vec.compose(ground, posed[:, root]))
+    return found
 
 
 def accumulated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
@@ -109,17 +110,6 @@ def accumulated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
     for step in steps:
         found.append(quat_vec.compose(found[-1], step))
     return np.array(found)
-
-
-def _carried(
-    rig: Rig, root: int, posed: np.ndarray, ground: np.ndarray, relative: np.ndarray | None = None
-) -> np.ndarray:
-    relative = rig.to_relative(posed) if relative is None else relative.copy()
-    parent = rig.parents[root]
-    above = quat_vec.compose(posed[:, parent], rig.rest[root]) if parent >= 0 else rig.rest[root]
-    moved = quat_vec.compose(ground, posed[:, root])
-    relative[:, root] = quat_vec.compose(quat_vec.inverse(above), moved)
-    return relative
 
 
 def _mean_ground(frames: np.ndarray) -> np.ndarray:

@@ -229,8 +229,7 @@ class _Rig:
             segments = helper_bones_io.add_segments(self.rig, bones, bendy, hanging)
             movers = bones.names_with(segments)
             own = [movers[bone] for bone in solution.parents]
-            unparented = [False] * len(own) if follows_pose else None
-            helpers = helper_bones_io.add_bones(self.rig, own, solution.heads, unparented)
+            helpers = helper_bones_io.add_bones(self.rig, own, solution.heads, not follows_pose)
             if follows_pose:
                 helper_bones_io.add_constraints(self.rig, helpers, solution.blends, movers)
         if not follows_pose:

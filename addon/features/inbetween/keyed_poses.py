@@ -65,7 +65,7 @@ def read(
     rows = {name: row for row, name in enumerate(rotations)}
     found: dict[object, list[_Bone]] = {}
     left = {}
-    for name, pairs in actions.unmuted_curves(action, slot).items():
+    for name, pairs in actions.bone_curves(action, slot, muted=False).items():
         pairs = [pair for pair in pairs if actions.plays(pair[1], rotations.get(name))]
         if not pairs or (only is not None and name not in only):
             continue
