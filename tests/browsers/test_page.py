@@ -21,6 +21,8 @@ return [...document.querySelectorAll("button, input, select, canvas")].filter((o
 # What is drawn, red, green, blue and opacity for each pixel.
 PIXELS = """(() => {
   const { width, height } = document.getElementById("view");
+  // Text that wraps once it is written changes it.
+  window.height_drawn = height;
   window.sinew.draw(IS_SMOOTH);
   const copy = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
   copy.drawImage(document.getElementById("view"), 0, 0);
@@ -45,8 +47,8 @@ def way(request, browser):
 
 def pixels(browser, is_smooth="false"):
     """float32 [height, width, 4], colours times opacity, 0 to 255"""
-    height = browser.run("return document.getElementById('view').height")
-    found = browser.floats(PIXELS.replace("IS_SMOOTH", is_smooth)).reshape(height, -1, 4).copy()
+    found = browser.floats(PIXELS.replace("IS_SMOOTH", is_smooth))
+    found = found.reshape(browser.run("return window.height_drawn"), -1, 4).copy()
     found[:, :, :3] *= found[:, :, 3:] / 255
     return found
 

@@ -256,9 +256,10 @@ private:
 constinit Pool pool;
 static_assert(std::is_trivially_destructible_v<Pool>);
 
-// When parallel_for() was called last, by any thread.
-constinit std::atomic<std::chrono::steady_clock::time_point> last_use{
-    std::chrono::steady_clock::time_point{}};
+using Clock = std::chrono::steady_clock;
+
+// When parallel_for() was called last, by any thread: ticks since the clock's epoch.
+constinit std::atomic<Clock::rep> last_use{0};
 
 std::size_t Pool::start_workers(std::size_t wanted) noexcept {
     while (worker_count_ < wanted) {
@@ -322,7 +323,7 @@ std::size_t hardware_threads() noexcept {
 }
 
 void run_chunks(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
-    last_use.store(std::chrono::steady_clock::now(), std::memory_order_relaxed);
+    last_use.store(Clock::now().time_since_epoch().count(), std::memory_order_relaxed);
     if (count == 0) return;
     chunk = std::clamp<std::size_t>(chunk, 1, count);
     const std::size_t useful =
@@ -334,7 +335,8 @@ void run_chunks(std::size_t count, std::size_t threads, const Work& work, std::s
 
 bool is_in_use() noexcept {
     constexpr std::chrono::milliseconds kFramesAreApart{100};
-    return std::chrono::steady_clock::now() - last_use.load(std::memory_order_relaxed) < kFramesAreApart;
+    const Clock::time_point last{Clock::duration(last_use.load(std::memory_order_relaxed))};
+    return Clock::now() - last < kFramesAreApart;
 }
 
 void end_threads() noexcept { pool.end(); }
