@@ -289,7 +289,7 @@ def influences(obj: bpy.types.Object, armature: bpy.types.Object) -> dict[str, n
 
 def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
     """Bones first, then the joints of bendy bones."""
-    posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    posed = scenes.evaluated(armature).pose.bones
     rest_matrices = [np.array(bone.matrix_local) for bone in armature.data.bones]
     pose_matrices = [np.array(bone.matrix) for bone in posed]
     number = {bone.name: index for index, bone in enumerate(armature.data.bones)}

@@ -92,12 +92,10 @@ def key(owner: bpy.types.bpy_struct, path: str, values: Iterable[tuple[int, obje
 def key_shape(obj: bpy.types.Object) -> None:
     """A first shape key that lifts all vertices, keyed: off at frame 1, on at frame 11."""
     obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="Key")
-    for point in key.data:
+    made = obj.shape_key_add(name="Key")
+    for point in made.data:
         point.co.z += 0.2
-    for frame, value in ((1, 0.0), (11, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
+    key(made, "value", ((1, 0.0), (11, 1.0)))
 
 
 def modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -122,12 +120,21 @@ def points_of(vertices: bpy.types.bpy_prop_collection, name: str = "co") -> np.n
     return points
 
 
+def evaluated(obj: bpy.types.Object) -> bpy.types.Object:
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+
+
 def final_points(obj: bpy.types.Object, name: str = "co") -> np.ndarray:
     """float32 [vertices, 3]: the final evaluated mesh, object space.
 
     name  undeformed_co for its Generated texture coordinates, if hair or the like has Blender make them
     """
-    return points_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices, name)
+    return points_of(evaluated(obj).data.vertices, name)
+
+
+def pose_of(armature: bpy.types.Object, name: str = "matrix") -> np.ndarray:
+    """float64 [bones, 4, 4] of the evaluated pose; name: matrix_basis for that of the channels"""
+    return np.array([getattr(bone, name) for bone in evaluated(armature).pose.bones])
 
 
 def rest_points(obj: bpy.types.Object) -> np.ndarray:
@@ -138,13 +145,29 @@ def diagonal(obj: bpy.types.Object) -> float:
     return float(np.linalg.norm(np.ptp(rest_points(obj), axis=0)))
 
 
-def shapes(obj: bpy.types.Object, frames: list[float]) -> np.ndarray:
-    """float32 [frames, vertices, 3]."""
+def at_frames(frames: Iterable[float], read: Callable[[], np.ndarray]) -> np.ndarray:
+    """[frames, ...]: what is read at each frame."""
     result = []
     for frame in frames:
         bpy.context.scene.frame_set(math.floor(frame), subframe=frame - math.floor(frame))
-        result.append(final_points(obj))
+        result.append(read())
     return np.stack(result)
+
+
+def shapes(obj: bpy.types.Object, frames: Iterable[float]) -> np.ndarray:
+    """float32 [frames, vertices, 3]."""
+    return at_frames(frames, lambda: final_points(obj))
+
+
+def world_points(obj: bpy.types.Object) -> np.ndarray:
+    """float64 [vertices, 3]: the final evaluated mesh, in the world."""
+    world = np.array(evaluated(obj).matrix_world)
+    return final_points(obj) @ world[:3, :3].T + world[:3, 3]
+
+
+def world_shapes(obj: bpy.types.Object, frames: Iterable[float]) -> np.ndarray:
+    """float64 [frames, vertices, 3]."""
+    return at_frames(frames, lambda: world_points(obj))
 
 
 def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume: bool) -> np.ndarray:

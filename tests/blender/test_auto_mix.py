@@ -225,8 +225,7 @@ def test_a_group_of_another_use_stays_as_it_is(use):
     assert before == {v: group.weight(v) for v in before}
     found = auto_mix.AutoMix(bpy.context.scene, [obj], "SCENE", SMOOTHING)
     mix.group = name
-    for _share in found.steps():
-        pass
+    list(found.steps())
     sentences = list(found.write(bpy.context))
     assert f"{name} is locked or has another use" in sentences[0]
     assert "Dual Quaternion at" in sentences[1]

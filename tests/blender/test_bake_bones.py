@@ -18,7 +18,7 @@ from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake
 from sinew_addon.features.heat import bake_error, measures
 from sinew_addon.io import actions
-from test_bake import FRAMES, read_elsewhere, world_shapes
+from test_bake import FRAMES, read_elsewhere
 
 METHOD = "dq"
 # World points of float32 matrices.
@@ -56,7 +56,7 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
     obj, path = arm
     before = path.read_bytes()
     scenes.add_sinew(obj, METHOD)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     bones = {bone.name: np.array(bone.matrix_local) for bone in obj.modifiers["Armature"].object.data.bones}
     file, (report,) = baked(path, tmp_path / "out")
     assert path.read_bytes() == before
@@ -107,7 +107,7 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
         scenes.key(bone, "scale", ((1, (1.0, 1.0, 1.0)), (11, (1.2, 1.5, 1.3))))
         scenes.save(path)
     scenes.add_sinew(obj, method)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", "--helpers", "3", method=method)
     assert_states(report, read_elsewhere(file, FRAMES, tmp_path)["Arm"], expected)
     assert report["after"]["rms"] < 0.25 * report["before"]["rms"]
@@ -116,9 +116,9 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
 
     # An animation from which neither was made: Sinew's shape, and the played one.
     pose_anew(rig)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     obj.sinew.method = "lbs"
-    linear = rms_and_worst(world_shapes([obj], FRAMES)[0], expected)[0]
+    linear = rms_and_worst(scenes.world_shapes(obj, FRAMES), expected)[0]
     found = {}
     for each in (file, keyed):
         bpy.ops.wm.open_mainfile(filepath=str(each))
@@ -151,7 +151,7 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     scenes.save(path)
     for each in (obj, sleeve):
         scenes.add_sinew(each, METHOD)
-    expected = world_shapes([obj, sleeve], FRAMES)
+    expected = [scenes.world_shapes(each, FRAMES) for each in (obj, sleeve)]
     file, (report,) = baked(path, tmp_path / "out", "--helpers", "6", "--influences", "3")
     read = read_elsewhere(file, FRAMES, tmp_path)
     assert_states(report, np.hstack([read["Arm"], read["Sleeve"]]), np.hstack(expected))
@@ -175,7 +175,7 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     """The exporter converts constraints to keys."""
     obj, path = arm
     scenes.add_sinew(obj, method)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     file, (report,) = baked(path, tmp_path / "out", "--motion", motion, method=method)
     glb = tmp_path / "arm.glb"
     checked(without_sinew.run(EXPORT, file, glb), 0)
@@ -195,16 +195,16 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     obj, _path = arm
     mesh = obj.data
     obj.modifiers[0].use_deform_preserve_volume = False
-    lbs = world_shapes([obj], FRAMES)[0]
+    lbs = scenes.world_shapes(obj, FRAMES)
     scenes.add_sinew(obj, METHOD)
     mesh.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
     mesh.attributes.active_color_name = "Paint"
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     before = list(mesh.attributes.keys())
     with pytest.raises(RuntimeError, match="No mesh here was baked"):
         bpy.ops.sinew.heat_map(quantity="bake_error")
     bpy.ops.sinew.bake(kind="bones", frames=",".join(map(str, FRAMES)), motion=motion, helpers=2)
-    played = world_shapes([obj], FRAMES)[0]
+    played = scenes.world_shapes(obj, FRAMES)
     colours = {}
     for choice, shape in ((bake_error.BEFORE, lbs), (bake_error.AFTER, played)):
         wanted = np.sqrt(np.square(shape - expected).sum(axis=2).mean(axis=0))
@@ -272,8 +272,7 @@ def test_helper_bones_for_a_stage_without_a_weighted_bone_are_refused(arm, tmp_p
     options = HelperOptions(helpers=3)
     started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False, helpers=options)
     with pytest.raises(SinewError, match="Arm: no bone has weights here"):
-        for _share in started.sample():
-            pass
+        list(started.sample())
 
 
 def test_in_the_open_file_modes_and_selection_stay(arm, tmp_path):
@@ -287,8 +286,7 @@ def test_in_the_open_file_modes_and_selection_stay(arm, tmp_path):
     curves = len(actions.all_curves(rig.animation_data.action, actions.slot_of(rig.animation_data)))
     options = HelperOptions(helpers=3)
     started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False, helpers=options)
-    for _share in started.sample():
-        pass
+    list(started.sample())
     started.place()
     assert (rig.mode, bpy.context.view_layer.objects.active, rig.select_get()) == ("POSE", rig, True)
     assert not obj.select_get()

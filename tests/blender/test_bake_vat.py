@@ -88,9 +88,9 @@ def world_of(objects):
     """Points and normals, [vertices, 3], in the world."""
     points, normals = [], []
     for obj in objects:
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        evaluated = scenes.evaluated(obj)
         world, mesh = np.array(evaluated.matrix_world), evaluated.data
-        points.append(scenes.final_points(obj) @ world[:3, :3].T + world[:3, 3])
+        points.append(scenes.world_points(obj))
         own = np.array([normal.vector[:] for normal in mesh.vertex_normals]) @ np.linalg.inv(world[:3, :3])
         normals.append(own / np.linalg.norm(own, axis=1, keepdims=True))
     return np.concatenate(points), np.concatenate(normals)

@@ -83,12 +83,8 @@ def make_walks(modes=("QUATERNION",)):
 
 def film(armature, frames):
     """float64 [frames, bones, 4, 4]: the evaluated pose in armature space, in the order of the rig."""
-    names, shown = clips.rig_of(armature).names, []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
-        shown.append(np.array([posed[name].matrix for name in names], dtype=np.float64))
-    return np.array(shown)
+    order = [armature.pose.bones.find(name) for name in clips.rig_of(armature).names]
+    return scenes.at_frames(frames, lambda: scenes.pose_of(armature)[order])
 
 
 def played(armature, action, frames):
@@ -196,12 +192,6 @@ def test_the_operator_blends_and_undo_takes_it_back():
     armature = bpy.data.objects["Legs"]
     assert armature.animation_data.action.name == "WALK"
     assert len(bpy.data.actions) == 2
-
-
-# --- Clips from files
-
-
-# Z up to Y up, as most BVH files have it: -Z is ahead.
 
 
 # --- The command

@@ -33,7 +33,7 @@ def expected_points(obj: bpy.types.Object, before: np.ndarray, **options: object
     before  float32 [vertices, 3], the shape without the stage
     """
     armature = attach.armature_of(obj)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = scenes.evaluated(armature)
     motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
     heads = np.array([bone.head_local[:] for bone in armature.data.bones])
     tails = np.array([bone.tail_local[:] for bone in armature.data.bones])

@@ -272,12 +272,7 @@ def test_points_override_a_keyed_method(tmp_path):
 
 
 def bones_of(armature: bpy.types.Object, frames: list[int]) -> np.ndarray:
-    result = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        result.append(np.array([bone.matrix for bone in shown.pose.bones]))
-    return np.array(result)
+    return scenes.at_frames(frames, lambda: scenes.pose_of(armature))
 
 
 @pytest.fixture

@@ -44,7 +44,7 @@ def copies(obj: bpy.types.Object) -> dict[str, bpy.types.Object]:
 
 def without_offset(copy: bpy.types.Object, place: int) -> np.ndarray:
     """A copy's final points, moved to the original's position, object space."""
-    matrix = np.array(copy.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    matrix = np.array(scenes.evaluated(copy).matrix_world)
     offset = place * state().spacing * np.array(state().axis)
     return scenes.final_points(copy) - np.linalg.solve(matrix[:3, :3], offset)
 

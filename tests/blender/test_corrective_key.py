@@ -85,7 +85,7 @@ def test_a_bone_drives_it(arm):
     values = []
     for frame in (1, 4, 8, 11):
         bpy.context.scene.frame_set(frame)
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        evaluated = scenes.evaluated(obj)
         values.append(evaluated.data.shape_keys.key_blocks[key.name].value)
     assert values[0] == pytest.approx(0.0, abs=2e-3)
     assert 0.2 < values[1] < 0.8

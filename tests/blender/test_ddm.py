@@ -33,7 +33,7 @@ def moments_of(obj: bpy.types.Object, radius: float) -> np.ndarray:
 
 def assert_equal_to_reference(obj: bpy.types.Object, radius: float, variant: str = "0") -> None:
     armature = attach.armature_of(obj)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = scenes.evaluated(armature)
     motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
     # Motions in the object's space: a rotation and a translation map it to the armature's.

@@ -84,14 +84,6 @@ def write(path: Path, **options: object) -> read_glb.File:
     return read_glb.File(path)
 
 
-def world_shapes(obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
-    shapes = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        shapes.append(characters.world_points([obj]))
-    return np.array(shapes)
-
-
 def numbers_in(file: read_glb.File) -> np.ndarray:
     """Values of the vertices in Blender."""
     primitives = file.header["meshes"][0]["primitives"]
@@ -100,7 +92,7 @@ def numbers_in(file: read_glb.File) -> np.ndarray:
 
 def assert_plays(path: Path, obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
     """Compares to 1e-5 of the diagonal. Returns what was read."""
-    expected = world_shapes(obj, frames)
+    expected = scenes.world_shapes(obj, frames)
     times = [frame / bpy.context.scene.render.fps for frame in frames]
     got = read_glb.points_at(path, times)[obj.name]
     diagonal = np.linalg.norm(np.ptp(expected[0], axis=0))
@@ -173,7 +165,7 @@ def test_stages_play_elsewhere_as_here(tmp_path, method, mixed, form):
     assert [twist["from"] for twist in of_skin["twists"]] == ["parent", "child"]
     got = assert_plays(tmp_path / "a.glb", obj, FRAMES)
     settings.twist_spread.enabled = settings.bulge_limit.enabled = False
-    assert scenes.worst(got[-1], world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.05
+    assert scenes.worst(got[-1], scenes.world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.05
 
 
 def test_centres_matter_and_are_of_each_primitive(tmp_path):
@@ -183,7 +175,7 @@ def test_centres_matter_and_are_of_each_primitive(tmp_path):
     assert len(file.header["meshes"][0]["primitives"]) == 3
     got = assert_plays(tmp_path / "a.glb", obj, FRAMES)
     use(obj, "dq")
-    assert scenes.worst(got[-1], world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.01
+    assert scenes.worst(got[-1], scenes.world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.01
 
 
 def test_modifiers_applied(tmp_path):
@@ -200,7 +192,7 @@ def test_z_up(tmp_path):
     times = [frame / bpy.context.scene.render.fps for frame in FRAMES]
     # The reader takes this direction for Y up.
     x, y, z = np.moveaxis(read_glb.points_at(tmp_path / "a.glb", times)[obj.name], 2, 0)
-    expected = world_shapes(obj, FRAMES)[:, numbers_in(file)]
+    expected = scenes.world_shapes(obj, FRAMES)[:, numbers_in(file)]
     assert scenes.worst(np.stack([x, z, -y], axis=2), expected) <= 1e-5 * np.linalg.norm(
         np.ptp(expected[0], axis=0)
     )
@@ -230,13 +222,13 @@ def test_other_attributes_are_the_artists_choice(tmp_path):
 def test_an_export_that_fails_ends_as_one_that_does_not(tmp_path):
     obj = make_character()
     use(obj, "cor")
-    before = world_shapes(obj, FRAMES)
+    before = scenes.world_shapes(obj, FRAMES)
     (tmp_path / "file").touch()
     with pytest.raises(RuntimeError):
         write(tmp_path / "file" / "a.glb")
     assert "_SINEW_CENTRE" not in obj.data.attributes
     assert obj.modifiers["Sinew"].show_viewport
-    assert np.array_equal(world_shapes(obj, FRAMES), before)
+    assert np.array_equal(scenes.world_shapes(obj, FRAMES), before)
 
 
 def test_after_an_export_that_nobody_ended(tmp_path):

@@ -289,8 +289,7 @@ def test_between_frames(scene, tmp_path):
     middles = [frame + 0.5 for frame in FRAMES[:-1]]
     name = rig.animation_data.action.name
     rate = bpy.context.scene.render.fps
-    world = np.array(obj.matrix_world, dtype=np.float64)
-    expected = scenes.shapes(obj, middles).astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+    expected = scenes.world_shapes(obj, middles)
     rest, shapes = other_gltf.points_at(tmp_path / "arm.glb", np.array(middles) / rate, name)
     distances, vertices = cKDTree(world_rest(obj)).query(rest)
     assert distances.max() <= 1e-6

@@ -71,7 +71,7 @@ def vectors(mesh, name):
 
 
 def evaluated(obj):
-    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    return scenes.evaluated(obj).data
 
 
 def corners(obj):
@@ -505,7 +505,7 @@ def imported_alembic(data, tmp_path):
     bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
     made = set(bpy.data.objects) - before
     (obj,) = (each for each in made if each.type == "MESH")
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     found = (
         vectors(mesh, "corner_normals"),
         sorted((each.name, each.data_type, each.domain) for each in mesh.attributes),
@@ -526,7 +526,7 @@ def test_a_mesh_that_is_not_valid_has_none():
 
 def bone_motions(obj, armature):
     """float64 [bones, 4, 4]: from the rest pose to this frame's, in the object's space."""
-    evaluated_armature = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated_armature = scenes.evaluated(armature)
     place = np.linalg.inv(np.array(obj.matrix_world)) @ np.array(armature.matrix_world)
     return [
         place @ np.array(bone.matrix) @ np.linalg.inv(np.array(bone.bone.matrix_local)) @ np.linalg.inv(place)

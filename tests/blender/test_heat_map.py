@@ -21,7 +21,7 @@ from sinew_addon.features.pages import measure
 
 def shown_colours(obj: bpy.types.Object) -> np.ndarray:
     """float32 [vertices, 3], linear, of the final evaluated mesh."""
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     attribute = mesh.attributes[heat_nodes.NAME]
     assert (attribute.data_type, attribute.domain) == ("FLOAT_COLOR", "POINT")
     colours = np.empty(4 * len(mesh.vertices), dtype=np.float32)
@@ -206,7 +206,7 @@ def test_switched_off_it_leaves_no_trace(set_up):
     measures.of(bpy.context.scene)
     before = whole_file.content()
     bpy.ops.sinew.heat_map()
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     assert mesh.attributes.active_color_name == heat_nodes.NAME
     assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
     assert [slot.material.name for slot in obj.material_slots] == ["Skin"]
@@ -267,7 +267,7 @@ def test_a_duplicate_has_colours_of_its_own():
     np.testing.assert_allclose(shown_colours(twin), shown_colours(obj), atol=1e-6)
     properties.of(twin).heat = False
     bpy.context.scene.frame_set(7)
-    assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
+    assert heat_nodes.NAME in scenes.evaluated(obj).data.attributes
     buffers = [properties.of(each).storage.point_buffer for each in (obj, twin)]
     assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in buffers] == [True, False]
 
@@ -368,7 +368,7 @@ def test_linked_meshes_show_it_too(tmp_path, override, front):
     bpy.context.scene.frame_set(11)
     colours = shown_colours(obj)
     assert np.ptp(colours, axis=0).max() > 0.05
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
     path = str(tmp_path / "shot.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)

@@ -48,7 +48,7 @@ def expected_points(obj: bpy.types.Object, rest: np.ndarray | None = None) -> np
     rest  float [vertices, 3], the vertices after shape keys; None: the mesh's
     """
     armature = attach.armature_of(obj)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = scenes.evaluated(armature)
     matrices = {b.name: np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones}
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
     blocks = obj.data.shape_keys.key_blocks if obj.data.shape_keys else {}

@@ -60,7 +60,7 @@ def shown_arm(what: str) -> bpy.types.Object:
 def attribute_colours(obj: bpy.types.Object) -> np.ndarray:
     """As they are drawn, float32 [values]."""
     bpy.context.view_layer.update()
-    attribute = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes[NAME]
+    attribute = scenes.evaluated(obj).data.attributes[NAME]
     colours = np.empty(4 * len(attribute.data), dtype=np.float32)
     attribute.data.foreach_get("color", colours)
     return colours

@@ -167,8 +167,7 @@ def test_a_bake_has_a_corrective_smooth_that_was_taken_over_once(arm, kind, tmp_
     bpy.context.view_layer.objects.active = obj
     assert bpy.ops.sinew.take_over_smooth() == {"FINISHED"}
     started = bake.start([obj], kind, FRAMES, tmp_path / "arm.blend", overwrite=False)
-    for _share in started.sample():
-        pass
+    list(started.sample())
     started.publish()
     started.place()
     distances = np.linalg.norm(scenes.shapes(obj, FRAMES) - expected, axis=2)

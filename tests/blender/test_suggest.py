@@ -109,8 +109,7 @@ def test_pictures_are_drawn_where_each_is_worst(monkeypatch):
         "draw",
         lambda *args, own=thumbnail.draw: seen.append(own(*args)) or seen[-1],
     )
-    for _share in suggest.scan(scene, [obj], "SCENE"):
-        pass
+    list(suggest.scan(scene, [obj], "SCENE"))
     assert len(seen) == len(found().methods)
     middles = [picture[picture.shape[0] // 2, picture.shape[1] // 2, 3] for picture in seen]
     # The place is in the middle of its picture.

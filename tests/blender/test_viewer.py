@@ -204,11 +204,7 @@ def test_what_hangs_on_bones_goes_with_them(tmp_path):
     eye = bpy.context.object
     eye.parent, eye.parent_type, eye.parent_bone = obj.parent, "BONE", "bone.2"
     path = scenes.save(tmp_path / "arm.blend")
-    worlds = []
-    for frame in FRAMES:
-        bpy.context.scene.frame_set(frame)
-        world = np.array(eye.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-        worlds.append(scenes.final_points(eye) @ world[:3, :3].T + world[:3, 3])
+    worlds = scenes.world_shapes(eye, FRAMES)
     assert np.abs(worlds[2] - worlds[0]).max() > 0.1
     header, meshes = read_page.read(write_page(path, "--methods", "lbs,cor", "--frames", "1,6,11"))
     assert [part["name"] for part in header["parts"]] == ["Arm", eye.name]
