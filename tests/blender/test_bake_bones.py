@@ -90,11 +90,10 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
 def pose_anew(rig):
     """Another action than the baked one, with rotations that this one does not have."""
     rig.animation_data_clear()
-    for frame, turns in ((1, (0.4, -0.9, 0.3)), (6, (-1.2, 0.2, -0.5)), (11, (0.9, 1.0, 0.8))):
-        for bone in list(rig.pose.bones)[:2]:
-            bone.rotation_mode = "XYZ"
-            bone.rotation_euler, bone.location, bone.scale = turns, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-            bone.keyframe_insert("rotation_euler", frame=frame)
+    for bone in list(rig.pose.bones)[:2]:
+        bone.rotation_mode, bone.location, bone.scale = "XYZ", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+        turns = ((1, (0.4, -0.9, 0.3)), (6, (-1.2, 0.2, -0.5)), (11, (0.9, 1.0, 0.8)))
+        scenes.key(bone, "rotation_euler", turns)
 
 
 @pytest.mark.parametrize(("method", "share", "scaled"), [(METHOD, 0.25, False), ("cor", 0.35, True)])
@@ -135,12 +134,7 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     obj, path = arm
     rig = obj.modifiers["Armature"].object
     sleeve = scenes.copied(obj, "Sleeve")
-    sleeve.shape_key_add(name="Basis")
-    key = sleeve.shape_key_add(name="Wide")
-    for point in key.points:
-        point.co.y *= 1.3
-        point.co.z *= 1.3
-    scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
+    scenes.key_shape(sleeve, (1.0, 1.3, 1.3))
     rig.scale, rig.rotation_euler = (2.0, 2.0, 2.0), (0.3, 0.2, 0.1)
     for each in (obj, sleeve):
         each.parent = rig
@@ -304,9 +298,7 @@ def test_envelopes_that_reach_other_vertices_from_frame_to_frame_are_refused(arm
     rig = obj.modifiers["Armature"].object
     obj.vertex_groups.clear()
     obj.modifiers["Armature"].use_bone_envelopes = True
-    for offset, frame in ((0.0, 1), (1.5, 11)):
-        rig.location.x = offset
-        rig.keyframe_insert("location", frame=frame)
+    scenes.key(rig, "location", ((1, (0.0, 0.0, 0.0)), (11, (1.5, 0.0, 0.0))))
     if not moving:
         obj.parent = rig
     scenes.add_sinew(obj, METHOD)

@@ -44,13 +44,7 @@ def character():
 
 def texels(path):
     """[height, width, 3], from the top."""
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"
-    width, height = image.size
-    found = np.empty(4 * width * height, dtype=np.float32)
-    image.pixels.foreach_get(found)
-    bpy.data.images.remove(image)
-    return found.reshape(height, width, 4)[::-1, :, :3]
+    return scenes.pixels_of(path, are_numbers=True)[::-1, :, :3]
 
 
 class Played:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import bpy
 import numpy as np
 import pytest
@@ -41,13 +43,9 @@ def test_a_grey_add_says_why():
         bpy.ops.sinew.add()
 
 
-def shared_mesh(obj):
-    scenes.copied(obj, linked=True)
-
-
 @pytest.mark.parametrize("by_script", [True, False])
 @pytest.mark.parametrize("heat", [False, True])
-@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, shared_mesh])
+@pytest.mark.parametrize("set_up", [None, scenes.put_in_front, partial(scenes.copied, linked=True)])
 def test_helpers_of_a_deleted_mesh_are_deleted(set_up, heat, by_script):
     """Its mesh, which is the artist's, has Blender's shape."""
     obj, _armature = scenes.make_arm()
@@ -159,8 +157,7 @@ def test_nothing_is_left_where_sinew_can_not_be_added(is_known, monkeypatch):
         monkeypatch.setattr(stack, "NEED_ORIGINAL_MESH", frozenset())
     other, armature = scenes.make_arm()
     obj = scenes.copied(other)
-    obj.modifiers.clear()
-    obj.parent, obj.parent_type = armature, "ARMATURE"
+    scenes.deform_by_parent(obj, armature)
     bpy.context.view_layer.objects.active = obj
     obj.modifiers.new("Multires", "MULTIRES")
     bpy.ops.object.multires_subdivide(modifier="Multires")

@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Generator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -21,7 +20,7 @@ from planted import HUMAN, PLANTS, Plant, Rig
 from program import run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.core.flex.limits import Table
-from sinew_addon.core.flex.verdict import Verdict
+from sinew_addon.core.steps import result_of
 from sinew_addon.features.flex import flex
 from whole_file import assert_same, content
 
@@ -93,7 +92,7 @@ def test_nothing_is_changed():
     bpy.context.view_layer.update()
     before, shape = content(), scenes.final_points(obj)
     shares: list[float] = []
-    verdict = _result(flex.flex([obj], ["lbs"], Table(), {}), shares)
+    verdict = result_of(flex.flex([obj], ["lbs"], Table(), {}), shares.append).verdict
     assert_same(before)
     np.testing.assert_array_equal(scenes.final_points(obj), shape)
     assert shares == sorted(shares)
@@ -103,20 +102,10 @@ def test_nothing_is_changed():
     steps = flex.flex([obj], ["lbs"], Table(), {})
     armature.pose.bones[1].rotation_euler = (0.0, 0.0, 0.0)
     bpy.context.view_layer.update()
-    again, known = (each.joints[1].values["own"] for each in (_result(steps), verdict))
+    again, known = (each.joints[1].values["own"] for each in (result_of(steps).verdict, verdict))
     assert {name: value for name, (value, _pose) in again.items()} == pytest.approx(
         {name: value for name, (value, _pose) in known.items()}, abs=1e-5
     )
-
-
-def _result(steps: Generator[float, None, flex.Result], shares: list[float] | None = None) -> Verdict:
-    while True:
-        try:
-            share = next(steps)
-        except StopIteration as end:
-            return end.value.verdict
-        if shares is not None:
-            shares.append(share)
 
 
 def test_the_command_says_what_is_wrong_where_and_what_mends_it(tmp_path):

@@ -31,9 +31,7 @@ def bendy(empty_file):
 
 def make_bendy(curved=False, bent=True, unequal=True):
     """An arm of three bendy bones that bend, twist and grow; with `bent` not set, they only twist."""
-    obj, rig = scenes.make_arm(bones=3)
-    obj.parent = rig
-    rig.location, rig.rotation_euler, rig.scale = (0.3, -0.4, 0.2), (0.5, 0.2, -0.3), (1.3, 1.3, 1.3)
+    obj, rig = scenes.placed_arm()
     for bone in rig.data.bones:
         bone.bbone_segments, bone.bbone_mapping_mode = 6, "CURVED" if curved else "STRAIGHT"
         if curved:
@@ -169,11 +167,7 @@ def test_what_is_not_exact_is_reported(bendy, tmp_path, cause):
         linear = scenes.world_shapes(obj, FRAMES)
         options["method"], modifier.use_deform_preserve_volume = "dq", True
     elif cause == "sliding":
-        obj.shape_key_add(name="Basis")
-        key = obj.shape_key_add(name="Along")
-        for point in key.points:
-            point.co.x *= 0.9
-        scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
+        scenes.key_shape(obj, (0.9, 1.0, 1.0))
     elif cause == "shear":
         scenes.key(obj.parent.pose.bones[0], "scale", ((1, (1, 1, 1)), (11, (1.1, 1.4, 0.8))))
         rest = world_rest(obj)
