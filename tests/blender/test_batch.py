@@ -148,8 +148,8 @@ def test_settings_for_files_and_objects(tmp_path):
         method = "lbs"
         """
     )
-    result = run_sinew("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
-    assert "2 of 2 files re-skinned" in result.stdout
+    command = ("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
+    assert "2 of 2 files re-skinned" in run_sinew(*command).stdout
     methods = {}
     for name in ("hero", "extra"):
         files.open_file(tmp_path / "out" / "sub" / f"{name}.blend")
@@ -162,6 +162,7 @@ def test_settings_for_files_and_objects(tmp_path):
     rows = report_of(tmp_path / "out")
     deviation = {mesh["object"]: mesh["deviation_part"] for mesh in rows["sub/hero.blend"]["meshes"]}
     assert deviation["Face"] <= scenes.TOLERANCE < 0.01 < deviation["Body"]
+    assert run_sinew(*command, status=1).stderr.count("use --overwrite to replace it") == 2
 
 
 @pytest.mark.slow

@@ -165,28 +165,6 @@ def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):
     assert "Traceback" not in result.stderr
 
 
-def test_reskin_writes_copies_that_use_the_method(arm_file, tmp_path):
-    path, expected = arm_file
-    before = path.read_bytes()
-    result = run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out")
-    assert "1 of 1 files" in result.stdout
-    assert path.read_bytes() == before
-    files.open_file(tmp_path / "out" / "arm.blend")
-    obj = bpy.data.objects["Arm"]
-    assert properties.of(obj).method == "dq"
-    assert scenes.worst(scenes.shapes(obj, [6, 11]), expected) <= 1e-5
-    # A second run reports this instead of overwriting the first one's copies.
-    assert (
-        "--overwrite"
-        in run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out", status=1).stderr
-    )
-    options = ("--method", "qv", "--set", "bulge_limit=on", "--overwrite")
-    run_sinew("reskin", path, *options, "--out", tmp_path / "out")
-    files.open_file(tmp_path / "out" / "arm.blend")
-    settings = properties.of(bpy.data.objects["Arm"])
-    assert (settings.method, settings.bulge_limit.enabled) == ("qv", True)
-
-
 def test_reskin_never_writes_to_the_input_folder(arm_file):
     path, _expected = arm_file
     before = path.read_bytes()
