@@ -23,8 +23,8 @@ from sinew_addon.core.precompute import precomputations
 from sinew_addon.deform import characters, precompute_watch, small_meshes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-# The reader of glTF for engines.
-sys.path.append(str(REPOSITORY / "shaders"))
+# The reader of glTF for engines, and what tests of Python have, too.
+sys.path += [str(REPOSITORY / "shaders"), str(REPOSITORY / "tests" / "python")]
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
 # Tests of what commands write: they only run in 4.2 and in the newest Blender. The versions in between run
 # all other tests: how Blender evaluates, stores and edits.
@@ -169,7 +169,7 @@ def route(request):
     routes.release()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def real_rig():
     """real_rig(name): the path of a rig in SINEW_RIGS; skips the test if it does not exist."""
 

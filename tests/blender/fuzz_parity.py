@@ -494,9 +494,7 @@ def add_further_armatures(
 ) -> None:
     """One or two more Armature modifiers after the first, with a copy of its armature in another pose."""
     rng = numbers(seed, "further armatures")
-    other = armature.copy()
-    other.data = armature.data.copy()
-    bpy.context.scene.collection.objects.link(other)
+    other = scenes.copied(armature)
     other.location = rng.uniform(-0.5, 0.5, 3)
     pose(seed + 1, features, other)
     place = list(obj.modifiers).index(obj.modifiers["Armature"])

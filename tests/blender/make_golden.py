@@ -26,7 +26,6 @@ import sinew
 import sinew_addon
 from mathutils import Euler, Quaternion
 from sinew_addon.core.parameters import Value
-from sinew_addon.core.sdef import KEYS
 from sinew_addon.deform import characters, session
 from sinew_addon.io import mesh_io
 
@@ -185,12 +184,13 @@ SetUp = Callable[[bpy.types.Object, bpy.types.Object], None]
 def make(set_up: SetUp) -> tuple[dict, dict[str, np.ndarray]]:
     """One case: the content of its JSON, and the arrays of its npz."""
     obj, armature = make_rig(set_up)
-    arrays = {**influences(obj, armature), **bones(armature), **topology(obj.data)}
+    influences = zip(("offsets", "bones", "weights"), scenes.weights_of(obj), strict=True)
+    arrays = {**dict(influences), **bones(armature), **topology(obj.data)}
     arrays["points"] = scenes.rest_points(obj)
     arrays["armature_from_mesh"] = np.array(
         armature.matrix_world.inverted() @ obj.matrix_world, dtype=np.float32
     )
-    arrays[GROUP] = shares(obj)
+    arrays[GROUP] = scenes.shares_of(obj, GROUP).astype(np.float32)
     names = [bone.name for bone in armature.data.bones]
     made = results()
     for result in made:
@@ -221,39 +221,12 @@ def make_rig(set_up: SetUp) -> tuple[bpy.types.Object, bpy.types.Object]:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj, armature = scenes.make_arm(bones=3, sides=6, rings=10)
     set_up(obj, armature)
-    paint(obj)
-    make_spheres(obj)
+    # With runs of 0 and of 1, and values in between.
+    scenes.paint(obj, GROUP, np.random.default_rng(2).uniform(-0.5, 1.5, len(obj.data.vertices)))
+    # Of every vertex but each seventh.
+    scenes.add_spheres(obj, (v for v in range(len(obj.data.vertices)) if v % 7), seed=3)
     bpy.context.view_layer.update()
     return obj, armature
-
-
-def paint(obj: bpy.types.Object) -> None:
-    """A vertex group with runs of 0 and of 1, and values in between."""
-    group = obj.vertex_groups.new(name=GROUP)
-    for vertex, share in enumerate(np.random.default_rng(2).uniform(-0.5, 1.5, len(obj.data.vertices))):
-        if share > 0.0:
-            group.add([vertex], min(float(share), 1.0), "REPLACE")
-
-
-def shares(obj: bpy.types.Object) -> np.ndarray:
-    index = obj.vertex_groups[GROUP].index
-    own = [[e.weight for e in vertex.groups if e.group == index] for vertex in obj.data.vertices]
-    return np.array([sum(weights) for weights in own], dtype=np.float32)
-
-
-def make_spheres(obj: bpy.types.Object) -> None:
-    """C, R0 and R1 of every vertex but each seventh, as shape keys that change nothing by themselves."""
-    rng = np.random.default_rng(3)
-    obj.shape_key_add(name="Basis")
-    keys = [obj.shape_key_add(name=name) for name in KEYS]
-    for key in keys:
-        # In Blender 5.2 a new key has the value 1.
-        key.value = 0.0
-    for vertex in obj.data.vertices:
-        if vertex.index % 7:
-            centre = np.array([round(vertex.co.x), 0.02, -0.03])
-            for key, point in zip(keys, (centre, *(centre + rng.uniform(-0.2, 0.2, (2, 3)))), strict=True):
-                key.data[vertex.index].co = point
 
 
 def vertex_data(obj: bpy.types.Object, method: str) -> np.ndarray | None:
@@ -269,27 +242,9 @@ def topology(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
     return {"face_offsets": read.face_offsets, "corner_vertices": read.corner_vertices, "edges": read.edges}
 
 
-def influences(obj: bpy.types.Object, armature: bpy.types.Object) -> dict[str, np.ndarray]:
-    names = [bone.name for bone in armature.data.bones]
-    entries = [
-        [
-            (names.index(obj.vertex_groups[e.group].name), e.weight)
-            for e in vertex.groups
-            if obj.vertex_groups[e.group].name != GROUP
-        ]
-        for vertex in obj.data.vertices
-    ]
-    flat = [entry for of_vertex in entries for entry in of_vertex]
-    return {
-        "offsets": np.cumsum([0, *map(len, entries)]).astype(np.int32),
-        "bones": np.array([bone for bone, _weight in flat], dtype=np.int32),
-        "weights": np.array([weight for _bone, weight in flat], dtype=np.float32),
-    }
-
-
 def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
     """Bones first, then the joints of bendy bones."""
-    posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    posed = scenes.evaluated(armature).pose.bones
     rest_matrices = [np.array(bone.matrix_local) for bone in armature.data.bones]
     pose_matrices = [np.array(bone.matrix) for bone in posed]
     number = {bone.name: index for index, bone in enumerate(armature.data.bones)}

@@ -13,6 +13,7 @@ from mathutils import Matrix
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.flex.limits import Table
 from sinew_addon.core.flex.verdict import Verdict
+from sinew_addon.core.steps import result_of
 from sinew_addon.deform import characters
 from sinew_addon.features.flex import flex
 from sinew_addon.io import files, mesh_io
@@ -111,12 +112,7 @@ class Rig:
 def verdict() -> Verdict:
     scene = bpy.context.scene
     meshes, _left = characters.deformable_meshes(scene, Path("planted"), ["dq"])
-    steps = flex.flex(meshes, (), Table(), dict.fromkeys(meshes, properties.BLENDER))
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value.verdict
+    return result_of(flex.flex(meshes, (), Table(), dict.fromkeys(meshes, properties.BLENDER))).verdict
 
 
 def found(of: Verdict) -> set[tuple[str, str]]:

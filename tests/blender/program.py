@@ -26,9 +26,27 @@ ENVIRONMENT = {**os.environ, "PYTHONIOENCODING": "utf-8"}
 
 
 def start_sinew(*args: object, env_more: dict[str, str] | None = None, **options: object) -> subprocess.Popen:
-    """options  of subprocess.Popen, such as its pipes"""
-    environment = {**ENVIRONMENT, **(env_more or {})}
-    return subprocess.Popen([*COMMAND, *map(str, args)], env=environment, **options)
+    """options  of subprocess.Popen, such as its pipes: by default all is read as text"""
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    options = {**pipes, "text": True, "encoding": "utf-8", **options}
+    return subprocess.Popen([*COMMAND, *map(str, args)], env={**ENVIRONMENT, **(env_more or {})}, **options)
+
+
+def run_script(path: Path, text: str) -> subprocess.CompletedProcess:
+    """Runs a script in a Python of its own, which may import from this folder. It must come to its end, and
+    exit with status 0."""
+    path.write_text(f"{text}\nprint('at its end')\n")
+    ran = subprocess.run(
+        [sys.executable, "-X", "faulthandler", path],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert "at its end" in ran.stdout, ran.stdout[-2000:] + ran.stderr[-3000:]
+    assert ran.returncode == 0, ran.stderr
+    return ran
 
 
 # Runs one script after the other, each with its words in sys.argv. What they print goes to two files, as
@@ -147,6 +165,12 @@ def checked(result: subprocess.CompletedProcess, status: int) -> subprocess.Comp
     assert result.returncode == status, result.stdout + result.stderr
     assert "Traceback" not in result.stderr, result.stderr
     return result
+
+
+def complaint(errors: str) -> str:
+    """The one line that reports the problem."""
+    (line,) = [line for line in errors.splitlines() if line.startswith("sinew: ")]
+    return line
 
 
 @contextmanager

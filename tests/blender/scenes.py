@@ -12,9 +12,11 @@ from typing import ClassVar
 import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
-from sinew_addon.attach import attach, stack
+from sinew_addon.attach import attach, node_group, properties, stack
 from sinew_addon.attach.updates import updates_suspended
+from sinew_addon.core import sdef
 from sinew_addon.deform import session
+from sinew_addon.features.heat import live
 
 # Documented tolerance against the Armature modifier, relative to the bounding box's diagonal.
 TOLERANCE = 1e-5
@@ -89,15 +91,13 @@ def key(owner: bpy.types.bpy_struct, path: str, values: Iterable[tuple[int, obje
         owner.keyframe_insert(path, frame=frame)
 
 
-def key_shape(obj: bpy.types.Object) -> None:
-    """A first shape key that lifts all vertices, keyed: off at frame 1, on at frame 11."""
+def key_shape(obj: bpy.types.Object, scale: tuple[float, float, float] | None = None) -> None:
+    """A first shape key that scales the mesh, or else lifts all vertices, keyed: off at frame 1, on at 11."""
     obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="Key")
-    for point in key.data:
-        point.co.z += 0.2
-    for frame, value in ((1, 0.0), (11, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
+    made = obj.shape_key_add(name="Key")
+    for point in made.data:
+        point.co = point.co + Vector((0.0, 0.0, 0.2)) if scale is None else point.co * Vector(scale)
+    key(made, "value", ((1, 0.0), (11, 1.0)))
 
 
 def modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -122,12 +122,38 @@ def points_of(vertices: bpy.types.bpy_prop_collection, name: str = "co") -> np.n
     return points
 
 
+def evaluated(obj: bpy.types.Object) -> bpy.types.Object:
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+
+
 def final_points(obj: bpy.types.Object, name: str = "co") -> np.ndarray:
     """float32 [vertices, 3]: the final evaluated mesh, object space.
 
     name  undeformed_co for its Generated texture coordinates, if hair or the like has Blender make them
     """
-    return points_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices, name)
+    return points_of(evaluated(obj).data.vertices, name)
+
+
+def pose_of(armature: bpy.types.Object, name: str = "matrix") -> np.ndarray:
+    """float64 [bones, 4, 4] of the evaluated pose.
+
+    name  matrix_basis for that of the channels
+    """
+    return np.array([getattr(bone, name) for bone in evaluated(armature).pose.bones])
+
+
+def pixels_of(path: Path, are_numbers: bool = False) -> np.ndarray:
+    """float32 [height, width, 4] of a picture, the lowest row first.
+
+    are_numbers  they are no colours
+    """
+    image = bpy.data.images.load(str(path))
+    if are_numbers:
+        image.colorspace_settings.name = "Non-Color"
+    found = np.empty((image.size[1], image.size[0], 4), dtype=np.float32)
+    image.pixels.foreach_get(found.ravel())
+    bpy.data.images.remove(image)
+    return found
 
 
 def rest_points(obj: bpy.types.Object) -> np.ndarray:
@@ -138,13 +164,29 @@ def diagonal(obj: bpy.types.Object) -> float:
     return float(np.linalg.norm(np.ptp(rest_points(obj), axis=0)))
 
 
-def shapes(obj: bpy.types.Object, frames: list[float]) -> np.ndarray:
-    """float32 [frames, vertices, 3]."""
+def at_frames(frames: Iterable[float], read: Callable[[], np.ndarray]) -> np.ndarray:
+    """[frames, ...]: what is read at each frame."""
     result = []
     for frame in frames:
         bpy.context.scene.frame_set(math.floor(frame), subframe=frame - math.floor(frame))
-        result.append(final_points(obj))
+        result.append(read())
     return np.stack(result)
+
+
+def shapes(obj: bpy.types.Object, frames: Iterable[float]) -> np.ndarray:
+    """float32 [frames, vertices, 3]."""
+    return at_frames(frames, lambda: final_points(obj))
+
+
+def world_points(obj: bpy.types.Object) -> np.ndarray:
+    """float64 [vertices, 3]: the final evaluated mesh, in the world."""
+    world = np.array(evaluated(obj).matrix_world)
+    return final_points(obj) @ world[:3, :3].T + world[:3, 3]
+
+
+def world_shapes(obj: bpy.types.Object, frames: Iterable[float]) -> np.ndarray:
+    """float64 [frames, vertices, 3]."""
+    return at_frames(frames, lambda: world_points(obj))
 
 
 def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume: bool) -> np.ndarray:
@@ -178,6 +220,56 @@ def skinned_arm(method: str | None = None, **options: object) -> tuple[bpy.types
     return obj, armature
 
 
+def placed_arm(bones: int = 3) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """make_arm() below its armature, which is moved, rotated and scaled."""
+    obj, armature = make_arm(bones)
+    obj.parent = armature
+    armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), (0.5, 0.2, -0.3)
+    armature.scale = (1.3, 1.3, 1.3)
+    bpy.context.view_layer.update()
+    return obj, armature
+
+
+def paint(obj: bpy.types.Object, name: str, shares: Iterable[float]) -> None:
+    """A new vertex group: a share for each vertex, at most 1, and none where it is not positive."""
+    group = obj.vertex_groups.new(name=name)
+    for vertex, share in enumerate(shares):
+        if share > 0.0:
+            group.add([vertex], min(float(share), 1.0), "REPLACE")
+
+
+def shares_of(obj: bpy.types.Object, name: str) -> np.ndarray:
+    """float64 [vertices] of a vertex group, read one by one."""
+    index = obj.vertex_groups[name].index
+    return np.array([sum(g.weight for g in v.groups if g.group == index) for v in obj.data.vertices])
+
+
+def set_stage(obj: bpy.types.Object, name: str, **values: object) -> None:
+    """Sets parameters of a stage, and switches it on."""
+    stage = getattr(properties.of(obj), name)
+    for parameter, value in {**values, "enabled": True}.items():
+        setattr(stage, parameter, value)
+
+
+def bone_motions(armature: bpy.types.Object) -> np.ndarray:
+    """float64 [bones, 4, 4]: from the rest pose to this frame's, in the armature's space."""
+    rest = np.array([bone.matrix_local for bone in armature.data.bones])
+    return pose_of(armature) @ np.linalg.inv(rest)
+
+
+def move_to(collection: bpy.types.Collection, *objects: bpy.types.Object) -> None:
+    """Out of the scene's own collection."""
+    for obj in objects:
+        bpy.context.scene.collection.objects.unlink(obj)
+        collection.objects.link(obj)
+
+
+def deform_by_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    """By a parent of type Armature, in the place of the object's modifiers."""
+    obj.modifiers.clear()
+    obj.parent, obj.parent_type = armature, "ARMATURE"
+
+
 def copied(obj: bpy.types.Object, name: str = "", linked: bool = False) -> bpy.types.Object:
     """linked  with the same mesh"""
     copy = obj.copy()
@@ -195,10 +287,10 @@ def added(name: str, data: bpy.types.ID | None) -> bpy.types.Object:
     return obj
 
 
-def save(path: Path) -> Path:
+def save(path: Path, **options: object) -> Path:
     """Saves the open file there, in a folder that may be new."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), **options)
     return path
 
 
@@ -234,8 +326,22 @@ def states_of(obj: bpy.types.Object) -> list:
     return session.states_of([obj], bpy.context.evaluated_depsgraph_get())
 
 
+def measure(obj: bpy.types.Object, other: str = "blender") -> live.Subject:
+    """What the panel measures of it at this frame, against another method."""
+    return live.measure(states_of(obj), other, bpy.context.evaluated_depsgraph_get())
+
+
 def worst(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a.astype(np.float64) - b).max())
+
+
+def assert_as_without(obj: bpy.types.Object, shown: np.ndarray | None = None) -> None:
+    """Removes Sinew. The shape that it showed, by default that of now, is the modifier's."""
+    shown = final_points(obj) if shown is None else shown
+    attach.remove(obj)
+    expected = final_points(obj)
+    assert shown.shape == expected.shape
+    assert worst(shown, expected) <= 1e-5
 
 
 def bend(armature: bpy.types.Object, degrees: float, bone: int = 1) -> None:
@@ -249,34 +355,39 @@ def forget_keys(armature: bpy.types.Object) -> None:
     armature.animation_data_clear()
 
 
+Made = bpy.types.Node | bpy.types.NodeSocket
+
+
+def nodes(make: Callable[[bpy.types.NodeTree, bpy.types.Node], Made]) -> bpy.types.NodeTree:
+    """A group of Geometry Nodes.
+
+    make  gets the group and the node of its input; returns what has the geometry of its output
+    """
+    group = bpy.data.node_groups.new("Made", "GeometryNodeTree")
+    group.is_modifier = True
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    source = node_group.add(group, "NodeGroupInput")
+    node_group.add(group, "NodeGroupOutput", {0: make(group, source)})
+    return group
+
+
 def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
     """Writes an arm, and a grid of `vertices` squared that Geometry Nodes smooth this many times when
     Blender evaluates it, as it does when it opens the file."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     make_arm(sides=6, rings=5)
-    group = bpy.data.node_groups.new("Slow", "GeometryNodeTree")
-    group.is_modifier = True
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    grid, blur, position, set_position, out = (
-        group.nodes.new(kind)
-        for kind in (
-            "GeometryNodeMeshGrid",
-            "GeometryNodeBlurAttribute",
-            "GeometryNodeInputPosition",
-            "GeometryNodeSetPosition",
-            "NodeGroupOutput",
-        )
-    )
-    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = vertices
-    blur.data_type = "FLOAT_VECTOR"
-    blur.inputs["Iterations"].default_value = iterations
-    value = next(socket for socket in blur.inputs if socket.enabled and socket.name == "Value")
-    group.links.new(position.outputs["Position"], value)
-    group.links.new(grid.outputs["Mesh"], set_position.inputs["Geometry"])
-    group.links.new(next(s for s in blur.outputs if s.enabled), set_position.inputs["Position"])
-    group.links.new(set_position.outputs["Geometry"], out.inputs[0])
+
+    def slow(group: bpy.types.NodeTree, _source: bpy.types.Node) -> Made:
+        size = {"Vertices X": vertices, "Vertices Y": vertices}
+        grid = node_group.add(group, "GeometryNodeMeshGrid", size)
+        position = node_group.add(group, "GeometryNodeInputPosition")
+        values = {"Value": position, "Iterations": iterations}
+        blur = node_group.add(group, "GeometryNodeBlurAttribute", values, data_type="FLOAT_VECTOR")
+        return node_group.add(group, "GeometryNodeSetPosition", {"Geometry": grid, "Position": blur})
+
     obj = added("Slow", bpy.data.meshes.new("Slow"))
-    obj.modifiers.new("Slow", "NODES").node_group = group
+    obj.modifiers.new("Slow", "NODES").node_group = nodes(slow)
     path.parent.mkdir(parents=True, exist_ok=True)
     # Saving the open file would evaluate it.
     bpy.data.libraries.write(str(path), {bpy.context.scene}, compress=True)
@@ -302,15 +413,31 @@ def link_here(
 
 
 def weights_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Offsets, bones and weights, read one by one, without Sinew's code."""
-    bones = [bone.name for bone in attach.armature_of(obj).data.bones]
+    """Offsets, bones and weights, read one by one, without Sinew's code. Groups of no bone are left out."""
+    armature = next(modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE")
+    numbers = [armature.data.bones.find(group.name) for group in obj.vertex_groups]
     offsets, indices, weights = [0], [], []
     for vertex in obj.data.vertices:
         for entry in vertex.groups:
-            indices.append(bones.index(obj.vertex_groups[entry.group].name))
-            weights.append(entry.weight)
+            if numbers[entry.group] >= 0:
+                indices.append(numbers[entry.group])
+                weights.append(entry.weight)
         offsets.append(len(indices))
     return np.int32(offsets), np.int32(indices), np.float32(weights)
+
+
+def add_spheres(obj: bpy.types.Object, vertices: Iterable[int], seed: int) -> None:
+    """The shape keys of mmd_tools that sdef reads, with C, R0 and R1 of these vertices."""
+    rng = np.random.default_rng(seed)
+    obj.shape_key_add(name="Basis")
+    keys = [obj.shape_key_add(name=name) for name in sdef.KEYS]
+    for made in keys:
+        # They are not meant as shapes: in Blender 5.2 a new key has the value 1.
+        made.value = 0.0
+    for vertex in vertices:
+        centre = np.array([round(obj.data.vertices[vertex].co.x), 0.02, -0.03])
+        for made, point in zip(keys, (centre, *(centre + rng.uniform(-0.2, 0.2, (2, 3)))), strict=True):
+            made.data[vertex].co = point
 
 
 def triangles_of(obj: bpy.types.Object) -> np.ndarray:

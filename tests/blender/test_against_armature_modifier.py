@@ -55,7 +55,7 @@ def test_far_from_the_origin():
 
 def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:
     """In edit mode the evaluated mesh differs from what it converts to."""
-    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = scenes.evaluated(obj)
     points = mesh_io.read_points(evaluated.to_mesh())
     evaluated.to_mesh_clear()
     return points

@@ -15,7 +15,6 @@ from sinew_addon.attach import properties
 from sinew_addon.core.auto_mix import VertexErrors
 from sinew_addon.deform import session
 from sinew_addon.features.auto_mix import auto_mix
-from sinew_addon.features.heat import live
 
 FRAMES = range(1, 12)
 SMOOTHING = 0.3
@@ -32,13 +31,8 @@ def pull_and_twist(armature: bpy.types.Object) -> None:
     _still, bent, twisted = armature.pose.bones
     for bone, axis, degrees, pull in ((bent, (0, 0, 1), BEND, PULL), (twisted, (0, 1, 0), TWIST, 0.0)):
         bone.rotation_mode = "AXIS_ANGLE"
-        for frame, share in ((1, 0.0), (11, 1.0)):
-            bone.rotation_axis_angle, bone.location = (
-                (share * math.radians(degrees), *axis),
-                (0, share * pull, 0),
-            )
-            bone.keyframe_insert("rotation_axis_angle", frame=frame)
-            bone.keyframe_insert("location", frame=frame)
+        scenes.key(bone, "rotation_axis_angle", ((1, (0.0, *axis)), (11, (math.radians(degrees), *axis))))
+        scenes.key(bone, "location", ((1, (0.0, 0.0, 0.0)), (11, (0.0, pull, 0.0))))
 
 
 def sharpen(obj: bpy.types.Object) -> None:
@@ -63,9 +57,8 @@ def jointed(method: str | None = "lbs", name: str = "Arm", rings: int = 61) -> b
 
 
 def shares(obj: bpy.types.Object) -> np.ndarray:
-    """The weights of its Mix, read one by one."""
-    index = obj.vertex_groups[properties.of(obj).mix.group].index
-    return np.array([sum(g.weight for g in v.groups if g.group == index) for v in obj.data.vertices])
+    """The weights of its Mix."""
+    return scenes.shares_of(obj, properties.of(obj).mix.group)
 
 
 def worst(obj: bpy.types.Object) -> dict[str, float]:
@@ -74,8 +67,7 @@ def worst(obj: bpy.types.Object) -> dict[str, float]:
     errors = None
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
+        measured = scenes.measure(obj).measured
         errors = errors or VertexErrors(measured.rest_distances)
         errors.add((measured, measured), None)
         for name in ("limb_change", "bulge_worst", "stretch_max", "stretch_rms"):
@@ -225,8 +217,7 @@ def test_a_group_of_another_use_stays_as_it_is(use):
     assert before == {v: group.weight(v) for v in before}
     found = auto_mix.AutoMix(bpy.context.scene, [obj], "SCENE", SMOOTHING)
     mix.group = name
-    for _share in found.steps():
-        pass
+    list(found.steps())
     sentences = list(found.write(bpy.context))
     assert f"{name} is locked or has another use" in sentences[0]
     assert "Dual Quaternion at" in sentences[1]

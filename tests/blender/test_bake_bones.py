@@ -18,7 +18,7 @@ from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake
 from sinew_addon.features.heat import bake_error, measures
 from sinew_addon.io import actions
-from test_bake import FRAMES, read_elsewhere, world_shapes
+from test_bake import FRAMES, read_elsewhere
 
 METHOD = "dq"
 # World points of float32 matrices.
@@ -56,7 +56,7 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
     obj, path = arm
     before = path.read_bytes()
     scenes.add_sinew(obj, METHOD)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     bones = {bone.name: np.array(bone.matrix_local) for bone in obj.modifiers["Armature"].object.data.bones}
     file, (report,) = baked(path, tmp_path / "out")
     assert path.read_bytes() == before
@@ -90,11 +90,10 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
 def pose_anew(rig):
     """Another action than the baked one, with rotations that this one does not have."""
     rig.animation_data_clear()
-    for frame, turns in ((1, (0.4, -0.9, 0.3)), (6, (-1.2, 0.2, -0.5)), (11, (0.9, 1.0, 0.8))):
-        for bone in list(rig.pose.bones)[:2]:
-            bone.rotation_mode = "XYZ"
-            bone.rotation_euler, bone.location, bone.scale = turns, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-            bone.keyframe_insert("rotation_euler", frame=frame)
+    for bone in list(rig.pose.bones)[:2]:
+        bone.rotation_mode, bone.location, bone.scale = "XYZ", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+        turns = ((1, (0.4, -0.9, 0.3)), (6, (-1.2, 0.2, -0.5)), (11, (0.9, 1.0, 0.8)))
+        scenes.key(bone, "rotation_euler", turns)
 
 
 @pytest.mark.parametrize(("method", "share", "scaled"), [(METHOD, 0.25, False), ("cor", 0.35, True)])
@@ -107,7 +106,7 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
         scenes.key(bone, "scale", ((1, (1.0, 1.0, 1.0)), (11, (1.2, 1.5, 1.3))))
         scenes.save(path)
     scenes.add_sinew(obj, method)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", "--helpers", "3", method=method)
     assert_states(report, read_elsewhere(file, FRAMES, tmp_path)["Arm"], expected)
     assert report["after"]["rms"] < 0.25 * report["before"]["rms"]
@@ -116,9 +115,9 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
 
     # An animation from which neither was made: Sinew's shape, and the played one.
     pose_anew(rig)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     obj.sinew.method = "lbs"
-    linear = rms_and_worst(world_shapes([obj], FRAMES)[0], expected)[0]
+    linear = rms_and_worst(scenes.world_shapes(obj, FRAMES), expected)[0]
     found = {}
     for each in (file, keyed):
         bpy.ops.wm.open_mainfile(filepath=str(each))
@@ -135,12 +134,7 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     obj, path = arm
     rig = obj.modifiers["Armature"].object
     sleeve = scenes.copied(obj, "Sleeve")
-    sleeve.shape_key_add(name="Basis")
-    key = sleeve.shape_key_add(name="Wide")
-    for point in key.points:
-        point.co.y *= 1.3
-        point.co.z *= 1.3
-    scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
+    scenes.key_shape(sleeve, (1.0, 1.3, 1.3))
     rig.scale, rig.rotation_euler = (2.0, 2.0, 2.0), (0.3, 0.2, 0.1)
     for each in (obj, sleeve):
         each.parent = rig
@@ -151,7 +145,7 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     scenes.save(path)
     for each in (obj, sleeve):
         scenes.add_sinew(each, METHOD)
-    expected = world_shapes([obj, sleeve], FRAMES)
+    expected = [scenes.world_shapes(each, FRAMES) for each in (obj, sleeve)]
     file, (report,) = baked(path, tmp_path / "out", "--helpers", "6", "--influences", "3")
     read = read_elsewhere(file, FRAMES, tmp_path)
     assert_states(report, np.hstack([read["Arm"], read["Sleeve"]]), np.hstack(expected))
@@ -175,7 +169,7 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     """The exporter converts constraints to keys."""
     obj, path = arm
     scenes.add_sinew(obj, method)
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     file, (report,) = baked(path, tmp_path / "out", "--motion", motion, method=method)
     glb = tmp_path / "arm.glb"
     checked(without_sinew.run(EXPORT, file, glb), 0)
@@ -195,16 +189,16 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     obj, _path = arm
     mesh = obj.data
     obj.modifiers[0].use_deform_preserve_volume = False
-    lbs = world_shapes([obj], FRAMES)[0]
+    lbs = scenes.world_shapes(obj, FRAMES)
     scenes.add_sinew(obj, METHOD)
     mesh.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
     mesh.attributes.active_color_name = "Paint"
-    expected = world_shapes([obj], FRAMES)[0]
+    expected = scenes.world_shapes(obj, FRAMES)
     before = list(mesh.attributes.keys())
     with pytest.raises(RuntimeError, match="No mesh here was baked"):
         bpy.ops.sinew.heat_map(quantity="bake_error")
     bpy.ops.sinew.bake(kind="bones", frames=",".join(map(str, FRAMES)), motion=motion, helpers=2)
-    played = world_shapes([obj], FRAMES)[0]
+    played = scenes.world_shapes(obj, FRAMES)
     colours = {}
     for choice, shape in ((bake_error.BEFORE, lbs), (bake_error.AFTER, played)):
         wanted = np.sqrt(np.square(shape - expected).sum(axis=2).mean(axis=0))
@@ -272,8 +266,7 @@ def test_helper_bones_for_a_stage_without_a_weighted_bone_are_refused(arm, tmp_p
     options = HelperOptions(helpers=3)
     started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False, helpers=options)
     with pytest.raises(SinewError, match="Arm: no bone has weights here"):
-        for _share in started.sample():
-            pass
+        list(started.sample())
 
 
 def test_in_the_open_file_modes_and_selection_stay(arm, tmp_path):
@@ -287,8 +280,7 @@ def test_in_the_open_file_modes_and_selection_stay(arm, tmp_path):
     curves = len(actions.all_curves(rig.animation_data.action, actions.slot_of(rig.animation_data)))
     options = HelperOptions(helpers=3)
     started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False, helpers=options)
-    for _share in started.sample():
-        pass
+    list(started.sample())
     started.place()
     assert (rig.mode, bpy.context.view_layer.objects.active, rig.select_get()) == ("POSE", rig, True)
     assert not obj.select_get()
@@ -306,9 +298,7 @@ def test_envelopes_that_reach_other_vertices_from_frame_to_frame_are_refused(arm
     rig = obj.modifiers["Armature"].object
     obj.vertex_groups.clear()
     obj.modifiers["Armature"].use_bone_envelopes = True
-    for offset, frame in ((0.0, 1), (1.5, 11)):
-        rig.location.x = offset
-        rig.keyframe_insert("location", frame=frame)
+    scenes.key(rig, "location", ((1, (0.0, 0.0, 0.0)), (11, (1.5, 0.0, 0.0))))
     if not moving:
         obj.parent = rig
     scenes.add_sinew(obj, METHOD)

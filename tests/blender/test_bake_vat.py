@@ -44,13 +44,7 @@ def character():
 
 def texels(path):
     """[height, width, 3], from the top."""
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"
-    width, height = image.size
-    found = np.empty(4 * width * height, dtype=np.float32)
-    image.pixels.foreach_get(found)
-    bpy.data.images.remove(image)
-    return found.reshape(height, width, 4)[::-1, :, :3]
+    return scenes.pixels_of(path, are_numbers=True)[::-1, :, :3]
 
 
 class Played:
@@ -88,9 +82,9 @@ def world_of(objects):
     """Points and normals, [vertices, 3], in the world."""
     points, normals = [], []
     for obj in objects:
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        evaluated = scenes.evaluated(obj)
         world, mesh = np.array(evaluated.matrix_world), evaluated.data
-        points.append(scenes.final_points(obj) @ world[:3, :3].T + world[:3, 3])
+        points.append(scenes.world_points(obj))
         own = np.array([normal.vector[:] for normal in mesh.vertex_normals]) @ np.linalg.inv(world[:3, :3])
         normals.append(own / np.linalg.norm(own, axis=1, keepdims=True))
     return np.concatenate(points), np.concatenate(normals)

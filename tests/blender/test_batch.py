@@ -26,7 +26,7 @@ import pytest
 import scenes
 import test_cluster
 import whole_file
-from program import ENVIRONMENT, run_sinew
+from program import ENVIRONMENT, run_sinew, start_sinew
 from sinew_addon.attach import properties
 from sinew_addon.blender_process import BlenderProcess, Limits
 from sinew_addon.io import files
@@ -44,25 +44,11 @@ def make_rig(path: Path, degrees: float = 100.0) -> Path:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     _obj, armature = scenes.make_arm(sides=6, rings=5)
     scenes.key_pose(armature, degrees)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
-    return path
+    return scenes.save(path, compress=True)
 
 
 def make_rigs(folder: Path, count: int) -> list[Path]:
     return [make_rig(folder / f"rig {number:03d}.blend", 20.0 + number) for number in range(count)]
-
-
-def start_sinew(*args: object, **options: object) -> subprocess.Popen:
-    return program.start_sinew(
-        *args,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        encoding="utf-8",
-        **options,
-    )
 
 
 def blenders_of(process: subprocess.Popen) -> list[psutil.Process]:
@@ -108,7 +94,10 @@ def report_of(out: Path) -> dict[str, dict]:
 
 
 def journal_of(out: Path) -> list[dict]:
-    return [json.loads(line) for line in (out / "sinew-journal.jsonl").read_bytes().splitlines()]
+    """The complete lines of a journal that may not be there yet, or end with half a line."""
+    path = out / "sinew-journal.jsonl"
+    content = path.read_bytes() if path.exists() else b""
+    return [json.loads(line) for line in content[: content.rfind(b"\n") + 1].splitlines()]
 
 
 def unfinished_in(folder: Path) -> list[Path]:
@@ -159,8 +148,8 @@ def test_settings_for_files_and_objects(tmp_path):
         method = "lbs"
         """
     )
-    result = run_sinew("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
-    assert "2 of 2 files re-skinned" in result.stdout
+    command = ("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
+    assert "2 of 2 files re-skinned" in run_sinew(*command).stdout
     methods = {}
     for name in ("hero", "extra"):
         files.open_file(tmp_path / "out" / "sub" / f"{name}.blend")
@@ -173,6 +162,7 @@ def test_settings_for_files_and_objects(tmp_path):
     rows = report_of(tmp_path / "out")
     deviation = {mesh["object"]: mesh["deviation_part"] for mesh in rows["sub/hero.blend"]["meshes"]}
     assert deviation["Face"] <= scenes.TOLERANCE < 0.01 < deviation["Body"]
+    assert run_sinew(*command, status=1).stderr.count("use --overwrite to replace it") == 2
 
 
 @pytest.mark.slow
@@ -487,7 +477,7 @@ def kill_one(processes: list[psutil.Process], choose: random.Random) -> bool:
 
 def check_whole(out: Path) -> None:
     """A file with its final name is complete: exactly the file that its record describes."""
-    records = {r["file"]: r for r in journal_lines(out)}
+    records = {r["file"]: r for r in journal_of(out)}
     for copy in out.glob("[!.]*.blend"):
         status = copy.stat()
         assert records[copy.name]["written"] == [status.st_size, status.st_mtime_ns]
@@ -499,15 +489,6 @@ def check_each_once(out: Path, paths: list[Path]) -> None:
     assert times == {path.name: 1 for path in paths}, "lost, or done twice"
     for path in paths:
         assert driven_points(out / path.name)["Arm method"] == "dq"
-
-
-def journal_lines(out: Path) -> list[dict]:
-    """The complete lines of a journal that may end with half a line."""
-    try:
-        content = (out / "sinew-journal.jsonl").read_bytes()
-    except FileNotFoundError:
-        return []
-    return [json.loads(line) for line in content[: content.rfind(b"\n") + 1].splitlines()]
 
 
 def lock_folder(path: Path) -> None:

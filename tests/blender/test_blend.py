@@ -4,24 +4,19 @@ played."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
 import scenes
+import walks
 from mathutils import Matrix
-from program import run_sinew
+from program import complaint, run_sinew
 from sinew import quat_vec
 from sinew_addon.core.motion import blend as core
 from sinew_addon.core.motion.blend import Settings
 from sinew_addon.core.steps import result_of
 from sinew_addon.features.blend import blend_actions
 from sinew_addon.io import actions, clips, files
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
-import walks
 
 CLOSE = 2e-5
 MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
@@ -83,12 +78,8 @@ def make_walks(modes=("QUATERNION",)):
 
 def film(armature, frames):
     """float64 [frames, bones, 4, 4]: the evaluated pose in armature space, in the order of the rig."""
-    names, shown = clips.rig_of(armature).names, []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
-        shown.append(np.array([posed[name].matrix for name in names], dtype=np.float64))
-    return np.array(shown)
+    order = [armature.pose.bones.find(name) for name in clips.rig_of(armature).names]
+    return scenes.at_frames(frames, lambda: scenes.pose_of(armature)[order])
 
 
 def played(armature, action, frames):
@@ -198,12 +189,6 @@ def test_the_operator_blends_and_undo_takes_it_back():
     assert len(bpy.data.actions) == 2
 
 
-# --- Clips from files
-
-
-# Z up to Y up, as most BVH files have it: -Z is ahead.
-
-
 # --- The command
 
 
@@ -246,7 +231,5 @@ def test_the_command_says_what_is_wrong(walking, tmp_path):
     ]
     for arguments, sentence, status in cases:
         result = run_sinew("blend", *arguments, status=status)
-        complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
-        assert len(complaints) == 1, result.stderr
-        assert sentence in complaints[0]
+        assert sentence in complaint(result.stderr)
     assert not (tmp_path / "out.blend").exists()

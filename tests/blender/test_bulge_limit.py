@@ -4,27 +4,19 @@ Objects at other places, masks and shape keys are in test_fuzz.py."""
 
 from __future__ import annotations
 
-import sys
-
 import bpy
+import bulge_limit_reference
 import numpy as np
 import pytest
 import routes
 import scenes
-from conftest import REPOSITORY
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.bulge_limit import segments
 from sinew_addon.deform import session
 
-sys.path.append(str(REPOSITORY / "tests" / "python"))
-import bulge_limit_reference
-
 
 def limit(obj: bpy.types.Object, **values: object) -> None:
-    stage = properties.of(obj).bulge_limit
-    for name, value in values.items():
-        setattr(stage, name, value)
-    stage.enabled = True
+    scenes.set_stage(obj, "bulge_limit", **values)
 
 
 def expected_points(obj: bpy.types.Object, before: np.ndarray, **options: object) -> np.ndarray:
@@ -33,8 +25,7 @@ def expected_points(obj: bpy.types.Object, before: np.ndarray, **options: object
     before  float32 [vertices, 3], the shape without the stage
     """
     armature = attach.armature_of(obj)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
+    motions = scenes.bone_motions(armature)
     heads = np.array([bone.head_local[:] for bone in armature.data.bones])
     tails = np.array([bone.tail_local[:] for bone in armature.data.bones])
     shapes = before.astype(np.float64), scenes.rest_points(obj).astype(np.float64)

@@ -30,11 +30,6 @@ def shared() -> bpy.types.PropertyGroup:
     return character.of(bpy.context.scene)
 
 
-def mesh_points(obj: bpy.types.Object) -> np.ndarray:
-    """The points without those that Solidify and Subdivision add."""
-    return scenes.final_points(obj)
-
-
 @pytest.mark.parametrize("selected", ["Hero Rig", "Body", "Shoes", "Hat"])
 def test_one_click_adds_sinew_with_a_method_to_all_five(armature, selected):
     five_meshes.select(bpy.data.objects[selected])
@@ -49,15 +44,18 @@ def test_all_five_have_the_shape_of_their_armature_modifiers(armature):
     expected = []
     for obj in meshes():
         obj.modifiers["Armature"].use_deform_preserve_volume = True
-        expected.append(mesh_points(obj))
+        expected.append(scenes.final_points(obj))
         obj.modifiers["Armature"].use_deform_preserve_volume = False
-    moved = [np.abs(points - mesh_points(obj)).max() for points, obj in zip(expected, meshes(), strict=True)]
+    moved = [
+        np.abs(points - scenes.final_points(obj)).max()
+        for points, obj in zip(expected, meshes(), strict=True)
+    ]
     assert min(moved) > 0.01, "both methods have one shape: nothing is tested"
     bpy.ops.sinew.add()
     assert methods() == ["lbs"] * 5
     shared().method = "dq"
     for points, obj in zip(expected, meshes(), strict=True):
-        np.testing.assert_allclose(mesh_points(obj), points, atol=1e-5 * scenes.diagonal(obj) * 3)
+        np.testing.assert_allclose(scenes.final_points(obj), points, atol=1e-5 * scenes.diagonal(obj) * 3)
 
 
 def test_the_lead_follows_what_belongs_to_the_character_now(armature):
@@ -174,12 +172,12 @@ def test_one_mesh_can_differ_and_follow_again(armature):
 
 
 def test_on_off_and_remove_for_all_or_for_one(armature):
-    before = [mesh_points(obj) for obj in meshes()]
+    before = [scenes.final_points(obj) for obj in meshes()]
     bpy.ops.sinew.add(method="dq")
     shared().enabled = False
     assert [properties.of(obj).enabled for obj in meshes()] == [False] * 5
     for points, obj in zip(before, meshes(), strict=True):
-        np.testing.assert_array_equal(mesh_points(obj), points)
+        np.testing.assert_array_equal(scenes.final_points(obj), points)
     shared().enabled = True
     assert [properties.of(obj).enabled for obj in meshes()] == [True] * 5
     bpy.ops.sinew.remove(name="Hair")

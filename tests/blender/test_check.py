@@ -66,30 +66,23 @@ def test_what_is_switched_off_needs_no_sinew(tmp_path):
     )
 
 
-def simulated(obj, armature):
-    modifier = scenes.put_in_front(obj, "CLOTH", "Cloth")
-    return f"modifier {modifier.name} in front of Armature is a simulation"
+# What is said of each.
+HARMS = {
+    "modifier Cloth in front of Armature is a simulation": lambda obj, armature: scenes.put_in_front(
+        obj, "CLOTH", "Cloth"
+    ),
+    "the armature of Armature is gone": lambda obj, armature: bpy.data.objects.remove(armature),
+    "the Armature modifier that Sinew stands in for is gone": lambda obj, armature: obj.modifiers.remove(
+        obj.modifiers["Armature"]
+    ),
+    "has the modifier Sinew of Sinew without its settings": lambda obj, armature: properties.clear(obj),
+}
 
 
-def without_armature(obj, armature):
-    bpy.data.objects.remove(armature)
-    return "the armature of Armature is gone"
-
-
-def without_armature_modifier(obj, armature):
-    obj.modifiers.remove(obj.modifiers["Armature"])
-    return "the Armature modifier that Sinew stands in for is gone"
-
-
-def without_settings(obj, armature):
-    properties.clear(obj)
-    return "has the modifier Sinew of Sinew without its settings"
-
-
-@pytest.mark.parametrize("harm", [simulated, without_armature, without_armature_modifier, without_settings])
-def test_what_sinew_can_not_drive(harm, tmp_path):
+@pytest.mark.parametrize("wanted", HARMS)
+def test_what_sinew_can_not_drive(wanted, tmp_path):
     obj, armature = scenes.skinned_arm("dq")
-    wanted = harm(obj, armature)
+    HARMS[wanted](obj, armature)
     report = check(scenes.save(tmp_path / "a.blend"), status=1)["a.blend"]
     assert any(wanted in problem for problem in report["problems"]), report
     assert all(problem.startswith("Arm") for problem in report["problems"])
@@ -110,10 +103,7 @@ def test_what_is_hidden_in_another_scene(tmp_path):
     """Such objects are checked as well."""
     obj, armature = scenes.skinned_arm("dq")
     other = bpy.data.scenes.new("Other")
-    other.collection.objects.link(obj)
-    other.collection.objects.link(armature)
-    bpy.context.scene.collection.objects.unlink(obj)
-    bpy.context.scene.collection.objects.unlink(armature)
+    scenes.move_to(other.collection, obj, armature)
     obj.hide_viewport = True
     report = check(scenes.save(tmp_path / "a.blend"))["a.blend"]
     assert report["meshes"] == [{"object": "Arm", "method": "dq"}]

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+import test_recommended
 import trimesh
 from conftest import REPOSITORY
 from program import run_sinew
@@ -20,14 +21,15 @@ from sinew_addon.attach import properties
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="drawn with the newest Blender only")
 
 
+def compared(path, *options):
+    """What `sinew compare` measures, beside the file."""
+    run_sinew("compare", path, *options, "--pictures", 0, "--out", path.parent)
+    return json.loads((path.with_suffix("") / "metrics.json").read_text(encoding="utf-8"))
+
+
 def test_recommended_is_one_of_the_methods(tmp_path):
     """Its numbers are those of what it chooses, and every other method has the file's own stages."""
-    obj, armature = scenes.make_arm(sides=16, rings=41)
-    armature.animation_data_clear()
-    bone = armature.pose.bones[1]
-    bone.rotation_mode = "XYZ"
-    scenes.key(bone, "rotation_euler", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 2.6, 0.0))))
-    scenes.add_sinew(obj, "lbs")
+    obj, _armature = test_recommended.arm(149.0, axis=1, sides=16, rings=41)
     properties.of(obj).delta_mush.enabled = True
     path = scenes.save(tmp_path / "arm.blend")
     options = ("--frames", "11", "--pictures", 0, "--out", tmp_path)
@@ -63,9 +65,7 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
     rest, triangles = scenes.rest_points(obj), scenes.triangles_of(obj)
     obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
     path = scenes.save(tmp_path / "arm.blend")
-    options = ("--methods", "blender,lbs,dq", "--frames", "1,6,11", "--pictures", 0)
-    run_sinew("compare", path, *options, "--out", tmp_path)
-    found = json.loads((tmp_path / "arm" / "metrics.json").read_text(encoding="utf-8"))
+    found = compared(path, "--methods", "blender,lbs,dq", "--frames", "1,6,11")
     assert (list(found["methods"]), found["frames"]) == (["blender", "lbs", "dq"], frames)
     rows = {
         (method, frame): {**row, "milliseconds": taken}
@@ -99,16 +99,13 @@ def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     first, _armature = scenes.make_arm()
     scenes.put_in_front(first)
     second, armature = scenes.make_arm(name="Leg")
-    second.modifiers.clear()
-    second.parent, second.parent_type = armature, "ARMATURE"
+    scenes.deform_by_parent(second, armature)
     second.location = (0.0, 3.0, 0.0)
     bpy.context.scene.frame_set(11)
     counts = [len(scenes.final_points(obj)) for obj in (first, second)]
     assert counts[0] > 2 * counts[1]
     path = scenes.save(tmp_path / "two.blend")
-    options = ("--methods", "lbs,dq", "--frames", "1,11", "--pictures", 0)
-    run_sinew("compare", path, *options, "--out", tmp_path)
-    found = json.loads((tmp_path / "two" / "metrics.json").read_text(encoding="utf-8"))
+    found = compared(path, "--methods", "lbs,dq", "--frames", "1,11")
     assert found["meshes"] == ["Arm", "Leg"]
     assert found["rest"]["vertices"] == sum(counts)
     assert (found["rest"]["holes"], found["rest"]["clashes"]) == (0, 0)
@@ -144,8 +141,7 @@ def test_planted_faults_are_found(tmp_path):
     for bone in armature.data.bones:
         obj.vertex_groups.new(name=f"old {bone.name}")
     path = scenes.save(tmp_path / "faulty.blend")
-    run_sinew("compare", path, "--frames", "1-2", "--pictures", 0, "--influences", 2, "--out", tmp_path)
-    found = json.loads((tmp_path / "faulty" / "metrics.json").read_text(encoding="utf-8"))["findings"]["Arm"]
+    found = compared(path, "--frames", "1-2", "--influences", 2)["findings"]["Arm"]
     assert {finding["name"]: finding["vertices"] for finding in found} == {
         "no_weights": [0, 1, 2],
         "small_sums": [40, 41],
@@ -211,9 +207,7 @@ def test_golden_pictures(tmp_path):
     percent = float(re.search(r"\b11\b.*?(\d+\.\d+) %", result.stdout).group(1))
     assert 0.5 < percent < 50.0
     # The golden camera is used: larger motion at one frame does not change the framing of others.
-    for frame, scale in ((1, 1.0), (11, 3.0)):
-        armature.pose.bones[1].scale = (scale, scale, scale)
-        armature.pose.bones[1].keyframe_insert("scale", frame=frame)
+    scenes.key(armature.pose.bones[1], "scale", ((1, (1.0, 1.0, 1.0)), (11, (3.0, 3.0, 3.0))))
     scenes.save(path)
     result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
     assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import bpy
+import five_meshes
 import numpy as np
 import pytest
 import scenes
@@ -22,9 +23,7 @@ TOLERANCE = 1e-6
 
 
 def compare(obj: bpy.types.Object, methods: set[str] | None = None) -> comparison_state.SinewComparison:
-    for other in bpy.context.view_layer.objects:
-        other.select_set(other == obj)
-    bpy.context.view_layer.objects.active = obj
+    five_meshes.select(obj)
     assert bpy.ops.sinew.compare(methods=methods or set(METHODS)) == {"FINISHED"}
     return state()
 
@@ -44,7 +43,7 @@ def copies(obj: bpy.types.Object) -> dict[str, bpy.types.Object]:
 
 def without_offset(copy: bpy.types.Object, place: int) -> np.ndarray:
     """A copy's final points, moved to the original's position, object space."""
-    matrix = np.array(copy.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    matrix = np.array(scenes.evaluated(copy).matrix_world)
     offset = place * state().spacing * np.array(state().axis)
     return scenes.final_points(copy) - np.linalg.solve(matrix[:3, :3], offset)
 
@@ -88,10 +87,6 @@ def assert_ends_without_trace(before: dict[str, object]) -> None:
     whole_file.assert_same(before)
 
 
-def plain(_obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    pass
-
-
 def turned_and_scaled(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     obj.rotation_euler, obj.scale, obj.location = (0.3, 0.5, 1.0), (1.0, 2.0, 0.5), (3.0, 1.0, 2.0)
     armature.rotation_euler, armature.scale = (1.0, 0.2, 0.0), (0.7, 0.7, 0.7)
@@ -99,11 +94,8 @@ def turned_and_scaled(obj: bpy.types.Object, armature: bpy.types.Object) -> None
 
 def moving(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     obj.parent = armature
-    for frame, turn in ((1, 0.0), (11, 2.0)):
-        armature.rotation_euler = (0.0, turn, turn)
-        armature.location = (turn, 0.0, 0.0)
-        armature.keyframe_insert("rotation_euler", frame=frame)
-        armature.keyframe_insert("location", frame=frame)
+    scenes.key(armature, "rotation_euler", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 2.0, 2.0))))
+    scenes.key(armature, "location", ((1, (0.0, 0.0, 0.0)), (11, (2.0, 0.0, 0.0))))
 
 
 def subdivided_behind(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
@@ -117,56 +109,41 @@ def subdivided_last(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
     obj.modifiers.new("Last", "SUBSURF")
 
 
-def mirrored_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    scenes.put_in_front(obj, "MIRROR").use_axis = (False, False, True)
-
-
-def with_shape_keys(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    scenes.key_shape(obj)
-
-
-def parent_deforms(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    obj.modifiers.clear()
-    obj.parent, obj.parent_type = armature, "ARMATURE"
-
-
 def two_modifiers(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     second = obj.modifiers.new("Multi", "ARMATURE")
     second.object, second.use_multi_modifier, second.vertex_group = armature, True, "bone.1"
 
 
-def shared_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    scenes.copied(obj, linked=True)
-
-
-SETUPS = [
-    plain,
-    turned_and_scaled,
-    moving,
-    subdivided_behind,
-    subdivided_last,
-    mirrored_in_front,
-    with_shape_keys,
-    parent_deforms,
-    two_modifiers,
-    shared_mesh,
-]
+SETUPS = {
+    "plain": lambda obj, armature: None,
+    "turned and scaled": turned_and_scaled,
+    "moving": moving,
+    "subdivided behind": subdivided_behind,
+    "subdivided last": subdivided_last,
+    "mirrored in front": lambda obj, armature: setattr(
+        scenes.put_in_front(obj, "MIRROR"), "use_axis", (False, False, True)
+    ),
+    "with shape keys": lambda obj, armature: scenes.key_shape(obj),
+    "parent deforms": scenes.deform_by_parent,
+    "two modifiers": two_modifiers,
+    "shared mesh": lambda obj, armature: scenes.copied(obj, linked=True),
+}
 
 
 @pytest.mark.parametrize(
     ("set_up", "skinned"),
     [
         *((set_up, False) for set_up in SETUPS),
-        (plain, True),
+        ("plain", True),
         *(
             pytest.param(set_up, True, marks=pytest.mark.slow)
-            for set_up in (mirrored_in_front, two_modifiers)
+            for set_up in ("mirrored in front", "two modifiers")
         ),
     ],
 )
 def test_rigs(set_up, skinned):
     obj, armature = scenes.make_arm(sides=8, rings=11)
-    set_up(obj, armature)
+    SETUPS[set_up](obj, armature)
     if skinned:
         scenes.add_sinew(obj, "dq")
         properties.of(obj).scale_rule = "3.x"
@@ -210,10 +187,10 @@ def delete(*objects: bpy.types.Object) -> None:
         assert bpy.ops.object.delete() == {"FINISHED"}
 
 
-@pytest.mark.parametrize("set_up", [plain, mirrored_in_front], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("set_up", ["plain", "mirrored in front"])
 def test_copies_that_the_artist_deletes_renames_and_moves(set_up):
     obj, armature = scenes.make_arm()
-    set_up(obj, armature)
+    SETUPS[set_up](obj, armature)
     bpy.context.scene.frame_set(1)
     before = whole_file.content()
     compare(obj)
@@ -238,7 +215,7 @@ def test_copies_that_the_artist_deletes_renames_and_moves(set_up):
 @pytest.mark.parametrize("copies_too", [False, True], ids=["collection", "copies"])
 def test_the_comparison_after_its_collection_was_deleted(copies_too):
     obj, armature = scenes.make_arm()
-    mirrored_in_front(obj, armature)
+    SETUPS["mirrored in front"](obj, armature)
     bpy.context.scene.frame_set(1)
     before = whole_file.content()
     compare(obj)
@@ -280,9 +257,7 @@ def test_the_original_is_deleted(tmp_path, skinned):
 
 def test_keys_of_the_method_are_the_originals_own():
     obj, _armature = scenes.skinned_arm("dq")
-    obj.keyframe_insert("sinew.method", frame=1)
-    properties.of(obj).method = "lbs"
-    obj.keyframe_insert("sinew.method", frame=5)
+    scenes.key(properties.of(obj), "method", ((1, "dq"), (5, "lbs")))
     obj.keyframe_insert('modifiers["Armature"].show_expanded', frame=5)
     bpy.context.scene.frame_set(1)
     before = whole_file.content()

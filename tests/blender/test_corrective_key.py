@@ -22,6 +22,12 @@ def arm():
     return obj, armature
 
 
+def choose(armature, bone):
+    armature.data.bones.active = armature.data.bones[bone]
+    armature.select_set(True)
+    scenes.enter(armature, "POSE")
+
+
 def add_key(obj, method, **options):
     scenes.add_sinew(obj, method)
     shown = scenes.final_points(obj)
@@ -73,10 +79,7 @@ def test_of_envelopes():
 
 def test_a_bone_drives_it(arm):
     obj, armature = arm
-    armature.data.bones.active = armature.data.bones["bone.1"]
-    bpy.context.view_layer.objects.active = armature
-    armature.select_set(True)
-    bpy.ops.object.mode_set(mode="POSE")
+    choose(armature, "bone.1")
     shown, key = add_key(obj, "cor", driven=True)
     bpy.ops.object.mode_set(mode="OBJECT")
     attach.remove(obj)
@@ -85,7 +88,7 @@ def test_a_bone_drives_it(arm):
     values = []
     for frame in (1, 4, 8, 11):
         bpy.context.scene.frame_set(frame)
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        evaluated = scenes.evaluated(obj)
         values.append(evaluated.data.shape_keys.key_blocks[key.name].value)
     assert values[0] == pytest.approx(0.0, abs=2e-3)
     assert 0.2 < values[1] < 0.8
@@ -101,8 +104,7 @@ def test_a_point_that_can_not_be_reached_stays(arm):
     bone.location, bone.rotation_euler = (0.0, 0.0, 0.0), (0.0, math.pi, 0.0)
     bpy.context.view_layer.update()
     shown, key = add_key(obj, "cor")
-    moved = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
-    key.data.foreach_get("co", moved.ravel())
+    moved = scenes.points_of(key.data)
     assert np.linalg.norm(moved - scenes.rest_points(obj), axis=1).max() < scenes.diagonal(obj)
     attach.remove(obj)
     without = np.linalg.norm(scenes.final_points(obj) - shown, axis=1)
@@ -134,10 +136,7 @@ def test_what_can_not_be_is_one_sentence(arm, case, text):
     scenes.add_sinew(obj, "lbs" if case == "same" else "cor")
     before = len(obj.data.shape_keys.key_blocks)
     if bone is not None:
-        armature.data.bones.active = armature.data.bones[bone]
-        bpy.context.view_layer.objects.active = armature
-        armature.select_set(True)
-        bpy.ops.object.mode_set(mode="POSE")
+        choose(armature, bone)
     driver = bpy.context.active_pose_bone if bone is not None else None
     with pytest.raises(SinewError, match=text):
         corrective_key.add(obj, bpy.context.evaluated_depsgraph_get(), driver)

@@ -4,20 +4,16 @@ data."""
 
 from __future__ import annotations
 
-import sys
-
 import bpy
 import numpy as np
 import pytest
+import reference
 import scenes
 import sinew
-from conftest import REPOSITORY, look_until_done
+from conftest import look_until_done
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.deform.plan import State
-
-sys.path.append(str(REPOSITORY / "tests" / "python"))
-import reference
 
 if "ddm" not in {method.name for method in sinew.methods()}:
     pytest.skip("built without ddm", allow_module_level=True)
@@ -33,11 +29,9 @@ def moments_of(obj: bpy.types.Object, radius: float) -> np.ndarray:
 
 def assert_equal_to_reference(obj: bpy.types.Object, radius: float, variant: str = "0") -> None:
     armature = attach.armature_of(obj)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
     # Motions in the object's space: a rotation and a translation map it to the armature's.
-    motions = np.linalg.inv(to_armature) @ motions @ to_armature
+    motions = np.linalg.inv(to_armature) @ scenes.bone_motions(armature) @ to_armature
     expected, margins = reference.deform(
         "ddm",
         scenes.rest_points(obj),

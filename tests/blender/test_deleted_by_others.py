@@ -6,13 +6,9 @@ therefore is a separate process."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 from conftest import halved
+from program import run_script
 
 BEGIN = """
 import bpy, numpy as np
@@ -83,9 +79,6 @@ sinew_addon.unregister()
 wanted = scenes.shapes(obj, [1, 6, 11])
 assert np.abs(got - wanted).max() < 1e-5, np.abs(got - wanted).max()
 """
-END = """
-print("at its end")
-"""
 
 
 # Deleted beside nothing of Sinew, then beside a skinned mesh.
@@ -102,16 +95,5 @@ print("at its end")
     ids=["rename-update", "delete-update", "delete-frame", "rename-frame"],
 )
 def test_others_delete_before_sinew_is_called(parts, event, tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(f"EVENT = {event!r}\n" + "\n".join((BEGIN, *parts, END)))
-    ran = subprocess.run(
-        [sys.executable, "-X", "faulthandler", script],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert "at its end" in ran.stdout, ran.stdout[-2000:] + ran.stderr[-3000:]
-    assert ran.returncode == 0, ran.stderr
+    ran = run_script(tmp_path / "script.py", "\n".join((f"EVENT = {event!r}", BEGIN, *parts)))
     assert "Traceback" not in ran.stderr, ran.stderr

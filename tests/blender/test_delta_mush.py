@@ -12,18 +12,9 @@ import whole_file
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.deform.plan import State
-from sinew_addon.features.heat import live
 
 FRAMES = [1, 6, 11]
 GROUP = "smooth here"
-
-
-def paint(obj: bpy.types.Object) -> None:
-    group = obj.vertex_groups.new(name=GROUP)
-    for vertex in obj.data.vertices:
-        share = float(np.clip(vertex.co.x - 0.4 + vertex.co.y, 0.0, 1.0))
-        if share > 0.0:
-            group.add([vertex.index], share, "REPLACE")
 
 
 def make_rough_arm() -> bpy.types.Object:
@@ -56,7 +47,7 @@ def make_rough_arm() -> bpy.types.Object:
     made.to_mesh(obj.data)
     made.free()
     obj.data.update()
-    paint(obj)
+    scenes.paint(obj, GROUP, scenes.rest_points(obj) @ (1.0, 1.0, 0.0) - 0.4)
     return obj
 
 
@@ -79,10 +70,7 @@ def by_corrective_smooth(
 
 def mush(obj: bpy.types.Object, method: str = "lbs", **values: object) -> None:
     scenes.add_sinew(obj, method)
-    stage = properties.of(obj).delta_mush
-    for name, value in values.items():
-        setattr(stage, name, value)
-    stage.enabled = True
+    scenes.set_stage(obj, "delta_mush", **values)
 
 
 # Settings of Corrective Smooth, and the corresponding ones of the stage.
@@ -234,8 +222,7 @@ def test_it_is_measured_against_the_modifier_that_was_taken_over():
     bpy.context.scene.frame_set(11)
 
     def distance() -> float:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        return live.measure(scenes.states_of(obj), "blender", depsgraph).measured.entry("distance_max")
+        return scenes.measure(obj).measured.entry("distance_max")
 
     assert distance() < 1e-5
     properties.of(obj).delta_mush.iterations = 30
@@ -252,47 +239,28 @@ def test_nothing_of_what_was_taken_over_stays():
     whole_file.assert_same(before)
 
 
-def bound(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
-    modifier.rest_source = "BIND"
-
-
-def with_another_between(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+def put_cast_between(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
     obj.modifiers.new("Cast", "CAST")
     obj.modifiers.move(len(obj.modifiers) - 1, list(obj.modifiers).index(modifier))
 
 
-def for_renders(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
-    modifier.show_viewport = False
+# By what is said of each.
+NOT_EXACT = {
+    "Rest Source": lambda obj, modifier: setattr(modifier, "rest_source", "BIND"),
+    "Cast between it": put_cast_between,
+    "in renders alone": lambda obj, modifier: setattr(modifier, "show_viewport", False),
+    "animated": lambda obj, modifier: modifier.keyframe_insert("scale", frame=1),
+    "Iterations beyond": lambda obj, modifier: setattr(modifier, "iterations", 1001),
+    "on already": lambda obj, modifier: scenes.set_stage(obj, "delta_mush"),
+}
 
 
-def keyed(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
-    modifier.keyframe_insert("scale", frame=1)
-
-
-def too_often(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
-    modifier.iterations = 1001
-
-
-def with_stage(obj: bpy.types.Object, _modifier: bpy.types.Modifier) -> None:
-    properties.of(obj).delta_mush.enabled = True
-
-
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        (bound, "Rest Source"),
-        (with_another_between, "Cast between it"),
-        (for_renders, "in renders alone"),
-        (keyed, "animated"),
-        (too_often, "Iterations beyond"),
-        (with_stage, "on already"),
-    ],
-)
-def test_one_that_can_not_be_taken_over_exactly_says_why(change, reason):
+@pytest.mark.parametrize("reason", NOT_EXACT)
+def test_one_that_can_not_be_taken_over_exactly_says_why(reason):
     obj = make_rough_arm()
     modifier = add_corrective(obj)
     scenes.add_sinew(obj)
-    change(obj, modifier)
+    NOT_EXACT[reason](obj, modifier)
     flags = (modifier.show_viewport, modifier.show_render)
     with pytest.raises(RuntimeError, match=reason):
         bpy.ops.sinew.take_over_smooth(name=obj.name)

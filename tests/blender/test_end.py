@@ -3,12 +3,8 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
+from program import run_script
 
 REGISTER = """
 import bpy
@@ -61,15 +57,4 @@ except RuntimeError:
     ids=["registered", "registered again", "in use", "used", "failed", "failed, then in use"],
 )
 def test_a_script_ends_with_status_0(parts, tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text("".join(parts) + "print('at its end')\n")
-    ran = subprocess.run(
-        [sys.executable, script],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert "at its end" in ran.stdout, ran.stdout + ran.stderr
-    assert ran.returncode == 0, ran.stderr
+    run_script(tmp_path / "script.py", "".join(parts))

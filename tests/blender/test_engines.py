@@ -72,11 +72,9 @@ def test_it_is_the_shape_after_the_import(name, route):
 def test_how_many_can_be_keyed():
     obj, _armature = make_crowded()
     scenes.add_sinew(obj, "limited")
-    settings = properties.of(obj)
-    for frame, count in ((1, 1), (10, 8)):
-        settings.limited.influences = count
-        settings.limited.keyframe_insert("influences", frame=frame)
-    for frame, count in ((1, 1), (10, 8)):
+    keys = ((1, 1), (10, 8))
+    scenes.key(properties.of(obj).limited, "influences", keys)
+    for frame, count in keys:
         bpy.context.scene.frame_set(frame)
         points = scenes.final_points(obj)
         reference, _other = make_crowded()

@@ -54,46 +54,38 @@ def evaluations_in(action: Callable[[], object], name: str) -> int:
         return said.read().count(f"BKE_object_eval_uber_data on OB{name} (".encode())
 
 
-def still(_obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    pass
+def pose(armature: bpy.types.Object) -> None:
+    """Bends it further."""
+    armature.pose.bones[1].rotation_quaternion[1] += 0.25
+    bpy.context.view_layer.update()
 
 
-def moving_armature(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    scenes.key(armature, "location", ((1, (0.0, 0.0, 0.0)), (11, (3.0, 1.0, 0.0))))
-
-
-def modifier_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    scenes.put_in_front(obj, "SOLIDIFY")
-
-
-def shared_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    scenes.added("Other", obj.data)
+def move(owner: bpy.types.Object) -> None:
+    scenes.key(owner, "location", ((1, (0.0, 0.0, 0.0)), (11, (3.0, 1.0, 0.0))))
 
 
 def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     obj.parent = armature
-    moving_armature(obj, armature)
+    move(armature)
 
 
-def moving_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    scenes.key(obj, "location", ((1, (0.0, 0.0, 0.0)), (11, (3.0, 1.0, 0.0))))
-
-
-def moving_keys(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    scenes.key_shape(obj)
-
-
-Setup = Callable[[bpy.types.Object, bpy.types.Object], None]
+SETUPS = {
+    "still": lambda obj, armature: None,
+    "moving armature": lambda obj, armature: move(armature),
+    "modifier in front": lambda obj, armature: scenes.put_in_front(obj, "SOLIDIFY"),
+    "shared mesh": lambda obj, armature: scenes.added("Other", obj.data),
+    "moving parent": moving_parent,
+    "moving mesh": lambda obj, armature: move(obj),
+    "moving keys": lambda obj, armature: scenes.key_shape(obj),
+}
+with_few = pytest.mark.parametrize("set_up", ["still", "modifier in front", "shared mesh"])
 
 
 @pytest.mark.usefixtures("counting")
-@pytest.mark.parametrize(
-    "set_up",
-    [still, moving_armature, modifier_in_front, shared_mesh, moving_parent, moving_mesh, moving_keys],
-)
-def test_a_frame_evaluates_the_mesh_once(set_up: Setup):
+@pytest.mark.parametrize("set_up", SETUPS)
+def test_a_frame_evaluates_the_mesh_once(set_up):
     obj, armature = scenes.make_arm()
-    set_up(obj, armature)
+    SETUPS[set_up](obj, armature)
     bpy.context.scene.frame_set(2)
     assert evaluations(obj, 5) == 1
     scenes.add_sinew(obj)
@@ -108,18 +100,13 @@ def test_a_frame_evaluates_the_mesh_once(set_up: Setup):
 
 
 @pytest.mark.usefixtures("counting")
-@pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
-def test_posing_evaluates_the_mesh_once(set_up: Setup):
+@with_few
+def test_posing_evaluates_the_mesh_once(set_up):
     obj, armature = scenes.make_arm()
-    set_up(obj, armature)
+    SETUPS[set_up](obj, armature)
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(2)
-
-    def pose() -> None:
-        armature.pose.bones[1].rotation_quaternion[1] += 0.25
-        bpy.context.view_layer.update()
-
-    assert [evaluations_in(pose, obj.name) for _ in range(3)] == [1, 1, 1]
+    assert [evaluations_in(lambda: pose(armature), obj.name) for _ in range(3)] == [1, 1, 1]
 
 
 def modules_passed(action: Callable[[], object]) -> dict[str, set[str]]:
@@ -144,21 +131,17 @@ def modules_passed(action: Callable[[], object]) -> dict[str, set[str]]:
     return passed
 
 
-@pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
-def test_a_frame_passes_few_modules_after_the_evaluation(set_up: Setup):
+@with_few
+def test_a_frame_passes_few_modules_after_the_evaluation(set_up):
     obj, armature = scenes.make_arm()
-    set_up(obj, armature)
+    SETUPS[set_up](obj, armature)
     scenes.add_sinew(obj)
     for frame in (1, 2, 3):
         bpy.context.scene.frame_set(frame)
-
-    def pose() -> None:
-        armature.pose.bones[1].rotation_quaternion[1] += 0.25
-        bpy.context.view_layer.update()
-
-    pose()
+    pose(armature)
     shown = session.state_of(obj).shown.number
-    passed = modules_passed(pose) | modules_passed(lambda: bpy.context.scene.frame_set(4))
+    passed = modules_passed(lambda: pose(armature))
+    passed |= modules_passed(lambda: bpy.context.scene.frame_set(4))
     assert session.state_of(obj).shown.number == shown + 2
     for function, modules in passed.items():
         print(function, len(modules), *sorted(modules))
@@ -166,49 +149,36 @@ def test_a_frame_passes_few_modules_after_the_evaluation(set_up: Setup):
     assert len(passed["on_depsgraph_update"]) <= 10
 
 
-def rename(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.name = "Another"
+CHANGES = {
+    "rename": lambda obj, armature: setattr(obj, "name", "Another"),
+    "hide in renders": lambda obj, armature: setattr(obj.modifiers["Sinew"], "show_render", False),
+    "edit a bone": lambda obj, armature: setattr(armature.data.bones[1], "use_deform", False),
+    "mute the driver": lambda obj, armature: setattr(obj.animation_data.drivers[0], "mute", True),
+    "swap the armature": lambda obj, armature: setattr(
+        obj.modifiers["Armature"], "object", scenes.copied(armature, linked=True)
+    ),
+}
 
 
-def hide_in_renders(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.modifiers["Sinew"].show_render = False
-
-
-def edit_bone(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    armature.data.bones[1].use_deform = False
-
-
-def mute_driver(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
-    obj.animation_data.drivers[0].mute = True
-
-
-def swap_armature(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    obj.modifiers["Armature"].object = scenes.copied(armature, linked=True)
-
-
-@pytest.mark.parametrize("change", [rename, hide_in_renders, edit_bone, mute_driver, swap_armature])
-def test_what_changes_along_with_a_pose_is_noticed(change: Setup):
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_changes_along_with_a_pose_is_noticed(change):
     """As by a script: Blender lists both at once."""
-    obj, armature = scenes.make_arm()
-    scenes.add_sinew(obj)
+    obj, armature = scenes.skinned_arm()
     bpy.context.scene.frame_set(2)
-    armature.pose.bones[1].rotation_quaternion[1] += 0.25
-    bpy.context.view_layer.update()
-    change(obj, armature)
-    armature.pose.bones[1].rotation_quaternion[1] += 0.25
-    bpy.context.view_layer.update()
-    state, points = session.state_of(obj), scenes.final_points(obj)
+    pose(armature)
+    CHANGES[change](obj, armature)
+    pose(armature)
+    shown, state = scenes.final_points(obj), session.state_of(obj)
     assert state.is_as_noted(obj)
     assert state.noted.name == obj.name
-    properties.of(obj).enabled = False
-    assert scenes.worst(points, scenes.final_points(obj)) < 1e-5
+    scenes.assert_as_without(obj, shown)
 
 
-@pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
-def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
+@with_few
+def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up):
     """If it were evaluated before Sinew deformed it, it would show the previous frame."""
     obj, armature = scenes.make_arm(sides=8, rings=12)
-    set_up(obj, armature)
+    SETUPS[set_up](obj, armature)
     obj.modifiers["Armature"].use_deform_preserve_volume = True
     pinned = obj.vertex_groups.new(name="Pinned")
     pinned.add([vertex.index for vertex in obj.data.vertices if vertex.index % 3], 1.0, "REPLACE")
@@ -226,11 +196,11 @@ def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
     assert obj.modifiers["Armature"].object is not None
 
 
-@pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
-def test_a_rig_that_follows_a_deformed_mesh_uses_the_same_frame(set_up: Setup):
+@with_few
+def test_a_rig_that_follows_a_deformed_mesh_uses_the_same_frame(set_up):
     """Read in the first evaluation: a later request would make Blender evaluate the rest."""
     followed, armature = scenes.make_arm()
-    set_up(followed, armature)
+    SETUPS[set_up](followed, armature)
     obj, follower = scenes.make_arm()
     constraint = follower.pose.bones[1].constraints.new("COPY_LOCATION")
     constraint.target, constraint.subtarget = followed, followed.vertex_groups[-1].name
@@ -323,10 +293,9 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
     obj.shape_key_add(name="Fat").points[30].co.z += 0.2
     obj.data.shape_keys.key_blocks["Fat"].value = 0.7
     front, _ = scenes.make_arm(name="Front")
-    modifier_in_front(front, _)
+    scenes.put_in_front(front, "SOLIDIFY")
     child, armature = scenes.make_arm(name="Child")
-    child.modifiers.clear()
-    child.parent, child.parent_type = armature, "ARMATURE"
+    scenes.deform_by_parent(child, armature)
     _skinned, _ = scenes.skinned_arm("lbs", name="Driven")
     bpy.context.scene.frame_set(7)
     path = scenes.save(tmp_path / "all.blend")
@@ -372,21 +341,15 @@ def test_objects_that_move_beside_their_armatures():
                 assert off <= scenes.TOLERANCE * scenes.diagonal(obj), (obj.name, frame)
 
 
-def vectors_of(attribute: bpy.types.FloatVectorAttribute) -> np.ndarray:
-    values = np.empty((len(attribute.data), 3), np.float32)
-    attribute.data.foreach_get("vector", values.ravel())
-    return values
-
-
 def test_a_frame_writes_into_the_evaluated_mesh_alone():
     """Not into the mesh itself, of which it is a copy; state_of() returns the same shape."""
     obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(1)
     attribute = obj.data.attributes[properties.of(obj).storage.attribute]
-    stored = vectors_of(attribute)
+    stored = scenes.points_of(attribute.data, "vector")
     bpy.context.scene.frame_set(7)
     ((_obj, state),) = scenes.states_of(obj)
     shown = scenes.final_points(obj)
     assert scenes.worst(shown, stored) > 0.1 * scenes.diagonal(obj)
     assert np.array_equal(state.points, shown)
-    assert np.array_equal(vectors_of(attribute), stored)
+    assert np.array_equal(scenes.points_of(attribute.data, "vector"), stored)

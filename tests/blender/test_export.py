@@ -50,10 +50,7 @@ def switch_on() -> None:
 def make_character(materials: int = 1, bones: int = 3) -> bpy.types.Object:
     """An arm, moved, rotated and scaled; faces with several materials, and vertices with their index as
     an attribute."""
-    obj, armature = scenes.make_arm(bones)
-    armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), Euler((0.5, 0.2, -0.3))
-    armature.scale = (1.3, 1.3, 1.3)
-    obj.parent = armature
+    obj, _armature = scenes.placed_arm(bones)
     obj.location, obj.rotation_euler, obj.scale = (0.1, 0.0, 0.05), Euler((0.0, 0.1, 0.2)), (1.1, 0.9, 1.0)
     numbers = obj.data.attributes.new("_NUMBER", "FLOAT", "POINT")
     numbers.data.foreach_set("value", np.arange(len(obj.data.vertices), dtype=np.float32))
@@ -66,9 +63,7 @@ def make_character(materials: int = 1, bones: int = 3) -> bpy.types.Object:
 
 
 def paint(obj: bpy.types.Object) -> None:
-    group = obj.vertex_groups.new(name=GROUP)
-    for vertex, share in enumerate(np.random.default_rng(1).uniform(-0.5, 1.5, len(obj.data.vertices))):
-        group.add([vertex], float(np.clip(share, 0.0, 1.0)), "REPLACE")
+    scenes.paint(obj, GROUP, np.random.default_rng(1).uniform(-0.5, 1.5, len(obj.data.vertices)))
 
 
 def use(obj: bpy.types.Object, method: str, mixed: str = "") -> None:
@@ -78,18 +73,16 @@ def use(obj: bpy.types.Object, method: str, mixed: str = "") -> None:
     characters.use_method(obj, method)
 
 
+def character(method: str, mixed: str = "") -> bpy.types.Object:
+    obj = make_character()
+    use(obj, method, mixed)
+    return obj
+
+
 def write(path: Path, **options: object) -> read_glb.File:
     bpy.context.scene.sinew_gltf.skinning = True
     bpy.ops.export_scene.gltf(**{"filepath": str(path), "export_attributes": True, **options})
     return read_glb.File(path)
-
-
-def world_shapes(obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
-    shapes = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        shapes.append(characters.world_points([obj]))
-    return np.array(shapes)
 
 
 def numbers_in(file: read_glb.File) -> np.ndarray:
@@ -100,7 +93,7 @@ def numbers_in(file: read_glb.File) -> np.ndarray:
 
 def assert_plays(path: Path, obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
     """Compares to 1e-5 of the diagonal. Returns what was read."""
-    expected = world_shapes(obj, frames)
+    expected = scenes.world_shapes(obj, frames)
     times = [frame / bpy.context.scene.render.fps for frame in frames]
     got = read_glb.points_at(path, times)[obj.name]
     diagonal = np.linalg.norm(np.ptp(expected[0], axis=0))
@@ -113,8 +106,7 @@ def assert_plays(path: Path, obj: bpy.types.Object, frames: list[int]) -> np.nda
     ("method", "mixed"), [("lbs", ""), ("dq", ""), ("cor", ""), ("lbs", "dq"), ("dq", "cor"), ("cor", "lbs")]
 )
 def test_it_plays_elsewhere_as_here(tmp_path, method, mixed):
-    obj = make_character()
-    use(obj, method, mixed)
+    obj = character(method, mixed)
     file = write(tmp_path / "a.glb")
     (mesh,) = file.header["meshes"]
     signs = {f"{name}.signs": "blender" for name in (method, mixed) if name in ("dq", "cor")}
@@ -156,9 +148,8 @@ def test_stages_play_elsewhere_as_here(tmp_path, method, mixed, form):
     if not mixed:
         paint(obj)
     settings = obj.sinew
-    settings.twist_spread.enabled = settings.bulge_limit.enabled = True
-    settings.twist_spread.amount, settings.bulge_limit.strength = 0.9, 0.8
-    settings.twist_spread.group, settings.bulge_limit.form = GROUP, form
+    scenes.set_stage(obj, "twist_spread", amount=0.9, group=GROUP)
+    scenes.set_stage(obj, "bulge_limit", strength=0.8, form=form)
     settings.dq.signs = settings.cor.signs = "hierarchy"
     file = write(tmp_path / "a.glb")
     content = file.header["meshes"][0]["extensions"]["SINEW_skinning"]
@@ -173,7 +164,7 @@ def test_stages_play_elsewhere_as_here(tmp_path, method, mixed, form):
     assert [twist["from"] for twist in of_skin["twists"]] == ["parent", "child"]
     got = assert_plays(tmp_path / "a.glb", obj, FRAMES)
     settings.twist_spread.enabled = settings.bulge_limit.enabled = False
-    assert scenes.worst(got[-1], world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.05
+    assert scenes.worst(got[-1], scenes.world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.05
 
 
 def test_centres_matter_and_are_of_each_primitive(tmp_path):
@@ -183,32 +174,29 @@ def test_centres_matter_and_are_of_each_primitive(tmp_path):
     assert len(file.header["meshes"][0]["primitives"]) == 3
     got = assert_plays(tmp_path / "a.glb", obj, FRAMES)
     use(obj, "dq")
-    assert scenes.worst(got[-1], world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.01
+    assert scenes.worst(got[-1], scenes.world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.01
 
 
 def test_modifiers_applied(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
+    obj = character("cor")
     write(tmp_path / "a.glb", export_apply=True)
     assert_plays(tmp_path / "a.glb", obj, FRAMES)
 
 
 def test_z_up(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
+    obj = character("cor")
     file = write(tmp_path / "a.glb", export_yup=False)
     times = [frame / bpy.context.scene.render.fps for frame in FRAMES]
     # The reader takes this direction for Y up.
     x, y, z = np.moveaxis(read_glb.points_at(tmp_path / "a.glb", times)[obj.name], 2, 0)
-    expected = world_shapes(obj, FRAMES)[:, numbers_in(file)]
+    expected = scenes.world_shapes(obj, FRAMES)[:, numbers_in(file)]
     assert scenes.worst(np.stack([x, z, -y], axis=2), expected) <= 1e-5 * np.linalg.norm(
         np.ptp(expected[0], axis=0)
     )
 
 
 def test_without_the_check_box_the_file_is_as_before(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
+    character("cor")
     bpy.ops.export_scene.gltf(filepath=str(tmp_path / "a.glb"), export_attributes=True)
     header = read_glb.File(tmp_path / "a.glb").header
     assert "SINEW_skinning" not in str(header)
@@ -216,8 +204,7 @@ def test_without_the_check_box_the_file_is_as_before(tmp_path):
 
 
 def test_other_attributes_are_the_artists_choice(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
+    obj = character("cor")
     names = [attribute.name for attribute in obj.data.attributes]
     active = obj.data.attributes.active_index
     file = write(tmp_path / "a.glb", export_attributes=False)
@@ -228,22 +215,20 @@ def test_other_attributes_are_the_artists_choice(tmp_path):
 
 
 def test_an_export_that_fails_ends_as_one_that_does_not(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
-    before = world_shapes(obj, FRAMES)
+    obj = character("cor")
+    before = scenes.world_shapes(obj, FRAMES)
     (tmp_path / "file").touch()
     with pytest.raises(RuntimeError):
         write(tmp_path / "file" / "a.glb")
     assert "_SINEW_CENTRE" not in obj.data.attributes
     assert obj.modifiers["Sinew"].show_viewport
-    assert np.array_equal(world_shapes(obj, FRAMES), before)
+    assert np.array_equal(scenes.world_shapes(obj, FRAMES), before)
 
 
 def test_after_an_export_that_nobody_ended(tmp_path):
     """As where the exporter fails while it reads. The next evaluation ends it, or saving, or the next export,
     which finds that meshes were removed or added."""
-    obj = make_character()
-    use(obj, "cor")
+    obj = character("cor")
     found, left_out = export.collect(bpy.context)
     assert left_out == []
     export.begin(found, [], {"gltf_attributes": True, "gltf_yup": True})
@@ -261,15 +246,13 @@ def test_after_an_export_that_nobody_ended(tmp_path):
     export.begin(found, [], {"gltf_attributes": True, "gltf_yup": True})
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     switch_on()
-    obj = make_character()
-    use(obj, "cor")
+    obj = character("cor")
     write(tmp_path / "b.glb")
     assert_plays(tmp_path / "b.glb", obj, FRAMES)
 
 
 def test_custom_properties_stay(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
+    obj = character("cor")
     obj.data["tailor"] = "Ann"
     # Saved files store centres in the mesh.
     scenes.save(tmp_path / "a.blend")
@@ -280,8 +263,7 @@ def test_custom_properties_stay(tmp_path):
 
 
 def test_off_is_not_exported(tmp_path):
-    obj = make_character()
-    use(obj, "cor")
+    obj = character("cor")
     obj.sinew.enabled = False
     file = write(tmp_path / "a.glb")
     assert "SINEW_skinning" not in str(file.header)
@@ -306,8 +288,7 @@ def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
 
 
 def test_a_preview_of_an_engine_is_linear(tmp_path):
-    obj = make_character()
-    use(obj, "unreal", "dq")
+    character("unreal", "dq")
     mesh = write(tmp_path / "a.glb").header["meshes"][0]
     assert mesh["extensions"]["SINEW_skinning"] == {"version": 1, "method": "lbs"}
 

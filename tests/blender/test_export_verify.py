@@ -31,11 +31,7 @@ FRAMES = list(range(1, 12))
 @pytest.fixture
 def scene(empty_file, tmp_path):
     """An arm of three bones, and its armature: bends, moved and rotated, as a whole."""
-    obj, rig = scenes.make_arm(bones=3)
-    obj.parent = rig
-    rig.location, rig.rotation_euler, rig.scale = (0.3, -0.4, 0.2), (0.5, 0.2, -0.3), (1.3, 1.3, 1.3)
-    bpy.context.view_layer.update()
-    return obj, rig
+    return scenes.placed_arm()
 
 
 def exported(tmp_path, *options, method="lbs", ending=".glb", status=0):
@@ -91,12 +87,8 @@ def plant(cause, obj, rig):
         rig.pose.bones[1].rotation_euler = (0.4, 0.2, 0.7)
     elif cause == "shape_keys":
         # Exporters write all of a key, whatever group limits it to.
-        obj.shape_key_add(name="Basis")
-        key = obj.shape_key_add(name="Wide")
-        for point in key.points:
-            point.co.z *= 1.5
-        scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
-        key.vertex_group = "bone.1"
+        scenes.key_shape(obj, (1.0, 1.0, 1.5))
+        obj.data.shape_keys.key_blocks["Key"].vertex_group = "bone.1"
     return {}
 
 
@@ -235,11 +227,7 @@ def test_the_panels_export_that_is_stopped_leaves_nothing(scene, tmp_path):
 
 def test_shape_keys_along_bendy_bones(empty_file, tmp_path):
     obj = make_bendy(unequal=False)
-    obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="Along")
-    for point in key.points:
-        point.co.x *= 0.9
-    scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
+    scenes.key_shape(obj, (0.9, 1.0, 1.0))
     # The weights are those of the scene's first frame, whatever is compared.
     mesh = exported(tmp_path, "--frames", "6,11")
     assert found_causes(mesh) == {"bendy"}
@@ -289,8 +277,7 @@ def test_between_frames(scene, tmp_path):
     middles = [frame + 0.5 for frame in FRAMES[:-1]]
     name = rig.animation_data.action.name
     rate = bpy.context.scene.render.fps
-    world = np.array(obj.matrix_world, dtype=np.float64)
-    expected = scenes.shapes(obj, middles).astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+    expected = scenes.world_shapes(obj, middles)
     rest, shapes = other_gltf.points_at(tmp_path / "arm.glb", np.array(middles) / rate, name)
     distances, vertices = cKDTree(world_rest(obj)).query(rest)
     assert distances.max() <= 1e-6

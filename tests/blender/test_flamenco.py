@@ -10,11 +10,11 @@ from pathlib import Path
 
 import bpy
 import pytest
-import scenes
 import sinew
 from program import COMMAND, ENVIRONMENT
 from sinew_addon.attach import properties
 from sinew_addon.io import files
+from test_batch import make_rig
 
 pytestmark = pytest.mark.skipif(
     shutil.which("node") is None, reason="node is not installed here, which compiles the job type"
@@ -52,13 +52,6 @@ def files_of(job_type: dict, folder: Path) -> str:
     return eval(setting["eval"], {}, {"settings": settings, "abspath": lambda path: Path(path).absolute()})
 
 
-def save_arm(path: Path) -> Path:
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    _obj, armature = scenes.make_arm(sides=6, rings=5)
-    scenes.key_pose(armature, 80.0)
-    return scenes.save(path)
-
-
 def run_task(task: dict, variables: dict[str, list[str]]) -> subprocess.CompletedProcess:
     """Acts like a worker of Flamenco: runs one command after the other, and none after a failure. A
     variable may stand for several words here."""
@@ -88,8 +81,8 @@ def method_in(path: Path) -> str:
 def two_files(tmp_path):
     """In two folders, with the same, difficult name."""
     folder = tmp_path / "jobs"
-    save_arm(folder / "hero [1].blend")
-    save_arm(folder / "shots" / "hero [1].blend")
+    make_rig(folder / "hero [1].blend")
+    make_rig(folder / "shots" / "hero [1].blend")
     return folder
 
 

@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
-from collections.abc import Generator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -21,7 +19,7 @@ from planted import HUMAN, PLANTS, Plant, Rig
 from program import run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.core.flex.limits import Table
-from sinew_addon.core.flex.verdict import Verdict
+from sinew_addon.core.steps import result_of
 from sinew_addon.features.flex import flex
 from whole_file import assert_same, content
 
@@ -40,9 +38,9 @@ def skinned(**options: object) -> bpy.types.Object:
 
 
 @pytest.fixture(scope="module")
-def of_human() -> set[tuple[str, str]]:
+def of_human(real_rig) -> set[tuple[str, str]]:
     """What is found in human.blend as it is."""
-    Rig.open(Path(os.environ["SINEW_RIGS"]) / "human.blend", HUMAN)
+    Rig.open(real_rig("human.blend"), HUMAN)
     return planted.found(planted.verdict())
 
 
@@ -53,20 +51,17 @@ def of_human() -> set[tuple[str, str]]:
         for each in PLANTS
     ],
 )
-def test_a_planted_fault_is_named_at_its_joint(real_rig, request, plant: Plant):
-    path = real_rig("human.blend")
-    before = request.getfixturevalue("of_human")
-    rig = Rig.open(path, HUMAN)
+def test_a_planted_fault_is_named_at_its_joint(real_rig, of_human, plant: Plant):
+    rig = Rig.open(real_rig("human.blend"), HUMAN)
     plant.plant(rig)
     if not plant.is_of_bones:
         rig.store()
-    new = planted.found(planted.verdict()) - before
+    new = planted.found(planted.verdict()) - of_human
     wanted = {(rig.names[joint], name) for joint in plant.joints for name in plant.findings}
     assert new & wanted, new
 
 
-def test_only_the_fingers_of_human_fail(real_rig, of_human):
-    real_rig("human.blend")
+def test_only_the_fingers_of_human_fail(of_human):
     assert {joint for joint, _name in of_human if not joint.startswith(FINGERS)} == set()
     assert {name for _joint, name in of_human} >= {"pivot"}
 
@@ -93,7 +88,7 @@ def test_nothing_is_changed():
     bpy.context.view_layer.update()
     before, shape = content(), scenes.final_points(obj)
     shares: list[float] = []
-    verdict = _result(flex.flex([obj], ["lbs"], Table(), {}), shares)
+    verdict = result_of(flex.flex([obj], ["lbs"], Table(), {}), shares.append).verdict
     assert_same(before)
     np.testing.assert_array_equal(scenes.final_points(obj), shape)
     assert shares == sorted(shares)
@@ -103,20 +98,10 @@ def test_nothing_is_changed():
     steps = flex.flex([obj], ["lbs"], Table(), {})
     armature.pose.bones[1].rotation_euler = (0.0, 0.0, 0.0)
     bpy.context.view_layer.update()
-    again, known = (each.joints[1].values["own"] for each in (_result(steps), verdict))
+    again, known = (each.joints[1].values["own"] for each in (result_of(steps).verdict, verdict))
     assert {name: value for name, (value, _pose) in again.items()} == pytest.approx(
         {name: value for name, (value, _pose) in known.items()}, abs=1e-5
     )
-
-
-def _result(steps: Generator[float, None, flex.Result], shares: list[float] | None = None) -> Verdict:
-    while True:
-        try:
-            share = next(steps)
-        except StopIteration as end:
-            return end.value.verdict
-        if shares is not None:
-            shares.append(share)
 
 
 def test_the_command_says_what_is_wrong_where_and_what_mends_it(tmp_path):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import read_page
 import scenes
-from program import needs_interrupts, run_sinew
+from program import needs_interrupts, run_sinew, start_sinew
 from test_batch import (
     contents,
     crash,
@@ -18,7 +18,6 @@ from test_batch import (
     make_rig,
     make_rigs,
     newest_only,
-    start_sinew,
     wait_for_work,
 )
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import routes
 import scenes
-from sinew_addon.attach import normals, properties, stack
+from sinew_addon.attach import node_group, normals, properties, stack
 from sinew_addon.core.opengl import has_opengl
 from sinew_addon.core.shading import Shading, SurfaceNormals
 from sinew_addon.core.stage_mesh import Topology
@@ -65,13 +65,11 @@ DOMAINS = {smooth: "POINT", sharp: "CORNER", partly_flat: "CORNER", flat: "", cu
 
 
 def vectors(mesh, name):
-    found = np.empty((len(getattr(mesh, name)), 3), dtype=np.float32)
-    getattr(mesh, name).foreach_get("vector", found.ravel())
-    return found
+    return scenes.points_of(getattr(mesh, name), "vector")
 
 
 def evaluated(obj):
-    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    return scenes.evaluated(obj).data
 
 
 def corners(obj):
@@ -153,23 +151,17 @@ def test_normals_of_every_frame_are_blenders(shading):
 
 def add_nodes_that_read(obj):
     """Another object whose Geometry Nodes read this one."""
-    group = bpy.data.node_groups.new("Reader", "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    info, out = group.nodes.new("GeometryNodeObjectInfo"), group.nodes.new("NodeGroupOutput")
-    info.inputs["Object"].default_value = obj
-    group.links.new(info.outputs["Geometry"], out.inputs[0])
-    other = add_other()
-    other.modifiers.new("Reader", "NODES").node_group = group
+
+    def read(group, _source):
+        return node_group.add(group, "GeometryNodeObjectInfo", {"Object": obj}).outputs["Geometry"]
+
+    add_other().modifiers.new("Reader", "NODES").node_group = scenes.nodes(read)
 
 
 def add_other():
     other = scenes.added("Other", bpy.data.meshes.new("Other"))
     other.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     return other
-
-
-def add_boolean(obj):
-    add_other().modifiers.new("Boolean", "BOOLEAN").object = obj
 
 
 def add_boolean_of_collection(obj):
@@ -179,10 +171,6 @@ def add_boolean_of_collection(obj):
     collection.objects.link(obj)
     modifier = add_other().modifiers.new("Boolean", "BOOLEAN")
     modifier.operand_type, modifier.collection = "COLLECTION", outer
-
-
-def add_shrinkwrap(obj):
-    add_other().constraints.new("SHRINKWRAP").target = obj
 
 
 def add_shrinkwrap_of_bone(obj):
@@ -196,26 +184,23 @@ def add_hair(obj):
     scenes.added("Hair", curves)
 
 
-def instance_faces(obj):
-    obj.instance_type = "FACES"
-
-
-def weigh_normals(obj):
-    modifier = obj.modifiers.new("Weighted", "WEIGHTED_NORMAL")
-    obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
-
-
 OBSTACLES = {
-    "weighted": (weigh_normals, "Weighted is in front"),
+    "weighted": (lambda obj: scenes.put_in_front(obj, "WEIGHTED_NORMAL", "Weighted"), "Weighted is in front"),
     "subdivision": (lambda obj: obj.modifiers.new("Subdivision", "SUBSURF"), "Subdivision follows"),
     "cast": (lambda obj: obj.modifiers.new("Cast", "CAST"), "Cast follows"),
     "nodes": (add_nodes_that_read, "another object"),
-    "boolean": (add_boolean, "another object"),
+    "boolean": (
+        lambda obj: setattr(add_other().modifiers.new("Boolean", "BOOLEAN"), "object", obj),
+        "another object",
+    ),
     "collection": (add_boolean_of_collection, "another object"),
-    "shrinkwrap": (add_shrinkwrap, "another object"),
+    "shrinkwrap": (
+        lambda obj: setattr(add_other().constraints.new("SHRINKWRAP"), "target", obj),
+        "another object",
+    ),
     "shrinkwrap of a bone": (add_shrinkwrap_of_bone, "another object"),
     "hair": (add_hair, "another object"),
-    "instances": (instance_faces, "instances"),
+    "instances": (lambda obj: setattr(obj, "instance_type", "FACES"), "instances"),
 }
 
 
@@ -238,10 +223,8 @@ def test_blender_computes_normals_where_other_objects_read_them(name):
 def test_an_input_that_names_the_object_later_is_noticed():
     """A script sets it: Blender then lists no more than the object whose modifier it is."""
     obj, _armature = make(sharp)
-    group = bpy.data.node_groups.new("Reader", "GeometryNodeTree")
+    group = scenes.nodes(lambda _group, source: source)
     group.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    group.nodes.new("NodeGroupOutput")
     other = add_other()
     modifier = other.modifiers.new("Reader", "NODES")
     modifier.node_group = group
@@ -262,9 +245,7 @@ def give_lattice(modifier):
     lattice = scenes.added("Lattice", bpy.data.lattices.new("Lattice"))
     lattice.scale = (4.0, 4.0, 4.0)
     lattice.data.points[0].co_deform.x -= 0.4
-    for frame, height in ((1, 0.0), (11, 0.5)):
-        lattice.location.z = height
-        lattice.keyframe_insert("location", frame=frame)
+    scenes.key(lattice, "location", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 0.0, 0.5))))
     modifier.object = lattice
 
 
@@ -310,17 +291,12 @@ def test_upstream_nodes_that_change_the_domain_of_normals():
     """The mesh itself is smooth, so there is room for normals of vertices; the nodes add sharp edges."""
     obj, _armature = scenes.make_arm()
     smooth(obj)
-    modifier = obj.modifiers.new("Flat", "NODES")
-    group = modifier.node_group = bpy.data.node_groups.new("Flat", "GeometryNodeTree")
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    source, shade, result = (
-        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSetShadeSmooth", "NodeGroupOutput")
-    )
-    shade.domain, shade.inputs["Shade Smooth"].default_value = "EDGE", False
-    group.links.new(source.outputs[0], shade.inputs[0])
-    group.links.new(shade.outputs[0], result.inputs[0])
-    obj.modifiers.move(1, 0)
+
+    def sharpen(group, source):
+        inputs = {0: source, "Shade Smooth": False}
+        return node_group.add(group, "GeometryNodeSetShadeSmooth", inputs, domain="EDGE")
+
+    scenes.put_in_front(obj, "NODES").node_group = scenes.nodes(sharpen)
     scenes.add_sinew(obj, "dq")
     for frame in (3, 11):
         bpy.context.scene.frame_set(frame)
@@ -391,11 +367,7 @@ def light_scene(obj):
 def pixels(path):
     bpy.context.scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(str(path))
-    found = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(found)
-    bpy.data.images.remove(image)
-    return found
+    return scenes.pixels_of(path)
 
 
 def assert_same_pictures(obj, tmp_path, is_custom, step=0.0):
@@ -505,7 +477,7 @@ def imported_alembic(data, tmp_path):
     bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
     made = set(bpy.data.objects) - before
     (obj,) = (each for each in made if each.type == "MESH")
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     found = (
         vectors(mesh, "corner_normals"),
         sorted((each.name, each.data_type, each.domain) for each in mesh.attributes),
@@ -522,16 +494,6 @@ def test_a_mesh_that_is_not_valid_has_none():
     found = np.ones((6, 3), np.float32)
     normals_of_it.write(np.eye(4, 3, dtype=np.float32), "CORNER", found)
     assert not found.any()
-
-
-def bone_motions(obj, armature):
-    """float64 [bones, 4, 4]: from the rest pose to this frame's, in the object's space."""
-    evaluated_armature = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    place = np.linalg.inv(np.array(obj.matrix_world)) @ np.array(armature.matrix_world)
-    return [
-        place @ np.array(bone.matrix) @ np.linalg.inv(np.array(bone.bone.matrix_local)) @ np.linalg.inv(place)
-        for bone in evaluated_armature.pose.bones
-    ]
 
 
 @needs_support
@@ -551,7 +513,8 @@ def test_skinned_normals_move_by_the_inverse_transpose_of_the_blend(shading):
         bpy.context.scene.frame_set(frame)
         assert session.state_of(obj).plan.normals.are_skinned
         assert has_given(obj)
-        motions = bone_motions(obj, armature)
+        place = np.linalg.inv(np.array(obj.matrix_world)) @ np.array(armature.matrix_world)
+        motions = place @ scenes.bone_motions(armature) @ np.linalg.inv(place)
         blends = np.zeros((len(obj.data.vertices), 3, 3))
         for vertex in range(len(blends)):
             own = slice(offsets[vertex], offsets[vertex + 1])

@@ -21,7 +21,7 @@ from sinew_addon.features.pages import measure
 
 def shown_colours(obj: bpy.types.Object) -> np.ndarray:
     """float32 [vertices, 3], linear, of the final evaluated mesh."""
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     attribute = mesh.attributes[heat_nodes.NAME]
     assert (attribute.data_type, attribute.domain) == ("FLOAT_COLOR", "POINT")
     colours = np.empty(4 * len(mesh.vertices), dtype=np.float32)
@@ -80,10 +80,8 @@ def test_the_modifier_compared_with_is_blenders():
     obj.modifiers["Armature"].use_deform_preserve_volume = True
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(11)
-    states = scenes.states_of(obj)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    assert live.measure(states, "blender", depsgraph).measured.entry("distance_max") < 1e-5
-    assert live.measure(states, "lbs", depsgraph).measured.entry("distance_max") > 0.02
+    assert scenes.measure(obj).measured.entry("distance_max") < 1e-5
+    assert scenes.measure(obj, "lbs").measured.entry("distance_max") > 0.02
 
 
 def test_colours_follow_frames_poses_and_methods():
@@ -206,7 +204,7 @@ def test_switched_off_it_leaves_no_trace(set_up):
     measures.of(bpy.context.scene)
     before = whole_file.content()
     bpy.ops.sinew.heat_map()
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     assert mesh.attributes.active_color_name == heat_nodes.NAME
     assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
     assert [slot.material.name for slot in obj.material_slots] == ["Skin"]
@@ -267,7 +265,7 @@ def test_a_duplicate_has_colours_of_its_own():
     np.testing.assert_allclose(shown_colours(twin), shown_colours(obj), atol=1e-6)
     properties.of(twin).heat = False
     bpy.context.scene.frame_set(7)
-    assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
+    assert heat_nodes.NAME in scenes.evaluated(obj).data.attributes
     buffers = [properties.of(each).storage.point_buffer for each in (obj, twin)]
     assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in buffers] == [True, False]
 
@@ -310,12 +308,10 @@ def test_a_render_shows_it(tmp_path):
     scene.frame_set(1)
     bpy.ops.sinew.heat_map()
     bpy.ops.render.render(write_still=True)
-    picture = bpy.data.images.load(scene.render.filepath)
-    picture.colorspace_settings.name = "Non-Color"
-    pixels = np.array(picture.pixels).reshape(-1, 4)[:, :3]
+    pixels = scenes.pixels_of(tmp_path / "heat.png", are_numbers=True)[:, :, :3]
     # At rest nothing is stretched: the middle of the map.
     middle = linear(HeatScale.fixed(METRICS["stretch"], 2.0, 1.0, 1.0).colours(np.ones(1)))[0]
-    np.testing.assert_allclose(np.median(pixels, axis=0), middle, atol=0.01)
+    np.testing.assert_allclose(np.median(pixels, axis=(0, 1)), middle, atol=0.01)
 
 
 def test_the_legend_says_range_unit_and_methods():
@@ -368,7 +364,7 @@ def test_linked_meshes_show_it_too(tmp_path, override, front):
     bpy.context.scene.frame_set(11)
     colours = shown_colours(obj)
     assert np.ptp(colours, axis=0).max() > 0.05
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = scenes.evaluated(obj).data
     assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
     path = str(tmp_path / "shot.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)

@@ -73,18 +73,10 @@ def test_names_of_files_stay_in_the_folder(name, arm_file, tmp_path):
 @pytest.mark.parametrize(
     ("option", "value"),
     [
-        ("--memory", "-5GiB"),
-        ("--memory", "1e400"),
-        ("--memory", "nan"),
-        ("--memory", ""),
-        ("--timeout", "nan"),
-        ("--timeout", "-1"),
-        ("--timeout", "soon"),
-        ("--jobs", "0"),
-        ("--jobs", "many"),
-        ("--frames", "1e309"),
-        ("--frames", "nan"),
-        ("--frames", ""),
+        *(("--memory", value) for value in ("-5GiB", "1e400", "nan", "")),
+        *(("--timeout", value) for value in ("nan", "-1", "soon")),
+        *(("--jobs", value) for value in ("0", "many")),
+        *(("--frames", value) for value in ("1e309", "nan", "")),
     ],
 )
 def test_numbers_that_are_none(option, value, arm_file, tmp_path):
@@ -114,6 +106,8 @@ def test_names_that_are_no_text(arm_file, tmp_path):
     process = start_sinew(
         *("reskin", "-", "--method", "dq", "--no-pictures", "--out", tmp_path / "out"),
         stdin=subprocess.PIPE,
+        text=False,
+        encoding=None,
         env_more={"LC_ALL": "C.UTF-8", "PYTHONIOENCODING": "utf-8:strict"},
     )
     process.communicate(os.fsencode(file) + b"\n", timeout=120)

@@ -8,11 +8,11 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-import routes
 import scenes
 from conftest import halved
 from sinew_addon.attach import attach, properties
@@ -112,19 +112,18 @@ def _with_keys(obj: bpy.types.Object) -> None:
     obj.data.shape_keys.key_blocks["Key"].value = 0.7
 
 
-def _switch(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: str) -> None:
+def _switch(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: Path) -> None:
     properties.of(character.obj).enabled = False
     assert character.icons() == {"Sinew": (False, False), "Armature": (True, True)}
     assert character.deformer(scenes.final_points(character.obj)) is ARMATURE
     properties.of(character.obj).enabled = True
 
 
-def _reopen(_character: Character, _rule: Rule, _chosen: tuple[str, str], path: str) -> None:
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+def _reopen(_character: Character, _rule: Rule, _chosen: tuple[str, str], path: Path) -> None:
+    scenes.reopened(path)
 
 
-def _undo(character: Character, rule: Rule, chosen: tuple[str, str], _path: str) -> None:
+def _undo(character: Character, rule: Rule, chosen: tuple[str, str], _path: Path) -> None:
     bpy.ops.ed.undo_push()
     character.click(*chosen)
     bpy.ops.ed.undo_push()
@@ -136,7 +135,7 @@ def _undo(character: Character, rule: Rule, chosen: tuple[str, str], _path: str)
     rule.click(*chosen)
 
 
-def _duplicate(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: str) -> None:
+def _duplicate(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: Path) -> None:
     old = character.obj
     new = scenes.copied(old)
     bpy.context.view_layer.update()
@@ -146,7 +145,7 @@ def _duplicate(character: Character, _rule: Rule, _chosen: tuple[str, str], _pat
     bpy.context.view_layer.update()
 
 
-def _paint(character: Character, rule: Rule, chosen: tuple[str, str], _path: str) -> None:
+def _paint(character: Character, rule: Rule, chosen: tuple[str, str], _path: Path) -> None:
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     bpy.context.view_layer.update()
     assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
@@ -159,25 +158,18 @@ def _paint(character: Character, rule: Rule, chosen: tuple[str, str], _path: str
     bpy.context.view_layer.update()
 
 
-def _edit(_character: Character, _rule: Rule, _chosen: tuple[str, str], _path: str) -> None:
+def _edit(_character: Character, _rule: Rule, _chosen: tuple[str, str], _path: Path) -> None:
     for mode in ("EDIT", "SCULPT", "OBJECT"):
         bpy.ops.object.mode_set(mode=mode)
         bpy.context.view_layer.update()
 
 
-@pytest.fixture
-def by_route(request):
-    routes.force(request.param)
-    yield
-    routes.release()
-
-
 @pytest.mark.parametrize(
-    ("prepare", "by_route"),
+    ("prepare", "route"),
     halved([(_in_front, "evaluation"), (_with_keys, "update")]),
-    indirect=["by_route"],
+    indirect=["route"],
 )
-@pytest.mark.usefixtures("by_route")
+@pytest.mark.usefixtures("route")
 def test_clicks_among_everything_else(prepare, rendered_points, tmp_path):
     """A long walk: clicks, Sinew off and on, saving and loading, undo, duplicates, modes."""
     character, rule, dice = Character(prepare), Rule(prepare is _with_keys), random.Random(7)
@@ -185,7 +177,7 @@ def test_clicks_among_everything_else(prepare, rendered_points, tmp_path):
     for step in range(60):
         chosen = dice.choice(CLICKS)
         if step % 2:
-            dice.choice(others)(character, rule, chosen, str(tmp_path / "arm.blend"))
+            dice.choice(others)(character, rule, chosen, tmp_path / "arm.blend")
         else:
             character.click(*chosen)
             rule.click(*chosen)
@@ -227,8 +219,7 @@ def test_add_to_a_bake(kind, tmp_path, capfd):
     """What was baked is off while Sinew is on, and plays again without it."""
     obj, _armature = scenes.make_arm()
     other = scenes.copied(obj, "Other")
-    path = str(tmp_path / "arm.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
+    path = scenes.save(tmp_path / "arm.blend")
     linear, both = (scenes.modifier_shapes(obj, [1, 6, 11], volume) for volume in (False, True))
     scenes.add_sinew(obj, "dq")
     assert bpy.ops.sinew.bake(kind=kind) == {"FINISHED"}
@@ -244,9 +235,7 @@ def test_add_to_a_bake(kind, tmp_path, capfd):
         assert scenes.worst(scenes.shapes(other, [1, 6, 11]), linear) <= near
         bpy.ops.sinew.use_method(method="dq")
         assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), both) <= near
-        bpy.ops.wm.save_mainfile()
-        bpy.ops.wm.open_mainfile(filepath=path)
-        obj, other = bpy.data.objects["Arm"], bpy.data.objects["Other"]
+        obj, other = scenes.reopened(path), bpy.data.objects["Other"]
         assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), both) <= near
         bpy.ops.sinew.remove()
         assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), both) <= near

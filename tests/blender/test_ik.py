@@ -22,11 +22,9 @@ FRAMES = range(1, 25)
 
 def make_empty(name, places):
     empty = scenes.added(name, None)
-    for frame, place in zip((1, 9, 17, 24), places, strict=False):
-        empty.location = place
-        empty.rotation_euler = (0.1 * frame, 0.03 * frame, 0.0)
-        for path in ("location", "rotation_euler"):
-            empty.keyframe_insert(path, frame=frame)
+    frames = (1, 9, 17, 24)
+    scenes.key(empty, "location", zip(frames, places, strict=False))
+    scenes.key(empty, "rotation_euler", [(frame, (0.1 * frame, 0.03 * frame, 0.0)) for frame in frames])
     return empty
 
 
@@ -70,12 +68,10 @@ def near(*, scale=1.0):
 
 def poses(arm, names, frames=FRAMES):
     """[frames, bones, 4, 4], world space."""
-    result = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        evaluated = arm.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        result.append([evaluated.matrix_world @ evaluated.pose.bones[name].matrix for name in names])
-    return np.array(result)
+    numbers = [arm.pose.bones.find(name) for name in names]
+    return scenes.at_frames(
+        frames, lambda: np.array(scenes.evaluated(arm).matrix_world) @ scenes.pose_of(arm)[numbers]
+    )
 
 
 def tails(arm, name, frames=FRAMES):
@@ -84,13 +80,7 @@ def tails(arm, name, frames=FRAMES):
 
 
 def places(empty, frames=FRAMES):
-    result = []
-    for frame in frames:
-        bpy.context.scene.frame_set(frame)
-        result.append(
-            empty.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.copy()
-        )
-    return np.array(result)
+    return scenes.at_frames(frames, lambda: np.array(scenes.evaluated(empty).matrix_world.translation))
 
 
 def bake():

@@ -17,16 +17,6 @@ from test_against_armature_modifier import assert_equal_to_modifier
 FRAMES = [1, 4, 8, 11]
 
 
-def arm_with(kind: str, **options: object) -> bpy.types.Object:
-    """An arm with a modifier before its Armature modifier."""
-    obj, _armature = scenes.make_arm(bones=3)
-    modifier = obj.modifiers.new("Front", kind)
-    for name, value in options.items():
-        setattr(modifier, name, value)
-    obj.modifiers.move(1, 0)
-    return obj
-
-
 def deforming_parent(obj, armature):
     obj.parent, obj.parent_type = armature, "ARMATURE"
 
@@ -74,20 +64,21 @@ def test_mirrored_groups_take_the_other_side():
 
 
 def test_a_lattice_in_front_follows_both_objects():
-    obj = arm_with("LATTICE")
+    obj, _armature = scenes.make_arm(bones=3)
+    modifier = scenes.put_in_front(obj, "LATTICE")
     lattice = scenes.added("Lattice", bpy.data.lattices.new("Lattice"))
     lattice.scale = (4.0, 4.0, 4.0)
     lattice.data.points[0].co_deform.x -= 0.4
-    obj.modifiers["Front"].object = lattice
+    modifier.object = lattice
     for moving in (lattice, obj):
-        moving.keyframe_insert("location", frame=1)
-        moving.location.y += 0.3
-        moving.keyframe_insert("location", frame=11)
+        scenes.key(moving, "location", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 0.3, 0.0))))
     assert_equal_to_modifier(obj, FRAMES)
 
 
 def test_number_of_vertices_that_changes_in_front():
-    obj = arm_with("BUILD", frame_start=1, frame_duration=12)
+    obj, _armature = scenes.make_arm(bones=3)
+    build = scenes.put_in_front(obj, "BUILD")
+    build.frame_start, build.frame_duration = 1, 12
     expected = [scenes.shapes(obj, [frame])[0] for frame in (2, 5, 8)]
     scenes.add_sinew(obj)
     for frame, shape in zip((2, 5, 8), expected, strict=True):
@@ -114,18 +105,13 @@ def test_a_proxy_at_the_address_of_a_deleted_object(route):
         scenes.put_in_front(obj)
         bpy.context.view_layer.update()
     assert properties.of(obj).storage.upstream_proxy.as_pointer() in addresses, "nothing is tested"
-    shown = scenes.final_points(obj)
-    properties.of(obj).enabled = False
-    expected = scenes.final_points(obj)
-    assert shown.shape == expected.shape
-    assert scenes.worst(shown, expected) <= 1e-5
+    scenes.assert_as_without(obj)
 
 
 @pytest.mark.parametrize("kind", ["CLOTH", "PARTICLE_SYSTEM", "SOFT_BODY"])
 def test_a_simulation_behind_a_parent_that_deforms(kind):
     obj, armature = scenes.make_arm()
-    obj.modifiers.clear()
-    deforming_parent(obj, armature)
+    scenes.deform_by_parent(obj, armature)
     obj.modifiers.new("Behind", kind)
     expected = scenes.shapes(obj, FRAMES)
     if kind == "SOFT_BODY":
@@ -139,13 +125,11 @@ def test_a_simulation_behind_a_parent_that_deforms(kind):
 
 def test_one_view_layer_has_it_for_its_position_alone():
     obj, _armature = scenes.make_arm()
-    mask = obj.modifiers.new("Mask", "MASK")
+    mask = scenes.put_in_front(obj, "MASK", "Mask")
     mask.vertex_group, mask.invert_vertex_group, mask.threshold = "bone.0", True, 0.5
-    obj.modifiers.move(1, 0)
     collection = bpy.data.collections.new("Its own")
     bpy.context.scene.collection.children.link(collection)
-    bpy.context.scene.collection.objects.unlink(obj)
-    collection.objects.link(obj)
+    scenes.move_to(collection, obj)
     follower = scenes.added("Follower", None)
     follower.constraints.new("COPY_TRANSFORMS").target = obj
     scenes.add_sinew(obj)
@@ -213,9 +197,7 @@ def test_an_edit_is_compared_once(kind, monkeypatch, route):
         assert len(meshes) <= (most if kind == "MIRROR" else 1), meshes
         assert len(compared) == 1
     monkeypatch.undo()
-    got = scenes.final_points(obj)
-    attach.remove(obj)
-    assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
+    scenes.assert_as_without(obj)
 
 
 @pytest.mark.parametrize("event", ["depsgraph_update_pre", "depsgraph_update_post"])
@@ -240,9 +222,7 @@ def test_a_mesh_that_another_addon_edits_while_its_copy_is_made(event):
         bpy.context.view_layer.update()
     assert edits
     bpy.context.view_layer.update()
-    got = scenes.final_points(obj)
-    attach.remove(obj)
-    assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
+    scenes.assert_as_without(obj)
 
 
 def test_weights_that_are_no_numbers_equal_those_of_the_copy():

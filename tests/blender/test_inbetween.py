@@ -84,27 +84,9 @@ def curves_of(armature) -> list:
     return [c for curves in actions.curve_lists(*actions.playing(armature)) for c in curves]
 
 
-def go_to(frame: float) -> None:
-    whole = math.floor(frame)
-    bpy.context.scene.frame_set(whole, subframe=frame - whole)
-
-
-def evaluated(armature):
-    return armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-
-
-def matrices(armature, name: str = "matrix") -> np.ndarray:
-    """float64 [bones, 4, 4] of the evaluated pose."""
-    return np.array([getattr(bone, name) for bone in evaluated(armature).pose.bones], dtype=np.float64)
-
-
 def film(armature, frames=FRAMES, name: str = "matrix") -> np.ndarray:
-    """float64 [frames, bones, 4, 4]."""
-    result = []
-    for frame in frames:
-        go_to(frame)
-        result.append(matrices(armature, name))
-    return np.array(result)
+    """float64 [frames, bones, 4, 4] of the evaluated poses."""
+    return scenes.at_frames(frames, lambda: scenes.pose_of(armature, name))
 
 
 def bake(armature, method="sclerp", path="straight", **settings) -> inbetween_bake.Baked:
@@ -181,7 +163,7 @@ def test_equals_the_library_between_keys_and_blender_at_keys(method, path):
     scale_as_shift = np.concatenate([np.broadcast_to([1.0, 0, 0, 0], (*scale.shape[:-1], 4)), scale], axis=-1)
     moved = 0.0
     for frame in (2, 6, 10, 13, 18, 27, 30):
-        go_to(frame)
+        bpy.context.scene.frame_set(frame)
         key = int(np.searchsorted(KEYS, frame, side="right")) - 1
         u = (frame - KEYS[key]) / (KEYS[key + 1] - KEYS[key])
         for bone in range(3):
@@ -196,7 +178,7 @@ def test_equals_the_library_between_keys_and_blender_at_keys(method, path):
                 ).transforms[4:]
             assert value.is_defined
             wanted, stretch = to_rotation_and_stretch(method, value.transforms)
-            got = np.array(evaluated(armature).pose.bones[bone].matrix_basis)
+            got = np.array(scenes.evaluated(armature).pose.bones[bone].matrix_basis)
             assert np.abs(got - basis(wanted, wanted_scale * stretch)).max() < CLOSE
             moved = max(moved, np.abs(got - keyed[key, bone]).max())
     assert moved > 0.3, "nothing moves: nothing is tested"
@@ -237,21 +219,21 @@ def test_channels_without_keys_are_left_alone():
     armature = make_rig(("QUATERNION", "XYZ", "XYZ"))
     turning, hinge, sliding = armature.pose.bones
     turning.location, hinge.rotation_euler = (1.0, 2.0, 3.0), (0.0, 0.5, 0.0)
+    turns = [(frame, Quaternion((1, 0, 0), 0.2 * frame)) for frame in (1, 11)]
+    scenes.key(turning, "rotation_quaternion", turns)
     for frame in (1, 11):
-        turning.rotation_quaternion = Quaternion((1, 0, 0), 0.2 * frame)
-        turning.keyframe_insert("rotation_quaternion", frame=frame)
         hinge.rotation_euler.x = 0.1 * frame
         hinge.keyframe_insert("rotation_euler", index=0, frame=frame)
         sliding.location.y = frame
         sliding.keyframe_insert("location", index=1, frame=frame)
     bake(armature)
-    go_to(6)
+    bpy.context.scene.frame_set(6)
     assert turning.location[:] == (1.0, 2.0, 3.0)
     assert hinge.rotation_euler[1:] == (0.5, 0.0)
     assert sliding.location[0] == sliding.location[2] == 0.0
     assert sliding.location.y == pytest.approx(6.0, abs=1e-5)
     turning.location.x = 5.0
-    go_to(7)
+    bpy.context.scene.frame_set(7)
     assert turning.location.x == 5.0
 
 
@@ -371,9 +353,9 @@ def test_a_baked_cycle_is_a_cycle(mode, path):
             curve.update()
         modifier = curve.modifiers.new("CYCLES")
         modifier.mode_before = modifier.mode_after = mode
-    go_to(1)
+    bpy.context.scene.frame_set(1)
     first = np.array(bone.location)
-    go_to(31)
+    bpy.context.scene.frame_set(31)
     gain = np.array(bone.location) - first
     groups, _left = keyed_poses.read(armature)
     before, at, after = (

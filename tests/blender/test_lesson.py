@@ -7,11 +7,11 @@ import runpy
 from pathlib import Path
 
 import bpy
+import five_meshes
 import pytest
 import scenes
 from sinew_addon.attach import properties
 from sinew_addon.features.compare import comparison_state
-from sinew_addon.features.heat import live
 from sinew_addon.ui import lesson
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,15 +24,12 @@ def opened():
 
 
 def measured(obj):
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    return live.measure(scenes.states_of(obj), properties.BLENDER, depsgraph).measured
+    return scenes.measure(obj).measured
 
 
 def click(name):
     obj = bpy.data.objects[name]
-    for each in bpy.context.view_layer.objects:
-        each.select_set(each == obj)
-    bpy.context.view_layer.objects.active = obj
+    five_meshes.select(obj)
     return obj
 
 

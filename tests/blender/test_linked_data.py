@@ -23,9 +23,7 @@ def save_library(folder: Path, skinned: bool, front: bool) -> np.ndarray:
     expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
     collection = bpy.data.collections.new("Character")
     bpy.context.scene.collection.children.link(collection)
-    for each in (obj, armature):
-        bpy.context.scene.collection.objects.unlink(each)
-        collection.objects.link(each)
+    scenes.move_to(collection, obj, armature)
     if skinned:
         scenes.add_sinew(obj, "dq")
     scenes.save(folder / "library.blend")

@@ -18,11 +18,7 @@ GROUP = "dq here"
 
 def paint(obj: bpy.types.Object) -> None:
     """Parts of it have weight 1, parts 0, and most between."""
-    group = obj.vertex_groups.new(name=GROUP)
-    for vertex in obj.data.vertices:
-        share = float(np.clip(1.5 * vertex.co.x / 3.0 - 0.2, 0.0, 1.0))
-        if share > 0.0:
-            group.add([vertex.index], share, "REPLACE")
+    scenes.paint(obj, GROUP, 0.5 * scenes.rest_points(obj)[:, 0] - 0.2)
 
 
 def by_two_modifiers(obj: bpy.types.Object) -> np.ndarray:
@@ -43,24 +39,20 @@ def mixed(obj: bpy.types.Object) -> None:
     mix.method, mix.group = "dq", GROUP
 
 
-def plain(_obj: bpy.types.Object) -> None:
-    pass
+CHARACTERS = {
+    "plain": lambda obj: None,
+    "in front": scenes.put_in_front,
+    "behind": lambda obj: setattr(obj.modifiers.new("Behind", "SUBSURF"), "levels", 1),
+    "with keys": scenes.key_shape,
+}
 
 
-def behind(obj: bpy.types.Object) -> None:
-    obj.modifiers.new("Behind", "SUBSURF").levels = 1
-
-
-def with_keys(obj: bpy.types.Object) -> None:
-    scenes.key_shape(obj)
-
-
-@pytest.mark.parametrize("set_up", [plain, scenes.put_in_front, behind, with_keys])
+@pytest.mark.parametrize("name", CHARACTERS)
 @pytest.mark.parametrize("is_safe", [False, True])
-def test_two_modifiers_have_the_same_shape(monkeypatch, set_up, is_safe):
+def test_two_modifiers_have_the_same_shape(monkeypatch, name, is_safe):
     obj, _armature = scenes.make_arm()
     paint(obj)
-    set_up(obj)
+    CHARACTERS[name](obj)
     expected = by_two_modifiers(obj)
     alone = scenes.modifier_shapes(obj, FRAMES, preserve_volume=False)
     assert scenes.worst(alone, expected) > 1e-3
@@ -77,11 +69,7 @@ def test_the_second_method_can_be_keyed():
     linear = scenes.modifier_shapes(obj, [4], preserve_volume=False)[0]
     mixed(obj)
     expected = scenes.shapes(obj, [8])[0]
-    mix = properties.of(obj).mix
-    mix.method = "OFF"
-    mix.keyframe_insert("method", frame=5)
-    mix.method = "dq"
-    mix.keyframe_insert("method", frame=6)
+    scenes.key(properties.of(obj).mix, "method", ((5, "OFF"), (6, "dq")))
     got = scenes.shapes(obj, [4, 8])
     assert scenes.worst(got[0], linear) < 1e-5
     assert scenes.worst(got[1], expected) == 0.0
@@ -101,9 +89,8 @@ def test_under_other_scale_rules_it_is_between_its_two(rule):
     properties.of(obj).method = "lbs"
     mix = properties.of(obj).mix
     mix.method, mix.group = "dq", GROUP
-    index = obj.vertex_groups[GROUP].index
-    shares = np.array([[sum(g.weight for g in v.groups if g.group == index)] for v in obj.data.vertices])
     got = scenes.shapes(obj, [8])[0]
+    shares = scenes.shares_of(obj, GROUP)[:, None]
     assert scenes.worst(got, first + shares * (second - first)) < 1e-5
     assert scenes.worst(first, second) > 1e-3
 

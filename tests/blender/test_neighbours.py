@@ -30,8 +30,7 @@ def route(request, monkeypatch) -> State:
 
 @pytest.fixture
 def arm(route) -> bpy.types.Object:
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(6)
     assert session.state_of(obj).plan.state is route
     return obj
@@ -59,18 +58,11 @@ def neighbour() -> Iterator[Callable]:
         take_off()
 
 
-def assert_equals_modifier(obj: bpy.types.Object) -> None:
-    got = scenes.shapes(obj, FRAMES)
+def assert_modifiers(obj: bpy.types.Object, frames: list[int], got: np.ndarray) -> None:
+    """They are the modifier's shapes at these frames."""
     assert not properties.of(obj).error
     properties.of(obj).enabled = False
-    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
-    properties.of(obj).enabled = True
-    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-
-
-def assert_frame_equals_modifier(obj: bpy.types.Object, frame: int, got: np.ndarray) -> None:
-    properties.of(obj).enabled = False
-    expected = scenes.modifier_shapes(obj, [frame], preserve_volume=True)[0]
+    expected = scenes.modifier_shapes(obj, frames, preserve_volume=True)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
@@ -159,30 +151,25 @@ def test_a_handlers_edit_after_sinews_is_shown(arm, neighbour, edit, set_up, onc
     take_off()
     got = scenes.final_points(arm)
     comparison.end(bpy.context)
-    assert_frame_equals_modifier(arm, 9, got)
+    assert_modifiers(arm, [9], got)
 
 
-def pose_bone(obj: bpy.types.Object) -> None:
-    scenes.bend(properties.of(obj).armature, 35.0)
+MOVES = {
+    "pose a bone": lambda obj: scenes.bend(properties.of(obj).armature, 35.0),
+    "move the armature": lambda obj: setattr(properties.of(obj).armature.location, "y", 0.4),
+    "move the mesh": lambda obj: setattr(obj.location, "y", 0.4),
+}
 
 
-def move_armature(obj: bpy.types.Object) -> None:
-    properties.of(obj).armature.location.y = 0.4
-
-
-def move_mesh(obj: bpy.types.Object) -> None:
-    obj.location.y = 0.4
-
-
-@pytest.mark.parametrize("act", [pose_bone, move_armature, move_mesh])
+@pytest.mark.parametrize("move", MOVES)
 @pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
-def test_what_a_handler_behind_sinews_poses_and_moves(arm, neighbour, event, act, route):
+def test_what_a_handler_behind_sinews_poses_and_moves(arm, neighbour, event, move, route):
     """Within Blender's evaluation it is part of the frame; after the update it is seen at the next event."""
     calls = []
 
     def call() -> None:
         calls.append(event)
-        act(arm)
+        MOVES[move](arm)
 
     take_off = neighbour(event, call)
     if event == "frame_change_post":
@@ -211,7 +198,7 @@ def test_a_handlers_edit_of_an_edited_mesh_is_in_the_next_event(arm, neighbour, 
     arm.data.update()
     bpy.context.view_layer.update()
     take_off()
-    assert_equals_modifier(arm)
+    assert_modifiers(arm, FRAMES, scenes.shapes(arm, FRAMES))
 
 
 @pytest.mark.parametrize("gone", ["applied", "deleted"])
@@ -273,9 +260,7 @@ def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
 @pytest.mark.parametrize("keyed", ["viewport", "render"])
 def test_keys_of_one_visibility_leave_the_other(arm, rendered_points, keyed):
     modifier = arm.modifiers["Armature"]
-    for frame, value in ((1, True), (5, False)):
-        setattr(modifier, f"show_{keyed}", value)
-        arm.keyframe_insert(modifier.path_from_id(f"show_{keyed}"), frame=frame)
+    scenes.key(modifier, f"show_{keyed}", ((1, True), (5, False)))
     for frame in (8, 3, 8, 3, 6):
         bpy.context.scene.frame_set(frame)
     shown, rendered = scenes.final_points(arm), rendered_points(arm)
@@ -302,8 +287,7 @@ def test_an_artists_driver_stays(arm):
 
 
 def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkeypatch):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(6)
 
     def fail(*_args: object) -> None:
@@ -346,8 +330,7 @@ def test_suspended_by_two_threads_at_once():
 
 
 def test_keys_that_two_objects_share_go_with_the_last(route):
-    obj, _armature = scenes.make_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = scenes.skinned_arm("dq")
     obj.keyframe_insert("sinew.method", frame=4)
     other = scenes.copied(obj, linked=True)
     session.refresh(bpy.context)

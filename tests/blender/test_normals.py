@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+import scenes
 import sinew
 from sinew_addon.io import mesh_io
 
@@ -45,10 +46,7 @@ def normals_of(mesh: bpy.types.Mesh) -> sinew.Normals:
 
 
 def by_blender(mesh: bpy.types.Mesh, domain: str) -> np.ndarray:
-    collection = getattr(mesh, COLLECTIONS[domain])
-    normals = np.empty((len(collection), 3), np.float32)
-    collection.foreach_get("vector", normals.ravel())
-    return normals
+    return scenes.points_of(getattr(mesh, COLLECTIONS[domain]), "vector")
 
 
 def give_points(mesh: bpy.types.Mesh, points: np.ndarray) -> None:

@@ -4,7 +4,7 @@ row calls what the tool calls, or the tool itself where Blender has it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scenes
 from conftest import halved
+from five_meshes import select as make_active
 from sinew_addon.attach import other_tools, properties, stack
 from sinew_addon.deform import safe_mode
 from sinew_addon.jobs.tasks import preflight
@@ -61,18 +62,21 @@ def make(prepare: Callable, has_sinew: bool) -> bpy.types.Object:
     if has_sinew:
         scenes.add_sinew(obj, "lbs")
     bpy.context.scene.frame_set(9)
-    for each in bpy.data.objects:
-        each.select_set(each == obj)
+    make_active(obj)
     return obj
 
 
 # --- What is seen of a mesh
 
 
+def keys_of(obj: bpy.types.Object) -> Sequence[bpy.types.ShapeKey]:
+    return obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
+
+
 def seen_of(obj: bpy.types.Object, name: str = "") -> Seen:
     """The mesh itself, its shape in this pose, weights, shape keys and modifiers but for Sinew's."""
     bpy.context.view_layer.update()
-    keys = obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
+    keys = keys_of(obj)
     own = stack.own_modifiers(obj) if properties.has_sinew(obj) else []
     left = [m for m in obj.modifiers if m not in own]
     weights = [[round(group.weight, 4) for group in vertex.groups] for vertex in obj.data.vertices]
@@ -112,7 +116,7 @@ def shown_keys(obj: bpy.types.Object) -> Seen:
     """The evaluated mesh, and with each of its shape keys pinned."""
     bpy.context.view_layer.update()
     found: Seen = {"shown": evaluated(obj)}
-    keys = obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
+    keys = keys_of(obj)
     obj.show_only_shape_key = True
     for number, key in enumerate(keys):
         value, key.value, obj.active_shape_key_index = key.value, 1.0, number
@@ -121,12 +125,6 @@ def shown_keys(obj: bpy.types.Object) -> Seen:
         key.value = value
     obj.show_only_shape_key, obj.active_shape_key_index = False, 0
     return found
-
-
-def make_active(obj: bpy.types.Object) -> None:
-    for each in bpy.context.scene.objects:
-        each.select_set(each == obj)
-    bpy.context.view_layer.objects.active = obj
 
 
 # --- Exporters: the file, read again, and what they leave
@@ -142,28 +140,18 @@ def read_again(operator: Callable, path: Path, **options: object) -> Seen:
     return found
 
 
-def exported(export: Callable, read: Callable, kind: str, **options: object) -> Callable:
+def exported(
+    export: Callable, read: Callable, kind: str, reading: dict[str, object] | None = None, **options: object
+) -> Callable:
+    """reading  options of the importer"""
+
     def tool(obj: bpy.types.Object, folder: Path) -> Seen:
         path = folder / f"arm.{kind}"
         export(filepath=str(path), **options)
         left = seen_of(obj, "left")
-        return left | read_again(read, path)
+        return left | read_again(read, path, **(reading or {}))
 
     return tool
-
-
-def alembic(obj: bpy.types.Object, folder: Path) -> Seen:
-    path = folder / "arm.abc"
-    bpy.ops.wm.alembic_export(filepath=str(path), as_background_job=False)
-    left = seen_of(obj, "left")
-    return left | read_again(bpy.ops.wm.alembic_import, path, as_background_job=False)
-
-
-def collada(obj: bpy.types.Object, folder: Path) -> Seen:
-    path = folder / "arm.dae"
-    bpy.ops.wm.collada_export(filepath=str(path), apply_modifiers=True)
-    left = seen_of(obj, "left")
-    return left | read_again(bpy.ops.wm.collada_import, path)
 
 
 # --- Tools that hide, apply, copy and join
@@ -192,7 +180,7 @@ def vrm_1(obj: bpy.types.Object, folder: Path) -> Seen:
 def cgcookie(obj: bpy.types.Object, _folder: Path) -> Seen:
     """Apply Modifiers with Shape Keys: each key on a copy, with the chosen modifiers applied."""
     chosen = [m.name for m in obj.modifiers if m.type in ("MIRROR", "SUBSURF")]
-    names = [key.name for key in obj.data.shape_keys.key_blocks] if obj.data.shape_keys else []
+    names = [key.name for key in keys_of(obj)]
     with hidden(skins_of(obj)):
         copies = [scenes.copied(obj) for _name in names[1:]]
         for number, each in enumerate((obj, *copies)):
@@ -215,10 +203,9 @@ def _keep_key(obj: bpy.types.Object, number: int) -> None:
 
 
 def _join_as_keys(obj: bpy.types.Object, copies: list[bpy.types.Object], names: list[str]) -> None:
-    for each in bpy.context.scene.objects:
-        each.select_set(each in copies)
-    bpy.context.view_layer.objects.active = obj
     if copies:
+        make_active(*copies)
+        bpy.context.view_layer.objects.active = obj
         bpy.ops.object.join_shapes()
     for name, each in zip(names[1:], copies, strict=True):
         obj.data.shape_keys.key_blocks[-1].name = name
@@ -232,8 +219,7 @@ def gret(obj: bpy.types.Object, _folder: Path) -> Seen:
     scene."""
     if obj.data.users > 1:
         obj.data = obj.data.copy()
-    keys = obj.data.shape_keys.key_blocks if obj.data.shape_keys is not None else ()
-    shapes = [(key.name, scenes.points_of(key.data)) for key in keys]
+    shapes = [(key.name, scenes.points_of(key.data)) for key in keys_of(obj)]
     copies = []
     for _name, points in shapes:
         new = obj.copy()
@@ -259,7 +245,7 @@ def gret(obj: bpy.types.Object, _folder: Path) -> Seen:
 
 def skkeeper(obj: bpy.types.Object, _folder: Path) -> Seen:
     """Apply All Modifiers (Keep Shapekeys): each key on a copy, which is converted."""
-    names = [key.name for key in obj.data.shape_keys.key_blocks] if obj.data.shape_keys else ["Basis"]
+    names = [key.name for key in keys_of(obj)] or ["Basis"]
     copies = [scenes.copied(obj) for _name in names]
     for number, each in enumerate(copies):
         _keep_key(each, number)
@@ -312,6 +298,12 @@ def convert_hidden(obj: bpy.types.Object, _folder: Path) -> Seen:
     return seen_of(new, "copy") | seen_of(obj, "left")
 
 
+def _apply_pose(armature: bpy.types.Object) -> None:
+    scenes.enter(armature, "POSE")
+    bpy.ops.pose.armature_apply()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def apply_armature(obj: bpy.types.Object, _folder: Path) -> Seen:
     """Pose as rest pose: the modifier is applied, the pose too, and the modifier made again."""
     armature, keys = obj.parent, obj.data.shape_keys
@@ -319,10 +311,7 @@ def apply_armature(obj: bpy.types.Object, _folder: Path) -> Seen:
         make_active(obj)
         for name in [m.name for m in skins_of(obj)]:
             bpy.ops.object.modifier_apply(modifier=name, single_user=True)
-        make_active(armature)
-        bpy.ops.object.mode_set(mode="POSE")
-        bpy.ops.pose.armature_apply()
-        bpy.ops.object.mode_set(mode="OBJECT")
+        _apply_pose(armature)
         obj.modifiers.new("Armature", "ARMATURE").object = armature
     return seen_of(obj)
 
@@ -343,10 +332,7 @@ def cats(obj: bpy.types.Object, _folder: Path) -> Seen:
         obj.data.vertices.foreach_set("co", shapes["shown Basis"].ravel())
         for key in keys.key_blocks:
             key.data.foreach_set("co", shapes[f"shown {key.name}"].ravel())
-    make_active(armature)
-    bpy.ops.object.mode_set(mode="POSE")
-    bpy.ops.pose.armature_apply()
-    bpy.ops.object.mode_set(mode="OBJECT")
+    _apply_pose(armature)
     return seen_of(obj)
 
 
@@ -381,7 +367,7 @@ def rigify(obj: bpy.types.Object, folder: Path) -> Seen:
     for modifier in skins_of(obj):
         modifier.object = other
     obj.parent = other
-    return exported(bpy.ops.export_scene.gltf, bpy.ops.import_scene.gltf, "glb")(obj, folder)
+    return exported(*GLTF)(obj, folder)
 
 
 def auto_rig_pro(obj: bpy.types.Object, folder: Path) -> Seen:
@@ -405,12 +391,13 @@ def auto_rig_pro(obj: bpy.types.Object, folder: Path) -> Seen:
 
 
 GLTF = (bpy.ops.export_scene.gltf, bpy.ops.import_scene.gltf, "glb")
+AT_ONCE = {"as_background_job": False}
 TOOLS = {
     "glTF": exported(*GLTF),
     "glTF, modifiers applied": exported(*GLTF, export_apply=True),
     "FBX": exported(bpy.ops.export_scene.fbx, bpy.ops.import_scene.fbx, "fbx"),
     "USD": exported(bpy.ops.wm.usd_export, bpy.ops.wm.usd_import, "usda"),
-    "Alembic": alembic,
+    "Alembic": exported(*(bpy.ops.wm.alembic_export, bpy.ops.wm.alembic_import, "abc", AT_ONCE), **AT_ONCE),
     "OBJ": exported(bpy.ops.wm.obj_export, bpy.ops.wm.obj_import, "obj"),
     "VRM 0": vrm_0,
     "VRM 1": vrm_1,
@@ -430,7 +417,8 @@ TOOLS = {
     "Auto-Rig Pro": auto_rig_pro,
 }
 if bpy.app.version < (5, 0):
-    TOOLS["Collada"] = collada
+    collada = bpy.ops.wm.collada_export, bpy.ops.wm.collada_import, "dae"
+    TOOLS["Collada"] = exported(*collada, apply_modifiers=True)
 
 
 def differences(got: Seen, expected: Seen) -> list[str]:

@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from program import RUN, checked, disk, run_sinew, start_sinew, with_sinew
+from program import RUN, checked, complaint, disk, run_sinew, start_sinew, with_sinew
 from sinew_addon import cli
 from sinew_addon.core import output
 from sinew_addon.core.errors import SinewError
@@ -81,12 +81,6 @@ def arguments_of(writer: str, inputs: dict, out: Path) -> list[str]:
     arguments, _name = WRITERS[writer]
     places = {**inputs, OUT: out}
     return [str(places.get(argument, argument)) for argument in arguments]
-
-
-def complaint(errors: str) -> str:
-    """The one line that reports the problem."""
-    (line,) = [line for line in errors.splitlines() if line.startswith("sinew: ")]
-    return line
 
 
 def complaint_here(arguments: list[str], capsys) -> str:
@@ -222,12 +216,7 @@ def test_what_is_raised_meanwhile_leaves_nothing(tmp_path):
 @pytest.mark.parametrize("arguments", [("methods",), ("methods", "--json"), ("info", "FILE")])
 def test_standard_output_on_a_full_disk(arguments, inputs):
     with open("/dev/full", "w") as full:
-        process = start_sinew(
-            *(inputs.get(argument, argument) for argument in arguments),
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        process = start_sinew(*(inputs.get(argument, argument) for argument in arguments), stdout=full)
         _output, errors = process.communicate(timeout=60)
     assert complaint(errors) == "sinew: standard output: can not be written: No space left on device"
     assert process.returncode == 1

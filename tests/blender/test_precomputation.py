@@ -7,6 +7,7 @@ from __future__ import annotations
 import dataclasses
 import threading
 import time
+from pathlib import Path
 
 import bmesh
 import bpy
@@ -101,8 +102,7 @@ def shapes_by_modifier(preserve_volume: bool) -> np.ndarray:
 
 
 def shape_by_cor() -> np.ndarray:
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "cor")
+    obj, _armature = scenes.skinned_arm("cor", bones=3)
     found = scenes.shapes(obj, [FRAME])[0]
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     forget_made()
@@ -141,8 +141,7 @@ def test_the_modifiers_shape_until_it_is_found(gate, route, preserve_volume):
 
 def test_stopped_it_waits_for_the_button(gate, in_window):
     gate.close()
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "cor")
+    obj, _armature = scenes.skinned_arm("cor", bones=3)
     assert gate.count == 1
     bpy.ops.sinew.stop_precomputation()
     assert not precomputations.running
@@ -162,8 +161,7 @@ def test_stopped_it_waits_for_the_button(gate, in_window):
 
 def test_a_result_that_comes_while_the_watcher_looks(gate, in_window):
     gate.close()
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "cor")
+    obj, _armature = scenes.skinned_arm("cor", bones=3)
     assert precomputations.running[0].ends_behind_gate()
     # Between the watcher's look at the object and its last, at what still runs.
     subscribers.precomputation_shown.append(gate.open)
@@ -189,8 +187,7 @@ def test_a_render_waits(gate, route, rendered_points):
 
 def test_a_render_waits_also_for_what_was_stopped(gate, in_window, rendered_points):
     gate.close()
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "cor")
+    obj, _armature = scenes.skinned_arm("cor", bones=3)
     bpy.ops.sinew.stop_precomputation()
     gate.open()
     bpy.context.scene.frame_set(FRAME)
@@ -294,11 +291,8 @@ def test_what_happens_meanwhile_does_no_harm(gate, in_window, event):
 
 
 def test_a_keyed_method_is_asked_for_when_it_comes(gate, route):
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "dq")
-    for frame, method in ((1, "dq"), (FRAME - 1, "cor"), (FRAME + 2, "dq")):
-        obj.sinew.method = method
-        obj.sinew.keyframe_insert("method", frame=frame)
+    obj, _armature = scenes.skinned_arm("dq", bones=3)
+    scenes.key(obj.sinew, "method", ((1, "dq"), (FRAME - 1, "cor"), (FRAME + 2, "dq")))
     bpy.context.scene.frame_set(1)
     session.refresh(bpy.context)
     gate.count = 0
@@ -357,13 +351,10 @@ def test_a_mesh_without_faces_is_blended_linearly_and_the_panel_says_so():
 # --- The cache
 
 
-def saved(tmp_path) -> tuple[np.ndarray, str]:
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, "cor")
+def saved(tmp_path) -> tuple[np.ndarray, Path]:
+    obj, _armature = scenes.skinned_arm("cor", bones=3)
     bpy.context.scene.frame_set(FRAME)
-    points, path = scenes.final_points(obj), str(tmp_path / "saved.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    return points, path
+    return scenes.final_points(obj), scenes.save(tmp_path / "saved.blend")
 
 
 def test_a_file_has_it(gate, tmp_path):
@@ -388,9 +379,8 @@ def test_copies_and_libraries_have_it(gate, tmp_path):
     assert session.state_of(over) is not None
     assert "cor" in session.state_of(over).bound.first_deformer.vertex_data.made
     assert gate.count == 1
-    bpy.ops.wm.open_mainfile(filepath=path)
+    obj = scenes.opened(path)
     forget_made()
-    obj = bpy.data.objects["Arm"]
     for linked in (True, False):
         copy = scenes.copied(obj, linked=linked)
         bpy.context.view_layer.update()
@@ -401,20 +391,17 @@ def test_copies_and_libraries_have_it(gate, tmp_path):
 
 def test_remove_leaves_none_of_it(tmp_path):
     _points, path = saved(tmp_path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    mesh = bpy.data.objects["Arm"].data
+    obj = scenes.opened(path)
+    mesh = obj.data
     assert len(stored_vertex_data.read(mesh)) == 1
-    attach.remove(bpy.data.objects["Arm"])
+    attach.remove(obj)
     assert not mesh.is_property_set(stored_vertex_data.NAME)
 
 
 def test_another_method_saves_none_of_it(tmp_path):
     _points, path = saved(tmp_path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    bpy.data.objects["Arm"].sinew.method = "dq"
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.wm.open_mainfile(filepath=path)
-    assert stored_vertex_data.read(bpy.data.objects["Arm"].data) == {}
+    scenes.opened(path).sinew.method = "dq"
+    assert stored_vertex_data.read(scenes.reopened(path).data) == {}
 
 
 def test_data_of_another_mesh_is_not_taken(gate, tmp_path):
@@ -468,14 +455,12 @@ def _end_early(array):
     ],
 )
 def test_damaged_data_is_computed_anew(method, store, harm, tmp_path, caplog):
-    obj, _armature = scenes.make_arm(bones=3)
-    scenes.add_sinew(obj, method)
+    obj, _armature = scenes.skinned_arm(method, bones=3)
     bpy.context.scene.frame_set(FRAME)
     expected = scenes.final_points(obj)
-    path = str(tmp_path / "saved.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
+    scenes.save(tmp_path / "saved.blend")
     session.forget()
-    mesh = bpy.data.objects["Arm"].data
+    mesh = obj.data
     assert stored_vertex_data.read(mesh)
     store(mesh, harm)
     forget_made()
@@ -516,8 +501,7 @@ def test_the_folder_has_what_no_file_has(gate, monkeypatch):
     for _ in range(2):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         forget_made()
-        obj, _armature = scenes.make_arm(bones=3)
-        scenes.add_sinew(obj, "cor")
+        obj, _armature = scenes.skinned_arm("cor", bones=3)
         assert "cor" in session.state_of(obj).bound.first_deformer.vertex_data.made
     assert gate.count == 1
     assert properties.has_sinew(obj)

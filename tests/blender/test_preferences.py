@@ -26,10 +26,7 @@ def preferences():
 
 @pytest.fixture
 def selected():
-    obj, _armature = scenes.make_arm()
-    bpy.context.view_layer.objects.active = obj
-    obj.select_set(True)
-    return obj
+    return scenes.make_arm()[0]
 
 
 def test_scripts_do_not_depend_on_it(preferences, selected):

@@ -64,9 +64,7 @@ def test_an_elbow_that_would_bulge_does_not():
     bpy.context.scene.frame_set(11)
 
     def of_limbs(name: str) -> float:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        subject = recommend.live.measure(scenes.states_of(obj), "blender", depsgraph)
-        return float(np.max(subject.measured.by_limb()[name]))
+        return float(np.max(scenes.measure(obj).measured.by_limb()[name]))
 
     lost = of_limbs("volume")
     properties.of(obj).method = "dq"

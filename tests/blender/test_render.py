@@ -34,19 +34,11 @@ def prepare(scene: bpy.types.Scene, motion_blur: bool) -> None:
 
 
 def render_animation(scene: bpy.types.Scene, folder, frames: tuple[int, int]) -> np.ndarray:
-    """float32 [frames, pixels]: an animation rendered in the background, read back from its files."""
+    """[frames, height, width, 4]: an animation rendered in the background, read back from its files."""
     scene.frame_start, scene.frame_end = frames
     scene.render.filepath = f"{folder}/"
     bpy.ops.render.render(animation=True)
-    return np.stack([read_picture(path) for path in sorted(folder.glob("*.png"))])
-
-
-def read_picture(path) -> np.ndarray:
-    image = bpy.data.images.load(str(path))
-    pixels = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    bpy.data.images.remove(image)
-    return pixels
+    return np.stack([scenes.pixels_of(path) for path in sorted(folder.glob("*.png"))])
 
 
 def with_and_without(
@@ -220,9 +212,7 @@ def test_keys_of_settings_and_of_modifiers_behind_are_rendered(tmp_path):
     scene.frame_set(11)
 
     def key_method() -> None:
-        for frame, method in ((8, "lbs"), (9, "dq")):
-            properties.of(obj).method = method
-            obj.keyframe_insert("sinew.method", frame=frame)
+        scenes.key(properties.of(obj), "method", ((8, "lbs"), (9, "dq")))
         scene.frame_set(11)
 
     got, expected = with_and_without(tmp_path, obj, "dq", (5, 7), key_method)

@@ -50,13 +50,7 @@ def full_scene(folder: Path) -> Path:
     obj.keyframe_insert('modifiers["Armature"].show_in_editmode', frame=3)
 
     keyed, _ = scenes.make_arm(sides=6, rings=9, name="Keyed")
-    keyed.shape_key_add(name="Basis")
-    block = keyed.shape_key_add(name="Fat")
-    for point in block.data:
-        point.co *= 1.3
-    block.keyframe_insert("value", frame=1)
-    block.value = 1.0
-    block.keyframe_insert("value", frame=11)
+    scenes.key_shape(keyed, (1.3, 1.3, 1.3))
     keyed.active_shape_key_index = 1
     keyed.modifiers.active = None
 
@@ -98,8 +92,7 @@ def add_what_takes_helpers() -> None:
     second.object, second.use_multi_modifier, second.vertex_group = chain, True, "bone.1"
     chained.keyframe_insert('modifiers["Multi"].show_viewport', frame=2)
     child, parent = scenes.make_arm(sides=6, rings=9, name="Child")
-    child.modifiers.clear()
-    child.parent, child.parent_type = parent, "ARMATURE"
+    scenes.deform_by_parent(child, parent)
 
 
 def add_what_is_shown_elsewhere(obj: bpy.types.Object) -> None:
@@ -113,15 +106,12 @@ def add_what_is_shown_elsewhere(obj: bpy.types.Object) -> None:
     off.modifiers["Armature"].show_viewport = off.modifiers["Armature"].show_render = False
     other = bpy.data.scenes.new("Other Scene")
     elsewhere, rig = scenes.make_arm(sides=6, rings=9, name="Elsewhere")
-    for each in (elsewhere, rig):
-        bpy.context.scene.collection.objects.unlink(each)
-        other.collection.objects.link(each)
+    scenes.move_to(other.collection, elsewhere, rig)
     hidden = bpy.data.collections.new("Hidden")
     bpy.context.scene.collection.children.link(hidden)
     bpy.context.view_layer.layer_collection.children["Hidden"].exclude = True
     excluded, _ = scenes.make_arm(sides=6, rings=9, name="Excluded")
-    bpy.context.scene.collection.objects.unlink(excluded)
-    hidden.objects.link(excluded)
+    scenes.move_to(hidden, excluded)
 
 
 def test_everything_comes_back(tmp_path):

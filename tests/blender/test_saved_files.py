@@ -18,25 +18,15 @@ from sinew_addon.attach import attach, node_group, note, properties, stack, upda
 from sinew_addon.deform import apply_plan, safe_mode, session, small_meshes
 from sinew_addon.io import armature_io
 from sinew_addon.ui import state_text
+from test_bake import read_elsewhere
 
 FRAMES = [1, 6, 11]
 
 READ = """
-import json, sys, bpy, numpy as np
+import json, sys, bpy
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 assert not hasattr(bpy.types.Object, "sinew")
-scene, obj = bpy.context.scene, bpy.data.objects["Arm"]
-if obj.mode != "OBJECT":
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.object.mode_set(mode="OBJECT")
-shapes = []
-for frame in json.loads(sys.argv[3]):
-    scene.frame_set(frame)
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", points.ravel())
-    shapes.append(points)
-np.save(sys.argv[2], np.stack(shapes))
+obj = bpy.data.objects["Arm"]
 sinews = obj.modifiers["Sinew"]
 sinews.show_viewport = True
 bpy.context.view_layer.update()
@@ -52,14 +42,9 @@ print("FACTS " + json.dumps({
 
 def played_without_sinew(path: Path) -> tuple[np.ndarray, dict]:
     """The shapes at FRAMES in a Blender without Sinew, and the file's message there."""
-    result = path.with_suffix(".npy")
-    run = checked(without_sinew.run(READ, path, result, json.dumps(FRAMES)), 0)
+    run = checked(without_sinew.run(READ, path), 0)
     facts = json.loads(next(line for line in run.stdout.splitlines() if line.startswith("FACTS "))[6:])
-    return np.load(result), facts
-
-
-def save(path: Path, **options: object) -> None:
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), **options)
+    return read_elsewhere(path, FRAMES, path.parent)["Arm"], facts
 
 
 @pytest.mark.parametrize("safe", [False, True])
@@ -75,8 +60,7 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
     expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume)
     scenes.add_sinew(obj, method)
     ours = scenes.shapes(obj, FRAMES)
-    path = tmp_path / "saved.blend"
-    save(path)
+    path = scenes.save(tmp_path / "saved.blend")
     # Sinew continues, and the artist's own choice is kept.
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
     assert obj.modifiers["Armature"].use_deform_preserve_volume is not preserve_volume
@@ -104,8 +88,7 @@ def test_no_warning_of_a_missing_sinew_where_it_is_installed(tmp_path):
     """The nodes of the warning are in saved files alone."""
     obj, _armature = scenes.skinned_arm("dq")
     nodes = set(stack.sinew_modifier(obj).node_group.nodes.keys())
-    path = tmp_path / "saved.blend"
-    save(path)
+    path = scenes.save(tmp_path / "saved.blend")
     assert set(stack.sinew_modifier(obj).node_group.nodes.keys()) == nodes
     assert warnings_of(obj) == []
     appended, _armature = scenes.link(path, "Arm", "Arm Rig", link=False)
@@ -136,12 +119,11 @@ def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
         if item.in_out == "OUTPUT":
             item.name = "Renamed"
     session.refresh(bpy.context)
-    path = tmp_path / "saved.blend"
-    save(path)
+    path = scenes.save(tmp_path / "saved.blend")
     assert stack.sinew_modifier(obj).show_viewport
     assert "newer Sinew" in properties.of(newer).error
     assert np.array_equal(scenes.shapes(newer, FRAMES), expected)
-    bpy.ops.wm.open_mainfile(filepath=str(path))
+    scenes.opened(path)
     assert properties.of(bpy.data.objects["Newer"]).enabled
     assert properties.of(bpy.data.objects["Newer"]).method == ""
     assert stack.sinew_modifier(bpy.data.objects["Arm"]).show_viewport
@@ -150,9 +132,10 @@ def test_a_method_of_a_newer_sinew_is_kept_and_others_go_on(tmp_path):
         f"import bpy, sinew_addon; sinew_addon.register(); bpy.ops.wm.open_mainfile(filepath={str(path)!r})"
     )
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
-    properties.of(bpy.data.objects["Newer"]).method = "lbs"
-    assert properties.of(bpy.data.objects["Newer"]).error == ""
-    assert stack.sinew_modifier(bpy.data.objects["Newer"]).show_viewport
+    newer = bpy.data.objects["Newer"]
+    properties.of(newer).method = "lbs"
+    assert properties.of(newer).error == ""
+    assert stack.sinew_modifier(newer).show_viewport
 
 
 def test_evaluations_while_saving_change_nothing(tmp_path):
@@ -175,7 +158,7 @@ def test_evaluations_while_saving_change_nothing(tmp_path):
         seen.append((before, state()))
 
     with scenes.handler("save_pre", neighbour):
-        save(tmp_path / "saved.blend")
+        scenes.save(tmp_path / "saved.blend")
     blenders_own = (armature, True, True, False, False)
     assert seen == [(blenders_own, blenders_own)]
     assert state() == (armature, True, True, True, True)
@@ -192,7 +175,7 @@ def test_edit_by_another_add_on_while_saving(tmp_path):
         obj.vertex_groups["bone.1"].add(range(100), 0.7, "REPLACE")
 
     with scenes.handler("save_pre", neighbour):
-        save(tmp_path / "saved.blend")
+        scenes.save(tmp_path / "saved.blend")
     got = scenes.shapes(obj, FRAMES)
     properties.of(obj).enabled = False
     assert scenes.worst(got, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
@@ -202,7 +185,7 @@ def test_a_save_that_fails_ends_as_one_that_does_not(tmp_path):
     obj, _armature = scenes.skinned_arm("dq")
     expected = scenes.shapes(obj, FRAMES)
     with pytest.raises(RuntimeError):
-        save(tmp_path / "no such folder" / "saved.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "no such folder" / "saved.blend"))
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
     assert not updates.phase.is_saving
 
@@ -221,13 +204,13 @@ def test_what_fails_for_an_object_while_saving_is_in_its_panel(tmp_path, monkeyp
         return prepare(each, plan)
 
     monkeypatch.setattr(apply_plan, "apply_saved", fail_for_one)
-    save(tmp_path / "saved.blend")
+    scenes.save(tmp_path / "saved.blend")
     monkeypatch.undo()
     assert "Arm: A Blender without Sinew will not show it posed: RuntimeError: disk on fire" in caplog.text
     assert "disk on fire" in " ".join(state_text.problems_of(obj))
     assert state_text.problems_of(other) == []
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-    save(tmp_path / "saved.blend")
+    scenes.save(tmp_path / "saved.blend")
     assert state_text.problems_of(obj) == []
 
 
@@ -241,9 +224,9 @@ def test_an_error_is_not_saved_as_the_artists_choice(tmp_path, monkeypatch):
     monkeypatch.setattr(armature_io, "read_pose", fail)
     scenes.shapes(obj, FRAMES)
     assert "disk on fire" in properties.of(obj).error
-    save(tmp_path / "saved.blend")
+    path = scenes.save(tmp_path / "saved.blend")
     monkeypatch.undo()
-    obj = scenes.opened(tmp_path / "saved.blend")
+    obj = scenes.opened(path)
     assert (properties.of(obj).enabled, properties.of(obj).error) == (True, "")
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
@@ -256,7 +239,7 @@ def test_saved_in_a_mode_of_the_modifier(tmp_path, mode):
     ours = scenes.shapes(obj, FRAMES)
     bpy.ops.object.mode_set(mode=mode)
     bpy.context.view_layer.update()
-    save(tmp_path / "saved.blend")
+    scenes.save(tmp_path / "saved.blend")
     bpy.ops.object.mode_set(mode="OBJECT")
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
     assert not obj.modifiers["Armature"].use_deform_preserve_volume
@@ -274,7 +257,7 @@ def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
     monkeypatch.setattr(small_meshes, "is_used", False)
     properties.of(small).enabled = what != "off"
     scenes.add_sinew(obj, "dq")
-    save(tmp_path / "saved.blend")
+    scenes.save(tmp_path / "saved.blend")
     shapes, _facts = played_without_sinew(tmp_path / "saved.blend")
     assert np.array_equal(shapes, expected)
     assert small.modifiers["Armature"].object == armature
@@ -299,9 +282,8 @@ def test_a_keyed_pose_that_differs_is_not_lost_by_opening(tmp_path):
     obj, armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(11)
     armature.pose.bones[1].rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
-    scenes.reopened(tmp_path / "saved.blend")
+    obj = scenes.reopened(tmp_path / "saved.blend")
     bpy.context.view_layer.update()
-    obj = bpy.data.objects["Arm"]
     shown = scenes.final_points(obj)
     bpy.context.scene.frame_set(10)
     bpy.context.scene.frame_set(11)

@@ -7,19 +7,14 @@ bones under Preserve Volume; the largest difference was 1.3e-6 of the diagonal.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
+import reference
 import scenes
 import sinew
 from sinew_addon.attach import properties
 from sinew_addon.deform import session
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
-import reference
 
 RIGID_METHODS = [method.name for method in sinew.methods() if method.name != "lbs"]
 

@@ -3,37 +3,25 @@
 
 from __future__ import annotations
 
-import sys
-
 import bpy
 import numpy as np
+import reference
 import routes
 import scenes
-from conftest import REPOSITORY
 from sinew_addon.attach import attach
 from sinew_addon.core import sdef
 from sinew_addon.deform import session
-
-sys.path.append(str(REPOSITORY / "tests" / "python"))
-import reference
 
 
 def make_model() -> tuple[bpy.types.Object, bpy.types.Object]:
     """An arm whose vertices of two bones are spherical, except every seventh. For every third the groups
     are stored in reverse order."""
     obj, armature = scenes.make_arm(bones=3)
-    rng = np.random.default_rng(1)
-    obj.shape_key_add(name="Basis")
-    keys = [obj.shape_key_add(name=name) for name in sdef.KEYS]
-    for key in keys:
-        # They are not meant as shapes: in Blender 5.2 a new key has the value 1.
-        key.value = 0.0
+    scenes.add_spheres(
+        obj, [v.index for v in obj.data.vertices if len(v.groups) == 2 and v.index % 7], seed=1
+    )
     for vertex in obj.data.vertices:
         entries = [(entry.group, entry.weight) for entry in vertex.groups]
-        if len(entries) == 2 and vertex.index % 7:
-            centre = np.array([round(vertex.co.x), 0.02, -0.03])
-            for key, point in zip(keys, (centre, *(centre + rng.uniform(-0.2, 0.2, (2, 3)))), strict=True):
-                key.data[vertex.index].co = point
         if len(entries) == 2 and vertex.index % 3 == 0:
             (first, weight), _second = entries
             obj.vertex_groups[first].remove([vertex.index])
@@ -48,8 +36,7 @@ def expected_points(obj: bpy.types.Object, rest: np.ndarray | None = None) -> np
     rest  float [vertices, 3], the vertices after shape keys; None: the mesh's
     """
     armature = attach.armature_of(obj)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    matrices = {b.name: np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones}
+    matrices = dict(zip(armature.data.bones.keys(), scenes.bone_motions(armature), strict=True))
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
     blocks = obj.data.shape_keys.key_blocks if obj.data.shape_keys else {}
     keys = [blocks[name] for name in sdef.KEYS if name in blocks]

@@ -18,7 +18,6 @@ from sinew_addon import cli
 from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake, bake_bones
 from sinew_addon.features.gltf import export
-from test_bake import world_shapes
 
 FRAMES = list(range(1, 12))
 # Of the diagonal.
@@ -32,9 +31,7 @@ def bendy(empty_file):
 
 def make_bendy(curved=False, bent=True, unequal=True):
     """An arm of three bendy bones that bend, twist and grow; with `bent` not set, they only twist."""
-    obj, rig = scenes.make_arm(bones=3)
-    obj.parent = rig
-    rig.location, rig.rotation_euler, rig.scale = (0.3, -0.4, 0.2), (0.5, 0.2, -0.3), (1.3, 1.3, 1.3)
+    obj, rig = scenes.placed_arm()
     for bone in rig.data.bones:
         bone.bbone_segments, bone.bbone_mapping_mode = 6, "CURVED" if curved else "STRAIGHT"
         if curved:
@@ -59,8 +56,7 @@ def baked(obj, method="lbs", frames=FRAMES, **options):
     """The report of a bake into the open file."""
     scenes.add_sinew(obj, method)
     started = bake.start([obj], "bones", frames, Path("arm.blend"), False, HelperOptions(**options))
-    for _share in started.sample():
-        pass
+    list(started.sample())
     started.place()
     (report,) = started.reports
     return report
@@ -105,13 +101,13 @@ SLOW = {"marks": pytest.mark.slow}
 )
 def test_gltf_has_the_armature_modifiers_shape(bendy, tmp_path, curved, motion):
     obj = bendy(curved)
-    (expected,), rest = world_shapes([obj], FRAMES), world_rest(obj)
+    expected, rest = scenes.world_shapes(obj, FRAMES), world_rest(obj)
     report = baked(obj, motion=motion)
     assert report.helpers == 0
     assert (report.segments.bendy, report.segments.bones) == (3, 21)
     for cause in ("method", "sliding", "shear", "cut"):
         assert getattr(report.segments, cause) <= EXACT * report.diagonal
-    assert np.abs(world_shapes([obj], FRAMES)[0] - expected).max() <= EXACT * size_of(expected)
+    assert np.abs(scenes.world_shapes(obj, FRAMES) - expected).max() <= EXACT * size_of(expected)
     bpy.ops.export_scene.gltf(filepath=str(tmp_path / "a.glb"))
     assert_plays(played_gltf(tmp_path / "a.glb"), expected, rest)
     assert scenes.worst(expected[0], expected[-1]) > 0.1
@@ -124,7 +120,7 @@ def test_usd_has_it_too(bendy, tmp_path, bent):
     import other_usd
 
     obj = bendy(curved=False, bent=bent, unequal=bent)
-    (expected,), rest = world_shapes([obj], FRAMES), world_rest(obj)
+    expected, rest = scenes.world_shapes(obj, FRAMES), world_rest(obj)
     baked(obj)
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = FRAMES[0], FRAMES[-1]
     bpy.ops.wm.usd_export(
@@ -150,7 +146,7 @@ def test_bendy_bones_play_other_animation(bendy, tmp_path):
             bone, "rotation_quaternion", ((1, (1, 0, 0, 0)), (11, (0.8, 0.6 - 0.2 * number, 0.2, 0.3)))
         )
     other = rig.animation_data.action
-    (expected,), rest = world_shapes([obj], FRAMES), world_rest(obj)
+    expected, rest = scenes.world_shapes(obj, FRAMES), world_rest(obj)
     rig.animation_data.action = action
     if slot is not None:
         rig.animation_data.action_slot = slot
@@ -168,20 +164,16 @@ def test_what_is_not_exact_is_reported(bendy, tmp_path, cause):
     obj, rest, options = bendy(unequal=False), None, {"influences": 8, "method": "lbs"}
     modifier = obj.modifiers["Armature"]
     if cause == "method":
-        (linear,) = world_shapes([obj], FRAMES)
+        linear = scenes.world_shapes(obj, FRAMES)
         options["method"], modifier.use_deform_preserve_volume = "dq", True
     elif cause == "sliding":
-        obj.shape_key_add(name="Basis")
-        key = obj.shape_key_add(name="Along")
-        for point in key.points:
-            point.co.x *= 0.9
-        scenes.key(key, "value", ((1, 0.0), (11, 1.0)))
+        scenes.key_shape(obj, (0.9, 1.0, 1.0))
     elif cause == "shear":
         scenes.key(obj.parent.pose.bones[0], "scale", ((1, (1, 1, 1)), (11, (1.1, 1.4, 0.8))))
         rest = world_rest(obj)
     else:
         options["influences"] = 2
-    (expected,) = world_shapes([obj], FRAMES)
+    expected = scenes.world_shapes(obj, FRAMES)
     scenes.add_sinew(obj, options["method"])
     (report,), _names, kept = bake_bones.replace_bendy_bones([obj], FRAMES, options["influences"])
     assert kept == []
@@ -196,7 +188,7 @@ def test_what_is_not_exact_is_reported(bendy, tmp_path, cause):
         if cause == "cut":
             bpy.context.view_layer.objects.active = obj
             bpy.ops.object.vertex_group_limit_total(group_select_mode="ALL", limit=2)
-        (played,) = world_shapes([obj], FRAMES)
+        played = scenes.world_shapes(obj, FRAMES)
     size, distance = size_of(expected), np.linalg.norm(played - expected, axis=2).max()
     found = {name: getattr(report, name) for name in CAUSES}
     assert distance > 1e-3 * size
@@ -209,10 +201,10 @@ def test_bakes_of_what_is_not_exact_come_nearer(bendy):
     """Weights are solved again, and helper bones are added, as for other rigs."""
     obj = bendy()
     obj.modifiers["Armature"].use_deform_preserve_volume = True
-    (expected,) = world_shapes([obj], FRAMES)
+    expected = scenes.world_shapes(obj, FRAMES)
     report = baked(obj, "dq", influences=8)
     assert report.helpers == 4
-    rms = np.sqrt(np.square(world_shapes([obj], FRAMES)[0] - expected).sum(axis=2).mean())
+    rms = np.sqrt(np.square(scenes.world_shapes(obj, FRAMES) - expected).sum(axis=2).mean())
     assert np.isclose(rms, report.after.rms, rtol=1e-2)
     assert report.after.rms < 0.7 * report.before.rms
     assert report.segments.method > report.after.worst
@@ -227,7 +219,7 @@ def test_the_command_exports_plain_bones(bendy, tmp_path, capfd, method):
     if method == "cor":
         scenes.add_sinew(obj, "cor")
     obj.modifiers["Armature"].use_deform_preserve_volume = method == "dq"
-    (expected,) = world_shapes([obj], FRAMES)
+    expected = scenes.world_shapes(obj, FRAMES)
     assert cli.main(["export", str(file), "--method", method, "--out", str(glb)]) == 0
     assert "Arm Rig: 21 bones for 3 bendy ones" in capfd.readouterr().err
     if method == "lbs":

@@ -30,6 +30,11 @@ def colours_of(mesh: bpy.types.Mesh) -> tuple[str, str]:
     return mesh.attributes.active_color_name, mesh.attributes.default_color_name
 
 
+def assert_restored(obj: bpy.types.Object, types: list[str]) -> None:
+    assert color_types() == types
+    assert colours_of(obj.data) == ("Second", "First")
+
+
 def painted_arm(name: str) -> bpy.types.Object:
     obj, _armature = scenes.make_arm(name=name)
     for colours in ("First", "Second"):
@@ -55,15 +60,6 @@ def shown_arm(what: str) -> bpy.types.Object:
         shading.color_type = ("MATERIAL", "RANDOM", "SINGLE", "OBJECT")[number % 4]
     bpy.context.scene.frame_set(6)
     return obj
-
-
-def attribute_colours(obj: bpy.types.Object) -> np.ndarray:
-    """As they are drawn, float32 [values]."""
-    bpy.context.view_layer.update()
-    attribute = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes[NAME]
-    colours = np.empty(4 * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get("color", colours)
-    return colours
 
 
 def show(what: str) -> None:
@@ -92,9 +88,8 @@ def test_another_measure_hides_the_errors_of_a_bake():
     types = color_types()
     show("error")
     measures.of(bpy.context.scene).quantity = "stretch"
-    assert color_types() == types
+    assert_restored(obj, types)
     assert NAME not in obj.data.attributes
-    assert colours_of(obj.data) == ("Second", "First")
     measures.of(bpy.context.scene).quantity = "bake_error_before"
     assert colours_of(obj.data) == (NAME, "First")
 
@@ -127,8 +122,7 @@ def test_another_bake_hides_the_errors_of_the_last_one():
     scenes.add_sinew(obj, "cor")
     bpy.ops.sinew.bake(kind="bones", frames="1,6,11", helpers=1)
     assert bake_error.shown(bpy.context.scene) == []
-    assert color_types() == types
-    assert colours_of(obj.data) == ("Second", "First")
+    assert_restored(obj, types)
     assert [mesh.name for mesh in bpy.data.meshes if NAME in mesh.attributes] == []
 
 
@@ -138,20 +132,18 @@ def test_undo_and_redo(what):
     types, name = color_types(), obj.name
     bpy.ops.ed.undo_push(message="before")
     show(what)
-    colours = attribute_colours(obj)
+    colours = test_heat_map.shown_colours(obj)
     bpy.ops.ed.undo_push(message="shown")
     bpy.ops.ed.undo()
     session.refresh(bpy.context)
-    assert color_types() == types
-    assert colours_of(bpy.data.objects[name].data) == ("Second", "First")
+    assert_restored(bpy.data.objects[name], types)
     bpy.ops.ed.redo()
     session.refresh(bpy.context)
     obj = bpy.data.objects[name]
     assert set(color_types()) == {"VERTEX"}
-    np.testing.assert_allclose(attribute_colours(obj), colours, atol=1e-6)
+    np.testing.assert_allclose(test_heat_map.shown_colours(obj), colours, atol=1e-6)
     show(what)
-    assert color_types() == types
-    assert colours_of(obj.data) == ("Second", "First")
+    assert_restored(obj, types)
 
 
 @pytest.mark.parametrize("what", ["heat", "error"])
@@ -159,16 +151,15 @@ def test_a_saved_file_shows_it_and_gives_all_back(what, tmp_path):
     obj = shown_arm(what)
     types, name, path = color_types(), obj.name, str(tmp_path / "shown.blend")
     show(what)
-    colours = attribute_colours(obj)
+    colours = test_heat_map.shown_colours(obj)
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
     obj = bpy.data.objects[name]
     assert set(color_types()) == {"VERTEX"}
-    np.testing.assert_allclose(attribute_colours(obj), colours, atol=1e-6)
+    np.testing.assert_allclose(test_heat_map.shown_colours(obj), colours, atol=1e-6)
     assert what == "heat" or bake_error.shown(bpy.context.scene) == [obj]
     show(what)
-    assert color_types() == types
-    assert colours_of(obj.data) == ("Second", "First")
+    assert_restored(obj, types)
 
 
 @pytest.mark.parametrize("what", ["heat", "error"])
@@ -188,8 +179,7 @@ def test_without_the_add_on_all_is_as_before(what):
     show(what)
     registration.unregister()
     try:
-        assert color_types() == types
-        assert colours_of(obj.data) == ("Second", "First")
+        assert_restored(obj, types)
         assert NAME not in obj.data.attributes
     finally:
         registration.register()
@@ -198,5 +188,4 @@ def test_without_the_add_on_all_is_as_before(what):
         assert set(color_types()) == {"VERTEX"}
         assert colours_of(obj.data) == (NAME, "First")
         attach.remove(obj)
-    assert color_types() == types
-    assert colours_of(obj.data) == ("Second", "First")
+    assert_restored(obj, types)

@@ -16,36 +16,18 @@ DEGREES = 60.0, 120.0, 170.0
 
 
 def make_tentacle() -> tuple[bpy.types.Object, bpy.types.Object, np.ndarray]:
-    """Returns a tube, its armature of bones that are one long, and its weights [vertices, bones]."""
-    data = bpy.data.armatures.new("Tentacle")
-    armature = scenes.added("Tentacle", data)
-    scenes.enter(armature, "EDIT")
-    above = None
-    for number in range(BONES):
-        bone = data.edit_bones.new(f"Bone {number}")
-        bone.head, bone.tail, bone.parent = (0, 0, number), (0, 0, number + 1), above
-        above = bone
-    scenes.enter(armature, "OBJECT")
-    around = np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    heights = np.linspace(0, BONES, 20 * BONES + 1)
-    height, angle = (each.ravel() for each in np.meshgrid(heights, around, indexing="ij"))
-    points = np.stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), height], axis=1)
-    ring = np.arange(12)
-    first = np.stack([ring, np.roll(ring, -1), np.roll(ring, -1) + 12, ring + 12], axis=1)
-    faces = (first + 12 * np.arange(len(heights) - 1)[:, None, None]).reshape(-1, 4)
-    mesh = bpy.data.meshes.new("Tube")
-    mesh.from_pydata(points.tolist(), [], faces.tolist())
-    obj = scenes.added("Tube", mesh)
-    distance = np.abs(height[:, None] - np.arange(BONES) - 0.5) / 2
+    """Returns an arm, its armature of bones that are one long, and its weights [vertices, bones]."""
+    obj, armature = scenes.make_arm(bones=BONES, rings=20 * BONES + 1)
+    scenes.forget_keys(armature)
+    for bone in armature.pose.bones:
+        bone.matrix_basis.identity()
+    distance = np.abs(scenes.rest_points(obj)[:, :1] - np.arange(BONES) - 0.5) / 2
     weights = np.where(distance < 1, (1 - distance**2) ** 2, 0)
     weights /= weights.sum(axis=1, keepdims=True)
-    for number in range(BONES):
-        group = obj.vertex_groups.new(name=f"Bone {number}")
-        for vertex in np.flatnonzero(weights[:, number] > 1e-6):
-            group.add([int(vertex)], float(weights[vertex, number]), "REPLACE")
-    modifier = obj.modifiers.new("Armature", "ARMATURE")
-    modifier.object = armature
-    modifier.use_deform_preserve_volume = True
+    obj.vertex_groups.clear()
+    for bone, shares in zip(armature.data.bones, weights.T, strict=True):
+        scenes.paint(obj, bone.name, shares)
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
     return obj, armature, weights
 
 
@@ -64,7 +46,7 @@ def blended(points: np.ndarray, weights: np.ndarray, degrees: np.ndarray, method
     if method == "dib":
         angle = 2 * weights @ half
     x, y, z = points.T
-    return np.stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle), z], axis=1)
+    return np.stack([x, y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)], axis=1)
 
 
 def longest_edge(obj: bpy.types.Object, points: np.ndarray) -> float:
@@ -175,4 +157,4 @@ def test_the_rest_pose_and_a_turned_armature_change_nothing():
     bpy.context.view_layer.update()
     x, y, z = before.T
     c, s = np.cos(np.radians(200)), np.sin(np.radians(200))
-    assert scenes.worst(scenes.final_points(obj), np.stack([c * x - s * y, s * x + c * y, z], axis=1)) < 1e-5
+    assert scenes.worst(scenes.final_points(obj), np.stack([x, c * y - s * z, s * y + c * z], axis=1)) < 1e-5

@@ -13,7 +13,6 @@ import whole_file
 from sinew_addon.attach import attach, normals, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
 from sinew_addon.deform import session, small_meshes
-from sinew_addon.features.heat import live
 from sinew_addon.ui import state_text
 
 FRAMES = [1, 6, 11]
@@ -25,9 +24,8 @@ def left_where_faster(small_meshes_as_users_have_them, monkeypatch):
 
 
 @pytest.fixture
-def arm():
-    obj, armature = scenes.skinned_arm()
-    return obj, armature
+def obj():
+    return scenes.skinned_arm()[0]
 
 
 def deformer(obj: bpy.types.Object) -> str:
@@ -73,10 +71,6 @@ def keep_volume(obj: bpy.types.Object) -> None:
     own.use_deform_preserve_volume = not own.use_deform_preserve_volume
 
 
-def key_the_method(obj: bpy.types.Object) -> None:
-    properties.of(obj).keyframe_insert("method", frame=1)
-
-
 def unkey(obj: bpy.types.Object) -> None:
     properties.of(obj).keyframe_delete("method", frame=1)
     obj.update_tag()
@@ -114,7 +108,10 @@ CHANGES = {
     "a scale rule": [(set_to("scale_rule", IGNORED.name), "sinew"), (set_to("scale_rule", "4.0"), "blender")],
     "a heat map": [(set_to("heat", True), "sinew"), (set_to("heat", False), "blender")],
     "Preserve Volume": [(keep_volume, "sinew"), (keep_volume, "blender")],
-    "keys": [(key_the_method, "sinew"), (unkey, "blender")],
+    "keys": [
+        (lambda obj: properties.of(obj).keyframe_insert("method", frame=1), "sinew"),
+        (unkey, "blender"),
+    ],
     "in front": [
         (lambda obj: scenes.put_in_front(obj, "MIRROR", "Mirror"), "sinew"),
         (lambda obj: obj.modifiers.remove(obj.modifiers["Mirror"]), "blender"),
@@ -125,8 +122,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_taken_up_and_left_by_what_the_artist_does(arm, name):
-    obj, _armature = arm
+def test_taken_up_and_left_by_what_the_artist_does(obj, name):
     assert deformer(obj) == "blender"
     for act, who in CHANGES[name]:
         act(obj)
@@ -134,8 +130,7 @@ def test_taken_up_and_left_by_what_the_artist_does(arm, name):
         assert deformer(obj) == who
 
 
-def test_larger_ones_are_taken_up(arm, monkeypatch):
-    obj, _armature = arm
+def test_larger_ones_are_taken_up(obj, monkeypatch):
     monkeypatch.setitem(small_meshes.VERTICES, "lbs", len(obj.data.vertices))
     bpy.ops.sinew.rebind()
     assert deformer(obj) == "sinew"
@@ -188,9 +183,8 @@ def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, be
 
 
 @pytest.mark.parametrize("beside", ["nothing", "one that is left to Blender"])
-def test_what_a_script_appends_between_two_frames_is_deformed(arm, tmp_path, beside):
+def test_what_a_script_appends_between_two_frames_is_deformed(obj, tmp_path, beside):
     """Where Sinew has nothing to do in frames; Blender has no other event for it."""
-    obj, _armature = arm
     properties.of(obj).method = "qv"
     of_qv = scenes.shapes(obj, FRAMES)
     scenes.save(tmp_path / "arm.blend")
@@ -216,8 +210,7 @@ def test_chained_modifiers_each_by_its_own():
     assert not session.plan_of(obj).uses_builtin
 
 
-def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
-    obj, _armature = arm
+def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(obj):
     scenes.shapes(obj, FRAMES)
     before = set(obj.data.attributes.keys())
     properties.of(obj).leave_small = False
@@ -228,14 +221,12 @@ def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
     assert set(obj.data.attributes.keys()) == before
 
 
-def test_numbers_are_those_of_sinew(arm):
-    obj, _armature = arm
+def test_numbers_are_those_of_sinew(obj):
     measured = []
     for leave in (True, False):
         properties.of(obj).leave_small = leave
         bpy.context.scene.frame_set(6)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        result = live.measure(scenes.states_of(obj), "dq", depsgraph).measured
+        result = scenes.measure(obj, "dq").measured
         measured.append((result.entry("volume_change"), result.field("distance").copy()))
     assert measured[0][0] == pytest.approx(measured[1][0], abs=1e-6)
     assert measured[0][1] == pytest.approx(measured[1][1], abs=1e-6)
@@ -243,8 +234,7 @@ def test_numbers_are_those_of_sinew(arm):
 
 
 @pytest.mark.parametrize("kind", ["shape-keys", "mdd"])
-def test_baked(arm, tmp_path, kind):
-    obj, _armature = arm
+def test_baked(obj, tmp_path, kind):
     expected = scenes.shapes(obj, FRAMES)
     scenes.save(tmp_path / "arm.blend")
     assert bpy.ops.sinew.bake(kind=kind, frames="1-11") == {"FINISHED"}
@@ -279,9 +269,8 @@ def test_fewer_are_left_where_sinew_gives_normals(kind, monkeypatch):
     assert deformer(obj) == "blender"
 
 
-def test_the_icons_of_a_mesh_that_is_left_to_blender(arm):
+def test_the_icons_of_a_mesh_that_is_left_to_blender(obj):
     """That of the Armature modifier hides it, as it deforms in Sinew's place; Sinew's own takes it over."""
-    obj, _armature = arm
     own, sinews = obj.modifiers["Armature"], stack.sinew_modifier(obj)
     bpy.context.scene.frame_set(6)
     shape = scenes.final_points(obj)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scenes
 import test_bake
+import test_compare
 import test_comparison
 import test_heat_map
 import trimesh
@@ -19,9 +20,9 @@ from program import run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS, Measured
-from sinew_addon.deform import characters, session
+from sinew_addon.deform import characters
 from sinew_addon.features.bake import bake
-from sinew_addon.features.heat import live, worst_frames
+from sinew_addon.features.heat import worst_frames
 from sinew_addon.features.pages import measure
 
 FRAMES = [1, 6, 11]
@@ -44,23 +45,20 @@ def options(stage: str) -> list[str]:
 
 def set_on(obj: bpy.types.Object, stage: str) -> None:
     """Sets them like the panel."""
-    own = properties.of(obj)
     if stage == "mix":
-        own.mix.method, own.mix.group = "lbs", GROUP
+        mix = properties.of(obj).mix
+        mix.method, mix.group = "lbs", GROUP
         return
-    spread, limit, mush = own.twist_spread, own.bulge_limit, own.delta_mush
-    spread.amount, spread.group, spread.enabled = 0.9, GROUP, True
-    limit.strength, limit.group, limit.enabled = 0.8, GROUP, True
-    mush.iterations, mush.pin_boundary, mush.enabled = 12, True, True
+    scenes.set_stage(obj, "twist_spread", amount=0.9, group=GROUP)
+    scenes.set_stage(obj, "bulge_limit", strength=0.8, group=GROUP)
+    scenes.set_stage(obj, "delta_mush", iterations=12, pin_boundary=True)
 
 
 @pytest.fixture
 def arm(tmp_path):
     """The mesh, and the file in which it is saved."""
     obj, _armature = scenes.make_arm(bones=3)
-    group = obj.vertex_groups.new(name=GROUP)
-    for vertex in obj.data.vertices:
-        group.add([vertex.index], float(np.clip(vertex.co.x - 0.5, 0.0, 1.0)), "REPLACE")
+    scenes.paint(obj, GROUP, scenes.rest_points(obj)[:, 0] - 0.5)
     return obj, scenes.save(tmp_path / "arm.blend")
 
 
@@ -90,14 +88,10 @@ def measured(obj: bpy.types.Object, frame: int, shape: np.ndarray) -> Measured:
     return found
 
 
-def test_compare_measures_the_shapes_with_it(arm, stage, tmp_path):
+def test_compare_measures_the_shapes_with_it(arm, stage):
     obj, path = arm
     _without, shapes = with_stage(obj, stage)
-    run_sinew(
-        *("compare", path, "--methods", "blender,dq", "--frames", "11", "--pictures", 0),
-        *(*options(stage), "--out", tmp_path / "page"),
-    )
-    found = json.loads((tmp_path / "page" / "arm" / "metrics.json").read_text(encoding="utf-8"))
+    found = test_compare.compared(path, "--methods", "blender,dq", "--frames", "11", *options(stage))
     rows = {method: row for method, (row,) in found["summaries"].items()}
     characters.use_method(obj, characters.BLENDER)
     # The Armature modifier has no stages.
@@ -134,8 +128,7 @@ def test_numbers_and_worst_frames_are_of_it(arm, stage):
     for frame, own in expected.items():
         assert found[frame] == pytest.approx(own.entry(METRICS["stretch"].worst), rel=1e-3, abs=1e-5)
     bpy.context.scene.frame_set(11)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    numbers = live.measure(session.states_of([obj], depsgraph), characters.BLENDER, depsgraph).measured
+    numbers = scenes.measure(obj).measured
     for name, value in expected[11].summary().__dict__.items():
         assert numbers.summary().__dict__[name] == pytest.approx(value, rel=2e-4, abs=2e-5), name
 
@@ -146,29 +139,28 @@ def test_copies_of_a_comparison_have_the_stages(arm, stage):
     assert_copy_shows(obj, without if stage == "mix" else shapes)
 
 
-def test_copies_have_a_corrective_smooth_that_was_taken_over_once(arm):
+@pytest.fixture
+def taken_over(arm):
+    """The mesh with a Corrective Smooth that was taken over, and its shapes before."""
     obj, _path = arm
-    modifier = obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH")
-    modifier.iterations = 20
+    obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH").iterations = 20
     scenes.add_sinew(obj, "dq")
     behind = scenes.shapes(obj, FRAMES)
     bpy.context.view_layer.objects.active = obj
     assert bpy.ops.sinew.take_over_smooth() == {"FINISHED"}
     assert properties.of(obj).delta_mush.enabled
-    assert_copy_shows(obj, behind)
+    return obj, behind
+
+
+def test_copies_have_a_corrective_smooth_that_was_taken_over_once(taken_over):
+    assert_copy_shows(*taken_over)
 
 
 @pytest.mark.parametrize("kind", ["mdd", "bones"])
-def test_a_bake_has_a_corrective_smooth_that_was_taken_over_once(arm, kind, tmp_path):
-    obj, _path = arm
-    obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH").iterations = 20
-    scenes.add_sinew(obj, "dq")
-    expected = scenes.shapes(obj, FRAMES)
-    bpy.context.view_layer.objects.active = obj
-    assert bpy.ops.sinew.take_over_smooth() == {"FINISHED"}
+def test_a_bake_has_a_corrective_smooth_that_was_taken_over_once(taken_over, kind, tmp_path):
+    obj, expected = taken_over
     started = bake.start([obj], kind, FRAMES, tmp_path / "arm.blend", overwrite=False)
-    for _share in started.sample():
-        pass
+    list(started.sample())
     started.publish()
     started.place()
     distances = np.linalg.norm(scenes.shapes(obj, FRAMES) - expected, axis=2)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import scenes
 import sinew
+import test_recommended
 from sinew_addon.attach import properties
 from sinew_addon.core import thumbnail
 from sinew_addon.core.suggestion import CRITERIA, MEASURED, Suggestion
-from sinew_addon.features.heat import live
 from sinew_addon.features.suggest import recommend, suggest, worst_pictures
 from sinew_addon.features.suggest.crossings import crossing_triangles
 
@@ -39,8 +39,7 @@ def test_numbers_are_those_of_each_method():
             continue
         properties.of(obj).method = method
         bpy.context.scene.frame_set(int(worst.frame))
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
+        measured = scenes.measure(obj).measured
         assert worst.value == pytest.approx(measured.entry(MEASURED[name]), rel=1e-5, abs=1e-7)
     # A bent and twisted arm: linear blending loses the most volume.
     assert abs(suggestion.worst["lbs", "volume"].value) > 2 * abs(suggestion.worst["dq", "volume"].value)
@@ -49,11 +48,7 @@ def test_numbers_are_those_of_each_method():
 
 def test_one_combination_is_recommended_and_a_click_uses_it():
     """The same one as by Recommended, measured in a row of its own."""
-    obj, armature = scenes.skinned_arm("lbs", sides=16, rings=41)
-    armature.animation_data_clear()
-    bone = armature.pose.bones[1]
-    bone.rotation_mode, bone.location = "XYZ", (0.0, 0.0, 0.0)
-    scenes.key(bone, "rotation_euler", ((1, (0.0, 0.0, 0.0)), (11, (0.0, 2.5, 0.0))))
+    obj, _armature = test_recommended.arm(143.0, axis=1, sides=16, rings=41)
     bpy.ops.sinew.suggest()
     suggestion, choice = found(), recommend.choices[bpy.context.scene.session_uid]
     assert choice == recommend.result_of(recommend.search(bpy.context.scene, [obj]))
@@ -62,7 +57,7 @@ def test_one_combination_is_recommended_and_a_click_uses_it():
     bpy.ops.sinew.use_recommended()
     assert (properties.of(obj).method, properties.of(obj).twist_spread.enabled) == (choice.method, True)
     bpy.context.scene.frame_set(11)
-    measured = live.measure(scenes.states_of(obj), "blender", bpy.context.evaluated_depsgraph_get()).measured
+    measured = scenes.measure(obj).measured
     known = suggestion.worst[suggest.RECOMMENDED, "volume"]
     assert known.frame == 11
     assert known.value == pytest.approx(measured.entry(MEASURED["volume"]), rel=1e-4)
@@ -109,8 +104,7 @@ def test_pictures_are_drawn_where_each_is_worst(monkeypatch):
         "draw",
         lambda *args, own=thumbnail.draw: seen.append(own(*args)) or seen[-1],
     )
-    for _share in suggest.scan(scene, [obj], "SCENE"):
-        pass
+    list(suggest.scan(scene, [obj], "SCENE"))
     assert len(seen) == len(found().methods)
     middles = [picture[picture.shape[0] // 2, picture.shape[1] // 2, 3] for picture in seen]
     # The place is in the middle of its picture.

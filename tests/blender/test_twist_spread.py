@@ -15,10 +15,7 @@ from sinew_addon.deform import session
 
 
 def spread(obj: bpy.types.Object, **values: object) -> None:
-    stage = properties.of(obj).twist_spread
-    for name, value in values.items():
-        setattr(stage, name, value)
-    stage.enabled = True
+    scenes.set_stage(obj, "twist_spread", **values)
 
 
 def assert_spread(obj: bpy.types.Object, before: np.ndarray) -> None:
@@ -95,10 +92,8 @@ def test_bones_have_an_amount_and_a_curve_that_can_be_keyed(route):
     bpy.context.view_layer.update()
     plain = scenes.final_points(obj)
     assert scenes.worst(whole, plain) > 0.05
-    for frame, amount, curve in ((1, 0.0, 0.0), (11, 1.0, 0.8)):
-        own.sinew_twist_amount, own.sinew_twist_curve = amount, curve
-        own.keyframe_insert("sinew_twist_amount", frame=frame)
-        own.keyframe_insert("sinew_twist_curve", frame=frame)
+    scenes.key(own, "sinew_twist_amount", ((1, 0.0), (11, 1.0)))
+    scenes.key(own, "sinew_twist_curve", ((1, 0.0), (11, 0.8)))
     at = scenes.shapes(obj, [1, 6, 11])
     assert scenes.worst(at[0], plain) < 1e-6
     bpy.context.scene.frame_set(6)

@@ -12,12 +12,6 @@ import scenes
 from sinew_addon.attach import attach, node_group, properties, stack
 
 
-@pytest.fixture(autouse=True)
-def released():
-    yield
-    routes.release()
-
-
 @pytest.fixture
 def rendered(rendered_points):
     """rendered(object): its shape, its undeformed shape and its attributes, as renderers get them."""
@@ -43,14 +37,6 @@ def _with_keys(obj):
     obj.data.shape_keys.key_blocks[1].value = 1.0
 
 
-def _in_front(kind):
-    def add(obj):
-        obj.modifiers.new("In Front", kind)
-        obj.modifiers.move(1, 0)
-
-    return add
-
-
 def _by_envelopes(obj):
     obj.vertex_groups.clear()
     obj.modifiers["Armature"].use_bone_envelopes = True
@@ -66,8 +52,8 @@ CHARACTERS = {
     "Subdivision behind": lambda obj: obj.modifiers.new("Behind", "SUBSURF"),
     "Solidify behind": lambda obj: obj.modifiers.new("Behind", "SOLIDIFY"),
     "Cast behind": lambda obj: obj.modifiers.new("Behind", "CAST"),
-    "Subdivision in front": _in_front("SUBSURF"),
-    "Cast in front": _in_front("CAST"),
+    "Subdivision in front": scenes.put_in_front,
+    "Cast in front": lambda obj: scenes.put_in_front(obj, "CAST"),
     "shared mesh": _shared,
     "no vertex groups": _by_envelopes,
     "Add Rest Position": lambda obj: setattr(obj, "add_rest_position_attribute", True),
@@ -75,9 +61,7 @@ CHARACTERS = {
 
 
 @pytest.mark.parametrize("name", CHARACTERS)
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_coordinates_are_those_with_the_armature_modifier(rendered, route, name):
-    routes.force(route)
     obj, _armature = scenes.make_arm()
     CHARACTERS[name](obj)
     expected = rendered(obj)
@@ -104,7 +88,9 @@ def test_modifiers_in_front_that_make_another_mesh(rendered, kind):
         obj.modifiers["Armature"].use_bone_envelopes = True
     modifier = scenes.put_in_front(obj, kind)
     if kind == "NODES":
-        modifier.node_group = _tree(lambda group, _source: node_group.add(group, "GeometryNodeMeshCone"))
+        modifier.node_group = scenes.nodes(
+            lambda group, _source: node_group.add(group, "GeometryNodeMeshCone")
+        )
     expected = rendered(obj)[0], scenes.final_points(obj)
     assert scenes.worst(expected[1], scenes.shapes(obj, [1])[0]) > 0.05
     scenes.add_sinew(obj, "lbs")
@@ -140,30 +126,19 @@ def _of_another_object(group, _source):
     return node_group.add(group, "GeometryNodeObjectInfo", {"Object": other}).outputs["Geometry"]
 
 
-def _tree(make):
-    group = bpy.data.node_groups.new("Made", "GeometryNodeTree")
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    source = node_group.add(group, "NodeGroupInput")
-    node_group.add(group, "NodeGroupOutput", {0: make(group, source)})
-    return group
-
-
 @pytest.mark.parametrize("make", [_remove, _remove_by_pattern, _of_another_object])
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_node_groups_in_front_that_lose_the_mark(rendered, route, make):
     """Also where the artist changes the group while Sinew is on."""
-    routes.force(route)
     obj, _armature = scenes.make_arm(bones=3)
     mask = obj.vertex_groups.new(name="Mask")
     mask.add(range(len(obj.data.vertices)), 0.7, "REPLACE")
     obj.modifiers["Armature"].vertex_group = mask.name
-    trees = [_tree(make), _tree(lambda group, source: source)]
+    trees = [scenes.nodes(make), scenes.nodes(lambda group, source: source)]
 
     def nested(group, source):
         return node_group.add(group, "GeometryNodeGroup", {0: source}, node_tree=trees[0])
 
-    outer = _tree(nested)
+    outer = scenes.nodes(nested)
     scenes.put_in_front(obj, "NODES").node_group = outer
 
     def shapes(tree):

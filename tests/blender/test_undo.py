@@ -17,12 +17,6 @@ from sinew_addon.attach import attach, node_group, properties, stack
 from sinew_addon.deform import session
 
 
-@pytest.fixture(autouse=True)
-def released():
-    yield
-    routes.release()
-
-
 def _arm_beside_cube():
     """An arm with Sinew and shape keys, and a cube next to it; both selected, the cube active."""
     obj, _armature = scenes.make_arm()
@@ -61,9 +55,7 @@ def _make_keys_absolute():
 
 @pytest.mark.parametrize("name", ["Sinew", "Skin"])
 @pytest.mark.parametrize("change", [_link_data, _make_keys_absolute])
-@pytest.mark.parametrize("route", routes.ROUTES)
 def test_undo_of_what_sinew_reacted_to_after_the_step(route, change, name):
-    routes.force(route)
     arm = _arm_beside_cube()
     stack.sinew_modifier(arm).name = name
     bpy.ops.ed.undo_push(message="named")
@@ -84,26 +76,10 @@ def test_undo_of_what_sinew_reacted_to_after_the_step(route, change, name):
     assert scenes.worst(scenes.final_points(bpy.data.objects["Arm"]), expected) < 1e-6
 
 
-def _weights(arm):
-    arm.vertex_groups["bone.0"].add(range(100, 200), 0.3, "REPLACE")
-
-
 def _points(arm):
     for vertex in arm.data.vertices:
         vertex.co.z += 0.3
     arm.data.update()
-
-
-def _key_value(arm):
-    arm.data.shape_keys.key_blocks["Key 1"].value = 0.7
-
-
-def _bone_option(arm):
-    attach.armature_of(arm).data.bones["bone.1"].use_deform = False
-
-
-def _pose(arm):
-    attach.armature_of(arm).pose.bones["bone.1"].rotation_quaternion = (0.9, 0.2, 0.3, 0.0)
 
 
 def _removed(arm):
@@ -111,12 +87,15 @@ def _removed(arm):
     session.refresh(bpy.context)
 
 
-def _added_object(_arm):
-    scenes.added("Empty", None)
-
-
-def _added_modifier(arm):
-    arm.modifiers.new("Behind", "SMOOTH").show_viewport = False
+EDITS = {
+    "weights": lambda arm: arm.vertex_groups["bone.0"].add(range(100, 200), 0.3, "REPLACE"),
+    "points": _points,
+    "key value": lambda arm: setattr(arm.data.shape_keys.key_blocks["Key 1"], "value", 0.7),
+    "bone option": lambda arm: setattr(attach.armature_of(arm).data.bones["bone.1"], "use_deform", False),
+    "pose": lambda arm: scenes.bend(attach.armature_of(arm), 70.0),
+    "added object": lambda arm: scenes.added("Empty", None),
+    "added modifier": lambda arm: setattr(arm.modifiers.new("Behind", "SMOOTH"), "show_viewport", False),
+}
 
 
 def _opened_again(tmp_path, edit):
@@ -124,25 +103,23 @@ def _opened_again(tmp_path, edit):
     arm, _rig = scenes.make_arm()
     other, _rig = scenes.make_arm(name="Other")
     other.location.y = 2.0
-    if edit is _key_value:
+    if edit == "key value":
         arm.shape_key_add()
         arm.shape_key_add(name="Key 1").value = 1.0
     for obj in (arm, other):
         scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(7)
     bpy.context.view_layer.objects.active = arm
-    path = str(tmp_path / "undo.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    scenes.reopened(tmp_path / "undo.blend")
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="opened")
 
 
+@pytest.mark.parametrize("route", [routes.UPDATE], indirect=True)
 @pytest.mark.parametrize("helper", ["point_buffer", "upstream_proxy", "armature", "copied"])
-def test_undo_that_takes_another_object_for_the_object(helper):
+def test_undo_that_takes_another_object_for_the_object(route, helper):
     """Blender does that where it reads the object into the memory that the other had
     (point_store.clear_references_to_itself)."""
-    routes.force(routes.UPDATE)
     arm, _rig = scenes.make_arm()
     scenes.put_in_front(arm, "CAST")
     scenes.add_sinew(arm, "dq")
@@ -178,18 +155,15 @@ def test_undo_that_takes_another_object_for_the_object(helper):
     assert arm == bpy.data.objects.get("Arm")
 
 
-_LEAVE_ALONE = [_weights, _points, _key_value, _bone_option, _pose, _added_object, _added_modifier]
-
-
-@pytest.mark.parametrize("edit", _LEAVE_ALONE, ids=lambda each: each.__name__)
-def test_what_a_step_leaves_alone_is_not_read_again(edit, tmp_path):
-    routes.force(routes.EVALUATION)
+@pytest.mark.parametrize("route", [routes.EVALUATION], indirect=True)
+@pytest.mark.parametrize("edit", EDITS)
+def test_what_a_step_leaves_alone_is_not_read_again(route, edit, tmp_path):
     _opened_again(tmp_path, edit)
     # All meshes are reported after undo of a file's first step.
-    for each in (_pose, edit):
-        each(bpy.data.objects["Arm"])
+    for each in ("pose", edit):
+        EDITS[each](bpy.data.objects["Arm"])
         bpy.context.view_layer.update()
-        bpy.ops.ed.undo_push(message=each.__name__)
+        bpy.ops.ed.undo_push(message=each)
     known = session.state_of(bpy.data.objects["Other"])
     bound = known.bound
     # Also a second time: reactions to undo are part of the next step.

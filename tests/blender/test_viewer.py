@@ -24,10 +24,7 @@ GROUP = "Painted"
 
 def make_character(bones=3):
     """An arm, moved, rotated and scaled as one, with a scaled bone."""
-    obj, armature = scenes.make_arm(bones)
-    armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), Euler((0.5, 0.2, -0.3))
-    armature.scale = (1.3, 1.3, 1.3)
-    obj.parent = armature
+    obj, armature = scenes.placed_arm(bones)
     obj.location, obj.rotation_euler, obj.scale = (0.1, 0.0, 0.05), Euler((0.0, 0.1, 0.2)), (1.1, 0.9, 1.0)
     scenes.key(armature.pose.bones[1], "scale", [(1, (1.0, 1.0, 1.0)), (11, (1.2, 0.9, 1.1))])
     bpy.context.view_layer.update()
@@ -76,10 +73,8 @@ def test_the_data_is_what_points_computes(tmp_path, bones):
 def test_the_painted_mix_is_that_of_the_file(tmp_path):
     obj = make_character()
     scenes.add_sinew(obj, "dq")
-    heights = np.array([vertex.co.z for vertex in obj.data.vertices])
-    group = obj.vertex_groups.new(name=GROUP)
-    for vertex, share in enumerate((heights - heights.min()) / np.ptp(heights)):
-        group.add([vertex], float(share), "REPLACE")
+    heights = scenes.rest_points(obj)[:, 2]
+    scenes.paint(obj, GROUP, (heights - heights.min()) / np.ptp(heights))
     obj.sinew.mix.method, obj.sinew.mix.group = "cor", GROUP
     path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "lbs,dq", "--frames", "1,6,11")
@@ -106,9 +101,7 @@ def make_limb(angle=150.0, mode="QUATERNION"):
             scenes.key(bone, "rotation_quaternion", [(1, (1.0, 0.0, 0.0, 0.0)), (11, last.to_quaternion())])
     obj.parent.pose.bones["forearm.L"].sinew_twist_curve = 0.5
     obj.parent.pose.bones["upper_arm.L"].sinew_twist_amount = 0.7
-    group = obj.vertex_groups.new(name=GROUP)
-    for vertex in range(len(obj.data.vertices)):
-        group.add([vertex], vertex % 5 / 4, "REPLACE")
+    scenes.paint(obj, GROUP, np.arange(len(obj.data.vertices)) % 5 / 4)
     scenes.add_sinew(obj, "dq")
     obj.sinew.mix.method, obj.sinew.mix.group = "lbs", GROUP
     return obj
@@ -117,11 +110,9 @@ def make_limb(angle=150.0, mode="QUATERNION"):
 @pytest.mark.parametrize("form", ["continuous", "kim_han"])
 def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
     obj = make_limb(150.0)
-    settings = obj.sinew
-    settings.twist_spread.enabled = settings.bulge_limit.enabled = True
-    settings.twist_spread.amount, settings.bulge_limit.strength = 0.9, 0.8
-    settings.bulge_limit.group, settings.bulge_limit.form = GROUP, form
-    settings.dq.signs = "hierarchy"
+    scenes.set_stage(obj, "twist_spread", amount=0.9)
+    scenes.set_stage(obj, "bulge_limit", strength=0.8, group=GROUP, form=form)
+    obj.sinew.dq.signs = "hierarchy"
     path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "blender,lbs,dq,cor", "--frames", "1,6,11")
     header, (arrays,) = read_page.read(page)
@@ -129,7 +120,7 @@ def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
     assert header["parts"][0]["hierarchy"] == ["dq"]
     assert len(np.unique(arrays["palettes"][2, :, 6, 2])) == 3
     assert_has_points(page, points_of(path, "dq"), "mix", obj)
-    settings.mix.method = "OFF"
+    obj.sinew.mix.method = "OFF"
     scenes.save(path)
     for method in ("lbs", "dq", "cor"):
         expected = points_of(path, method)
@@ -204,11 +195,7 @@ def test_what_hangs_on_bones_goes_with_them(tmp_path):
     eye = bpy.context.object
     eye.parent, eye.parent_type, eye.parent_bone = obj.parent, "BONE", "bone.2"
     path = scenes.save(tmp_path / "arm.blend")
-    worlds = []
-    for frame in FRAMES:
-        bpy.context.scene.frame_set(frame)
-        world = np.array(eye.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-        worlds.append(scenes.final_points(eye) @ world[:3, :3].T + world[:3, 3])
+    worlds = scenes.world_shapes(eye, FRAMES)
     assert np.abs(worlds[2] - worlds[0]).max() > 0.1
     header, meshes = read_page.read(write_page(path, "--methods", "lbs,cor", "--frames", "1,6,11"))
     assert [part["name"] for part in header["parts"]] == ["Arm", eye.name]

@@ -41,8 +41,7 @@ def test_finds_the_peaks_worst_first(quantity):
     # The numbers are those of the frames.
     for frame, value in worst:
         bpy.context.scene.frame_set(frame)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
+        measured = scenes.measure(obj).measured
         assert measured.summary().__dict__ | {"bulge_worst": measured.summary().bulge_worst}
         assert measured.entry(METRICS[quantity].worst) == pytest.approx(value, rel=1e-6)
 
@@ -69,7 +68,7 @@ def test_a_range_fitted_to_frames_holds_all_their_values():
     largest = 0.0
     for frame in range(1, 31):
         scene.frame_set(frame)
-        subject = live.measure(scenes.states_of(obj), settings.other, bpy.context.evaluated_depsgraph_get())
+        subject = scenes.measure(obj, settings.other)
         values = subject.measured.field("bulge")
         largest = max(largest, np.abs(values).max())
         scale = heat_map.scale_of(settings, subject.measured, values)
@@ -103,19 +102,17 @@ def test_numbers_of_the_other_method_are_its_own():
     scene = bpy.context.scene
     scene.unit_settings.system = "METRIC"
     scene.frame_set(15)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    subject = live.measure(scenes.states_of(obj), "lbs", depsgraph)
+    subject = scenes.measure(obj, "lbs")
     measured, other = subject.measured, live.measured_under_other(subject, "lbs")
     assert dict(heat_panel.distances(scene, measured))["Distance"].endswith(" cm")
     obj.sinew.method = "lbs"
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    again = live.measure(scenes.states_of(obj), "lbs", depsgraph)
+    again = scenes.measure(obj, "lbs")
     for name in ("volume_change", "stretch_max", "bulge_min", "bulge_max"):
         assert again.measured.entry(name) == pytest.approx(other.entry(name), rel=1e-6)
     # The other method is shown: there is nothing to compare with.
     assert live.measured_under_other(again, "lbs") is None
     assert {len(row) for row in heat_panel.rows(scene, again.measured, None)} == {3}
-    armature = live.measure(scenes.states_of(obj), "blender", depsgraph)
+    armature = scenes.measure(obj)
     assert live.measured_under_other(armature, "blender") is not None
 
 
@@ -123,32 +120,28 @@ def test_measuring_twice_measures_once():
     """The panel draws often, but computes a frame once."""
     obj, _armature = waving_arm()
     scenes.add_sinew(obj, "dq")
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    first = live.measure(scenes.states_of(obj), "lbs", depsgraph).measured
-    assert live.measure(scenes.states_of(obj), "lbs", depsgraph).measured is first
-    subject = live.measure(scenes.states_of(obj), "lbs", depsgraph)
+    first = scenes.measure(obj, "lbs").measured
+    assert scenes.measure(obj, "lbs").measured is first
+    subject = scenes.measure(obj, "lbs")
     other = live.measured_under_other(subject, "lbs")
     assert live.measured_under_other(subject, "lbs") is other
     bpy.context.scene.frame_set(9)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    second = live.measure(scenes.states_of(obj), "lbs", depsgraph)
+    second = scenes.measure(obj, "lbs")
     assert second.measured is not first
     assert live.measured_under_other(second, "lbs") is not other
     gauge = second.gauge
     bpy.context.scene.frame_set(10)
-    assert live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge is gauge
+    assert scenes.measure(obj, "lbs").gauge is gauge
 
 
 def test_topology_edited_is_measured_anew():
     obj, _armature = waving_arm()
     scenes.add_sinew(obj, "dq")
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    before = live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge.surface
+    before = scenes.measure(obj, "lbs").gauge.surface
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.quads_convert_to_tris(quad_method="FIXED_ALTERNATE", ngon_method="CLIP")
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.scene.frame_set(9)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    after = live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge.surface
+    after = scenes.measure(obj, "lbs").gauge.surface
     assert len(after.edges) == len(obj.data.edges) > len(before.edges)

@@ -123,23 +123,19 @@ def wait(ticks: int = 2) -> Steps:
         yield
 
 
-def click(name: str, *objects: str, **arguments: object) -> set[str]:
+def click(name: str, *objects: str, how: str = "INVOKE_DEFAULT", **arguments: object) -> set[str]:
     """Selects the objects, of which the first becomes active, and presses a button whose effect can be
     undone."""
     if objects:
         choose(*objects)
     category, _dot, operator = name.partition(".")
     with window.in_view3d("WINDOW"):
-        return getattr(getattr(bpy.ops, category), operator)("INVOKE_DEFAULT", True, **arguments)
+        return getattr(getattr(bpy.ops, category), operator)(how, True, **arguments)
 
 
 def execute(name: str, *objects: str, **arguments: object) -> set[str]:
     """The same, without a dialog."""
-    if objects:
-        choose(*objects)
-    category, _dot, operator = name.partition(".")
-    with window.in_view3d("WINDOW"):
-        return getattr(getattr(bpy.ops, category), operator)("EXEC_DEFAULT", True, **arguments)
+    return click(name, *objects, how="EXEC_DEFAULT", **arguments)
 
 
 def choose(*names: str) -> None:
