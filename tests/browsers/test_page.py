@@ -22,7 +22,7 @@ return [...document.querySelectorAll("button, input, select, canvas")].filter((o
 PIXELS = """(() => {
   const { width, height } = document.getElementById("view");
   // Text that wraps once it is written changes it.
-  window.height_drawn = height;
+  window.sinew.height_drawn = height;
   window.sinew.draw(IS_SMOOTH);
   const copy = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
   copy.drawImage(document.getElementById("view"), 0, 0);
@@ -48,7 +48,7 @@ def way(request, browser):
 def pixels(browser, is_smooth="false"):
     """float32 [height, width, 4], colours times opacity, 0 to 255"""
     found = browser.floats(PIXELS.replace("IS_SMOOTH", is_smooth))
-    found = found.reshape(browser.run("return window.height_drawn"), -1, 4).copy()
+    found = found.reshape(browser.run("return window.sinew.height_drawn"), -1, 4).copy()
     found[:, :, :3] *= found[:, :, 3:] / 255
     return found
 

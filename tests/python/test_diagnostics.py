@@ -24,7 +24,9 @@ def findings_of(groups, group_names=NAMES):
         np.array([group for entries in groups for group, _weight in entries], np.int32),
         np.array([weight for entries in groups for _group, weight in entries], np.float32),
     )
-    bones = replace(Bones.none(), names=NAMES, deform=np.ones(len(NAMES), bool))
+    deform = np.ones(len(NAMES), bool)
+    envelopes = replace(Bones.none().envelopes, multiply=~deform)
+    bones = replace(Bones.none(), names=NAMES, deform=deform, envelopes=envelopes)
     entries = entries_of_bones(weights, bones.of_groups(list(group_names)))
     weighting = Weighting(bones, entries, use_envelopes=False)
     found = check_weights(weighting, np.zeros((len(groups), 3)), weights, group_names)
