@@ -245,7 +245,7 @@ def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
     restore_volume(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     for modifier, replaced in replaced_modifiers(obj):
-        if not replaced.visibility_is_keyed:
+        if not _is_keyed(obj, modifier, replaced):
             _show(modifier, *own_visibility(replaced))
     baked.switch_on(obj)
     notify(subscribers.before_removal, obj)
@@ -404,12 +404,14 @@ def _store(obj: bpy.types.Object, pairs: Pairs, name: str, view: icons.View) -> 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
     helping, smooth = stack.helping_modifiers(obj), {}
+    # Else an animation that came while Sinew deformed has not set them yet.
+    is_animation_known = situation.is_by_sinew or Situation(settings.stack.situation) is Situation.OFF
     for name in VIEWS:
         view = _view(obj, pairs, name)
         wanted = icons.icons(view, situation)
         for (modifier, replaced), is_on in zip(pairs, wanted.modifiers, strict=True):
             is_keyed = is_visibility_animated(obj, modifier)
-            if not (is_keyed if situation.is_by_sinew else replaced.visibility_is_keyed):
+            if not (is_keyed if is_animation_known else replaced.visibility_is_keyed):
                 _show_in(modifier, name, is_on)
         if nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
             _show_in(nodes, name, wanted.sinew)

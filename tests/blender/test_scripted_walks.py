@@ -164,6 +164,8 @@ CASES = {
     "pose Rig lower; update; frame 3",
     "keys while Sinew is off, saved": "add Arm; enabled Arm; key_visibility Arm 3 7 0.0; frame 5; save_copy; "
     "frame 8",
+    "keys while Sinew is off, removed": "frame 3; add Sleeve; enabled Sleeve; "
+    "key_visibility Sleeve Armature 2 8 0.0; remove Sleeve; update; frame 9",
     "a driver of one that was off in the viewport": "toggle_modifier Arm Armature 0.9; add Arm dq; "
     "drive_visibility Arm Rig Armature; frame 6; method Arm dq; frame 8; remove Arm",
     "keys of one that was off in the viewport": "toggle_modifier Arm Armature 0.9; add Arm dq; "
