@@ -158,7 +158,7 @@ def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
         or any(modifier.type in _READERS for modifier in stack.upstream(obj))
     ):
         return True
-    has_copy = properties.of(obj).storage.upstream_proxy is not None and not shares_mesh(obj)
+    has_copy = _has_copy(properties.of(obj).storage.upstream_proxy)
     return not has_copy and mesh.users - mesh.use_fake_user - shares_mesh(obj) > 1
 
 
@@ -170,7 +170,8 @@ def is_current(obj: bpy.types.Object) -> bool:
         return True
     # Blender renames groups along with bones only where an Armature modifier has these.
     has_same_groups = proxy.vertex_groups.keys() == obj.vertex_groups.keys()
-    return has_same_groups and _follows_keys(obj, proxy) and mesh_compare.are_alike(obj.data, proxy.data)
+    is_like = has_same_groups and _has_copy(proxy) and _follows_keys(obj, proxy)
+    return is_like and mesh_compare.are_alike(obj.data, proxy.data)
 
 
 def _follows_keys(obj: bpy.types.Object, proxy: bpy.types.Object) -> bool:
@@ -187,7 +188,15 @@ def _follows_keys(obj: bpy.types.Object, proxy: bpy.types.Object) -> bool:
 def follow_points(obj: bpy.types.Object) -> None:
     """Gives the proxy's copy of the mesh, which is not current, the points of the mesh. Another add-on's
     handler can move these with each frame, also of a render."""
-    mesh_compare.write_points(obj.data, properties.of(obj).storage.upstream_proxy.data)
+    proxy = properties.of(obj).storage.upstream_proxy
+    if _has_copy(proxy):
+        mesh_compare.write_points(obj.data, proxy.data)
+
+
+def _has_copy(proxy: bpy.types.Object | None) -> bool:
+    """Whether a proxy has a mesh of its own. Another one is the artist's, and need not be its object's any
+    more."""
+    return proxy is not None and bool(proxy.data.get(_COPY))
 
 
 def remove(obj: bpy.types.Object) -> None:

@@ -237,6 +237,8 @@ CASES = {
     "shape_key_value Arm 0.7 0.1; edit_mesh Arm delete 0.3; frame 11",
     "another mesh with shape keys": "add_shape_key Arm; add_modifier Arm SUBSURF; add Arm; frame 6; "
     "replace_mesh Arm; shape_key_value Arm 0.9 0.9; swap_mesh Arm; shape_key_value Arm 0.9 0.9; frame 8",
+    "a shared mesh in the place of which it gets its own": "add_modifier Leg SUBSURF; share_mesh Leg Box; "
+    "add Leg dq; swap_mesh Leg; ~move_vertices Box; render 0.1; frame 9; move_vertices Box; frame 6",
     "a keyed shape key deleted": "add_shape_key Arm; key_shape_key Arm 1 11; add_shape_key Arm; "
     "add_modifier Arm SUBSURF; add Arm; frame 6; delete_shape_key Arm 0.9 'key 1'; frame 7",
     "its mesh without shape keys changes": "add_modifier Arm MASK lower; add Arm; frame 6; "
