@@ -955,8 +955,10 @@ def no_size(w: Walker, r: random.Random) -> None:
             raise ValueError(f"{each.name}: without size its shape depends on the frame before")
         is_kept = _KEEP_COLLAPSED.issuperset(modifier.type for modifier in w.modifiers(each))
         if np.isfinite(scale).all() and is_kept and _is_collapsed_once(each):
-            # Its points can be far from its origin, and are as exact as that.
-            points = np.vstack((points[0], np.zeros(3)))
+            # In the world, as the direction in which a mesh has no size shows nothing. Points can be far from
+            # the origin, and are as exact as that.
+            world = np.array(each.matrix_world)
+            points = np.vstack((points[0] @ world[:3, :3].T + world[:3, 3], np.zeros(3)))
             w.rendered[f"{each.name_full} in the render, without size"] = points
     obj.scale = before
     w.this_frame()
