@@ -130,7 +130,8 @@ def animated_paths(obj: bpy.types.Object) -> set[str]:
 
 
 def remove_curves(owner: bpy.types.ID, end: str) -> None:
-    """Removes the curves whose data path ends with this."""
+    """Removes the curves whose data path ends with this, and with the last of them the action, which others
+    would share."""
     action = owner.animation_data.action if owner.animation_data is not None else None
     for curve in [c for c in curves_of(owner) if c.data_path.endswith(end)]:
         if not hasattr(action, "layers"):
@@ -142,6 +143,8 @@ def remove_curves(owner: bpy.types.ID, end: str) -> None:
                     if curve in list(bag.fcurves):
                         bag.fcurves.remove(curve)
                         break
+    if action is not None and not curves_of(owner):
+        owner.animation_data.action = None
 
 
 def key(owner: bpy.types.ID, path: str, values: list[tuple[int, float]]) -> None:
