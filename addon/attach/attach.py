@@ -404,7 +404,7 @@ def _store(obj: bpy.types.Object, pairs: Pairs, name: str, view: icons.View) -> 
 def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
     settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
     helping, smooth = stack.helping_modifiers(obj), {}
-    # Else an animation that came while Sinew deformed has not set them yet.
+    # Where Sinew deformed until now, an animation that came meanwhile has not set the icons yet.
     is_animation_known = situation.is_by_sinew or Situation(settings.stack.situation) is Situation.OFF
     for name in VIEWS:
         view = _view(obj, pairs, name)
@@ -533,12 +533,12 @@ def _replaced_modifier(
     if found is None:
         situation, nodes = Situation(properties.of(obj).stack.situation), sinew_modifier(obj)
         is_alone = situation is Situation.ALONE
-        known = [(stack.modifier_of(obj, each), each) for each in replaced_modifiers]
-        known = [pair for pair in known if pair[0] is not None]
+        pairs = ((stack.modifier_of(obj, each), each) for each in replaced_modifiers)
+        known = [pair for pair in pairs if pair[0] is not None]
         for name in VIEWS if situation.is_by_sinew and known else ():
             view = _view(obj, known, name)
             if view.deformer is Deformer.NOTHING and not view.hidden and getattr(modifier, f"show_{name}"):
-                # Sinew's icon was off as nothing deformed it, which ends.
+                # Sinew's icon is off because nothing deformed the mesh here. This modifier does.
                 _show_in(nodes, name, True)
         found = replaced_modifiers.add()
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render

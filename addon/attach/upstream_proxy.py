@@ -211,7 +211,7 @@ def remove_helper(helper: bpy.types.Object) -> None:
     still want it."""
     # A proxy follows its object, which point buffers do not.
     mesh, is_proxy = helper.data, len(helper.constraints) > 0
-    is_own = not is_proxy or bool(mesh.get(_COPY))
+    is_own = not is_proxy or _has_copy(helper)
     bpy.data.objects.remove(helper)
     if is_own and mesh.users == 0:
         bpy.data.meshes.remove(mesh)
