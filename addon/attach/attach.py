@@ -34,6 +34,9 @@ from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
 
+# The methods between which an Armature modifier's Preserve Volume chooses.
+MODIFIERS_OWN = ("lbs", "dq")
+
 # Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about it.
 Pairs: TypeAlias = list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]
 
@@ -184,11 +187,17 @@ def _begin_with_icons(obj: bpy.types.Object) -> None:
 
 
 def notes(obj: bpy.types.Object) -> list[str]:
-    """Returns sentences on what Add found switched off, and on what it switched off itself."""
-    if not was_off(obj):
-        return []
-    text = "Its Armature modifier was off before Sinew; Remove switches it off again"
-    return [phrase(text), *baked.notes(obj)]
+    """Returns sentences on an animated method, on what Add found switched off, and on what it switched off
+    itself."""
+    found = []
+    settings = properties.of(obj)
+    if settings.method in MODIFIERS_OWN and any(is_volume_followed(obj, m) for m, _ in replaced_modifiers(obj)):
+        text = "Its Preserve Volume is animated, and chooses between Linear Blend and Dual Quaternion"
+        found.append(phrase(text))
+    if was_off(obj):
+        text = "Its Armature modifier was off before Sinew; Remove switches it off again"
+        found += [phrase(text), *baked.notes(obj)]
+    return found
 
 
 def hangs_on(obj: bpy.types.Object, armatures: Collection[bpy.types.Object]) -> bool:
@@ -202,6 +211,17 @@ def hangs_on(obj: bpy.types.Object, armatures: Collection[bpy.types.Object]) -> 
 def method_of(modifier: bpy.types.ArmatureModifier) -> str:
     """Returns the method of the modifier itself."""
     return "dq" if modifier.use_deform_preserve_volume else "lbs"
+
+
+def is_volume_animated(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> bool:
+    """Whether keys or drivers set its Preserve Volume."""
+    return is_animated(obj, modifier, "use_deform_preserve_volume")
+
+
+def is_volume_followed(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> bool:
+    """Whether an animated Preserve Volume decides between the two methods of the modifier itself. A copy in a
+    comparison has the method that its label names."""
+    return is_volume_animated(obj, modifier) and not properties.is_copy(obj)
 
 
 def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
@@ -283,7 +303,7 @@ def switch(obj: bpy.types.Object, on: bool, is_alone: bool = False) -> None:
         nodes = sinew_modifier(obj)
         is_alone = is_alone or (nodes is not None and is_visibility_animated(obj, nodes))
         # Tools for weights find the deforming bones through Armature modifiers that are on.
-        is_alone = is_alone and obj.mode != "WEIGHT_PAINT"
+        is_alone = is_alone and obj.mode != "WEIGHT_PAINT" and not stack.is_deformed_mesh_read(obj)
         _set_icons(obj, Situation.ALONE if is_alone else Situation.SINEW)
         return
     if settings.replaces_modifiers:
@@ -442,6 +462,8 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
         restore_volume(obj)
     for (modifier, replaced), wanted in zip(pairs, nearest, strict=True):
         own = modifier.use_deform_preserve_volume
+        if is_volume_animated(obj, modifier):
+            wanted = own
         property_groups.store(replaced, "preserve_volume", own)
         property_groups.store(replaced, "was_nearest", own == wanted)
         _preserve_volume(modifier, wanted)

@@ -11,7 +11,16 @@ import numpy as np
 from ..core.influences import GroupWeights, entries_of_bones
 from ..core.phrases import phrase
 from ..core.rig import Bones, Weighting
+from ..io.actions import animated_paths
 from . import stack
+
+_NAMES = (
+    "use_vertex_groups",
+    "use_bone_envelopes",
+    "vertex_group",
+    "invert_vertex_group",
+    "use_multi_modifier",
+)
 
 
 @dataclass(frozen=True)
@@ -34,13 +43,7 @@ class ModifierOptions:
     @staticmethod
     def values(modifier: bpy.types.ArmatureModifier) -> tuple[bool, bool, str, bool, bool]:
         """Returns the same values in the same order, for quick comparison."""
-        return (
-            modifier.use_vertex_groups,
-            modifier.use_bone_envelopes,
-            modifier.vertex_group,
-            modifier.invert_vertex_group,
-            modifier.use_multi_modifier,
-        )
+        return tuple(getattr(modifier, name) for name in _NAMES)
 
     def weighting(self, group_names: list[str], weights: GroupWeights, bones: Bones) -> Weighting:
         """Returns what deforms the mesh: its groups that have a bone, or no groups where the modifier does
@@ -58,6 +61,12 @@ class ModifierOptions:
             return None
         mask = weights.of_group(group_names.index(self.mask))
         return 1.0 - mask if self.invert_mask else mask
+
+
+def are_animated(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> bool:
+    """Whether keys or drivers set one of the options."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].'
+    return not animated_paths(obj).isdisjoint(start + name for name in _NAMES)
 
 
 def differences(obj: bpy.types.Object) -> list[str]:

@@ -218,6 +218,17 @@ def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [m for m in upstream(obj) if can_be_on(obj, m) and m.type not in HARMLESS_UPSTREAM]
 
 
+def is_deformed_mesh_read(obj: bpy.types.Object) -> bool:
+    """Whether Blender reads the mesh behind the leading modifiers that just deform, so without Sinew's: a rigid
+    body of source Deform (rigidbody_get_mesh), and brushes where a later modifier makes another mesh
+    (sculpt_update_object), in Blender's sources of 4.2 to 5.2."""
+    body = obj.rigid_body
+    if body is not None and body.mesh_source == "DEFORM":
+        return True
+    is_painted = obj.mode in ("WEIGHT_PAINT", "VERTEX_PAINT")
+    return is_painted and any(can_be_on(obj, m) and m.type not in ONLY_DEFORM for m in downstream(obj))
+
+
 def parent_deforms(obj: bpy.types.Object) -> bool:
     """Whether the object's parent deforms it before all modifiers (parent type Armature)."""
     return obj.parent is not None and obj.parent_type == "ARMATURE" and obj.parent.type == "ARMATURE"

@@ -118,15 +118,21 @@ def _new(obj: bpy.types.Object, name: str, kind: str) -> bpy.types.Modifier:
 
 def mark(obj: bpy.types.Object, is_marked: bool) -> None:
     """Switches Add Rest Position on, or back to what the artist chose, also meanwhile."""
-    before, is_on = properties.of(obj).before, obj.add_rest_position_attribute
+    before = properties.of(obj).before
     is_marked = is_marked and _can_mark(obj)
     if not before.marks_rest and not is_marked:
         return
-    own = is_on and (before.adds_rest_position or not before.marks_rest)
+    own = adds_rest_position(obj)
     property_groups.store(before, "adds_rest_position", own)
     property_groups.store(before, "marks_rest", is_marked)
-    if is_on != (is_marked or own):
+    if obj.add_rest_position_attribute != (is_marked or own):
         obj.add_rest_position_attribute = is_marked or own
+
+
+def adds_rest_position(obj: bpy.types.Object) -> bool:
+    """Whether the artist switched Add Rest Position on."""
+    before = properties.of(obj).before
+    return obj.add_rest_position_attribute and (before.adds_rest_position or not before.marks_rest)
 
 
 def _can_mark(obj: bpy.types.Object) -> bool:

@@ -12,7 +12,7 @@ from ..core.errors import SinewError
 from ..core.influences import GroupWeights
 from ..io import mesh_compare
 from ..io.actions import animated_paths
-from . import node_group, properties, references, stack
+from . import node_group, properties, references, stack, undeformed
 
 # A Multi Modifier directly behind one of these mixes with what it got, not with what it made.
 _MIXED_BY_MULTI_MODIFIERS = {"LATTICE", "MESH_DEFORM"}
@@ -40,6 +40,9 @@ WEIGHT_CHANGERS = {
     "DATA_TRANSFER",
     "NODES",
 }
+
+# Their levels depend on the scene's Simplify.
+_SIMPLIFIED = {"SUBSURF", "MULTIRES"}
 
 # They read from the mesh what scripts cannot: nobody could tell when a copy is out of date.
 _READERS = {"MULTIRES", "SKIN"}
@@ -271,13 +274,14 @@ def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
     if not shares:
         copy.data = _copy_of_mesh(obj)
     properties.clear(copy)
-    copy.add_rest_position_attribute = False
+    copy.add_rest_position_attribute = undeformed.adds_rest_position(obj)
     identity = properties.of(copy).identity
     identity.is_helper, identity.token = True, copy.session_uid
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)
     _keep_animation_of_modifiers(copy)
+    _follow_simplify(copy)
     _clear_parent(copy)
     return copy
 
@@ -324,16 +328,32 @@ def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
         copy.animation_data_clear()
 
 
+def _follow_simplify(copy: bpy.types.Object) -> None:
+    """Has Blender evaluate the copy again where Simplify changes, as it does for objects that a scene has, and
+    in each frame where Simplify is animated."""
+    for modifier in copy.modifiers:
+        if modifier.type not in _SIMPLIFIED:
+            continue
+        # A copy is never in edit mode.
+        driver = modifier.driver_add("show_in_editmode").driver
+        driver.type = "SUM"
+        for name in ("use_simplify", "simplify_subdivision", "simplify_subdivision_render"):
+            variable = driver.variables.new()
+            variable.type = "CONTEXT_PROP"
+            target = variable.targets[0]
+            target.context_property, target.data_path = "ACTIVE_SCENE", f"render.{name}"
+
+
 def signature(obj: bpy.types.Object) -> str:
-    """Returns a text that differs where the copy would: by the settings of the upstream modifiers, and the
-    pinned shape key."""
-    pinned = (obj.show_only_shape_key, obj.active_shape_key_index)
+    """Returns a text that differs where the copy would: by the settings of the upstream modifiers, the pinned
+    shape key and Add Rest Position."""
+    pinned = obj.active_shape_key_index if obj.show_only_shape_key else None
     animation = obj.animation_data
     action = animation.action.session_uid if animation is not None and animation.action is not None else 0
     animated = tuple(path for path in animated_paths(obj) if path.startswith("modifiers["))
     modifiers = [_modifier_values(modifier, animated) for modifier in stack.upstream(obj)]
     parent = (obj.parent_type, obj.parent and obj.parent.session_uid, obj.parent_bone)
-    return repr((pinned, action, parent, modifiers))
+    return repr((pinned, undeformed.adds_rest_position(obj), action, parent, modifiers))
 
 
 def _modifier_values(modifier: bpy.types.Modifier, animated: tuple[str, ...]) -> list:

@@ -85,6 +85,8 @@ def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: b
     """
     if not skinned.plan.uses_builtin:
         return
+    if skinned.noted.options_keyed and bound.is_of_other_modifiers(obj, skinned.bound, depsgraph):
+        skinned.bind(bound.read(obj, depsgraph))
     if skinned.needs_recheck:
         changes = Changes(meshes={obj.data.session_uid})
         if source.has_changed(obj, skinned.bound.source, depsgraph, changes, touched=False):

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..attach import attach, properties, stage_settings
-from ..attach.modifier_options import ModifierOptions
+from ..attach.modifier_options import ModifierOptions, are_animated
 from ..attach.properties import METHODS
 from ..core import sdef
 from ..core.phrases import phrase
@@ -123,7 +123,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
             read_now.points = old.source.points
         old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skin_stages))
         return replace(old, source=read_now)
-    options = [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
+    options = _options_of(obj, depsgraph)
     masks = _masks(read_now, groups)
     stages = []
     before = () if old is None else old.skin_stack.skin_stages
@@ -171,14 +171,24 @@ def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
     return bound.source.triangles is None and needs_surface(obj)
 
 
-def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
+def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether it was bound to other armatures, options or vertex groups of stages."""
     pairs = attach.replaced_modifiers(obj)
     return (
         bound.armatures != [uid(replaced.armature) for _modifier, replaced in pairs]
-        or bound.options != [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
+        or bound.options != _options_of(obj, depsgraph)
         or bound.groups != stage_settings.vertex_groups(properties.of(obj))
     )
+
+
+def _options_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[ModifierOptions]:
+    """Returns those of each Armature modifier at this evaluation."""
+    evaluated = obj.evaluated_get(depsgraph).modifiers
+    return [
+        # Of a hidden object, what the artist changes is not evaluated.
+        ModifierOptions.read(evaluated.get(m.name, m) if are_animated(obj, m) else m)
+        for m, _replaced in attach.replaced_modifiers(obj)
+    ]
 
 
 def uid(data: bpy.types.ID | None) -> int:
@@ -215,7 +225,7 @@ def _stage_mesh(read_now: Source, stages: list[SkinStage]) -> StageMesh:
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:
     if armature is None or armature.data.is_editmode:
         return Bones.none()
-    return armature_io.read_bones(armature.evaluated_get(depsgraph))
+    return armature_io.read_current_bones(armature, depsgraph)
 
 
 def methods_of(obj: bpy.types.Object) -> list[str]:

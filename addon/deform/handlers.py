@@ -111,7 +111,9 @@ def _end_event(depsgraph: bpy.types.Depsgraph, waiting: Changes | None) -> None:
     """
     if waiting is not None:
         _keep_evaluated_shapes(waiting)
-        session.refresh_between_steps(bpy.context)
+        # No window need show it.
+        with bpy.context.temp_override(scene=depsgraph.scene, view_layer=depsgraph.view_layer):
+            session.refresh_between_steps(bpy.context)
     upstream_proxy.just_made.clear()
     for _obj, state in current.pairs:
         state.evaluation.is_event_known = state.evaluation.was_tagged
@@ -145,7 +147,7 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
     before, current.waiting = current.waiting, session.waiting()
     # What handlers change, Blender evaluates without an event. Once for each upstream proxy: one in another
     # scene goes on waiting.
-    return changes if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph else None
+    return changes if current.waiting - before and depsgraph == depsgraph.view_layer.depsgraph else None
 
 
 def _keep_evaluated_shapes(changes: Changes) -> None:

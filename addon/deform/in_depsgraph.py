@@ -14,6 +14,7 @@ import numpy as np
 import sinew
 
 from ..attach import point_store, properties
+from ..attach.modifier_options import ModifierOptions
 from ..core.icons import VIEWS
 from ..io import mesh_io
 from ..io.actions import is_visibility_animated
@@ -86,11 +87,15 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         return "its mode, or the users of its mesh, changed"
     if [armature is None for _replaced, armature in modifiers] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
+    if skinned.noted.options_keyed and bound.options != [
+        ModifierOptions.read(evaluated.modifiers[replaced.name]) for replaced, _armature in modifiers
+    ]:
+        return "an animation set options of its Armature modifiers"
     memory = _memory_to_write(settings, mesh, skinned)
     if memory is None:
         return "its mesh changed"
     evaluation = skinned.evaluation
-    if evaluation.mesh_shown == mesh.as_pointer():
+    if evaluation.mesh_shown == mesh.as_pointer() and not skinned.noted.deformed_is_read:
         _leave_out(evaluated, modifiers)
     out, normals = memory
     _note_unannounced_change(out, skinned)

@@ -66,8 +66,11 @@ def read(
                 frames.append(None)
                 continue
         pose = _finite(armature_io.read_pose(armature, stage.deformer.bones), stage.deformer.bones)
-        own = method if not frames else properties.method_of_modifier(method, replaced.method, is_first=False)
+        number = len(frames)
+        own = properties.method_of_modifier(method, replaced.method, is_first=number == 0)
         is_mixed = stage.deformer.mix_weights is not None and own == method
+        if skinned.noted.volume_keyed[number] and own in attach.MODIFIERS_OWN:
+            own = attach.method_of(evaluated.modifiers[replaced.name])
         mix = settings.mixed_method if is_mixed else ""
         data = stage.deformer.vertex_data
         if data is not None and not data.is_ready(own):

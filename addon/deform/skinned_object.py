@@ -10,7 +10,7 @@ import numpy as np
 import sinew
 
 from ..attach import attach, normals, properties, stack, undeformed, upstream_proxy
-from ..attach.modifier_options import ModifierOptions
+from ..attach.modifier_options import ModifierOptions, are_animated
 from ..core.errors import SinewError
 from ..core.skin_stack import NO_STAGES, SkinStageFrame
 from ..core.stages import StageValues
@@ -90,6 +90,10 @@ class Noted:
     normals_domain       the normals that drew the mesh, as from normals.domain_of()
     mesh_users           the number of users of the mesh; with several, another could read while Sinew writes
     visibility_keyed     for each Armature modifier, whether an animation switches it on and off
+    volume_keyed         for each Armature modifier, whether an animation chooses between its two methods
+    options_keyed        an animation sets other options of an Armature modifier
+    rests                from rests_of()
+    deformed_is_read     as from stack.is_deformed_mesh_read()
     state                what the artist can change about the object itself, from state_of()
     switches             a part of the state, from switches_of()
     surroundings         from surroundings_of()
@@ -107,6 +111,10 @@ class Noted:
     normals_domain: str
     mesh_users: int
     visibility_keyed: list[bool]
+    volume_keyed: list[bool]
+    options_keyed: bool
+    rests: list[int]
+    deformed_is_read: bool
     state: list
     switches: list
     surroundings: list
@@ -120,6 +128,7 @@ class Noted:
     def of(cls, obj: bpy.types.Object, plan: Plan, bound: Bound) -> Noted:
         storage, mesh = properties.of(obj).storage, obj.data
         own = {obj.session_uid, mesh.session_uid, uid(mesh.shape_keys), uid(storage.upstream_proxy)}
+        modifiers = stack.armature_modifiers(obj)
         return cls(
             name=obj.name,
             mode=obj.mode,
@@ -127,7 +136,11 @@ class Noted:
             attribute=storage.attribute,
             normals_domain=normals.domain_of(mesh),
             mesh_users=mesh.users,
-            visibility_keyed=[is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)],
+            visibility_keyed=[is_visibility_animated(obj, m) for m in modifiers],
+            volume_keyed=[attach.is_volume_followed(obj, m) for m in modifiers],
+            options_keyed=any(are_animated(obj, m) for m in modifiers),
+            rests=rests_of(obj),
+            deformed_is_read=stack.is_deformed_mesh_read(obj),
             state=state_of(obj),
             switches=switches_of(obj),
             surroundings=surroundings_of(obj),
@@ -212,6 +225,8 @@ class SkinnedObject:
 
         meshes  Changes.meshes_in() of this change of frame, which changed nothing else
         """
+        if self.noted.rests != rests_of(obj):
+            return False
         if meshes is None:
             return not self.needs_recheck
         if self.plan.uses_builtin:
@@ -251,7 +266,7 @@ class SkinnedObject:
         are_unknown  the changes do not say which armatures may have other bones
         """
         settings: properties.SinewSettings = obj.sinew
-        changed = False
+        changed, are_unknown = False, are_unknown or self.noted.rests != rests_of(obj)
         for stage, replaced in zip(
             self.bound.skin_stack.skin_stages, settings.replaced_modifiers, strict=False
         ):
@@ -261,7 +276,7 @@ class SkinnedObject:
             if are_unknown or armature.data.session_uid in changes.armatures or not known.complete:
                 # Clothes and hair have the armature of the body.
                 if armature.session_uid not in changes.bones:
-                    bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+                    bones = armature_io.read_current_bones(armature, depsgraph)
                     changes.bones[armature.session_uid] = bones
                 changed |= not changes.bones[armature.session_uid].equals(known)
         return changed
@@ -314,17 +329,28 @@ def state_of(obj: bpy.types.Object) -> list:
         mesh.users,
         obj.show_only_shape_key,
         obj.instance_type,
+        stack.is_deformed_mesh_read(obj),
         keys is None or keys.use_relative,
     ]
     if settings.storage.upstream_proxy is not None:
         state.append(upstream_proxy.signature(obj))
-    state += [armature.mode for armature in settings.armatures]
+    state += [armature.mode for armature in settings.armatures] + rests_of(obj)
     # Adding an animation has no event of its own.
     state += sorted(path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers")))
     for modifier in obj.modifiers:
         if modifier.type == "ARMATURE":
-            state += (uid(modifier.object), attach.method_of(modifier), *ModifierOptions.values(modifier))
+            state.append(uid(modifier.object))
+            # What animation sets is followed in each evaluation.
+            if not attach.is_volume_animated(obj, modifier):
+                state.append(attach.method_of(modifier))
+            if not are_animated(obj, modifier):
+                state += ModifierOptions.values(modifier)
     return state + switches_of(obj)
+
+
+def rests_of(obj: bpy.types.Object) -> list[int]:
+    """The session_uid of its armatures' data, which have the bones at rest."""
+    return [armature.data.session_uid for armature in properties.of(obj).armatures]
 
 
 def surroundings_of(obj: bpy.types.Object) -> list:

@@ -57,13 +57,14 @@ def has_builtin_shape(obj: bpy.types.Object) -> bool:
 
 
 def other_volume(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
-    """Returns the Armature modifiers whose Preserve Volume differs from Sinew's method."""
+    """Returns the Armature modifiers whose Preserve Volume differs from Sinew's method and is not followed."""
     method = properties.of(obj).method
     return [
         modifier
         for number, (modifier, replaced) in enumerate(attach.replaced_modifiers(obj))
         if attach.method_of(modifier)
         != properties.method_of_modifier(method, replaced.method, is_first=number == 0)
+        and not attach.is_volume_followed(obj, modifier)
     ]
 
 

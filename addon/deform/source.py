@@ -35,6 +35,7 @@ class Source:
     mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, without upstream
                       modifiers
     sdef_keys         float32 [4, vertices, 3], as from mesh_io.read_sdef_keys(); None without them
+    mesh              the session_uid of the object's mesh
     from_upstream     read from the upstream proxy
     normals_domain    the normals that draw the mesh, as from normals.domain_of()
     key_values        of the shape keys that are mixed in mixed_points
@@ -47,6 +48,7 @@ class Source:
     triangles: np.ndarray | None
     topology: Topology
     mesh_points: np.ndarray
+    mesh: int
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
     shading: Shading = field(default_factory=Shading)
@@ -159,7 +161,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     topology = mesh_io.read_topology(mesh)
     shading = mesh_io.read_shading(mesh)
     domain = normals.domain_of(mesh)
-    surface = (points, None, topology, mesh_points)
+    surface = (points, None, topology, mesh_points, obj.data.session_uid)
     source = Source(names, weights, *surface, keys, sdef_keys, shading, from_upstream, domain)
     return _with_surface(obj, mesh, source) if with_surface else source
 
@@ -190,7 +192,7 @@ def has_changed(
     touched  the object itself may have changed
     """
     helper = properties.of(obj).storage.upstream_proxy
-    if (helper is not None) != source.from_upstream:
+    if (helper is not None) != source.from_upstream or source.mesh != obj.data.session_uid:
         return True
     if touched and _group_names(obj, depsgraph) != source.group_names:
         return True
@@ -272,7 +274,8 @@ def _keyed_points(evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, s
         source.mixed_points = _finite(source.shape_keys.mix(values))
     if evaluated.show_only_shape_key:
         keys = evaluated_mesh.shape_keys
-        pinned = _finite(mesh_io.read_pinned_points(keys, evaluated.active_shape_key_index))
+        active, names = evaluated.active_shape_key_index, source.group_names
+        pinned = _finite(mesh_io.read_pinned_points(keys, active, names, source.weights))
         if not np.array_equal(pinned, source.mixed_points):
             source.mixed_points = pinned
             # NaN equals nothing: leaving the pin mixes again, whatever the values are.

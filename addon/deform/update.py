@@ -89,7 +89,9 @@ class _Event:
             is_due=skinned.needs_apply,
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
-            is_other=skinned.noted.mode != apply_plan.mode_of(obj) or self._find_outdated_copy(),
+            is_other=skinned.noted.mode != apply_plan.mode_of(obj)
+            or self._find_outdated_copy()
+            or (skinned.noted.options_keyed and self._has_other_modifiers(skinned)),
             is_untouched=skinned.is_untouched_by(changes),
         )
         if facts.calls_for_plan or facts.is_untouched:
@@ -116,6 +118,9 @@ class _Event:
             upstream_proxy.share_mesh(obj)
         return self.is_copy_outdated
 
+    def _has_other_modifiers(self, skinned: SkinnedObject) -> bool:
+        return bound.is_of_other_modifiers(self.obj, skinned.bound, self.depsgraph)
+
     def _is_copy_known(self) -> bool:
         """Whether the copy was compared or made in this event. The mesh is listed by what Sinew has evaluated
         within it, as by what others' handlers change."""
@@ -138,7 +143,7 @@ class _Event:
         read = skinned.bound.source
         return replace(
             facts,
-            has_other_modifiers=bound.is_of_other_modifiers(obj, skinned.bound),
+            has_other_modifiers=self._has_other_modifiers(skinned),
             have_bones_changed=have_bones_changed,
             has_other_mesh=source.has_changed(obj, read, depsgraph, changes, self.known.is_planned),
             is_slider_moved=not bpy.app.background and source.is_slider_moved(obj, read, depsgraph, changes),

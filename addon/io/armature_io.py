@@ -19,6 +19,14 @@ _SHEAR = 1e-5
 _FLAT = 1e-20
 
 
+def read_current_bones(armature: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Bones:
+    """Returns the rest bones of an armature object in this evaluation; where it was given other data since, the
+    bones of these, as its next evaluation has them."""
+    evaluated = armature.evaluated_get(depsgraph)
+    is_current = evaluated.data.session_uid == armature.data.session_uid
+    return read_bones(evaluated if is_current else armature)
+
+
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     """Returns the rest bones of an evaluated armature object, in the order of its pose, and the joints of
     bendy bones."""

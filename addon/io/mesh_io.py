@@ -240,19 +240,24 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
             f"{obj.name}: its shape keys are absolute, which Sinew does not mix; switch them to Relative"
         )
     points = {block.name: read_key_points(block) for block in keys.key_blocks}
-    basis = keys.reference_key
+    basis, names = keys.reference_key, obj.vertex_groups.keys()
     moves: list[np.ndarray | None] = []
     for block in keys.key_blocks:
         if block == basis:
             moves.append(None)
             continue
         move = points[block.name] - points[block.relative_key.name]
-        if block.vertex_group:
-            group = obj.vertex_groups.get(block.vertex_group)
-            if group is not None:
-                move *= weights.of_group(group.index)[:, None]
-        moves.append(move)
+        mask = _mask_of(block, names, weights)
+        moves.append(move if mask is None else mask * move)
     return ShapeKeys(tuple(points), points[basis.name], moves)
+
+
+def _mask_of(
+    block: bpy.types.ShapeKey, group_names: list[str], weights: GroupWeights
+) -> np.ndarray | None:
+    """Returns float32 [vertices, 1], the weights of the shape key's vertex group; None for all of it."""
+    name = block.vertex_group
+    return weights.of_group(group_names.index(name))[:, None] if name in group_names else None
 
 
 def read_key_values(evaluated_keys: bpy.types.Key) -> np.ndarray:
@@ -263,13 +268,24 @@ def read_key_values(evaluated_keys: bpy.types.Key) -> np.ndarray:
     return values
 
 
-def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
-    """Returns float32 [vertices, 3]: the pinned shape key as stored; the basis where it is muted.
+def read_pinned_points(
+    keys: bpy.types.Key, active: int, group_names: list[str], weights: GroupWeights
+) -> np.ndarray:
+    """Returns float32 [vertices, 3]: the pinned shape key, masked by its vertex group; the basis where it is
+    muted.
 
-    active  the index of the shape key
+    active       the index of the shape key
+    group_names  of the weights
     """
-    block = keys.key_blocks[active] if 0 <= active < len(keys.key_blocks) else keys.reference_key
-    return read_key_points(keys.reference_key if block.mute else block)
+    basis = keys.reference_key
+    block = keys.key_blocks[active] if 0 <= active < len(keys.key_blocks) else basis
+    if block.mute:
+        return read_key_points(basis)
+    mask = _mask_of(block, group_names, weights)
+    if mask is None:
+        return read_key_points(block)
+    points = read_key_points(basis)
+    return points + mask * (read_key_points(block) - points)
 
 
 def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, domain: str = "POINT") -> None:
