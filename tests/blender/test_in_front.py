@@ -248,3 +248,77 @@ def test_weights_are_painted_on_the_shared_mesh():
         bpy.ops.object.mode_set(mode=mode)
         bpy.context.view_layer.update()
         assert obj.data.users == users
+
+
+def reads_rest_position(obj):
+    """Nodes in front that move each vertex by its rest position."""
+
+    def make(group, source):
+        named = group.nodes.new("GeometryNodeInputNamedAttribute")
+        named.data_type, named.inputs["Name"].default_value = "FLOAT_VECTOR", "rest_position"
+        move = group.nodes.new("GeometryNodeSetPosition")
+        group.links.new(named.outputs[0], move.inputs["Offset"])
+        group.links.new(source.outputs[0], move.inputs["Geometry"])
+        return move.outputs[0]
+
+    scenes.put_in_front(obj, "NODES").node_group = scenes.nodes(make)
+
+
+@pytest.mark.usefixtures("route")
+@pytest.mark.parametrize("is_keyed", [False, True])
+def test_rest_position_that_the_artist_adds(is_keyed):
+    obj, _armature = scenes.make_arm()
+    if is_keyed:
+        scenes.key_shape(obj)
+    reads_rest_position(obj)
+    expected = {}
+    for is_added in (True, False):
+        obj.add_rest_position_attribute = is_added
+        expected[is_added] = scenes.shapes(obj, FRAMES)
+    assert scenes.worst(expected[True], expected[False]) > 0.1, "nothing is tested"
+    obj.add_rest_position_attribute = True
+    scenes.add_sinew(obj)
+    for is_added in (True, False):
+        obj.add_rest_position_attribute = is_added
+        got = scenes.shapes(obj, FRAMES)
+        assert scenes.worst(got, expected[is_added]) <= scenes.TOLERANCE * scenes.diagonal(obj), is_added
+
+
+def test_clicks_in_the_list_of_shape_keys_make_no_proxy():
+    obj, _armature = scenes.make_arm()
+    scenes.put_in_front(obj)
+    scenes.key_shape(obj)
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(5)
+    proxy = properties.of(obj).storage.upstream_proxy.session_uid
+    for index in (1, 0, 1):
+        obj.active_shape_key_index = index
+        bpy.context.view_layer.update()
+    assert properties.of(obj).storage.upstream_proxy.session_uid == proxy
+    obj.show_only_shape_key = True
+    for index in (1, 0):
+        obj.active_shape_key_index = index
+        bpy.context.view_layer.update()
+        shown = scenes.final_points(obj)
+        properties.of(obj).enabled = False
+        assert scenes.worst(shown, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+        properties.of(obj).enabled = True
+
+
+@pytest.mark.usefixtures("route")
+@pytest.mark.parametrize("front", [None, "SUBSURF"])
+@pytest.mark.parametrize("group", ["", "bone.1", "missing"])
+@pytest.mark.parametrize("is_muted", [False, True])
+def test_a_pinned_shape_key_is_masked_by_its_group(front, group, is_muted):
+    obj, _armature = scenes.make_arm()
+    if front is not None:
+        scenes.put_in_front(obj, front)
+    scenes.key_shape(obj)
+    second = obj.shape_key_add(name="Second", from_mix=False)
+    for point in second.data:
+        point.co.y *= 2.0
+    second.relative_key, second.vertex_group, second.mute = obj.data.shape_keys.key_blocks[1], group, is_muted
+    obj.active_shape_key_index, obj.show_only_shape_key = 2, True
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
