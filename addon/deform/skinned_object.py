@@ -113,7 +113,7 @@ class Noted:
     visibility_keyed: list[bool]
     volume_keyed: list[bool]
     options_keyed: bool
-    rests: list[int]
+    rests: list[int | None]
     deformed_is_read: bool
     state: list
     switches: list
@@ -348,9 +348,10 @@ def state_of(obj: bpy.types.Object) -> list:
     return state + switches_of(obj)
 
 
-def rests_of(obj: bpy.types.Object) -> list[int]:
-    """The session_uid of its armatures' data, which have the bones at rest."""
-    return [armature.data.session_uid for armature in properties.of(obj).armatures]
+def rests_of(obj: bpy.types.Object) -> list[int | None]:
+    """The session_uid of the data of each Armature modifier's armature, which have the bones at rest."""
+    kept = obj.sinew.replaced_modifiers
+    return [each.armature and each.armature.data.session_uid for each in kept]
 
 
 def surroundings_of(obj: bpy.types.Object) -> list:

@@ -20,6 +20,21 @@ from pathlib import Path
 import walk_script
 
 
+def coordinates_of(evaluated):
+    """The points that Generated texture coordinates are made from. Blender 5.3 leaves those of loose edges behind a
+    Subdivision as they lay in memory."""
+    import bpy
+    import numpy as np
+    import walk_sides
+
+    points = walk_sides.points_of(evaluated.data.vertices, "undeformed_co")
+    if bpy.app.version >= (5, 3):
+        corners = np.empty(len(evaluated.data.loops), np.int32)
+        evaluated.data.loops.foreach_get("vertex_index", corners)
+        points[np.setdiff1d(np.arange(len(points)), corners)] = 0.0
+    return points
+
+
 def make_engine(walker, points_of) -> type:
     import bpy
 
@@ -35,7 +50,7 @@ def make_engine(walker, points_of) -> type:
                 if obj.type == "MESH" and not walker.side.may_react(obj.original):
                     name = f"{obj.original.name_full} in the render, frame {scene.frame_current}"
                     walker.rendered[name] = points_of(obj)
-                    walker.rendered[f"{name}, coordinates"] = points_of(obj, "undeformed_co")
+                    walker.rendered[f"{name}, coordinates"] = coordinates_of(obj)
                     walker.expect_rendered(name, obj.original, depsgraph)
             result = self.begin_result(0, 0, 4, 4)
             self.end_result(result)
@@ -209,7 +224,7 @@ class Child:
             last = next((m for m in reversed(self.walker.modifiers(obj)) if m.show_viewport), None)
             if last is not None and last.type == "PARTICLE_SYSTEM":
                 name = f"{obj.name_full} in the render, coordinates in the viewport"
-                self.walker.rendered[name] = self.points_of(evaluated, "undeformed_co")
+                self.walker.rendered[name] = coordinates_of(evaluated)
             if self.side.is_sinew:
                 import walk_normals
 
