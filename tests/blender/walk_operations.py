@@ -1275,8 +1275,14 @@ def edit_bones(w: Walker, r: random.Random) -> None:
         bone.roll += 0.3
     if r.random() < 0.5:
         bpy.context.view_layer.update()
-    if r.random() < 0.8:
+    if r.random() < 0.8 or what == "delete":
         bpy.ops.object.mode_set(mode="OBJECT")
+    if what == "delete":
+        # Blender evaluates drivers and children of a deleted bone anew only once something touches them (seen
+        # on 4.5 and 5.3).
+        for obj in w.objects("MESH"):
+            obj.update_tag()
+            obj.data.update_tag()
 
 
 @operation(1.5)
