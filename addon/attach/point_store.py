@@ -21,7 +21,7 @@ from . import (
     undeformed,
     upstream_proxy,
 )
-from .subscribers import subscribers
+from .subscribers import notify, subscribers
 
 ATTRIBUTE, NORMALS_ATTRIBUTE = ".sinew_points", ".sinew_normals"
 _OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, node_group.IN_STACK)
@@ -52,7 +52,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
     if normals:
         inputs[node_group.IN_RENDERS] = in_renders
     inputs |= undeformed.ensure(obj)
-    made_by_features = (make(obj) for make in subscribers.node_group)
+    made_by_features = notify(subscribers.node_group, obj)
     group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind, normals)
     if nodes.node_group != group:
         # The driver can be on an input that the other group does not have.

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Features subscribe here to what Sinew does with its objects; nothing below the features imports them."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -45,10 +46,22 @@ class Subscribers:
     precomputation_shown: list[Callable[[], None]] = field(default_factory=list)
 
 
+log = logging.getLogger("sinew")
 subscribers = Subscribers()
+# The functions whose errors were reported.
+_reported: set[Callable] = set()
 
 
-def notify(functions: list[Callable], *arguments: object) -> None:
+def notify(functions: list[Callable], *arguments: object) -> list:
+    """Calls each of the functions, and returns their results. One that raises costs itself alone; it is reported
+    once."""
+    results = []
     # A copy, as a function may remove itself.
     for function in list(functions):
-        function(*arguments)
+        try:
+            results.append(function(*arguments))
+        except Exception as error:
+            if function not in _reported:
+                _reported.add(function)
+                log.exception("%s failed: %s", function.__qualname__, error)
+    return results

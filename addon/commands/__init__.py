@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The subcommands of `sinew`, one module each: `add_parser(subparsers)` and `run(args, console) -> int`."""
+"""The subcommands of `sinew`, one module each: a `Command` of cli.py."""

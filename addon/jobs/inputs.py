@@ -80,7 +80,7 @@ def files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[P
 
 
 def blend_files_below(folder: Path) -> Iterator[Path]:
-    return (path for path in _files_below(folder) if path.name.endswith(".blend"))
+    return (path for path in _files_below(folder) if path.suffix.lower() == ".blend")
 
 
 def _files_below(folder: Path) -> Iterator[Path]:

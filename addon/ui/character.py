@@ -74,8 +74,8 @@ def _forget(*_args: object) -> None:
 
 
 def _selection(context: bpy.types.Context) -> tuple[object, ...]:
-    active = context.active_object
-    names = (obj.name for obj in context.selected_objects)
+    active = operators.active_object(context)
+    names = (obj.name for obj in operators.selected(context))
     return (context.scene.session_uid, active.name if active is not None else "", *names)
 
 

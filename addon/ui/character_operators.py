@@ -10,7 +10,7 @@ from ..attach.feature import Feature
 from ..core.errors import SinewError
 from ..deform import session
 from . import character
-from .operators import Named, OnSinewObjects, sinew_targets
+from .operators import Named, OnSinewObjects, active_object, sinew_targets
 from .sidebar import Sidebar
 from .translations import tip, tr
 
@@ -58,7 +58,7 @@ class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
     )
 
     def run(self, context: bpy.types.Context) -> None:
-        active = context.active_object
+        active = active_object(context)
         name = self.name or (active.name if active is not None else "")
         obj = next((o for o in sinew_targets(context) if o.name == name), None)
         if obj is None:

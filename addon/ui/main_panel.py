@@ -47,7 +47,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         meshes = operators.targets(context)
-        for other in attach.not_meshes(context.selected_objects):
+        for other in attach.not_meshes(operators.selected(context)):
             draw_text(
                 layout,
                 "{name} stays with its Armature modifier: Sinew deforms meshes only",
@@ -56,7 +56,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
             )
         if not meshes:
             draw_text(layout, "Select a mesh that an armature deforms, or the armature", icon="INFO")
-            if not context.selected_objects:
+            if not operators.selected(context):
                 layout.operator("sinew.open_lesson", icon="HELP")
             return
         waits = operators.waits_for_render()

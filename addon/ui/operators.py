@@ -16,10 +16,20 @@ from ..io import addon_preferences
 from .translations import counted, tr
 
 
+def selected(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Returns the selected objects, also in a context without a window's members, as of a script."""
+    found = getattr(context, "selected_objects", None)
+    return list(context.view_layer.objects.selected if found is None else found)
+
+
+def active_object(context: bpy.types.Context) -> bpy.types.Object | None:
+    """Returns the active object, as selected() does."""
+    return getattr(context, "active_object", context.view_layer.objects.active)
+
+
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Returns the selected objects and the active one."""
-    chosen = list(context.selected_objects)
-    active = context.active_object
+    chosen, active = selected(context), active_object(context)
     if active is not None and active not in chosen:
         chosen.append(active)
     return chosen
@@ -38,7 +48,7 @@ def _armature_meant(obj: bpy.types.Object) -> bpy.types.Object | None:
 def armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Returns the selected or active armatures, and those of selected meshes; the active one first."""
     found = {_armature_meant(obj) for obj in _chosen(context)} - {None}
-    return sorted(found, key=lambda o: (o != context.active_object, o.name))
+    return sorted(found, key=lambda o: (o != active_object(context), o.name))
 
 
 def _each_target(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
@@ -63,7 +73,7 @@ def _is_of(obj: bpy.types.Object, meant: Collection[bpy.types.Object]) -> bool:
 def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Returns the meshes to act on: all that the armatures() deform, as clothes, hair and eyes belong to the
     selected body; the active one first."""
-    active, found = context.active_object, list(_each_target(context))
+    active, found = active_object(context), list(_each_target(context))
     order = {name: place for place, name in enumerate(context.scene.objects.keys())} if found else {}
     return sorted(found, key=lambda obj: (obj != active, order[obj.name]))
 
@@ -209,7 +219,7 @@ class SINEW_OT_add(Acting, OfOneMesh, bpy.types.Operator):
     bl_label = "Add Sinew"
     bl_description = (
         "Deform all meshes of the armature with Sinew, in the place of their Armature modifiers. Those stay "
-        "in the stack, switched off"
+        "in the stack, where other tools find them"
     )
 
     method: bpy.props.EnumProperty(
@@ -229,7 +239,7 @@ class SINEW_OT_add(Acting, OfOneMesh, bpy.types.Operator):
             has_target = True
         if has_target:
             return "The meshes of the armature have Sinew already"
-        for other in attach.not_meshes(context.selected_objects):
+        for other in attach.not_meshes(selected(context)):
             return tr("{name} is no mesh: Sinew deforms meshes only", name=other.name)
         return "Select a mesh with an Armature modifier, or an armature that deforms one"
 
@@ -292,7 +302,7 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, OfOneMesh, bpy.types.Operator):
     bl_label = "Take Over Corrective Smooth"
     bl_description = (
         "Have Delta Mush smooth in the place of the Corrective Smooth modifier, by its settings. It stays in "
-        "the stack, switched off, until Sinew is removed"
+        "the stack, switched off while Sinew deforms"
     )
 
     @classmethod

@@ -9,6 +9,7 @@ from ..attach import attach, other_tools, properties
 from ..core.icons import Deformer
 from ..deform import lifecycle, session, small_meshes
 from ..deform.plan import ARMATURE_MODIFIER_MODES, State
+from . import operators
 from .sidebar import draw_text, names_text
 from .translations import tr
 
@@ -169,8 +170,9 @@ def draw_character(
         if len(names) == len(meshes):
             who = tr("All {count} meshes", count=len(meshes))
         draw_text(layout, f"{who}: {tr(reason)}", icon="INFO")
-    if context.active_object in meshes:
-        draw_in_mode(layout, context.active_object)
+    active = operators.active_object(context)
+    if active in meshes:
+        draw_in_mode(layout, active)
     warned = [obj.name for obj in meshes if problems_of(obj)]
     if warned:
         draw_text(layout, "{names}: warnings, see Meshes", icon="ERROR", names=names_text(warned))

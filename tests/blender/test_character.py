@@ -8,7 +8,8 @@ import five_meshes
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.attach import properties
+from sinew_addon.attach import attach, properties
+from sinew_addon.attach.subscribers import subscribers
 from sinew_addon.deform import session, small_meshes
 from sinew_addon.ui import character, operators, state_text
 
@@ -230,3 +231,43 @@ def test_what_is_at_work_is_said_above_the_modifiers(armature, monkeypatch):
     bpy.context.view_layer.update()
     assert "its Armature modifier was deleted" in state_text.sentence_of(body)
     assert state_text.icon_of(body) == "ERROR"
+
+
+def test_polls_without_a_window():
+    """As in a script's worker thread, whose context has no selection."""
+    obj, _armature = scenes.skinned_arm()
+    kinds = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("SINEW_OT_")]
+    expected = {kind.__name__: kind.poll(bpy.context) for kind in kinds if hasattr(kind, "poll")}
+    # A window's sidebar has it.
+    expected["SINEW_OT_open_tab"] = False
+    assert any(expected.values())
+    with bpy.context.temp_override(window=None):
+        assert not hasattr(bpy.context, "selected_objects")
+        got = {name: getattr(bpy.types, name).poll(bpy.context) for name in expected}
+        assert operators.selected(bpy.context) == [obj]
+        assert operators.active_object(bpy.context) == obj
+    assert got == expected
+
+
+def test_a_subscriber_that_raises_costs_itself_alone(caplog):
+    obj, _armature = scenes.skinned_arm()
+    bpy.context.scene.frame_set(8)
+
+    def fail(*_):
+        raise ValueError("not this one")
+
+    for functions in (subscribers.before_removal, subscribers.deformed, subscribers.node_group):
+        functions.insert(0, fail)
+    try:
+        session.refresh(bpy.context)
+        attach.remove(obj)
+    finally:
+        for functions in (subscribers.before_removal, subscribers.deformed, subscribers.node_group):
+            functions.remove(fail)
+    assert not properties.has_sinew(obj)
+    assert [modifier.type for modifier in obj.modifiers] == ["ARMATURE"]
+    assert obj.modifiers[0].show_viewport
+    # Once for all of them.
+    assert [record.message for record in caplog.records if "not this one" in record.message] == [
+        "test_a_subscriber_that_raises_costs_itself_alone.<locals>.fail failed: not this one"
+    ]

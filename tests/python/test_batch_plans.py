@@ -101,6 +101,13 @@ def link(path: Path, target: object) -> None:
         pytest.skip("no link was made here, though the system says so")
 
 
+def test_names_in_capitals(studio):
+    """As old file systems and some programs write them."""
+    (studio / "empty/HERO.BLEND").touch()
+    assert planned(["empty"]) == {"empty/HERO.BLEND": "out/HERO.blend"}
+    assert set(planned(["."])) == {*ALL, "empty/HERO.BLEND"}
+
+
 def test_linked_folders_and_their_circles(studio):
     link(studio / "chars" / "guests", studio)
     elsewhere = studio.parent / "elsewhere"

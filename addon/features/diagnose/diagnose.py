@@ -20,6 +20,7 @@ from ...core.vectors import rotations_of
 from ...deform import characters, session
 from ...io import armature_io, mesh_io
 from ...ui import stepped
+from ...ui.operators import selected
 from ...ui.translations import tr
 from ..pages.measure import Edited
 
@@ -114,7 +115,7 @@ def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.ty
     if active is not None and active.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     # All selected meshes would enter edit mode, too, with their own selections.
-    for other in context.selected_objects:
+    for other in selected(context):
         other.select_set(False)
     obj.select_set(True)
     context.view_layer.objects.active = obj

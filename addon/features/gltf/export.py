@@ -259,8 +259,26 @@ def _extend(of: Any, content: dict[str, Any]) -> None:
     of.extensions = {**(of.extensions or {}), EXTENSION: made}
 
 
+def _remove_own(exported: Any, source: bpy.types.ID) -> None:
+    """Removes Sinew's settings from the custom properties that the exporter found, as Blender (up to 4.5) stores
+    registered properties among these.
+
+    exported  a node, mesh or scene of the exporter's
+    """
+    if isinstance(exported.extras, dict):
+        own = {p.identifier for p in source.bl_rna.properties if p.is_runtime and "sinew" in p.identifier}
+        exported.extras = {name: it for name, it in exported.extras.items() if name not in own} or None
+
+
 class GltfExtension:
     """The functions that the exporter calls while it reads meshes, and when it has read all."""
+
+    def gather_node_hook(self, node: Any, obj: bpy.types.Object, *_: Any) -> None:
+        if isinstance(obj, bpy.types.ID):
+            _remove_own(node, obj)
+
+    def gather_scene_hook(self, gltf_scene: Any, scene: bpy.types.Scene, *_: Any) -> None:
+        _remove_own(gltf_scene, scene)
 
     def gather_attribute_keep(self, attribute: Any, _settings: dict[str, Any]) -> None:
         """Keeps attributes that begin with an underscore: all or only these, as the artist chose."""
