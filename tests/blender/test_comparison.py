@@ -250,7 +250,6 @@ def test_the_original_is_deleted(tmp_path, skinned):
     delete(obj)
     bpy.context.scene.frame_set(5)
     bpy.context.scene.frame_set(1)
-    assert len(comparison_state.copies_of(state())) == len(METHODS)
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
     whole_file.assert_same(before)
 
@@ -444,3 +443,65 @@ def test_restore_ends_a_comparison(tmp_path):
     files.open_file(tmp_path / "restored" / "compared.blend")
     assert [o.name for o in bpy.data.objects if o.type == "MESH"] == ["Arm"]
     assert not bpy.data.node_groups
+
+
+def names() -> set[str]:
+    kinds = ("objects", "collections", "meshes", "node_groups", "actions", "scenes")
+    return {f"{kind} {each.name}" for kind in kinds for each in getattr(bpy.data, kind)}
+
+
+def remove(_obj):
+    assert bpy.ops.sinew.remove() == {"FINISHED"}
+
+
+def delete_character(obj):
+    bpy.data.batch_remove([obj, attach.armature_of(obj)])
+
+
+def delete_by_hand(obj):
+    """As the key X does."""
+    five_meshes.select(obj, attach.armature_of(obj))
+    bpy.ops.object.delete()
+
+
+def delete_armature(obj):
+    five_meshes.select(attach.armature_of(obj))
+    bpy.ops.object.delete()
+
+
+def delete_scene(_obj):
+    bpy.data.scenes.new("Other")
+    bpy.data.scenes.remove(bpy.context.scene)
+
+
+@pytest.mark.parametrize(
+    "act", [remove, delete_character, delete_by_hand, delete_armature, delete_scene]
+)
+def test_a_comparison_ends_with_its_character(act, tmp_path):
+    obj, _armature = scenes.skinned_arm()
+    before = names()
+    compare(obj, {"lbs", "dq", "cor"})
+    bpy.context.scene.frame_set(8)
+    act(obj)
+    bpy.context.view_layer.update()
+    # Without a window, what was deleted is followed before the file is saved.
+    scenes.save(tmp_path / "a.blend")
+    assert [each.name for each in bpy.data.objects if properties.is_copy(each)] == []
+    # What belongs to the mesh itself goes with Remove.
+    if act is delete_armature:
+        attach.remove(obj)
+    assert names() - before == ({"scenes Other"} if act is delete_scene else set())
+    assert state() is None
+
+
+def test_a_comparison_stays_with_what_is_left_of_its_character():
+    armature = five_meshes.make(vertices=200)
+    first, second = (bpy.data.objects[name] for name in five_meshes.MESHES[:2])
+    five_meshes.select(armature)
+    bpy.ops.sinew.add()
+    compare(first, {"dq"})
+    attach.remove(first)
+    bpy.data.objects.remove(second)
+    bpy.context.view_layer.update()
+    assert state() is not None
+    assert set(copies(first)) == {"dq"}

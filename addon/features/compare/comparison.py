@@ -120,8 +120,7 @@ def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Obje
 
 def is_on() -> bool:
     """Whether any scene of the file itself shows a comparison."""
-    scenes = [scene for scene in bpy.data.scenes if scene.library is None]
-    return any(comparison_state.of_scene(scene) is not None for scene in scenes)
+    return bool(_states())
 
 
 def method_shown(obj: bpy.types.Object) -> str:
@@ -133,6 +132,35 @@ def originals(state: comparison_state.SinewComparison) -> list[bpy.types.Object]
     """Returns the compared objects, without those that the artist has deleted."""
     found = {properties.of(copy).identity.copied: None for copy in comparison_state.copies_of(state)}
     return [obj for obj in found if obj is not None and obj.users_collection]
+
+
+def _states() -> list[comparison_state.SinewComparison]:
+    found = (comparison_state.of_scene(scene) for scene in bpy.data.scenes if scene.library is None)
+    return [state for state in found if state is not None]
+
+
+def is_without_original() -> bool:
+    """Whether copies are left of which no original is there, or none with an armature: the artist has deleted the
+    character, its armature or the scene."""
+    shown = {copy for state in _states() for copy in comparison_state.copies_of(state)}
+    copies = [obj for obj in bpy.data.objects if properties.is_copy(obj) and obj.library is None]
+    if not copies:
+        return False
+    compared = [properties.of(copy).identity.copied for copy in shown]
+    there = (obj for obj in compared if obj is not None and obj.users_collection)
+    armatures = (attach.armature_of(obj) for obj in there)
+    return not any(armature is not None and not attach.is_deleted(armature) for armature in armatures)
+
+
+def is_original(obj: bpy.types.Object) -> bool:
+    """Whether a comparison shows copies of it."""
+    return any(obj in originals(state) for state in _states())
+
+
+def is_of_none_with_sinew() -> bool:
+    """Whether none of the compared objects has Sinew."""
+    compared = {obj for state in _states() for obj in originals(state)}
+    return not any(map(properties.has_sinew, compared))
 
 
 def end(context: bpy.types.Context) -> None:
@@ -147,12 +175,18 @@ def end(context: bpy.types.Context) -> None:
             collections += [(scene, state.collection)] if state.collection is not None else []
             scene.property_unset("sinew_comparison")
     compared = {properties.of(copy).identity.copied for copy in copies} - {None}
+    # Of scenes that the artist has deleted.
+    inside = {each for copy in copies for each in copy.users_collection if not each.is_embedded_data}
+    inside -= {collection for _scene, collection in collections}
+    loose = [each for each in inside if each.users == each.use_fake_user]
     for copy in copies:
+        session.forget_object(copy)
         upstream_proxy.remove(copy)
         point_buffer.remove(copy)
     bpy.data.batch_remove(copies)
     for scene, collection in collections:
         _remove_collection(scene, collection)
+    bpy.data.batch_remove(loose)
     # An object that the artist deleted was kept in the file only by its copies.
     for obj in compared:
         if obj.users == 0:

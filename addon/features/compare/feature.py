@@ -6,8 +6,10 @@ from collections.abc import Generator
 import bpy
 import numpy as np
 
-from ...attach import attach, properties
+from ...attach import attach, properties, references
 from ...attach.feature import Feature
+from ...attach.subscribers import subscribers
+from ...attach.updates import may_change_file
 from ...core.errors import SinewError
 from ...deform import characters
 from ...ui import operators, stepped
@@ -169,9 +171,8 @@ class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
     def refusal(cls, context: bpy.types.Context) -> str:
         return "" if comparison.is_on() else "There is no comparison"
 
-    def run(self, context: bpy.types.Context) -> None:
-        framing.give_back(context)
-        comparison.end(context)
+    def run(self, _context: bpy.types.Context) -> None:
+        _end()
 
 
 class SINEW_OT_save_comparison(SavesPage, bpy.types.Operator):
@@ -256,6 +257,48 @@ def _draw_arrangement(
         draw_text(layout, "Shown: {method}", method=tr(properties.method_label(shown)))
 
 
+def _end() -> None:
+    framing.give_back(bpy.context)
+    comparison.end(bpy.context)
+
+
+def _on_objects_changed(_objects: list[bpy.types.Object]) -> None:
+    """Deleting objects within the handlers of an evaluation can crash Blender."""
+    if not bpy.app.background and not bpy.app.timers.is_registered(_end_soon):
+        bpy.app.timers.register(_end_soon)
+
+
+def _end_without_original() -> None:
+    if comparison.is_without_original():
+        _end()
+
+
+def _end_soon() -> float | None:
+    """A timer."""
+    if not may_change_file():
+        return 0.25
+    with references.between_steps():
+        _end_without_original()
+    return None
+
+
+# Whether Sinew is being taken off a compared object.
+_is_taken_off = False
+
+
+def _before_removal(obj: bpy.types.Object) -> None:
+    global _is_taken_off
+    _is_taken_off = comparison.is_original(obj)
+
+
+def _after_removal() -> None:
+    """With the last of a character's meshes its comparison goes, too."""
+    global _is_taken_off
+    was_original, _is_taken_off = _is_taken_off, False
+    if was_original and comparison.is_of_none_with_sinew():
+        _end()
+
+
 FEATURE = Feature(
     (
         *(comparison_state.SinewComparison, SinewComparisonChoice, SINEW_OT_compare),
@@ -264,4 +307,10 @@ FEATURE = Feature(
     ),
     {"Scene.sinew_comparison": bpy.props.PointerProperty(type=comparison_state.SinewComparison)},
     overlays=(comparison_labels.draw,),
+    subscriptions=(
+        (subscribers.objects_changed, _on_objects_changed),
+        (subscribers.saving, _end_without_original),
+        (subscribers.before_removal, _before_removal),
+        (subscribers.after_removal, _after_removal),
+    ),
 )
