@@ -187,12 +187,15 @@ def _begin_with_icons(obj: bpy.types.Object) -> None:
 
 
 def notes(obj: bpy.types.Object) -> list[str]:
-    """Returns sentences on an animated method, on what Add found switched off, and on what it switched off
-    itself."""
+    """Returns sentences on an animated method, on icons that were set back, on what Add found switched off, and
+    on what it switched off itself."""
     found = []
     settings = properties.of(obj)
     if settings.method in MODIFIERS_OWN and any(is_volume_followed(obj, m) for m, _ in replaced_modifiers(obj)):
         text = "Its Preserve Volume is animated, and chooses between Linear Blend and Dual Quaternion"
+        found.append(phrase(text))
+    if undeformed.was_switched(obj):
+        text = "The modifiers that Sinew needs beside its own stay as that is: switch the modifier Sinew"
         found.append(phrase(text))
     if was_off(obj):
         text = "Its Armature modifier was off before Sinew; Remove switches it off again"
@@ -329,6 +332,7 @@ def follow_icons(obj: bpy.types.Object) -> None:
     for name in VIEWS:
         view = _view(obj, pairs, name)
         before = icons.icons(view, situation)
+        undeformed.note_switched(obj, name, before.sinew)
         modifiers = tuple(
             was_on if _is_keyed(obj, modifier, replaced) else getattr(modifier, f"show_{name}")
             for (modifier, replaced), was_on in zip(pairs, before.modifiers, strict=True)

@@ -116,6 +116,24 @@ def _new(obj: bpy.types.Object, name: str, kind: str) -> bpy.types.Modifier:
     return made
 
 
+# The session_uid of each object of whose helping modifiers somebody has switched one.
+_switched: set[int] = set()
+
+
+def note_switched(obj: bpy.types.Object, view: str, are_on: bool) -> None:
+    """Notes where the icon of a helping modifier in a view was switched since Sinew set it: it is set back.
+
+    view  viewport or render
+    """
+    helping = stack.helping_modifiers(obj)
+    if any(getattr(modifier, f"show_{view}") != are_on for modifier in helping):
+        _switched.add(obj.session_uid)
+
+
+def was_switched(obj: bpy.types.Object) -> bool:
+    return obj.session_uid in _switched
+
+
 def mark(obj: bpy.types.Object, is_marked: bool) -> None:
     """Switches Add Rest Position on, or back to what the artist chose, also meanwhile."""
     before = properties.of(obj).before

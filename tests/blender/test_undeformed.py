@@ -246,3 +246,24 @@ def test_a_saved_file_is_as_without_sinew(rendered, tmp_path):
     assert [m.show_viewport or m.show_render for m in saved.modifiers] == [True, False, False, False]
     bpy.ops.wm.open_mainfile(filepath=path)
     _assert_same(rendered(bpy.data.objects["Arm"]), expected)
+
+
+def test_it_is_said_where_a_click_on_a_helping_modifier_is_taken_back():
+    obj, _armature = scenes.skinned_arm("dq")
+    nodes = stack.sinew_modifier(obj)
+    # Clicks on Sinew's own icon and on its switch are none on theirs.
+    for act in (
+        lambda: setattr(nodes, "show_viewport", False),
+        lambda: setattr(nodes, "show_viewport", True),
+        lambda: setattr(obj.sinew, "enabled", False),
+        lambda: setattr(obj.sinew, "enabled", True),
+    ):
+        act()
+        bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(bpy.context.scene.frame_current + 1)
+        assert attach.notes(obj) == []
+    for modifier in stack.helping_modifiers(obj):
+        modifier.show_viewport = False
+    bpy.context.view_layer.update()
+    assert all(modifier.show_viewport for modifier in stack.helping_modifiers(obj))
+    assert "switch the modifier Sinew" in attach.notes(obj)[0]
