@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import functools
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -156,9 +157,14 @@ for _version in ("3.11", "3.12", "3.13", "3.14"):
             os.utime(wheel_of(version), (start, start))
 
 
+# The newest bpy of the registry and its Python, for ./dev test --blender NEWEST: no lock need name it.
+UNLOCKED, UNLOCKED_PYTHON = os.environ.get("SINEW_UNLOCKED", " ").split(" ")
+if UNLOCKED:
+    BLENDERS[UNLOCKED] = UNLOCKED_PYTHON
 OTHERS = ("cross", "lint", "shaders")
 # The locks of a Blender: its own wheel, and what that needs with the tests.
 LOCKS = {bpy: f"{'tests-numpy-1' if bpy in NUMPY_1 else 'tests'} bpy-{bpy}" for bpy in BLENDERS}
+LOCKS |= {UNLOCKED: "tests"} if UNLOCKED else {}
 # Name, locks, Python, whether it has the library, whether the extension. bpy contains Blender's program for
 # zips; what makes the site and the stub imports the library.
 ENVIRONMENTS = [(f"bpy-{bpy}", LOCKS[bpy], python, True, True) for bpy, python in BLENDERS.items()]
@@ -173,7 +179,8 @@ for _name, _locks, _version, _library, _addon in ENVIRONMENTS:
     def environment(session: nox.Session, its: tuple = (_name, _locks, _version, _library, _addon)) -> None:
         """What locks have, and of the checkout what belongs to it."""
         name, locks, version, library, addon = its
-        sync(session, locks, *[f"./{wheel_of(version)}"] * library, *["-e ./addon"] * addon)
+        unlocked = [f"bpy=={UNLOCKED}", "bpy-vrm-format"] * (name == f"bpy-{UNLOCKED}")
+        sync(session, locks, *[f"./{wheel_of(version)}"] * library, *["-e ./addon"] * addon, *unlocked)
         # So documents call them.
         for link in (Path(".venvs", name), *[Path(".venv")] * (name == f"bpy-{EVERYDAY}")):
             if link != environment_of(name) and not link.is_symlink():
@@ -393,15 +400,37 @@ def bring(version: str) -> str | None:
     return python_of(version)
 
 
+def newest_bpy() -> tuple[str, str]:
+    """The newest bpy that the registry has for a Python that is here, and that Python."""
+    found = []
+    for python in filter(python_of, WHEEL_PYTHONS):
+        words = f"uv pip compile - --quiet --no-deps --no-header --no-annotate --python-version {python}"
+        done = subprocess.run(words.split(), input="bpy", capture_output=True, text=True, check=False)
+        found += [(version, python) for version in re.findall(r"^bpy==([\d.]+)", done.stdout, re.MULTILINE)]
+    return max(found, key=lambda each: [*map(int, each[0].split("."))], default=None) or sys.exit(
+        "dev: the registry has no bpy for the Pythons here."
+    )
+
+
 def test(words: list[str]) -> int:
     if words and words[0].startswith("--platform"):
         set_up("cross")
         words = words[0].split("=")[1:] + words[1:]
         return call(f"{python_in('cross')} tools/platform_tests.py", *words)
+    parser = argparse.ArgumentParser(prog="./dev test", add_help=False, allow_abbrev=False)
+    parser.add_argument("--blender", choices=(*BLENDERS, "NEWEST"))
+    own, words = parser.parse_known_args(words)
+    if own.blender == "NEWEST" and not UNLOCKED:
+        tell_uv_of_the_registry()
+        version, python = newest_bpy()
+        say(f"the newest Blender that the registry has is {version}")
+        os.environ["SINEW_UNLOCKED"] = f"{version} {python}"
+        os.execv(sys.executable, [sys.executable, *sys.argv])
     is_all, is_quick = "--all" in words, "--quick" in words
     options = [word for word in words if word not in ("--all", "--quick")]
-    is_whole = not (is_quick or options)
+    is_whole = not (is_quick or options or own.blender)
     wanted = [*BLENDERS] if is_all else [EVERYDAY] if is_quick else [OLDEST, EVERYDAY, NEWEST]
+    wanted = [UNLOCKED or own.blender] if own.blender else wanted
     pythons = {version for version in {BLENDERS[b] for b in wanted} if python_of(version) or bring(version)}
     tested = [bpy for bpy, python in BLENDERS.items() if bpy in wanted and python in pythons]
     others = ["experiments-programs", "browsers"] * is_all + ["lint"] * is_whole
@@ -412,9 +441,9 @@ def test(words: list[str]) -> int:
     if is_all:
         os.environ |= {"SINEW_TEST_ALL": "1", "SINEW_EXPERIMENTS": f"{ROOT}/build/experiments/experiments"}
     # The longest first.
-    jobs = ["native"] * (not options) + ["window"] * is_whole
-    jobs += [*(f"blender-{bpy}" for bpy in reversed(tested)), "python", "shader"]
-    jobs += ["browser"] * is_all + ["installed", "commands"] * is_whole
+    jobs = ["native"] * (not options and not own.blender) + ["window"] * is_whole
+    jobs += [*(f"blender-{bpy}" for bpy in reversed(tested)), *["python", "shader"] * (not own.blender)]
+    jobs += ["browser"] * (is_all and not own.blender) + ["installed", "commands"] * is_whole
     for name in {"SINEW_RIGS", "SINEW_FULL_BLENDER"} - {*os.environ}:
         say(f"{name} is not set: tests that need it are skipped")
     shutil.rmtree(LOGS, ignore_errors=True)

@@ -36,6 +36,8 @@ def link(folder: Path, override: bool) -> None:
     if override:
         with bpy.data.libraries.load(str(library), link=True) as (_source, target):
             target.collections = ["Character"]
+        # Blender 5.3 makes no override of a collection that is not in the scene, and says nothing.
+        bpy.context.scene.collection.children.link(target.collections[0])
         target.collections[0].override_hierarchy_create(
             bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
         )
