@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 import pytest
 import scenes
+from conftest import IS_NEWEST
 from program import run_sinew
 from sinew_addon.attach import attach, properties
 from sinew_addon.commands.check import line_of
