@@ -300,6 +300,9 @@ bool TwistSpread::apply(Strided<Vec3<float>> points, std::span<const Affine<floa
     const bool is_beyond = std::ranges::any_of(
         state.bones, [](const auto& bone) { return bone.is_twisted && bone.around != 0.0f; });
     frame.goes_around = is_beyond && (goes_short(frame.blend) || goes_short(frame.mix_blend));
+    // Blends other than linear differ by the turns that they leave out alone.
+    if (!frame.goes_around && frame.blend != TwistBlend::linear && frame.mix_blend != TwistBlend::linear)
+        frame.mix_blend = frame.blend;
     const std::size_t vertices = kLanes * state.blocks.size();
     parallel_for(
         state.blocks.size(), useful_threads(options.threads, vertices, kVerticesWorthAThread),
