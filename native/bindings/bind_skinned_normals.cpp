@@ -66,9 +66,8 @@ py::array_t<float> deform_normals(const Timed<SkinnedNormals>& skinned, const Ar
     auto normals = checked_out(out, skinned.frame_count());
     check_apart(normals, points);
     const auto to = as_points_to_write(normals);
-    skinned.call([&] {
-        return skinned.deform_normals(arguments.bones, arguments.options, as_points(points), to);
-    });
+    skinned.call(
+        [&] { return skinned.deform_normals(arguments.bones, arguments.options, as_points(points), to); });
     return normals;
 }
 

@@ -24,8 +24,8 @@ TEST(QuaternionOrder, of_a_program_changes_no_rotation) {
     for (const Quat<float>& third :
          {to_quat(kThird), quat_of_columns(kThird), nearest_rotation(kThird).rotation,
           quat_from_axis_angle(axis, kAngle), quat_from_rotation_vector(kAngle * glm::normalize(axis)),
-          (half * half).real,
-          exp(log(to_dual_quat(Affine<float>{kThird}))).real, QuatVec<float>{}.rotation * to_quat(kThird),
+          (half * half).real, exp(log(to_dual_quat(Affine<float>{kThird}))).real,
+          QuatVec<float>{}.rotation * to_quat(kThird),
           Sclerp::between(DualQuat<float>{}, to_dual_quat(Affine<float>{kThird}), 1.0f).transform.real}) {
         EXPECT_LT(error_of(third), 1e-5f);
     }

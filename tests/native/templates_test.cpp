@@ -77,13 +77,13 @@ TYPED_TEST(Spline, sizes_that_do_not_fit_read_and_write_nothing) {
     const std::vector<Transform> keys(4);
     const std::vector<double> times{0.0, 1.0, 2.0, 3.0};
     const auto few = [](const auto& all) { return std::span(all).first(2); };
-    for (const auto& value : {catmull_rom<TypeParam, double>(keys, few(times), 0.5),
-                              catmull_rom<TypeParam, double>(few(keys), times, 2.5),
-                              catmull_rom<TypeParam, double>({}, {}, 0.5),
-                              catmull_rom_vector<Transform, double>(few(keys), times, 2.5),
-                              TypeParam::template blend<BlendSigns::kToHeaviest, double>(keys, few(times)),
-                              TypeParam::template blend<BlendSigns::kToHeaviest, double>(few(keys), times),
-                              TypeParam::template blend<BlendSigns::kToHeaviest, double>({}, {})}) {
+    for (const auto& value :
+         {catmull_rom<TypeParam, double>(keys, few(times), 0.5),
+          catmull_rom<TypeParam, double>(few(keys), times, 2.5), catmull_rom<TypeParam, double>({}, {}, 0.5),
+          catmull_rom_vector<Transform, double>(few(keys), times, 2.5),
+          TypeParam::template blend<BlendSigns::kToHeaviest, double>(keys, few(times)),
+          TypeParam::template blend<BlendSigns::kToHeaviest, double>(few(keys), times),
+          TypeParam::template blend<BlendSigns::kToHeaviest, double>({}, {})}) {
         EXPECT_FALSE(value.is_defined);
         EXPECT_EQ(distance(to_affine(value.transform), Affine<double>{}), 0.0);
     }
@@ -96,7 +96,8 @@ TYPED_TEST(Spline, sizes_that_do_not_fit_read_and_write_nothing) {
         are_done.push_back(root_relative<Transform>(skeleton, mark, from, onto));
         are_done.push_back(update_branch<Transform>(skeleton, mark, from, 1, onto));
         are_done.push_back(interpolate_keyframes<TypeParam, double>(skeleton, from, all, 0.5, onto));
-        are_done.push_back(spline_keyframes<TypeParam, double>(skeleton, from, few(times).first(1), 0.5, onto));
+        are_done.push_back(
+            spline_keyframes<TypeParam, double>(skeleton, from, few(times).first(1), 0.5, onto));
         are_done.push_back(
             spline_keyframes_vector<Transform, double>(skeleton, from, few(times).first(1), 0.5, onto));
     }
@@ -141,7 +142,8 @@ TEST(Fits, of_numbers_that_differ_are_not_defined) {
 
 // Beside one that is 1e600 times as heavy.
 TEST(RobustAverage, a_weight_that_vanishes_counts_as_0) {
-    const std::vector poses{DualQuat<double>{}, to_dual_quat(QuatVec<double>{about<double>({1, 2, 3}, 180.0), {}}),
+    const std::vector poses{DualQuat<double>{},
+                            to_dual_quat(QuatVec<double>{about<double>({1, 2, 3}, 180.0), {}}),
                             DualQuat<double>{}};
     const std::vector weights{1e300, 1e-300, 1e300};
     std::vector<double> kept(3, 5.0);

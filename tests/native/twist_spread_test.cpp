@@ -113,8 +113,9 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
             }
             if (weight == 0.0 && !(below > 0.0)) continue;
             const double mix = data.mix.empty() ? 0.0 : static_cast<double>(data.mix[vertex]);
-            point = TwistSpreadStage::deform_vertex(bone, options.blend, options.mix_blend, mix, weight, below,
-                                                    static_cast<double>(data.weights[vertex]), rest, point);
+            point =
+                TwistSpreadStage::deform_vertex(bone, options.blend, options.mix_blend, mix, weight, below,
+                                                static_cast<double>(data.weights[vertex]), rest, point);
         }
         result.push_back(point);
     }

@@ -30,7 +30,7 @@ struct Poses {
     std::vector<DualQuat<double>> poses;
     std::vector<double> weights;       ///< with sum 1; all positive before they are rounded
     std::vector<std::size_t> numbers;  ///< where each is among those given
-    double longest = 0.0;         ///< the longest translation
+    double longest = 0.0;              ///< the longest translation
 
     [[nodiscard]] std::size_t size() const noexcept { return poses.size(); }
 };

@@ -201,7 +201,8 @@ template <class T>
 template <class T>
 [[nodiscard]] RigidFit<T> fit_rigid(const Pairs<T>& pairs) noexcept {
     if (!detail::are_paired(pairs.source.size(), pairs.target, pairs.weights) ||
-        !detail::are_paired(pairs.source_directions.size(), pairs.target_directions, pairs.direction_weights)) {
+        !detail::are_paired(pairs.source_directions.size(), pairs.target_directions,
+                            pairs.direction_weights)) {
         return {{}, T(0), false, false};
     }
     const detail::PairMoments m = detail::moments_of(pairs);

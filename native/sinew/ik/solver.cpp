@@ -163,8 +163,8 @@ struct IkBone {
         } else {
             // At most one of the two is not 0.
             const double half = 0.5 * (c.x + c.z);
-            swing = Quat<double>(std::cos(half), {is_free[0] ? std::sin(half) : 0.0, 0.0,
-                                                   is_free[2] ? std::sin(half) : 0.0});
+            swing = Quat<double>(std::cos(half),
+                                 {is_free[0] ? std::sin(half) : 0.0, 0.0, is_free[2] ? std::sin(half) : 0.0});
         }
         coordinates = c;
         rotation = swing * Quat<double>(std::cos(0.5 * c.y), {0.0, std::sin(0.5 * c.y), 0.0});

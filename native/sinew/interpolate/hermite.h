@@ -37,7 +37,8 @@ template <class T>
 template <class T>
 [[nodiscard]] Vec3<T> hermite(std::span<const Vec3<T>> points, std::span<const Vec3<T>> tangents,
                               std::span<const T> times, T time) noexcept {
-    if (times.empty() || points.size() != times.size() || tangents.size() != times.size()) return Vec3<T>(T(0));
+    if (times.empty() || points.size() != times.size() || tangents.size() != times.size())
+        return Vec3<T>(T(0));
     const KeyInterval<T> at = key_interval(times, time);
     if (at.key == at.next) return points[at.key];
     const T u = at.part;

@@ -41,7 +41,8 @@ template <class Transform, class T, class Combine>
 bool spline_bones(const Skeleton& skeleton, std::span<const Transform> keyframes, std::span<const T> times,
                   T time, std::span<Transform> parent_from_bone, Combine combine) noexcept {
     const std::size_t bones = skeleton.bone_count();
-    if (times.empty() || keyframes.size() != bones * times.size() || parent_from_bone.size() != bones) return false;
+    if (times.empty() || keyframes.size() != bones * times.size() || parent_from_bone.size() != bones)
+        return false;
     const SplineSpan<T> span = spline_span(times, time);
     bool are_defined = true;
     for (std::size_t bone = 0; bone < bones; ++bone) {
