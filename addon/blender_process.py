@@ -35,13 +35,10 @@ INTERVAL = 0.1
 GREETINGS = (b'{"ready"', b'{"refused"')
 
 
-# What Windows, and so Blender's own message, calls the commonest.
+# What Windows, and so Blender's own message, calls the commonest. 11 is what Blender's handler of crashes ends with.
 CRASHES = {
-    4: "EXCEPTION_ILLEGAL_INSTRUCTION",
     11: "EXCEPTION_ACCESS_VIOLATION",
-    22: "abort",
     0xC0000005: "EXCEPTION_ACCESS_VIOLATION",
-    0xC000001D: "EXCEPTION_ILLEGAL_INSTRUCTION",
     0xC00000FD: "EXCEPTION_STACK_OVERFLOW",
 }
 
@@ -243,8 +240,7 @@ class BlenderProcess:
 def how_it_ended(status: int, is_windows: bool = os.name == "nt") -> str:
     """Returns the beginning of a sentence.
 
-    status  of a process: elsewhere than on Windows, that of a crash is -1 times the signal. A crash of Windows has the
-            number of its exception. Blender's own handler of crashes gives that of the signal there.
+    status  of a process: elsewhere than on Windows, that of a crash is -1 times the signal
     """
     if status < 0:
         return f"Blender crashed ({signal.Signals(-status).name})"

@@ -166,7 +166,7 @@ def numbers(made, points):
     return volume, np.hypot(*points[:, :2].T).min() / 0.5, (posed / rest).max()
 
 
-@pytest.mark.parametrize("blends", itertools.product(BLENDS, repeat=2), ids="-".join)
+@pytest.mark.parametrize("blends", list(itertools.product(BLENDS, repeat=2)), ids="-".join)
 def test_a_mix_has_the_share_of_what_each_blend_gives(blends):
     made, alone = wrist()
     mix = np.linspace(-0.5, 1.5, len(made.points)).astype(np.float32)
