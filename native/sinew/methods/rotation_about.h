@@ -40,7 +40,7 @@ template <class T, class Bone>
                                     std::span<const Influence<T>> influences, const Vec3<T>& rest,
                                     std::span<const double> parameters) noexcept {
     const bool are_kept = Signs::are_kept(parameters);
-    Quat<T> rotation(T(0), T(0), T(0), T(0));
+    Quat<T> rotation(T(0), Vec3<T>(T(0)));
     // Summing displacements returns the rest pose unchanged.
     Vec3<T> displacement{T(0)};
     for (const Influence<T>& influence : influences) {
