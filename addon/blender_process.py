@@ -35,6 +35,14 @@ INTERVAL = 0.1
 GREETINGS = (b'{"ready"', b'{"refused"')
 
 
+# What Windows, and so Blender's own message, calls the commonest. 11 is what Blender's handler of crashes ends with.
+CRASHES = {
+    11: "EXCEPTION_ACCESS_VIOLATION",
+    0xC0000005: "EXCEPTION_ACCESS_VIOLATION",
+    0xC00000FD: "EXCEPTION_STACK_OVERFLOW",
+}
+
+
 class BlenderLost(Exception):  # noqa: N818
     """The process ended, or had to be ended, before the file was done. The message is the end of a
     sentence."""
@@ -202,14 +210,10 @@ class BlenderProcess:
         return None
 
     def _cause_of_end(self) -> str:
-        status = self._process.wait()
-        try:
-            how = signal.Signals(-status).name
-        except ValueError:
-            how = f"status {status}"
+        how = how_it_ended(self._process.wait())
         doing = self._doing()
         self._clean_up()
-        return self._excess or f"Blender crashed ({how}) while {doing}"
+        return self._excess or f"{how} while {doing}"
 
     def _clean_up(self) -> None:
         self._process.wait()
@@ -231,6 +235,20 @@ class BlenderProcess:
             return psutil.Process(self._process.pid).memory_info().rss
         except psutil.Error:
             return 0
+
+
+def how_it_ended(status: int, is_windows: bool = os.name == "nt") -> str:
+    """Returns the beginning of a sentence.
+
+    status  of a process: elsewhere than on Windows, that of a crash is -1 times the signal
+    """
+    if status < 0:
+        return f"Blender crashed ({signal.Signals(-status).name})"
+    if is_windows and status in CRASHES:
+        return f"Blender crashed ({CRASHES[status]})"
+    if is_windows and status >= 0x80000000:
+        return f"Blender crashed (exception 0x{status:08X})"
+    return f"Blender was ended (status {status})"
 
 
 def wait_for_any(blenders: Iterable[BlenderProcess]) -> None:

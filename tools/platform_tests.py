@@ -23,13 +23,8 @@ from pathlib import Path
 import arm64_python
 import windows_python
 from cross_build import BUILD, ROOT, build_tests, build_wheels, python_of
-from platforms import PLATFORMS, Platform
+from platforms import PARTS, PLATFORMS, Platform, note_as_tested
 
-PARTS = {
-    "linux-x64": ("native",),
-    "linux-arm64": ("native", "python"),
-    "windows-x64": ("native", "python", "blender"),
-}
 # The prefix of a C++ program's command. The C library for arm64 is Debian's package for cross-compilation
 # (libc6-arm64-cross).
 NATIVE: dict[str, list[str | Path]] = {
@@ -207,7 +202,10 @@ def main() -> None:
     print("\n== Summary ==")
     for part, status in results.items():
         print(f"  {options.platform} {part:8} {'passed' if status == 0 else f'FAILED ({status})'}")
-    sys.exit(any(results.values()))
+    if any(results.values()):
+        sys.exit(1)
+    if not (options.part or options.quick or for_pytest):
+        note_as_tested(options.platform)
 
 
 if __name__ == "__main__":

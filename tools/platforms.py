@@ -3,7 +3,17 @@
 
 from __future__ import annotations
 
+import subprocess
 from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+# What `./dev test --platform` runs of each.
+PARTS = {
+    "linux-x64": ("native",),
+    "linux-arm64": ("native", "python"),
+    "windows-x64": ("native", "python", "blender"),
+}
 
 
 @dataclass(frozen=True)
@@ -88,3 +98,25 @@ PLATFORMS = {
         ),
     )
 }
+
+
+def _state() -> str:
+    """The commit, and whether files differ from it."""
+    words = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def _record(name: str) -> Path:
+    return ROOT / "build/platforms" / name / "tested"
+
+
+def note_as_tested(name: str) -> None:
+    """Its tests passed, all of them."""
+    _record(name).write_text(_state())
+
+
+def not_tested() -> list[str]:
+    """The platforms whose tests have not passed here, all of them, as the files are."""
+    state = _state()
+    noted = {name: _record(name).read_text() for name in PARTS if _record(name).exists()}
+    return [name for name in PARTS if noted.get(name) != state or state.endswith("-dirty")]

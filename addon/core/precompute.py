@@ -36,7 +36,7 @@ class Precomputations:
         self.waits = True
         self.cache = cache
         self.stopped: set[str] = set()
-        # With the time when each was started.
+        # With the time when each was started; time.monotonic() has steps of 16 ms on Windows before Python 3.13.
         self._running: dict[str, tuple[sinew.Precomputation, float]] = {}
         self._made: OrderedDict[str, np.ndarray] = OrderedDict()
         self._lock = sinew.Lock()
@@ -65,7 +65,7 @@ class Precomputations:
             self._take_results()
             if key not in self._running:
                 self.stopped.discard(key)
-                self._running[key] = start(gives_way=gives_way), time.monotonic()
+                self._running[key] = start(gives_way=gives_way), time.perf_counter()
             return self._running[key][0]
 
     def make_now(self, key: str, start: Start) -> np.ndarray:
@@ -110,7 +110,7 @@ class Precomputations:
                 continue
             if made is not None:
                 self._keep(key, made)
-                if self.cache is not None and time.monotonic() - started > SECONDS_WORTH_A_FILE:
+                if self.cache is not None and time.perf_counter() - started > SECONDS_WORTH_A_FILE:
                     self.cache.store(key, made)
 
     def _keep(self, key: str, made: np.ndarray) -> None:

@@ -156,12 +156,12 @@ py::array_t<float> checked_points(const py::handle& value, const char* argument,
     return points;
 }
 
-void refuse_rest_points(const py::array_t<float>& points, std::size_t count) {
+void refuse_rest_points(const py::array_t<float>& points, std::size_t count,
+                        const Affine<float>& bones_from_model) {
     check_points(as_points(points), count);
-    refuse_space();
+    check_space(bones_from_model);
+    throw std::bad_alloc();
 }
-
-void refuse_space() { fail("bones_from_model", "an invertible transform", "one of determinant 0"); }
 
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument) {
     const std::string wanted = "float32 [n, 4, 4] or [n, 3, 4]";

@@ -126,11 +126,9 @@ py::array_t<float> checked_points(const py::handle& value, const char* argument)
 /// The same, n = `count`.
 py::array_t<float> checked_points(const py::handle& value, const char* argument, std::size_t count);
 
-/// Raises ValueError for what set_rest_points() did not take: points [n, 3], else their transform.
-[[noreturn]] void refuse_rest_points(const py::array_t<float>& points, std::size_t count);
-
-/// Raises ValueError for bones_from_model.
-[[noreturn]] void refuse_space();
+/// Raises for what set_rest_points() did not take: ValueError for points [n, 3] or their space, else MemoryError.
+[[noreturn]] void refuse_rest_points(const py::array_t<float>& points, std::size_t count,
+                                     const Affine<float>& bones_from_model = {});
 
 /// An array [n, 4, 4] or [n, 3, 4], row-major, finite. A fourth row is not read.
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument);

@@ -12,6 +12,7 @@
 #include "module.h"
 #include "parameters.h"
 #include "sinew/deformer.h"
+#include "sinew/mesh/check_arrays.h"
 #include "sinew/methods/methods.h"
 #include "sinew/skeleton/continued_rotations.h"
 
@@ -313,7 +314,7 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
         options.rotations = arguments.rotations;
     }
     options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
-    if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) refuse_space();
+    check_space(options.bones_from_model);
     return arguments;
 }
 
@@ -327,7 +328,7 @@ py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone
                                                      rest_inverses, parameters, parents, turns);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const auto to = as_points_to_write(points);
-    deformer.call([&] { static_cast<void>(deformer.deform(arguments.bones, arguments.options, to)); });
+    deformer.call([&] { return deformer.deform(arguments.bones, arguments.options, to); });
     return points;
 }
 

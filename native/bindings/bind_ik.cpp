@@ -194,7 +194,7 @@ Solution solve(Solver& self, const ArrayLike& rest, const ArrayLike& tips, const
             read(3, i, own);
             for (Quat<double>& q : own) {
                 const double length = glm::length(q);
-                q = length > 0.0 && std::isfinite(length) ? q / length : Quat<double>(1.0, 0.0, 0.0, 0.0);
+                q = length > 0.0 && std::isfinite(length) ? q / length : Quat<double>(1.0, Vec3<double>(0.0));
             }
             if (inputs.size() > 5) read(5, i, points);
             const auto from_root = Item<DualQuat<double>>::read(inputs[4].at(i, common));

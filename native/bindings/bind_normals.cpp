@@ -81,7 +81,7 @@ py::array_t<float> compute(const Timed<Normals>& normals, const ArrayLike& point
     py::array_t<float> result = checked_out(out, normals.count(of));
     check_apart(result, given);
     const auto to = as_points_to_write(result);
-    normals.call([&] { static_cast<void>(normals.compute(of, as_points(given), to, most)); });
+    normals.call([&] { return normals.compute(of, as_points(given), to, most); });
     return result;
 }
 

@@ -47,7 +47,9 @@ Array relative_to_root(const Skeleton& skeleton, const ArrayLike& any_transforms
     const auto [transforms, root] = promoted<2>({"transforms", "root"}, {any_transforms, any_root});
     return with_layout(transforms, "transforms", "bones", [&]<class Transform, class T>() {
         auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
-        root_relative<Transform>(skeleton, checked_root<Transform, T>(root), bones, bones);
+        const auto before = checked_root<Transform, T>(root);
+        // Their numbers were checked.
+        static_cast<void>(root_relative<Transform>(skeleton, before, bones, bones));
         return as_array(bones);
     });
 }
@@ -65,8 +67,9 @@ Array branch_updated(const Skeleton& skeleton, const ArrayLike& any_relative, co
     return with_layout(transforms, "transforms", "bones", [&]<class Transform, class T>() {
         const auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
         auto result = checked_bones<Transform, T>(skeleton, relative, "root_relative");
-        update_branch<Transform>(skeleton, checked_root<Transform, T>(root), bones,
-                                 static_cast<std::size_t>(index), result);
+        const auto before = checked_root<Transform, T>(root);
+        static_cast<void>(
+            update_branch<Transform>(skeleton, before, bones, static_cast<std::size_t>(index), result));
         return as_array(result);
     });
 }

@@ -48,8 +48,7 @@ Deformed deform(const Timed<SkinnedNormals>& skinned, const ArrayLike& bone_tran
     const auto to_points = as_points_to_write(points), to_normals = as_points_to_write(normals),
                to_tangents = as_points_to_write(tangents);
     skinned.call([&] {
-        static_cast<void>(
-            skinned.deform(arguments.bones, arguments.options, to_points, to_normals, to_tangents));
+        return skinned.deform(arguments.bones, arguments.options, to_points, to_normals, to_tangents);
     });
     if (!skinned.has_tangents()) return py::make_tuple(points, normals, py::none());
     return py::make_tuple(points, normals, tangents);
@@ -67,9 +66,8 @@ py::array_t<float> deform_normals(const Timed<SkinnedNormals>& skinned, const Ar
     auto normals = checked_out(out, skinned.frame_count());
     check_apart(normals, points);
     const auto to = as_points_to_write(normals);
-    skinned.call([&] {
-        static_cast<void>(skinned.deform_normals(arguments.bones, arguments.options, as_points(points), to));
-    });
+    skinned.call(
+        [&] { return skinned.deform_normals(arguments.bones, arguments.options, as_points(points), to); });
     return normals;
 }
 

@@ -49,7 +49,8 @@ std::vector<TwistChannels<float>> checked_channels(const OptionalArrayLike& chan
     for (std::size_t i = 0; i < count; ++i) {
         const float* const row = rows.data() + kChannelColumns * static_cast<py::ssize_t>(i);
         check_finite(row, kChannelColumns, "channels", static_cast<py::ssize_t>(i));
-        result.push_back({Quat<float>(row[0], row[1], row[2], row[3]), Vec3<float>(row[4], row[5], row[6])});
+        result.push_back(
+            {Quat<float>(row[0], {row[1], row[2], row[3]}), Vec3<float>(row[4], row[5], row[6])});
     }
     return result;
 }

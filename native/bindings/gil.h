@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <new>
 #include <utility>
 
 namespace sinew::bindings {
@@ -35,13 +36,14 @@ struct Timed : Object {
         : Object(std::move(object)) {}  // implicit, so that functions return either
     Timed(Timed&& other) noexcept : Object(std::move(other)) {}
 
-    /// Calls work(), which must neither throw nor touch Python's objects.
+    /// Calls work(), which must neither throw nor touch Python's objects. It returns false where memory is missing:
+    /// arguments were checked before.
     template <class Work>
     void call(const Work& work) const {
         constexpr std::chrono::nanoseconds kLongestUnderLock{30'000};
         const auto timed = [&] {
             const auto start = std::chrono::steady_clock::now();
-            work();
+            if (!work()) throw std::bad_alloc();
             last_.store(std::chrono::steady_clock::now() - start, std::memory_order_relaxed);
         };
         last_.load(std::memory_order_relaxed) > kLongestUnderLock ? without_gil(timed) : timed();

@@ -91,7 +91,7 @@ struct Item<Affine<T>> : Numbers<T, 4, 4> {
 template <class T>
 struct Item<Quat<T>> : Numbers<T, 4> {
     static constexpr const char* kShape = "[.., 4]";
-    static Quat<T> read(const T* from) { return Quat<T>(from[0], from[1], from[2], from[3]); }
+    static Quat<T> read(const T* from) { return Quat<T>(from[0], {from[1], from[2], from[3]}); }
     static void write(const Quat<T>& q, T* to) {
         to[0] = q.w;
         Item<Vec3<T>>::write(vector_part(q), to + 1);

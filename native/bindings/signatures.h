@@ -60,7 +60,7 @@ using NamedTuple = Typed<Text("sinew._types.") + name + Text("[typing.Any]")>;
 inline constexpr const char* kVertexCount = "Number of vertices.";
 inline constexpr const char* kInfluenceCount = "Number of influences of positive weight.";
 inline constexpr const char* kBoneCount =
-    "How many bones a pose must have: one more than the highest bone index in the influences.";
+    "How many bones a pose must have: one more than the highest that an influence or vertex data names.";
 
 }  // namespace sinew::bindings
 

@@ -17,7 +17,7 @@ py::array_t<float> applied(const Timed<Stage>& stage, const py::array_t<float>& 
     stage.call([&] {
         const auto from = as_points(given);
         if (from.data() != to.data()) std::memmove(to.data(), from.data(), from.size_bytes());
-        static_cast<void>(apply(to));
+        return apply(to);
     });
     return result;
 }
@@ -30,7 +30,7 @@ void set_rest_points(Timed<Stage>& stage, const ArrayLike& rest_points,
     // May have to wait for another thread that applies it.
     bool is_set = false;
     without_gil([&] { is_set = stage.set_rest_points(as_points(points), space); });
-    if (!is_set) refuse_rest_points(points, stage.vertex_count());
+    if (!is_set) refuse_rest_points(points, stage.vertex_count(), space);
 }
 
 }  // namespace sinew::bindings

@@ -81,9 +81,10 @@ public:
     explicit Binding(const BindData& data);
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
-    /// Influences of positive weight.
+    /// Influences of positive weight, once they are normalised.
     [[nodiscard]] std::size_t influence_count() const noexcept;
-    /// One more than the highest bone index in the influences.
+    /// One more than the highest bone that an influence names, also one of weight 0, or a row of vertex data that is
+    /// not all 0.
     [[nodiscard]] std::size_t bone_count() const noexcept;
     [[nodiscard]] BoundMesh unpack() const;
 

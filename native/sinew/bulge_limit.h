@@ -40,7 +40,7 @@ public:
                                        const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
-    /// One more than the highest bone index in the influences.
+    /// As Binding::bone_count().
     [[nodiscard]] std::size_t bone_count() const noexcept;
 
     /// Limits the points in place.

@@ -114,12 +114,9 @@ std::vector<float> Deformer::mix_weights() const {
 }
 
 bool Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) noexcept {
-    const PackedMesh& mesh = state_->packed->mesh;
     if (!are_points(rest_points, vertex_count())) return false;
     const PaletteStore::Writing writing(state_->palettes);
-    state_->own_rest_points.resize(kPointRows * mesh.blocks.size());
-    pack_points(mesh, rest_points, state_->own_rest_points);
-    return true;
+    return set_own_points(state_->packed->mesh, rest_points, state_->own_rest_points);
 }
 
 bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,

@@ -35,8 +35,9 @@ struct MixData {
 };
 
 /// A binding and a method, ready to deform any pose. Any number of threads may use one Deformer at once; if more than
-/// 16 deform at the same time, some wait. It allocates when more of them than ever before deform at once. A child that
-/// is forked meanwhile can use it, too, but must set rest points again that were being set.
+/// 16 deform at the same time, some wait. It allocates when more of them than ever before deform at once; where there
+/// is no memory for that, they take turns. A child that is forked meanwhile can use it, too, but must set rest points
+/// again that were being set.
 class SINEW_EXPORT Deformer {
 public:
     /// Throws also for a method that is not in the list of methods, and one whose vertex data the binding lacks.
@@ -49,9 +50,10 @@ public:
     /// The method that the stage `mix` adds, or null.
     [[nodiscard]] const MethodInfo* mixed_method() const noexcept;
     [[nodiscard]] std::size_t vertex_count() const noexcept;
-    /// Influences of positive weight.
+    /// Influences of positive weight, once they are normalised.
     [[nodiscard]] std::size_t influence_count() const noexcept;
-    /// One more than the highest bone index in the influences.
+    /// One more than the highest bone that an influence names, also one of weight 0, or a row of vertex data that is
+    /// not all 0.
     [[nodiscard]] std::size_t bone_count() const noexcept;
 
     /// Its binding, with the current rest points.
@@ -60,8 +62,8 @@ public:
     [[nodiscard]] std::vector<float> mix_weights() const;
 
     /// Sets the rest points [vertices] of this deformer alone, such as when shape keys change. Each result of a
-    /// concurrent deform() has either the old points or the new ones. The first call copies the points of the
-    /// binding; later calls do not allocate. Returns whether the size fits and all are finite: else nothing changes.
+    /// concurrent deform() has either the old points or the new ones. The first call allocates
+    /// memory for them. Returns whether the size fits, all are finite and there is memory: else nothing changes.
     [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points) noexcept;
 
     /// Writes the deformed points, model space.

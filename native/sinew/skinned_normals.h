@@ -45,7 +45,7 @@ public:
     /// Writes the deformed points, bit for bit those of a Deformer, and normals and tangents of unit length.
     ///
     /// posed_from_rest  [bones, at least deformer().bone_count()] finite; missing bones stay at rest
-    /// points           [vertices]
+    /// points           [vertices], as for Deformer::deform(), which may return false without memory
     /// normals          [frames]
     /// tangents         [frames], or empty; empty if there are none at rest
     ///

@@ -45,8 +45,9 @@ public:
     /// without a Y axis, and a singular transform.
     TwistSpread(const Binding& binding, const TwistSpreadData& data);
 
-    /// Sets other rest points [vertices], or the same points with another bones_from_model. The first call copies
-    /// the points of the binding; later calls do not allocate. Returns as BulgeLimit::set_rest_points().
+    /// Sets other rest points [vertices], or the same points with another bones_from_model. The first call
+    /// allocates memory for them. Returns whether the size fits, all are finite, the transform has an inverse and there
+    /// is memory: else nothing changes.
     [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points,
                                        const Affine<float>& bones_from_model = {}) noexcept;
 

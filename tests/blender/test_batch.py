@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import random
@@ -28,7 +29,7 @@ import test_cluster
 import whole_file
 from program import ENVIRONMENT, run_sinew, start_sinew
 from sinew_addon.attach import properties
-from sinew_addon.blender_process import BlenderProcess, Limits
+from sinew_addon.blender_process import BlenderProcess, Limits, how_it_ended
 from sinew_addon.io import files
 from sinew_addon.jobs.job_file import Settings
 
@@ -80,12 +81,32 @@ def wait_for_work(process: subprocess.Popen, but: int | None = None) -> psutil.P
 
 
 def crash(process: psutil.Process) -> str:
-    """Returns what the batch calls it. Windows has no signals for that: there the process is ended."""
-    if os.name == "nt":
-        process.kill()
-        return "status 15"
+    """Returns what the batch calls it. On Windows the process ends with the status of a crash."""
+    if sys.platform == "win32":
+        kernel = ctypes.WinDLL("kernel32")
+        handle = kernel.OpenProcess(1, False, process.pid)  # PROCESS_TERMINATE
+        assert kernel.TerminateProcess(handle, 0xC0000005)
+        kernel.CloseHandle(handle)
+        return "EXCEPTION_ACCESS_VIOLATION"
     process.send_signal(signal.SIGSEGV)
     return "SIGSEGV"
+
+
+@pytest.mark.parametrize(
+    ("status", "is_windows", "said"),
+    [
+        (-11, False, "Blender crashed (SIGSEGV)"),
+        (-9, False, "Blender crashed (SIGKILL)"),
+        (11, False, "Blender was ended (status 11)"),
+        (11, True, "Blender crashed (EXCEPTION_ACCESS_VIOLATION)"),
+        (0xC0000005, True, "Blender crashed (EXCEPTION_ACCESS_VIOLATION)"),
+        (0xC0000409, True, "Blender crashed (exception 0xC0000409)"),
+        (15, True, "Blender was ended (status 15)"),
+        (1, True, "Blender was ended (status 1)"),
+    ],
+)
+def test_a_crash_is_called_what_the_system_calls_it(status, is_windows, said):
+    assert how_it_ended(status, is_windows) == said
 
 
 def report_of(out: Path) -> dict[str, dict]:

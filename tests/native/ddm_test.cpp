@@ -5,6 +5,7 @@
 #include "sinew/methods/ddm/ddm.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -147,6 +148,22 @@ TEST_P(DdmKernels, take_bones_that_the_moments_alone_name) {
         std::ranges::fill(bound.scene.bones, 5);
         EXPECT_LT(error_of(bound, variant()), 2.0 * kTolerance) << is_mixed;
     }
+}
+
+TEST(BoneCount, includes_what_vertex_data_names) {
+    Scene scene;
+    scene.add_vertex({1, 2, 3}, {{0, 1.0f}});
+    std::vector<float> rows(3 * kMomentFloats);
+    for (std::size_t row = 0; row < 3; ++row) {
+        rows[kMomentFloats * row + 1] = std::array{0.0f, 7.0f, 9.0f}[row];
+        if (row < 2) rows[kMomentFloats * row + 2] = 0.5f;
+    }
+    const VertexData of_ddm{Ddm::info, rows};
+    BindData data = scene.data();
+    EXPECT_EQ(Binding(data).bone_count(), 1);
+    data.vertex_data = std::span(&of_ddm, 1);
+    // Not the last row's, which is all 0.
+    EXPECT_EQ(Binding(data).bone_count(), 8);
 }
 
 }  // namespace

@@ -80,6 +80,20 @@ TEST_P(Deform, refuses_rest_points_that_do_not_fit_or_are_not_finite) {
     EXPECT_TRUE(same_bits(deformed(deformer, scene), expected));
 }
 
+// Not a bone of the vertex before it is stored and none afterwards.
+TEST_P(Deform, weights_that_vanish_beside_the_others_count_as_0) {
+    Scene scene = random_scene(23, 30, 1.0);
+    scene.add_vertex({1, 2, 3}, {{0, 1e30f}, {1, 1e30f}, {2, 1e-20f}});
+    scene.add_vertex({1, 2, 3}, {{3, 0.0f}, {4, 1e-20f}, {5, 1e-38f}});
+    const Deformer deformer(scene.data(), method());
+    const BoundMesh bound = deformer.unpack();
+    EXPECT_EQ(bound.influence_offsets[31] - bound.influence_offsets[30], 2);
+    EXPECT_EQ(deformer.influence_count(), bound.influence_bones.size());
+    BindData stored = bound.data();
+    stored.vertex_data = scene.data().vertex_data;
+    EXPECT_TRUE(same_bits(deformed(Deformer(stored, method()), scene), deformed(deformer, scene)));
+}
+
 TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
     Scene scene = random_scene(20, 10000, 1.0);
     Deformer deformer(scene.data(), method());

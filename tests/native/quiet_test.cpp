@@ -2,6 +2,7 @@
 // Protects frames from allocations and locks: they are counted, in a program of its own, as that counts everything
 // in the process.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
@@ -39,6 +40,7 @@ std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
 std::atomic<std::size_t> bytes{0};
 std::atomic<int> beside{0};
+std::atomic<bool> has_memory{true};
 
 }  // namespace
 
@@ -102,7 +104,7 @@ void free_aligned(void* memory) {
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
     allocations.fetch_add(1);
     bytes.fetch_add(size);
-    return allocate(std::max<std::size_t>(size, 1));
+    return !has_memory ? nullptr : allocate(std::max<std::size_t>(size, 1));
 }
 
 void* operator new(std::size_t size) {
@@ -113,7 +115,7 @@ void* operator new(std::size_t size) {
 void* operator new(std::size_t size, std::align_val_t alignment) {
     allocations.fetch_add(1);
     const auto unit = static_cast<std::size_t>(alignment);
-    if (void* const memory = allocate_aligned(unit, size)) return memory;
+    if (void* const memory = has_memory ? allocate_aligned(unit, size) : nullptr) return memory;
     throw std::bad_alloc();
 }
 
@@ -204,6 +206,40 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     for (std::thread& thread : threads) thread.join();
     // A deformer allocates palettes once for each thread that uses it beside others. Each thread counts all.
     EXPECT_LE(in_frames, 5 * 4 * 3 * static_cast<int>(deformers.size()));
+}
+
+// What throws nothing says by its result that memory is missing, and nothing has changed.
+TEST(Frames, without_memory_return_false) {
+    const Scene scene = random_scene(7, 3000, 1.0);
+    const Binding binding(scene.data());
+    const std::vector<Affine<float>> rest_bones(scene.posed_from_rest.size());
+    const TwistBone twist{0, 0, 1, false, {0, 0, 0}, {0, 1, 0}};
+    const std::vector<Vec3<float>> along_z(scene.rest_points.size(), Vec3<float>(0, 0, 1));
+    Deformer deformer(binding, Dq::info);
+    TwistSpread spread(binding, {std::span(&twist, 1), rest_bones});
+    const SkinnedNormals skinned(binding, Dq::info, {along_z});
+    const auto before = deformed(deformer, scene);
+    struct Vertex {
+        Vec3<float> point{7.0f}, normal{8.0f};
+    };
+    std::vector<Vertex> buffer(scene.rest_points.size());
+    const Strided<Vec3<float>> points(&buffer[0].point, buffer.size(), sizeof(Vertex));
+    const Strided<Vec3<float>> normals(&buffer[0].normal, buffer.size(), sizeof(Vertex));
+    const auto results = [&] {
+        return std::array{deformer.deform(scene.posed_from_rest, {}, points),
+                          skinned.deform(scene.posed_from_rest, {}, points, normals),
+                          deformer.set_rest_points(along_z), spread.set_rest_points(along_z)};
+    };
+    has_memory = false;
+    const auto without = results();
+    has_memory = true;
+    EXPECT_EQ(without, (std::array{false, false, false, false}));
+    EXPECT_TRUE(std::ranges::all_of(buffer, [](const Vertex& vertex) {
+        return vertex.point == Vec3<float>(7.0f) && vertex.normal == Vec3<float>(8.0f);
+    }));
+    EXPECT_TRUE(same_bits(deformed(deformer, scene), before));
+    EXPECT_EQ(results(), (std::array{true, true, true, true}));
+    EXPECT_FALSE(same_bits(deformed(deformer, scene), before));
 }
 
 template <auto function>

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -92,7 +93,7 @@ double distance(const Affine<T>& a, const Affine<T>& b) {
 
 template <class T>
 bool same_bits(const Vec3<T>& a, const Vec3<T>& b) {
-    return a.x == b.x && a.y == b.y && a.z == b.z;
+    return std::memcmp(&a, &b, sizeof(a)) == 0;
 }
 
 inline bool same_bits(const std::vector<Vec3<float>>& a, const std::vector<Vec3<float>>& b) {

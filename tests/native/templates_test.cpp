@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Protects the memory of averages, splines and inverse kinematics, for sanitizers; tests/python has the oracles.
+// Protects the memory of fits, splines, skeletons and inverse kinematics, for sanitizers, and whatever sizes are given; tests/python has the oracles.
+#include <algorithm>
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "sinew/fit/average.h"
+#include "sinew/fit/hand_eye.h"
 #include "sinew/ik/solver.h"
+#include "sinew/interpolate/hermite.h"
 #include "sinew/interpolate/methods.h"
+#include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/skeleton/keyframes.h"
 #include "support.h"
 
@@ -40,6 +45,13 @@ TYPED_TEST(Average, leaves_outliers_out) {
     EXPECT_FALSE(robust_average<T>({}, {}, {}).is_defined);
 }
 
+template <class Transform>
+Transform as(const QuatVec<double>& motion) {
+    if constexpr (std::is_same_v<Transform, Affine<double>>) return to_affine(motion);
+    if constexpr (std::is_same_v<Transform, QuatVec<double>>) return motion;
+    if constexpr (std::is_same_v<Transform, DualQuat<double>>) return to_dual_quat(motion);
+}
+
 template <class Method>
 class Spline : public testing::Test {};
 
@@ -52,15 +64,92 @@ TYPED_TEST(Spline, half_turns_between_keys_are_finite) {
     constexpr std::array kTimes{0.0, 1.0, 1.5, 4.0, 5.0};
     std::vector<Transform> keys;
     for (const double degrees : {0.0, 180.0, 360.0, 180.0, 0.0}) {
-        const QuatVec<double> key{about<double>({1, 2, 3}, degrees), {degrees, 0, 0}};
-        if constexpr (std::is_same_v<Transform, Affine<double>>) keys.push_back(to_affine(key));
-        if constexpr (std::is_same_v<Transform, QuatVec<double>>) keys.push_back(key);
-        if constexpr (std::is_same_v<Transform, DualQuat<double>>) keys.push_back(to_dual_quat(key));
+        keys.push_back(as<Transform>({about<double>({1, 2, 3}, degrees), {degrees, 0, 0}}));
     }
     for (const double time : {-1.0, 0.0, 0.5, 1.0, 1.2, 2.0, 4.0, 5.0, 9.0}) {
         const auto value = catmull_rom<TypeParam, double>(std::span<const Transform>(keys), kTimes, time);
         EXPECT_TRUE(is_finite(to_affine(value.transform))) << time;
     }
+}
+
+TYPED_TEST(Spline, sizes_that_do_not_fit_read_and_write_nothing) {
+    using Transform = typename TypeParam::template Transform<double>;
+    const std::vector<Transform> keys(4);
+    const std::vector<double> times{0.0, 1.0, 2.0, 3.0};
+    const auto few = [](const auto& all) { return std::span(all).first(2); };
+    for (const auto& value :
+         {catmull_rom<TypeParam, double>(keys, few(times), 0.5),
+          catmull_rom<TypeParam, double>(few(keys), times, 2.5), catmull_rom<TypeParam, double>({}, {}, 0.5),
+          catmull_rom_vector<Transform, double>(few(keys), times, 2.5),
+          TypeParam::template blend<BlendSigns::kToHeaviest, double>(keys, few(times)),
+          TypeParam::template blend<BlendSigns::kToHeaviest, double>(few(keys), times),
+          TypeParam::template blend<BlendSigns::kToHeaviest, double>({}, {})}) {
+        EXPECT_FALSE(value.is_defined);
+        EXPECT_EQ(distance(to_affine(value.transform), Affine<double>{}), 0.0);
+    }
+    const Skeleton skeleton(std::vector<std::int32_t>{-1, 0, 1, 2});
+    const Transform mark = as<Transform>({about<double>({1, 2, 3}, 50.0), {9, 8, 7}});
+    std::vector<Transform> bones(4, mark), three(3, mark);
+    const std::span<const Transform> all(keys), some = all.first(3);
+    std::vector<bool> are_done;
+    for (const auto& [from, onto] : {std::pair(some, std::span(bones)), std::pair(all, std::span(three))}) {
+        are_done.push_back(root_relative<Transform>(skeleton, mark, from, onto));
+        are_done.push_back(update_branch<Transform>(skeleton, mark, from, 1, onto));
+        are_done.push_back(interpolate_keyframes<TypeParam, double>(skeleton, from, all, 0.5, onto));
+        are_done.push_back(
+            spline_keyframes<TypeParam, double>(skeleton, from, few(times).first(1), 0.5, onto));
+        are_done.push_back(
+            spline_keyframes_vector<Transform, double>(skeleton, from, few(times).first(1), 0.5, onto));
+    }
+    are_done.push_back(update_branch<Transform>(skeleton, mark, all, 4, bones));
+    are_done.push_back(interpolate_keyframes<TypeParam, double>(skeleton, all, some, 0.5, bones));
+    are_done.push_back(spline_keyframes<TypeParam, double>(skeleton, {}, {}, 0.5, bones));
+    EXPECT_EQ(std::ranges::count(are_done, true), 0);
+    for (const Transform& bone : bones) EXPECT_EQ(distance(to_affine(bone), to_affine(mark)), 0.0);
+    EXPECT_TRUE(root_relative<Transform>(skeleton, mark, all, bones));
+}
+
+TEST(Hermite, sizes_that_do_not_fit_read_nothing) {
+    const std::vector<Vec3<double>> points(4, Vec3<double>(1.0));
+    const std::vector<DualQuat<double>> keys(4);
+    const std::vector<Twist<double>> velocities(4);
+    const std::vector<double> times{0.0, 1.0, 2.0, 3.0};
+    const auto few = [](const auto& all) { return std::span(all).first(2); };
+    EXPECT_EQ(hermite<double>(few(points), points, times, 2.5), Vec3<double>(0.0));
+    EXPECT_EQ(hermite<double>(points, few(points), times, 2.5), Vec3<double>(0.0));
+    EXPECT_EQ(hermite<double>(std::span<const Vec3<double>>(), {}, {}, 2.5), Vec3<double>(0.0));
+    EXPECT_FALSE(hermite<double>(few(keys), velocities, times, 2.5).is_defined);
+    EXPECT_FALSE(hermite<double>(keys, few(velocities), times, 2.5).is_defined);
+    EXPECT_FALSE(hermite<double>(std::span<const DualQuat<double>>(), {}, {}, 2.5).is_defined);
+    EXPECT_TRUE(hermite<double>(keys, velocities, times, 2.5).is_defined);
+}
+
+TEST(Fits, of_numbers_that_differ_are_not_defined) {
+    const std::vector<Vec3<double>> three(3, Vec3<double>(1.0));
+    const std::vector<DualQuat<double>> poses(3);
+    const std::vector<double> two(2, 1.0);
+    std::vector<double> kept(2);
+    const auto few = [](const auto& all) { return std::span(all).first(2); };
+    EXPECT_FALSE(fit_rigid(Pairs<double>{three, few(three)}).is_defined);
+    EXPECT_FALSE(fit_rigid(Pairs<double>{three, three, two}).is_defined);
+    EXPECT_FALSE(fit_rigid(Pairs<double>{{}, {}, {}, three, few(three)}).is_defined);
+    EXPECT_FALSE(fit_rigid(Pairs<double>{{}, {}, {}, three, three, two}).is_defined);
+    EXPECT_FALSE(hand_eye<double>(poses, few(poses)).is_defined);
+    EXPECT_FALSE(hand_eye<double>(poses, poses, two).is_defined);
+    EXPECT_FALSE(average<double>(poses, two).is_defined);
+    EXPECT_FALSE(robust_average<double>(poses, {}, kept).is_defined);
+}
+
+// Beside one that is 1e600 times as heavy.
+TEST(RobustAverage, a_weight_that_vanishes_counts_as_0) {
+    const std::vector poses{DualQuat<double>{},
+                            to_dual_quat(QuatVec<double>{about<double>({1, 2, 3}, 180.0), {}}),
+                            DualQuat<double>{}};
+    const std::vector weights{1e300, 1e-300, 1e300};
+    std::vector<double> kept(3, 5.0);
+    EXPECT_TRUE(average<double>(poses, weights).is_defined);
+    EXPECT_TRUE(robust_average<double>(poses, weights, kept).is_defined);
+    EXPECT_EQ(kept, (std::vector{1.0, 0.0, 1.0}));
 }
 
 TEST(IkSolver, takes_limits_poles_and_trees_and_solves_nothing_where_sizes_do_not_fit) {

@@ -126,7 +126,6 @@ TEST(ParallelFor, hands_an_exception_to_its_caller_and_goes_on_working) {
                 EXPECT_THROW(parallel_for(20 * 4096, threads, work), std::out_of_range)
                     << threads << " " << bad;
                 EXPECT_LE(calls, 20);
-                if (threads == 1) break;  // one chunk
             }
         }
         ASSERT_TRUE(covers_once(50000, 4));
@@ -134,16 +133,28 @@ TEST(ParallelFor, hands_an_exception_to_its_caller_and_goes_on_working) {
     EXPECT_TRUE(meets_a_helper());
 }
 
+// However many threads there are, and where another call has them.
 TEST(ParallelFor, takes_chunks_of_any_size) {
     for (const std::size_t piece : {std::size_t{0}, std::size_t{1}, std::size_t{7}, ~std::size_t{0}}) {
-        std::vector<int> visits(100, 0);
-        parallel_for(
-            100, 3,
-            [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end; ++i) ++visits[i];
-            },
-            piece);
-        EXPECT_TRUE(std::all_of(visits.begin(), visits.end(), [](int n) { return n == 1; })) << piece;
+        for (const std::size_t threads : {1, 3}) {
+            std::atomic<std::size_t> largest{0};
+            const auto covers = [&] {
+                std::vector<int> visits(100, 0);
+                parallel_for(
+                    100, threads,
+                    [&](std::size_t begin, std::size_t end) {
+                        for (std::size_t i = begin; i < end; ++i) ++visits[i];
+                        if (end - begin > largest) largest = end - begin;
+                    },
+                    piece);
+                return std::all_of(visits.begin(), visits.end(), [](int n) { return n == 1; });
+            };
+            EXPECT_TRUE(covers()) << piece;
+            std::atomic<bool> is_covered{true};
+            parallel_for(2 * 4096, 2, [&](std::size_t, std::size_t) { is_covered = covers() && is_covered; });
+            EXPECT_TRUE(is_covered) << piece;
+            EXPECT_LE(largest, std::clamp<std::size_t>(piece, 1, 100));
+        }
     }
 }
 

@@ -137,6 +137,17 @@ def test_only_bindings_include_pybind11():
     assert {path for path in users if bindings not in path.parents} == set()
 
 
+def test_no_quaternion_is_made_of_four_numbers():
+    """Of which GLM takes another as w where a program defines GLM_FORCE_QUAT_DATA_XYZW."""
+    within = r"(?:[^(){},&]|\([^(){}]*\)|\{[^(){}]*\})+"
+    four = re.compile(rf"\b(?:Quat<\w+>|glm::d?quat)[ \w]*[({{]{within}(?:,{within}){{3}}[)}}]")
+    assert four.search("return Quat<T>(cos(half), v.x, v.y, v.z);")
+    assert four.search("Quat<T> real{T(1), T(0), T(0), T(0)};")
+    assert not four.search("Quat<T>(s / T(4), {x, y, z})")
+    found = {path: four.findall(path.read_text()) for path in sources(ROOT / "native", ".h", ".cpp")}
+    assert {path.name: each for path, each in found.items() if each} == {}
+
+
 def test_package_sinew_imports_nothing_of_blender_or_the_extension():
     files = sources(ROOT / "native" / "python" / "sinew", ".py", ".pyi")
     assert files

@@ -53,6 +53,7 @@ def posed(rig, blend):
 @pytest.mark.parametrize("most", [2, 12])
 @pytest.mark.parametrize("turns", [None, 0.7, -2.0])
 def test_agrees_with_the_reference(blend, scaled, most, turns):
+    second = BLENDS[(BLENDS.index(blend) + (2 if scaled else 3)) % len(BLENDS)]
     rig = random_rig(1, vertices=300, most_influences=most, scaled=scaled)
     twists, *ends = chain(rig)
     parents = np.arange(-1, len(rig.transforms) - 1, dtype=np.int32)
@@ -63,7 +64,7 @@ def test_agrees_with_the_reference(blend, scaled, most, turns):
         "curves": rng.uniform(-1.0, 1.0, len(twists)).astype(np.float32),
         "channels": None if turns is None else true_channels(rig, twists, turns),
         "blend": blend,
-        "mix_blend": "linear" if blend == "rotations" else "rotations",
+        "mix_blend": second,
     }
     mix = None if turns is None else rng.uniform(-0.5, 1.5, 300).astype(np.float32)
     mask = np.linspace(-0.5, 1.5, 300).astype(np.float32)
@@ -117,7 +118,7 @@ REST_BONES = np.array([[[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, z], [0, 0, 0, 1]]
 JOINT = translation([0.0, 0.0, 2.0])
 
 
-def wrist(over=1.0, from_parent=False):
+def wrist(over=1.0, from_parent=False, mix=None):
     """The tube, whose weights change over this length, and the stage."""
     made = Tube(over=over)
     bone = int(from_parent)
@@ -128,6 +129,7 @@ def wrist(over=1.0, from_parent=False):
         [[0, 0, 2 * bone + 2]],
         REST_BONES,
         parents=[-1, 0],
+        mix=mix,
     )
     return made, spread
 
@@ -162,6 +164,20 @@ def numbers(made, points):
     posed, rest = (np.linalg.norm(p[edges[0]] - p[edges[1]], axis=1) for p in (points, made.points))
     volume = made.volume(points) / made.volume(made.points)
     return volume, np.hypot(*points[:, :2].T).min() / 0.5, (posed / rest).max()
+
+
+@pytest.mark.parametrize("blends", list(itertools.product(BLENDS, repeat=2)), ids="-".join)
+def test_a_mix_has_the_share_of_what_each_blend_gives(blends):
+    made, alone = wrist()
+    mix = np.linspace(-0.5, 1.5, len(made.points)).astype(np.float32)
+    share = np.clip(mix, 0.0, 1.0)[:, None]
+    pose, channels = hand(300.0), told(300.0)
+    points = sinew.Deformer(*made.mesh, "dq").deform(pose)
+    first, second = (alone.apply(points, pose, blend=blend, channels=channels) for blend in blends)
+    assert blends[0] == blends[1] or np.abs(second - first).max() > 0.05
+    _made, mixed = wrist(mix=mix)
+    got = mixed.apply(points, pose, blend=blends[0], mix_blend=blends[1], channels=channels)
+    np.testing.assert_allclose(got, first + share * (second - first), atol=2 * TOLERANCE)
 
 
 # Volume, least radius and longest edge, each 1 at rest; computed independently of this code, in numpy.

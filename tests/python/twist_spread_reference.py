@@ -120,7 +120,7 @@ def spread(  # noqa: PLR0913 - as the library's
         motion, along = transforms[bone], np.asarray(tails[number], float) - heads[number]
         linear, shift = motion[:3, :3], motion[:3, 3]
         beyond, posed_axis = are_below(tip, parents, len(rest_bones)), linear @ axis
-        for vertex, x in enumerate(result):
+        for vertex, x in enumerate(result.copy()):
             span = slice(offsets[vertex], offsets[vertex + 1])
             of, share = bones[span], np.asarray(weights[span], np.float64)
             if not share.sum() > 0.0:
@@ -136,18 +136,21 @@ def spread(  # noqa: PLR0913 - as the library's
             own = 1.0 if mask is None else np.clip(mask[vertex], 0.0, 1.0)
             theta = own * factor * angle * (e - 1.0 if from_parent else e)
             second = 0.0 if mix is None else np.clip(mix[vertex], 0.0, 1.0)
-            of_linear = (blend == "linear") * (1.0 - second) + (mix_blend == "linear") * second
             twisted = linear @ (origin + about(axis, theta) @ (rest - origin)) + shift
             untwisted = linear @ rest + shift
-            change = of_linear * weight * (twisted - untwisted)
-            if of_linear < 1.0 and posed_axis.any():
+            # The point is a mix of two methods' points, and so is what is added to it.
+            for made_by, portion in ((blend, 1.0 - second), (mix_blend, second)):
+                if made_by == "linear":
+                    result[vertex] += portion * weight * (twisted - untwisted)
+                    continue
+                if not posed_axis.any():
+                    continue
                 side = np.copysign(1.0, np.linalg.det(linear)) if np.linalg.det(linear) else 1.0
                 posed = side * posed_axis / np.linalg.norm(posed_axis)
                 centre = linear @ origin + shift
-                gap = left_out(mix_blend if blend == "linear" else blend, around, below, own * factor * part)
+                gap = left_out(made_by, around, below, own * factor * part)
                 moved = centre + about(posed, weight * theta + gap) @ (x - centre)
                 if not is_rigid(linear):
                     moved += weight * (twisted - centre - about(posed, theta) @ (untwisted - centre))
-                change = change + (1.0 - of_linear) * (moved - x)
-            result[vertex] = x + change
+                result[vertex] += portion * (moved - x)
     return result, margins

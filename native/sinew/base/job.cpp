@@ -6,7 +6,6 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
-#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -56,7 +55,7 @@ void make_room() {
     works_since = now();
 }
 
-/// Starts a thread. Returns false if the system refuses.
+/// Starts a thread. Returns false if the system refuses, or has no memory.
 template <class Run>
 bool start(std::thread& thread, bool gives_way, const Run& run) {
     try {
@@ -65,7 +64,7 @@ bool start(std::thread& thread, bool gives_way, const Run& run) {
             works_since = now();
             run();
         });
-    } catch (const std::system_error&) {
+    } catch (const std::exception&) {
         return false;
     }
     return true;
@@ -86,6 +85,7 @@ bool Job::go_on(double done) noexcept {
 
 void Job::for_each(std::size_t count, std::size_t chunk,
                    const std::function<void(std::size_t, std::size_t)>& work) {
+    chunk = std::max<std::size_t>(chunk, 1);
     std::atomic<std::size_t> next{0};
     std::mutex mutex;
     std::exception_ptr error;

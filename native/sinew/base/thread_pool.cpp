@@ -62,6 +62,11 @@ bool spin_until(const Ready& ready) {
     return ready();
 }
 
+/// The chunks one after the other.
+void run_alone(std::size_t count, const Work& work, std::size_t chunk) {
+    for (std::size_t begin = 0; begin < count; begin += chunk) work(begin, std::min(begin + chunk, count));
+}
+
 /// A thread of the operating system. Not std::thread, because that allocates, and because its destructor would
 /// terminate the process, as nobody joins the threads of the pool.
 class SystemThread {
@@ -114,10 +119,7 @@ public:
     void run(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
         // A flag instead of a mutex: in a nested call the same thread tries to lock again, which std::mutex
         // forbids.
-        if (busy_.exchange(true, std::memory_order_acquire)) {
-            work(0, count);
-            return;
-        }
+        if (busy_.exchange(true, std::memory_order_acquire)) return run_alone(count, work, chunk);
         const auto helpers = static_cast<std::uint32_t>(start_workers(threads - 1));
         std::exception_ptr error;
         error_ = &error;
@@ -328,7 +330,7 @@ void run_chunks(std::size_t count, std::size_t threads, const Work& work, std::s
     chunk = std::clamp<std::size_t>(chunk, 1, count);
     const std::size_t useful =
         std::min({useful_threads(threads, count - 1, chunk), (count - 1) / chunk + 1, kMaxThreads});
-    if (useful <= 1) return work(0, count);
+    if (useful <= 1) return run_alone(count, work, chunk);
     if (job_system.run != nullptr) return run_by_host(count, useful, work, chunk);
     pool.run(count, useful, work, chunk);
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -29,13 +28,14 @@ inline constexpr int kAverageSteps = 300;
 
 struct Poses {
     std::vector<DualQuat<double>> poses;
-    std::vector<double> weights;  ///< with sum 1; all positive
-    double longest = 0.0;         ///< the longest translation
+    std::vector<double> weights;       ///< with sum 1; all positive before they are rounded
+    std::vector<std::size_t> numbers;  ///< where each is among those given
+    double longest = 0.0;              ///< the longest translation
 
     [[nodiscard]] std::size_t size() const noexcept { return poses.size(); }
 };
 
-/// The poses with positive weight; none if there are none.
+/// The poses whose share of the largest weight is positive; none if there are none.
 template <class T>
 [[nodiscard]] Poses poses_of(std::span<const DualQuat<T>> poses, std::span<const T> weights) {
     Poses result;
@@ -43,11 +43,12 @@ template <class T>
     for (std::size_t i = 0; i < poses.size(); ++i) largest = std::max(largest, weight_at(weights, i));
     double sum = 0.0;
     for (std::size_t i = 0; i < poses.size(); ++i) {
-        const double weight = weight_at(weights, i);
-        if (!(weight > 0.0)) continue;
+        const double share = weight_at(weights, i) / largest;
+        if (!(share > 0.0)) continue;
         result.poses.push_back(normalized(cast<double>(poses[i])));
-        result.weights.push_back(weight / largest);
-        sum += weight / largest;
+        result.weights.push_back(share);
+        result.numbers.push_back(i);
+        sum += share;
         result.longest = std::max(result.longest, safe_length(translation(result.poses.back())));
     }
     for (double& weight : result.weights) weight /= sum;
@@ -134,12 +135,12 @@ template <class T>
 /// poses    [n] unit
 /// weights  [n] not negative; empty: 1 each
 ///
-/// Not defined if no weight is positive (the identity), if several means are equally good (such as for rotations
+/// Not defined if no weight is positive or the numbers differ (the identity), if several means are equally good (such as for rotations
 /// by 0, 120 and 240 degrees about one axis), if a pose is 180 degrees from the result, or if the iteration does
 /// not converge; the result is then one of the candidates, finite. Computed in double. Throws std::bad_alloc.
 template <class T>
 [[nodiscard]] Averaged<T> average(std::span<const DualQuat<T>> poses, std::span<const T> weights = {}) {
-    assert(weights.empty() || weights.size() == poses.size());
+    if (!detail::are_paired(poses.size(), poses, weights)) return {{}, false};
     const detail::Poses known = detail::poses_of(poses, weights);
     if (known.size() == 0) return {{}, false};
     const Blended<DualQuat<double>> start = detail::chordal_mean(known);
@@ -169,13 +170,13 @@ template <class T>
 /// kept            [n] how much each counts besides its weight, 0 to 1; 0 for an outlier
 ///
 /// Distances are those between images of the origin. As in everything that compares rotations with positions, the
-/// origin should be within what moves. Not defined if no weight is positive (the identity), if the poses that
-/// count do not have more than half of the weight or are not all within 90 degrees of the result, so that other
-/// means may be equally good, or if the iteration does not converge. Throws std::bad_alloc.
+/// origin should be within what moves. Not defined if no weight is positive or the numbers differ (the identity), if
+/// the poses that count do not have more than half of the weight or are not all within 90 degrees of the result, so
+/// that other means may be equally good, or if the iteration does not converge. Throws std::bad_alloc.
 template <class T>
 [[nodiscard]] Averaged<T> robust_average(std::span<const DualQuat<T>> poses, std::span<const T> weights,
                                          std::span<T> kept) {
-    assert(kept.size() == poses.size());
+    if (!detail::are_paired(poses.size(), kept, weights)) return {{}, false};
     std::fill(kept.begin(), kept.end(), T(0));
     const detail::Poses known = detail::poses_of(poses, weights);
     if (known.size() == 0) return {{}, false};
@@ -208,14 +209,11 @@ template <class T>
     constexpr double kQuarterTurn = 1.5707963267948966;
     double counted = 0.0;
     bool is_within_90 = true;
-    for (std::size_t i = 0, next = 0; i < poses.size(); ++i) {
-        if (!weights.empty() && !(weights[i] > T(0))) continue;
-        kept[i] = static_cast<T>(parts[next]);
-        if (parts[next] > 0.0) {
-            counted += known.weights[next];
-            is_within_90 = is_within_90 && rigid_distance(mean, known.poses[next]).angle < kQuarterTurn;
-        }
-        ++next;
+    for (std::size_t i = 0; i < known.size(); ++i) {
+        kept[known.numbers[i]] = static_cast<T>(parts[i]);
+        if (!(parts[i] > 0.0)) continue;
+        counted += known.weights[i];
+        is_within_90 = is_within_90 && rigid_distance(mean, known.poses[i]).angle < kQuarterTurn;
     }
     return {cast<T>(mean), has_settled && is_within_90 && counted > 0.5 + 1e-9};
 }

@@ -20,8 +20,8 @@ namespace sinew {
 /// transform   x
 /// error       roots of the weighted means of the squared angles (radians) and distances between a x and x b
 /// is_defined  false if the motions do not determine x to within rounding of T: fewer than two motions, rotations
-///             only about parallel axes, only rotations by 180 degrees, or no positive weight. The transform is
-///             then one of many, finite
+///             only about parallel axes, only rotations by 180 degrees, no positive weight, or different numbers
+///             of motions. The transform is then one of many, finite
 template <class T>
 struct HandEye {
     DualQuat<T> transform;
@@ -77,7 +77,7 @@ inline void add_equations(Triangle& rows, const DualQuat<double>& a, const DualQ
 [[nodiscard]] inline DualQuat<double> unit_in_null_space(const SingularValues<8>& s) noexcept {
     const auto part = [&](std::size_t column, std::size_t first) {
         const auto& v = s.v[column];
-        return Quat<double>(v[first], v[first + 1], v[first + 2], v[first + 3]);
+        return Quat<double>(v[first], {v[first + 1], v[first + 2], v[first + 3]});
     };
     const Quat<double> u1 = part(6, 0);
     const Quat<double> w1 = part(6, 4);
@@ -188,7 +188,7 @@ template <class T>
 template <class T>
 [[nodiscard]] HandEye<T> hand_eye(std::span<const DualQuat<T>> a, std::span<const DualQuat<T>> b,
                                   std::span<const T> weights = {}) noexcept {
-    assert(a.size() == b.size());
+    if (!detail::are_paired(a.size(), b, weights)) return {{}, {}, false};
     double length = 0.0;
     double largest_weight = 0.0;
     for (std::size_t i = 0; i < a.size(); ++i) {

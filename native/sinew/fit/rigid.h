@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -38,7 +37,7 @@ struct Pairs {
 /// error        the root of the weighted mean of the remaining squared distances, of points and directions
 /// is_defined   false if other rotations are equally good to within rounding of T: points on one line or all in
 ///              one position, a mirror image with a symmetry, no positive weight. The transform is then one of
-///              the best, finite; without positive weights the identity
+///              the best, finite; without positive weights, and where the numbers of Pairs differ, the identity
 /// is_mirrored  a mirror image would fit better, by more than rounding
 template <class T>
 struct RigidFit {
@@ -65,6 +64,12 @@ struct PairMoments {
     double largest_weight = 1.0;
 };
 
+/// Whether there is one of `others` for each of `count`, and a weight, if there are any.
+template <class Others, class Weights>
+[[nodiscard]] bool are_paired(std::size_t count, const Others& others, const Weights& weights) noexcept {
+    return others.size() == count && (weights.empty() || weights.size() == count);
+}
+
 template <class T>
 [[nodiscard]] double weight_at(std::span<const T> weights, std::size_t i) noexcept {
     return weights.empty() ? 1.0 : static_cast<double>(weights[i]);
@@ -77,7 +82,6 @@ inline double largest_component(const Vec3<double>& v) noexcept {
 /// Calls f(source, target, weight) for each pair of points with positive weight.
 template <class T, class F>
 void for_points(const Pairs<T>& pairs, F f) noexcept {
-    assert(pairs.source.size() == pairs.target.size());
     for (std::size_t i = 0; i < pairs.source.size(); ++i) {
         const double weight = weight_at(pairs.weights, i);
         if (weight > 0.0) f(Vec3<double>(pairs.source[i]), Vec3<double>(pairs.target[i]), weight);
@@ -87,7 +91,6 @@ void for_points(const Pairs<T>& pairs, F f) noexcept {
 /// Calls f(source, target, weight) for each pair of directions that counts, normalised.
 template <class T, class F>
 void for_directions(const Pairs<T>& pairs, F f) noexcept {
-    assert(pairs.source_directions.size() == pairs.target_directions.size());
     const Vec3<double> none(0.0);
     for (std::size_t i = 0; i < pairs.source_directions.size(); ++i) {
         const double weight = weight_at(pairs.direction_weights, i);
@@ -197,6 +200,11 @@ template <class T>
 /// points; nothing is allocated.
 template <class T>
 [[nodiscard]] RigidFit<T> fit_rigid(const Pairs<T>& pairs) noexcept {
+    if (!detail::are_paired(pairs.source.size(), pairs.target, pairs.weights) ||
+        !detail::are_paired(pairs.source_directions.size(), pairs.target_directions,
+                            pairs.direction_weights)) {
+        return {{}, T(0), false, false};
+    }
     const detail::PairMoments m = detail::moments_of(pairs);
     const NearestRotation<double> nearest = nearest_rotation(m.covariance);
     const Vec3<double> translation = m.target_middle - rotate(nearest.rotation, m.source_middle);

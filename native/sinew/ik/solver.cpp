@@ -96,7 +96,7 @@ struct IkBone {
     std::array<double, 3> high{};
     std::array<double, 3> weight{1.0, 1.0, 1.0};
 
-    Quat<double> rotation{1.0, 0.0, 0.0, 0.0};
+    Quat<double> rotation{1.0, Vec3<double>(0.0)};
     Vec3<double> coordinates{0.0};
     DualQuat<double> parent_from_rest;
 
@@ -140,7 +140,7 @@ struct IkBone {
             const auto axis = static_cast<std::size_t>(i);
             c[i] = is_free[axis] ? std::clamp(c[i], low[axis], high[axis]) : 0.0;
         }
-        Quat<double> swing(1.0, 0.0, 0.0, 0.0);
+        Quat<double> swing(1.0, Vec3<double>(0.0));
         if (swings_about_two) {
             if (has_ellipse) {
                 const double half_x = c.x < 0.0 ? low[0] : high[0];
@@ -159,15 +159,15 @@ struct IkBone {
                 c.x *= std::sqrt(most / square);
                 c.z *= std::sqrt(most / square);
             }
-            swing = Quat<double>(std::sqrt(1.0 - c.x * c.x - c.z * c.z), c.x, 0.0, c.z);
+            swing = Quat<double>(std::sqrt(1.0 - c.x * c.x - c.z * c.z), {c.x, 0.0, c.z});
         } else {
             // At most one of the two is not 0.
             const double half = 0.5 * (c.x + c.z);
-            swing = Quat<double>(std::cos(half), is_free[0] ? std::sin(half) : 0.0, 0.0,
-                                 is_free[2] ? std::sin(half) : 0.0);
+            swing = Quat<double>(std::cos(half),
+                                 {is_free[0] ? std::sin(half) : 0.0, 0.0, is_free[2] ? std::sin(half) : 0.0});
         }
         coordinates = c;
-        rotation = swing * Quat<double>(std::cos(0.5 * c.y), 0.0, std::sin(0.5 * c.y), 0.0);
+        rotation = swing * Quat<double>(std::cos(0.5 * c.y), {0.0, std::sin(0.5 * c.y), 0.0});
     }
 
     /// Rotates the bone further by `axis`, a rotation vector in the space of the root, as far as its limits
@@ -218,9 +218,9 @@ struct IkTip {
     double reach = 0.0;              ///< for this solve, in lengths of the longest chain
     Vec3<double> offset{0.0};        ///< in the space of the bone
     Vec3<double> position{0.0};
-    Quat<double> rotation{1.0, 0.0, 0.0, 0.0};
+    Quat<double> rotation{1.0, Vec3<double>(0.0)};
     Vec3<double> goal{0.0};
-    Quat<double> goal_rotation{1.0, 0.0, 0.0, 0.0};
+    Quat<double> goal_rotation{1.0, Vec3<double>(0.0)};
 };
 
 }  // namespace

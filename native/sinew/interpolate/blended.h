@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -41,10 +40,11 @@ struct Shares {
     [[nodiscard]] T of(T weight) const noexcept { return weight / largest * scale; }
 };
 
-/// weights  [n], n >= 1, of any sign. Not defined if their sum is at most kDegenerateBlend times the largest.
+/// weights  [n] of any sign. Not defined if there are none, or if their sum is at most kDegenerateBlend times the
+///          largest.
 template <class T>
 [[nodiscard]] Shares<T> shares(std::span<const T> weights) noexcept {
-    assert(!weights.empty());
+    if (weights.empty()) return {0, T(1), T(1), false};
     const auto largest = std::max_element(weights.begin(), weights.end());
     const auto heaviest = static_cast<std::size_t>(largest - weights.begin());
     if (!(*largest > T(0))) return {heaviest, T(1), T(1), false};

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <span>
 
 #include "sinew/interpolate/dual.h"
@@ -19,10 +18,9 @@ struct KeyInterval {
     T length = T(0);
 };
 
-/// times  [n], n >= 1, non-decreasing, finite. Keys of equal time are a cut, as in spline_span().
+/// times  [n] non-decreasing, finite; without any, both keys are 0. Keys of equal time are a cut, as in spline_span().
 template <class T>
 [[nodiscard]] KeyInterval<T> key_interval(std::span<const T> times, T time) noexcept {
-    assert(!times.empty());
     const auto next = static_cast<std::size_t>(std::ranges::upper_bound(times, time) - times.begin());
     if (next == 0) return {};
     if (next == times.size()) return {next - 1, next - 1};
@@ -34,10 +32,13 @@ template <class T>
 ///
 /// points, tangents  [n]; tangents are per unit of time
 /// times             [n], n >= 1, non-decreasing. The curve is constant before the first time and after the last
+///
+/// Without any, and where the numbers differ, the result is 0.
 template <class T>
 [[nodiscard]] Vec3<T> hermite(std::span<const Vec3<T>> points, std::span<const Vec3<T>> tangents,
                               std::span<const T> times, T time) noexcept {
-    assert(points.size() == times.size() && tangents.size() == times.size());
+    if (times.empty() || points.size() != times.size() || tangents.size() != times.size())
+        return Vec3<T>(T(0));
     const KeyInterval<T> at = key_interval(times, time);
     if (at.key == at.next) return points[at.key];
     const T u = at.part;
@@ -56,12 +57,13 @@ template <class T>
 ///             is key * exp(h velocity)
 /// times       [n], n >= 1, non-decreasing. The curve is constant before the first time and after the last
 ///
-/// Not defined where Sclerp is not defined between two of its control poses, such as keys 180 degrees apart.
+/// Not defined where Sclerp is not defined between two of its control poses, such as keys 180 degrees apart; without
+/// any keys, and where the numbers differ (the identity).
 template <class T>
 [[nodiscard]] Blended<DualQuat<T>> hermite(std::span<const DualQuat<T>> keys,
                                            std::span<const Twist<T>> velocities, std::span<const T> times,
                                            T time) noexcept {
-    assert(keys.size() == times.size() && velocities.size() == times.size());
+    if (times.empty() || keys.size() != times.size() || velocities.size() != times.size()) return {{}, false};
     const KeyInterval<T> at = key_interval(times, time);
     if (at.key == at.next) return {keys[at.key], has_unit_rotation(keys[at.key])};
     const T third = at.length / T(3);

@@ -9,7 +9,8 @@ namespace sinew {
 
 // Each method is a type with a name, the representation that it works with, and
 //   between(a, b, t)             from `a` at t = 0 to `b` at t = 1; other t extrapolate
-//   blend(transforms, weights)   for n >= 1 transforms; weights of any sign, normalised to sum 1
+//   blend(transforms, weights)   for n >= 1 transforms and as many weights of any sign, normalised to sum 1; for
+//                                other numbers not defined: the identity
 // All rotations must have unit length; otherwise the result is not defined (has_unit_rotation()). If the sum of
 // the weights is not positive, or if the result overflows, the result is not defined and is the heaviest
 // transform. Of equal weights the first counts as the heaviest; if another order would then give another blend
@@ -37,6 +38,7 @@ struct Linear {
     template <BlendSigns signs = BlendSigns::kToHeaviest, class T>
     [[nodiscard]] static Blended<Of<T>> blend(std::span<const Of<T>> transforms,
                                               std::span<const T> weights) noexcept {
+        if (transforms.empty() || weights.size() != transforms.size()) return {{}, false};
         const Shares<T> share = shares(weights);
         const Of<T>& heaviest = transforms[share.heaviest];
         if (!share.is_defined) return {heaviest, false};

@@ -31,6 +31,7 @@ struct MatrixLog {
     template <BlendSigns signs = BlendSigns::kToHeaviest, class T>
     [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
                                                   std::span<const T> weights) noexcept {
+        if (transforms.empty() || weights.size() != transforms.size()) return {{}, false};
         const Shares<T> share = shares(weights);
         if (!share.is_defined) return {transforms[share.heaviest], false};
         Twist<T> total;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <span>
 
 #include "sinew/interpolate/blended.h"
@@ -22,14 +21,13 @@ struct SplineSpan {
 /// the interval as its text says; in its algorithm 3 the terms printed as 2t^3 0 3t^2 + 1 and t^3 + t^2 are 2t^3
 /// - 3t^2 + 1 and t^3 - t^2).
 ///
-/// times  [n], n >= 1, non-decreasing, finite
+/// times  [n] non-decreasing, finite. Without any, all keys are 0
 ///
 /// The tangents at the first and the last key have the direction of the straight line to the next one. The curve
 /// is constant before the first time and after the last. Keys of equal time are a cut: the curve ends at the
 /// first of them and starts again at the last, which is the value at that time.
 template <class T>
 [[nodiscard]] SplineSpan<T> spline_span(std::span<const T> times, T time) noexcept {
-    assert(!times.empty());
     const std::size_t last = times.size() - 1;
     const auto next = static_cast<std::size_t>(std::ranges::upper_bound(times, time) - times.begin());
     if (next == 0) return {{0, 0, 0, 0}};
@@ -104,18 +102,21 @@ template <class Transform, class T>
 /// The Catmull-Rom spline through `keys` at `time`, in blend form.
 ///
 /// keys   [n] in a representation of Method
-/// times  [n], n >= 1, non-decreasing
+/// times  [n], n >= 1, non-decreasing. Without any, and for another number of keys, the result is not defined: the
+///        identity
 template <class Method, class T>
-[[nodiscard]] auto catmull_rom(std::span<const typename Method::template Transform<T>> keys,
-                               std::span<const T> times, T time) noexcept {
+[[nodiscard]] Blended<typename Method::template Transform<T>> catmull_rom(
+    std::span<const typename Method::template Transform<T>> keys, std::span<const T> times, T time) noexcept {
+    if (keys.empty() || keys.size() != times.size()) return {{}, false};
     const SplineSpan<T> span = spline_span(times, time);
     return spline_blend<Method>(span, keys_of(span, keys));
 }
 
-/// The same in vector form. Not rigid between keys. Transform may be Vec3, for points.
+/// The same in vector form. Not rigid between keys. Transform may be Vec3, for points, whose identity is 0.
 template <class Transform, class T>
 [[nodiscard]] Blended<Transform> catmull_rom_vector(std::span<const Transform> keys, std::span<const T> times,
                                                     T time) noexcept {
+    if (keys.empty() || keys.size() != times.size()) return {Transform{}, false};
     const SplineSpan<T> span = spline_span(times, time);
     return spline_vector(span, keys_of(span, keys));
 }

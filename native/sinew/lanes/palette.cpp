@@ -43,7 +43,7 @@ void take_signs(const Kernel& kernel, const Bones& bones, const Palette& palette
     for (std::size_t i = 0; i < bones.used.size(); ++i) {
         Float4* const row = palette.bones + kernel.rest_row.size() * i;
         const auto& [w, x, y, z] = row->value;
-        if (!is_away(bones, static_cast<std::size_t>(bones.used[i]), Quat<double>(w, x, y, z))) continue;
+        if (!is_away(bones, static_cast<std::size_t>(bones.used[i]), Quat<double>(w, {x, y, z}))) continue;
         for (std::size_t k = 0; k < kernel.signed_float4s; ++k) {
             for (float& number : row[k].value) number = -number;
         }

@@ -32,11 +32,11 @@ void check_weights(const std::string& argument, std::span<const float> weights, 
 
 /// Throws if there are some but fewer than `bone_count` rest bones, or if one is not finite.
 ///
-/// bone_count  one more than the highest bone index in the influences
+/// bone_count  as Binding::bone_count()
 void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count);
 
 /// Throws if a value is not finite, or if the transform has no inverse.
-void check_space(const Affine<float>& bones_from_model);
+SINEW_EXPORT void check_space(const Affine<float>& bones_from_model);
 /// Whether check_space() does not throw.
 [[nodiscard]] bool is_space(const Affine<float>& bones_from_model) noexcept;
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <iterator>
 #include <map>
+#include <new>
 #include <numeric>
 #include <unordered_map>
 #include <unordered_set>
@@ -337,6 +338,17 @@ void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_point
             xyz[2].lane[lane] = point.z;
         }
     }
+}
+
+bool set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                    std::vector<Lanes<float>>& packed) noexcept {
+    try {
+        packed.resize(kPointRows * mesh.blocks.size());
+    } catch (const std::bad_alloc&) {
+        return false;
+    }
+    pack_points(mesh, rest_points, packed);
+    return true;
 }
 
 UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points, std::size_t vertices) {

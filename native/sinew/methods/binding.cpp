@@ -158,11 +158,9 @@ NormalisedInfluences normalised_influences(const BindData& data) {
                  "sum " + std::to_string(sum) + " at vertex " + std::to_string(vertex));
         }
         for (std::size_t i = begin; i < end; ++i) {
-            const float weight = data.influence_weights[i];
-            if (weight > 0.0f) {
-                const double share = static_cast<double>(weight) / (data.is_normalised ? 1.0 : sum);
-                result.influences.push_back({data.influence_bones[i], static_cast<float>(share)});
-            }
+            const double weight = static_cast<double>(data.influence_weights[i]);
+            const auto share = static_cast<float>(data.is_normalised ? weight : weight / sum);
+            if (share > 0.0f) result.influences.push_back({data.influence_bones[i], share});
         }
         result.offsets.push_back(static_cast<std::uint32_t>(result.influences.size()));
     }

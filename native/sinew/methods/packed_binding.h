@@ -18,7 +18,8 @@ namespace sinew {
 /// Throws as Binding does. Does not check rest bones and vertex data.
 void check(const BindData& data);
 
-/// Influences of positive weight. The weights of each vertex that has any have sum 1.
+/// Influences whose share of their vertex's weights, a float, is above 0. The shares of a vertex that has any have
+/// sum 1.
 struct NormalisedInfluences {
     std::vector<std::uint32_t> offsets{0};  // [vertices + 1]
     std::vector<Influence<float>> influences;

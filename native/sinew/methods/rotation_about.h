@@ -40,8 +40,8 @@ template <class T, class Bone>
                                     std::span<const Influence<T>> influences, const Vec3<T>& rest,
                                     std::span<const double> parameters) noexcept {
     const bool are_kept = Signs::are_kept(parameters);
-    Quat<T> rotation(T(0), T(0), T(0), T(0));
-    // Summing displacements returns the rest pose unchanged to the last bit.
+    Quat<T> rotation(T(0), Vec3<T>(T(0)));
+    // Summing displacements returns the rest pose unchanged.
     Vec3<T> displacement{T(0)};
     for (const Influence<T>& influence : influences) {
         const Bone& bone = bones[static_cast<std::size_t>(influence.bone)];

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <mutex>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -72,20 +73,23 @@ struct SkinnedNormals::State {
             std::vector<Vec3<float>> stepped = points;
             for (Vec3<float>& point : stepped) point[axis] += step;
             const auto i = static_cast<std::size_t>(axis);
-            if (!deformers[1 + i].set_rest_points(stepped)) {
+            if (!are_points(stepped, points.size())) {
                 fail("rest_points", "finite values", "infinity beside them");
             }
+            if (!deformers[1 + i].set_rest_points(stepped)) throw std::bad_alloc();
             moved[i].resize(points.size());
             if (!vertices.empty()) cofactors[i].resize(points.size());
         }
     }
 
     /// Deforms the rest points displaced by a step along each axis.
-    void move_steps(std::span<const Affine<float>> posed_from_rest,
-                    const DeformOptions& options) const noexcept {
+    [[nodiscard]] bool move_steps(std::span<const Affine<float>> posed_from_rest,
+                                  const DeformOptions& options) const noexcept {
+        bool are_moved = true;
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            static_cast<void>(deformers[1 + axis].deform(posed_from_rest, options, moved[axis]));
+            are_moved = deformers[1 + axis].deform(posed_from_rest, options, moved[axis]) && are_moved;
         }
+        return are_moved;
     }
 
     void move_normals(Strided<const Vec3<float>> points, Strided<Vec3<float>> to,
@@ -150,8 +154,8 @@ bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, cons
     if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
     if (!tangents.empty() && tangents.size() != most_tangents) return false;
     const std::scoped_lock lock(state.mutex);
-    static_cast<void>(state.deformers[0].deform(posed_from_rest, options, points));
-    state.move_steps(posed_from_rest, options);
+    if (!state.deformers[0].deform(posed_from_rest, options, points)) return false;
+    if (!state.move_steps(posed_from_rest, options)) return false;
     state.move_normals(points, normals, options.threads);
     if (tangents.empty()) return true;
     const auto part = [&](std::size_t begin, std::size_t end) {
@@ -168,7 +172,7 @@ bool SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_re
     const State& state = *state_;
     if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
     const std::scoped_lock lock(state.mutex);
-    state.move_steps(posed_from_rest, options);
+    if (!state.move_steps(posed_from_rest, options)) return false;
     state.move_normals(points, normals, options.threads);
     return true;
 }

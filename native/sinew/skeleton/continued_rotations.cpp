@@ -39,10 +39,10 @@ std::vector<Quat<float>> continued_rotations(const Skeleton& skeleton,
     for (std::size_t bone = 0; bone < count; ++bone) {
         const std::int32_t parent = skeleton.parents()[bone];
         const Quat<double> before =
-            parent < 0 ? Quat<double>(1.0, 0.0, 0.0, 0.0) : rotations[static_cast<std::size_t>(parent)];
+            parent < 0 ? Quat<double>(1.0, Vec3<double>(0.0)) : rotations[static_cast<std::size_t>(parent)];
         const Mat3<double> linear(posed_from_rest[bone].linear);
         const Quat<double> rotation = glm::determinant(linear) < 0.0 ? before : rotation_of(linear);
-        const Quat<double> turn(bone < turns.size() ? turns[bone] : Quat<float>(0.0f, 0.0f, 0.0f, 0.0f));
+        const Quat<double> turn(bone < turns.size() ? turns[bone] : Quat<float>(0.0f, Vec3<float>(0.0f)));
         rotations.push_back(is_away(rotation, before, turn) ? -rotation : rotation);
         result.emplace_back(rotations.back());
     }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cassert>
 #include <span>
 
 #include "sinew/interpolate/spline.h"
@@ -18,17 +17,17 @@ namespace sinew {
 /// from, onto        [bones] parent_from_bone at t = 0 and at t = 1, in a representation of Method
 /// parent_from_bone  [bones] the result; may be the same memory as either
 ///
-/// Returns whether all bones' results are defined. For others the result is as described at Method.
+/// Returns whether all bones' results are defined. For others the result is as described at Method. Returns false, and
+/// writes nothing, if a size is wrong.
 template <class Method, class T>
 bool interpolate_keyframes(const Skeleton& skeleton,
                            std::span<const typename Method::template Transform<T>> from,
                            std::span<const typename Method::template Transform<T>> onto, T t,
                            std::span<typename Method::template Transform<T>> parent_from_bone) noexcept {
-    assert(from.size() == skeleton.bone_count());
-    assert(onto.size() == skeleton.bone_count());
-    assert(parent_from_bone.size() == skeleton.bone_count());
+    const std::size_t bones = skeleton.bone_count();
+    if (from.size() != bones || onto.size() != bones || parent_from_bone.size() != bones) return false;
     bool are_defined = true;
-    for (std::size_t bone = 0; bone < skeleton.bone_count(); ++bone) {
+    for (std::size_t bone = 0; bone < bones; ++bone) {
         const auto between = Method::between(from[bone], onto[bone], t);
         parent_from_bone[bone] = between.transform;
         are_defined = are_defined && between.is_defined;
@@ -42,8 +41,8 @@ template <class Transform, class T, class Combine>
 bool spline_bones(const Skeleton& skeleton, std::span<const Transform> keyframes, std::span<const T> times,
                   T time, std::span<Transform> parent_from_bone, Combine combine) noexcept {
     const std::size_t bones = skeleton.bone_count();
-    assert(keyframes.size() == bones * times.size());
-    assert(parent_from_bone.size() == bones);
+    if (times.empty() || keyframes.size() != bones * times.size() || parent_from_bone.size() != bones)
+        return false;
     const SplineSpan<T> span = spline_span(times, time);
     bool are_defined = true;
     for (std::size_t bone = 0; bone < bones; ++bone) {
@@ -64,7 +63,7 @@ bool spline_bones(const Skeleton& skeleton, std::span<const Transform> keyframes
 /// times             [keys], keys >= 1, non-decreasing
 /// parent_from_bone  [bones] the result
 ///
-/// Returns whether all bones' results are defined.
+/// Returns whether all bones' results are defined. Returns false, and writes nothing, if a size is wrong.
 template <class Method, class T>
 bool spline_keyframes(const Skeleton& skeleton,
                       std::span<const typename Method::template Transform<T>> keyframes,

@@ -10,8 +10,8 @@ namespace sinew {
 /// unit dual quaternion: |real| = 1 and dot(real, dual) = 0. The default is the identity.
 template <class T>
 struct DualQuat {
-    Quat<T> real{T(1), T(0), T(0), T(0)};
-    Quat<T> dual{T(0), T(0), T(0), T(0)};
+    Quat<T> real{T(1), Vec3<T>(T(0))};
+    Quat<T> dual{T(0), Vec3<T>(T(0))};
 };
 
 /// Applies `b` first, then `a`.

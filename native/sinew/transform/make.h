@@ -41,7 +41,7 @@ template <template <class> class Target, class T>
 
 template <template <class> class Target, class T>
 [[nodiscard]] Target<T> from_translation(const Vec3<T>& translation) noexcept {
-    return to<Target>(QuatVec<T>{Quat<T>(T(1), T(0), T(0), T(0)), translation});
+    return to<Target>(QuatVec<T>{Quat<T>(T(1), Vec3<T>(T(0))), translation});
 }
 
 }  // namespace sinew

@@ -11,7 +11,7 @@ namespace sinew {
 
 template <class T>
 struct NearestRotation {
-    Quat<T> rotation{T(1), T(0), T(0), T(0)};
+    Quat<T> rotation{T(1), Vec3<T>(T(0))};
     T gap = T(0);
 };
 
@@ -73,7 +73,7 @@ template <class T>
         if (i != best && k[i][i] > second) second = k[i][i];
     }
     const Quat<T> q =
-        glm::normalize(Quat<T>(vectors[0][best], vectors[1][best], vectors[2][best], vectors[3][best]));
+        glm::normalize(Quat<T>(vectors[0][best], {vectors[1][best], vectors[2][best], vectors[3][best]}));
     return {q.w < T(0) ? -q : q, k[best][best] - second};
 }
 

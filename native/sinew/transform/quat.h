@@ -4,8 +4,8 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#if defined(GLM_FORCE_QUAT_CTOR_XYZW) || (defined(GLM_FORCE_QUAT_DATA_XYZW) && GLM_VERSION >= 1000)
-#error "Sinew constructs quaternions as (w, x, y, z): build without GLM_FORCE_QUAT_CTOR_XYZW"
+#ifdef GLM_FORCE_QUAT_DATA_WXYZ
+#error "The library has quaternions with w last in memory: build without GLM_FORCE_QUAT_DATA_WXYZ"
 #endif
 
 namespace sinew {
@@ -20,7 +20,9 @@ using Vec3 = glm::vec<3, T, glm::packed_highp>;
 template <class T>
 using Mat3 = glm::mat<3, 3, T, glm::packed_highp>;
 
-/// Constructed as (w, x, y, z). Components are accessed by name, never by index.
+/// Constructed of w and the vector (x, y, z): four numbers are w, x, y, z, but x, y, z, w in a program that defines
+/// GLM_FORCE_QUAT_DATA_XYZW with GLM 1.0.1 and later (1.0.0: GLM_FORCE_QUAT_CTOR_XYZW). Components are accessed by name,
+/// never by index.
 template <class T>
 using Quat = glm::qua<T, glm::packed_highp>;
 
@@ -33,7 +35,7 @@ inline constexpr double kDegenerateBlend = 1e-6;
 /// The quaternion (0, v).
 template <class T>
 [[nodiscard]] Quat<T> pure(const Vec3<T>& v) noexcept {
-    return Quat<T>(T(0), v.x, v.y, v.z);
+    return Quat<T>(T(0), v);
 }
 
 /// The vector part of `q`.

@@ -9,7 +9,7 @@ namespace sinew {
 /// has unit length. The default is the identity.
 template <class T>
 struct QuatVec {
-    Quat<T> rotation{T(1), T(0), T(0), T(0)};
+    Quat<T> rotation{T(1), Vec3<T>(T(0))};
     Vec3<T> translation{T(0)};
 };
 
@@ -47,7 +47,7 @@ template <class T>
 [[nodiscard]] QuatVec<T> normalized(const QuatVec<T>& a) noexcept {
     const T length = glm::length(a.rotation);
     const T before = prescale(a.rotation, length);
-    if (!(before > T(0))) return {Quat<T>(T(1), T(0), T(0), T(0)), a.translation};
+    if (!(before > T(0))) return {Quat<T>(T(1), Vec3<T>(T(0))), a.translation};
     if (before != T(1)) return {glm::normalize(a.rotation / before), a.translation};
     return {a.rotation / length, a.translation};
 }

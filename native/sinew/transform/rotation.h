@@ -50,10 +50,10 @@ template <class T>
     using std::cos;
     using std::sin;
     const Vec3<T> direction = unit(axis, Vec3<T>(T(0)));
-    if (direction == Vec3<T>(T(0))) return Quat<T>(T(1), T(0), T(0), T(0));
+    if (direction == Vec3<T>(T(0))) return Quat<T>(T(1), Vec3<T>(T(0)));
     const T half = angle * T(0.5);
     const Vec3<T> v = sin(half) * direction;
-    return Quat<T>(cos(half), v.x, v.y, v.z);
+    return Quat<T>(cos(half), v);
 }
 
 /// Axis times angle of the unit quaternion `q`, in radians, with a length of 0 to pi: of the two ways that q and
@@ -76,7 +76,7 @@ template <class T>
     using std::cos;
     const T half = safe_length(rotation) * T(0.5);
     const Vec3<T> v = (T(0.5) * sinc(half)) * rotation;
-    return Quat<T>(cos(half), v.x, v.y, v.z);
+    return Quat<T>(cos(half), v);
 }
 
 /// x, y and z of the unit quaternion `q` or of -q, whichever has w >= 0: three numbers that represent a rotation
@@ -94,7 +94,7 @@ template <class T>
 [[nodiscard]] Quat<T> from_three_numbers(const Vec3<T>& v) noexcept {
     using std::max;
     using std::sqrt;
-    return glm::normalize(Quat<T>(sqrt(max(T(1) - glm::dot(v, v), T(0))), v.x, v.y, v.z));
+    return glm::normalize(Quat<T>(sqrt(max(T(1) - glm::dot(v, v), T(0))), v));
 }
 
 /// The angle of the rotation from `a` to `b`, 0 to pi. Both have unit length; their signs do not matter.

@@ -54,8 +54,7 @@ template <class T>
     const T along = screw.translation * T(0.5);
     const Vec3<T> axial = sin(half) * axis;
     const Vec3<T> dual = sin(half) * moment + (along * cos(half)) * axis;
-    return {Quat<T>(cos(half), axial.x, axial.y, axial.z),
-            Quat<T>(-along * sin(half), dual.x, dual.y, dual.z)};
+    return {Quat<T>(cos(half), axial), Quat<T>(-along * sin(half), dual)};
 }
 
 /// The screw of the unit dual quaternion `a`, with an angle of 0 to pi (Kavan et al. 2008, section 3.3).

@@ -48,7 +48,7 @@ template <class T>
     const Vec3<T> difference(axes[1][2] - axes[2][1], axes[2][0] - axes[0][2], axes[0][1] - axes[1][0]);
     if (first == 3) {
         const T s = T(2) * std::sqrt(T(1) + axes[0][0] + axes[1][1] + axes[2][2]);
-        return glm::normalize(Quat<T>(s / T(4), difference.x / s, difference.y / s, difference.z / s));
+        return glm::normalize(Quat<T>(s / T(4), difference / s));
     }
     const int second = (first + 1) % 3;
     const int third = (first + 2) % 3;
@@ -58,7 +58,7 @@ template <class T>
     v[first] = s / T(4);
     v[second] = (axes[first][second] + axes[second][first]) / s;
     v[third] = (axes[first][third] + axes[third][first]) / s;
-    return glm::normalize(Quat<T>(difference[first] / s, v.x, v.y, v.z));
+    return glm::normalize(Quat<T>(difference[first] / s, v));
 }
 
 /// The right-handed rotation that keeps the direction of the Y column of `linear` and makes the other columns

@@ -176,7 +176,7 @@ class Binding:
     def __setstate__(self, arg0: typing.Any) -> None: ...
     @property
     def bone_count(self) -> int:
-        """How many bones a pose must have: one more than the highest bone index in the influences."""
+        """How many bones a pose must have: one more than the highest that an influence or vertex data names."""
     @property
     def influence_count(self) -> int:
         """Number of influences of positive weight."""
@@ -226,7 +226,7 @@ class Deformer:
         """
     @property
     def bone_count(self) -> int:
-        """How many bones a pose must have: one more than the highest bone index in the influences."""
+        """How many bones a pose must have: one more than the highest that an influence or vertex data names."""
     @property
     def influence_count(self) -> int:
         """Number of influences of positive weight."""
@@ -323,7 +323,7 @@ class BulgeLimit:
         """
     @property
     def bone_count(self) -> int:
-        """How many bones a pose must have: one more than the highest bone index in the influences."""
+        """How many bones a pose must have: one more than the highest that an influence or vertex data names."""
     @property
     def vertex_count(self) -> int:
         """Number of vertices."""

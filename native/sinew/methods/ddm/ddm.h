@@ -99,7 +99,7 @@ struct Ddm : BlendsQuatVecs {
             centroid += moments.first;
             extent += moments.second[0][0] + moments.second[1][1] + moments.second[2][2];
         }
-        Quat<T> rotation(T(0), T(0), T(0), T(0));
+        Quat<T> rotation(T(0), Vec3<T>(T(0)));
         Vec3<T> by_bones(T(0));
         for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(rows[i + 1])];

@@ -60,7 +60,7 @@ struct IterativeDq {
             }
             return motion;
         };
-        DualQuat<T> sum{Quat<T>(T(0), T(0), T(0), T(0)), Quat<T>(T(0), T(0), T(0), T(0))};
+        DualQuat<T> sum{Quat<T>(T(0), Vec3<T>(T(0))), Quat<T>(T(0), Vec3<T>(T(0)))};
         for (const Influence<T>& influence : influences) {
             const DualQuat<T> motion = motion_of(influence);
             const T sign = !are_kept && glm::dot(motion.real, sum.real) < T(0) ? T(-1) : T(1);

@@ -43,7 +43,7 @@ struct Dq {
                                                std::span<const Influence<T>> influences, const Vec3<T>& rest,
                                                std::span<const double> parameters = {}) noexcept {
         const bool are_kept = Signs::are_kept(parameters);
-        DualQuat<T> sum{Quat<T>(T(0), T(0), T(0), T(0)), Quat<T>(T(0), T(0), T(0), T(0))};
+        DualQuat<T> sum{Quat<T>(T(0), Vec3<T>(T(0))), Quat<T>(T(0), Vec3<T>(T(0)))};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
             const T sign = !are_kept && glm::dot(bone.rigid.real, sum.real) < T(0) ? T(-1) : T(1);

@@ -36,7 +36,7 @@ struct Lbs {
                                                std::span<const Influence<T>> influences,
                                                const Vec3<T>& rest) noexcept {
         // Summing displacements instead of positions keeps the digits of a vertex far from the origin, and
-        // returns the rest pose unchanged to the last bit.
+        // returns the rest pose unchanged.
         Vec3<T> displacement{T(0)};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];

@@ -28,7 +28,7 @@ struct Qv : BlendsQuatVecs {
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences,
                                                const Vec3<T>& rest) noexcept {
-        Quat<T> rotation(T(0), T(0), T(0), T(0));
+        Quat<T> rotation(T(0), Vec3<T>(T(0)));
         Vec3<T> translation{T(0)};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];

@@ -69,8 +69,12 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
     Vec<D> amount = hn::Set(d, frame.strength);
     if (frame.weights != nullptr) amount = hn::Mul(amount, hn::Load(d, frame.weights[b].lane.data() + lane));
     const Vec<D> less = hn::NegMulAdd(allowed, inverse_root(d, squared), hn::Set(d, 1.0f));
-    const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
-    return add_scaled<D>(point, share, vector_to_model(d, frame.spaces, to_nearest));
+    const Points<D> moved =
+        add_scaled<D>(point, hn::Mul(amount, less), vector_to_model(d, frame.spaces, to_nearest));
+    // A sum with 0 would change the sign of -0.
+    const auto moves = hn::And(bulges, hn::Gt(amount, hn::Zero(d)));
+    return {hn::IfThenElse(moves, moved.x, point.x), hn::IfThenElse(moves, moved.y, point.y),
+            hn::IfThenElse(moves, moved.z, point.z)};
 }
 
 /// Limits blocks [begin, end) with the same bones, two or more.

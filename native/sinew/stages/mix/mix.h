@@ -24,7 +24,7 @@ struct Mix {
     /// weight  0 to 1; 0 and 1 give exactly a and b
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(const Vec3<T>& a, const Vec3<T>& b, T weight) noexcept {
-        // In this form the result equals a and b to the last bit where they are equal, such as at rest.
+        // In this form the result equals a and b where they are equal, such as at rest.
         return weight < T(1) ? a + weight * (b - a) : b;
     }
 };

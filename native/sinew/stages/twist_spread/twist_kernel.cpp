@@ -118,31 +118,32 @@ HWY_INLINE void twist_by(D d, const TwistFrame& frame, const BlockTwist& twist, 
         of.added = add_scaled<D>(of.added, factor, by);
         of.point = add_scaled<D>(of.point, factor, by);
     };
-    const bool first_is_linear = frame.blend == TwistBlend::linear;
-    const bool second_is_linear = frame.mix_blend == TwistBlend::linear;
     const Points<D> before = of.point;
     const Vec<D> one = hn::Set(d, 1.0f);
-    Vec<D> others = one;
-    if (first_is_linear || second_is_linear) {
-        others = second_is_linear ? hn::Sub(one, of.mix) : of.mix;
-        add_times(hn::Sub(one, others), by_own());
+    const bool are_alike = frame.blend == frame.mix_blend;
+    for (std::size_t k = 0; k < (are_alike ? 1 : 2); ++k) {
+        const TwistBlend blend = k == 0 ? frame.blend : frame.mix_blend;
+        const Vec<D> portion = are_alike ? one : k == 0 ? hn::Sub(one, of.mix) : of.mix;
+        if (blend == TwistBlend::linear) {
+            add_times(portion, by_own());
+            continue;
+        }
+        if (!bone.has_axis) continue;
+        const Vec<D> weight = load(twist.weight);
+        Vec<D> posed_angle = hn::Mul(weight, angle);
+        if (frame.goes_around) {
+            const Vec<D> turns = left_out(d, blend, bone, load(twist.below), of.mask);
+            posed_angle = hn::MulAdd(turns, hn::Set(d, std::numbers::pi_v<float>), posed_angle);
+        }
+        const bool is_short = bone.is_short && !frame.goes_around;
+        const Turned<D> posed(d, is_short ? posed_angle : shortest(d, posed_angle));
+        Points<D> by = spun(d, bone.posed, posed, before);
+        if (bone.is_scaled) {
+            const Points<D> alone = spun(d, bone.posed, own, displaced(d, bone.displacement, rest_of()));
+            by = add<D>(by, subtract<D>(by_own(), times<D>(weight, alone)));
+        }
+        add_times(portion, by);
     }
-    if (!bone.has_axis) return;
-    const Vec<D> weight = load(twist.weight);
-    Vec<D> posed_angle = hn::Mul(weight, angle);
-    if (frame.goes_around) {
-        const TwistBlend blend = first_is_linear ? frame.mix_blend : frame.blend;
-        const Vec<D> turns = left_out(d, blend, bone, load(twist.below), of.mask);
-        posed_angle = hn::MulAdd(turns, hn::Set(d, std::numbers::pi_v<float>), posed_angle);
-    }
-    const bool is_short = bone.is_short && !frame.goes_around;
-    const Turned<D> posed(d, is_short ? posed_angle : shortest(d, posed_angle));
-    Points<D> by = spun(d, bone.posed, posed, before);
-    if (bone.is_scaled) {
-        const Points<D> alone = spun(d, bone.posed, own, displaced(d, bone.displacement, rest_of()));
-        by = add<D>(by, subtract<D>(by_own(), times<D>(weight, alone)));
-    }
-    add_times(others, by);
 }
 
 /// Whether a twist moves vertices of a block in this frame.

@@ -66,7 +66,7 @@ struct TwistFrame {
     const Lanes<float>* weights;  // [PackedMesh::blocks]; null if all are 1
     const Lanes<float>* mix;      // the same; null if all are 0
     TwistBlend blend = TwistBlend::linear;
-    TwistBlend mix_blend = TwistBlend::linear;  // without a mix the same
+    TwistBlend mix_blend = TwistBlend::linear;  // the same without a mix, and where it would not matter
     bool is_linear = true;                      // all blends are
     bool goes_around = false;  // a bone is farther than the shorter way, and a method blends the shorter way
     Spaces spaces;

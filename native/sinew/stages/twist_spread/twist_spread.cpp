@@ -143,7 +143,7 @@ struct TwistSpread::State {
         const Quat<double> rotation =
             rotation_between(motion(posed, of.base).linear, motion(posed, of.tip).linear, tip_rest.linear);
         double expected = 0.0;
-        if (!channels.empty() && channels[twist].rotation != Quat<float>(0.0f, 0.0f, 0.0f, 0.0f)) {
+        if (!channels.empty() && channels[twist].rotation != Quat<float>(0.0f, Vec3<float>(0.0f))) {
             const TwistChannels<double> told{glm::normalize(Quat<double>(channels[twist].rotation)),
                                              Vec3<double>(channels[twist].angles)};
             const Quat<double> axes = to_quat(rotation_keeping_y(tip_rest.linear));
@@ -256,8 +256,7 @@ bool TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
                                   const Affine<float>& bones_from_model) noexcept {
     if (!are_points(rest_points, vertex_count()) || !is_space(bones_from_model)) return false;
     const std::scoped_lock lock(state_->mutex);
-    state_->own_rest_points.resize(kPointRows * state_->mesh.blocks.size());
-    pack_points(state_->mesh, rest_points, state_->own_rest_points);
+    if (!set_own_points(state_->mesh, rest_points, state_->own_rest_points)) return false;
     state_->measure(bones_from_model);
     return true;
 }
@@ -300,6 +299,9 @@ bool TwistSpread::apply(Strided<Vec3<float>> points, std::span<const Affine<floa
     const bool is_beyond = std::ranges::any_of(
         state.bones, [](const auto& bone) { return bone.is_twisted && bone.around != 0.0f; });
     frame.goes_around = is_beyond && (goes_short(frame.blend) || goes_short(frame.mix_blend));
+    // Blends other than linear differ by the turns that they leave out alone.
+    if (!frame.goes_around && frame.blend != TwistBlend::linear && frame.mix_blend != TwistBlend::linear)
+        frame.mix_blend = frame.blend;
     const std::size_t vertices = kLanes * state.blocks.size();
     parallel_for(
         state.blocks.size(), useful_threads(options.threads, vertices, kVerticesWorthAThread),

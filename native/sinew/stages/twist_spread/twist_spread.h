@@ -163,35 +163,44 @@ struct TwistSpreadStage {
         bool is_scaled;  // the motion is not rigid
     };
 
-    /// The vertex after twisting by one bone. Those of a vertex follow each other, the last in TwistSpreadData first.
-    ///
-    /// linear  the share of linear blending in `point`
-    /// blend   what the rest is
-    /// weight  of the bone
-    /// below   as for left_out()
-    /// mask    of the vertex, 0 to 1
+    /// What twisting by one bone adds to a vertex that a method with this blend made. The parameters are those of
+    /// deform_vertex().
     template <class T>
-    [[nodiscard]] static Vec3<T> deform_vertex(const Bone<T>& bone, T linear, TwistBlend blend, T weight,
-                                               T below, T mask, const Vec3<T>& rest,
-                                               const Vec3<T>& point) noexcept {
+    [[nodiscard]] static Vec3<T> added(const Bone<T>& bone, TwistBlend blend, T weight, T below, T mask,
+                                       const Vec3<T>& rest, const Vec3<T>& point) noexcept {
         const T e = share(bone.head, bone.tail, bone.curve, rest);
         const T turns = mask * bone.angle * (bone.is_from_parent ? e - T(1) : e);
         // With the bone's matrix M, linear blending by M R(turns) instead of M.
         const Vec3<T> own = bone.motion.linear * spun(bone.origin, bone.axis, turns, rest);
-        Vec3<T> result = point + linear * weight * own;
+        if (blend == TwistBlend::linear) return weight * own;
         const Vec3<T> posed_axis = bone.motion.linear * bone.axis;
         const T length = glm::length(posed_axis);
-        if (!(linear < T(1)) || !(length > T(0))) return result;
+        if (!(length > T(0))) return Vec3<T>(T(0));
         // Other blends are rotated about the posed axis.
         const Vec3<T> origin = transform_point(bone.motion, bone.origin);
         const Vec3<T> axis =
             (glm::determinant(bone.motion.linear) < T(0) ? T(-1) : T(1)) / length * posed_axis;
-        Vec3<T> by =
-            spun(origin, axis, weight * turns + left_out(blend, bone.around, below, mask * bone.part), point);
+        const T missing = left_out(blend, bone.around, below, mask * bone.part);
+        const Vec3<T> by = spun(origin, axis, weight * turns + missing, point);
+        if (!bone.is_scaled) return by;
         // A scaled bone keeps its scaled shape: a vertex of this bone alone is moved by M R(turns).
-        if (bone.is_scaled)
-            by += weight * (own - spun(origin, axis, turns, transform_point(bone.motion, rest)));
-        return result + (T(1) - linear) * by;
+        return by + weight * (own - spun(origin, axis, turns, transform_point(bone.motion, rest)));
+    }
+
+    /// The vertex after twisting by one bone. Those of a vertex follow each other, the last in TwistSpreadData first.
+    /// A point that mixes two methods mixes what the twist adds to the points of each.
+    ///
+    /// blend, mix_blend  of the first and of the second method
+    /// mix     the share of the second, 0 to 1
+    /// weight  of the bone
+    /// below   as for left_out()
+    /// mask    of the vertex, 0 to 1
+    template <class T>
+    [[nodiscard]] static Vec3<T> deform_vertex(const Bone<T>& bone, TwistBlend blend, TwistBlend mix_blend,
+                                               T mix, T weight, T below, T mask, const Vec3<T>& rest,
+                                               const Vec3<T>& point) noexcept {
+        return point + (T(1) - mix) * added(bone, blend, weight, below, mask, rest, point) +
+               mix * added(bone, mix_blend, weight, below, mask, rest, point);
     }
 };
 
