@@ -22,14 +22,16 @@ def bone_buffer(
     twists: Twists = (),
     amounts: Numbers = (),
     curves: Numbers = (),
+    axes: np.ndarray | None = None,
 ) -> np.ndarray:
     """float32 [bones, 8, 4]: see docs/engines.md.
 
-    posed, rest      float [bones, 4, 4], from the bone's own axes to one space, that of the armature; Y is
-                     along the bone. At rest they are the inverses of glTF's inverse bind matrices.
+    posed, rest      float [bones, 4, 4], from the bone's own axes to one space, that of the armature. At rest
+                     they are the inverses of glTF's inverse bind matrices.
     parents          -1 for none: only signs by hierarchy need them
-    lengths          [bones], along the bone's own Y: only the stages need them
+    lengths          [bones], of each bone's limb: only the stages need them
     amounts, curves  [twists], 0 to 1 and -1 to 1
+    axes             [bones, 3], the limb's direction in the bone's own axes; None: Y of each
     """
     posed, rest = posed.astype(np.float64), rest.astype(np.float64)
     motions = posed @ np.linalg.inv(rest)
@@ -38,9 +40,10 @@ def bone_buffer(
         rotations = along_chain(rotations, parents, np.linalg.det(motions[:, :3, :3]) < 0)
     buffer = of_motions(motions, rotations)
     if lengths is not None:
-        heads = rest[:, :3, 3]
-        add_segments(buffer, heads, heads + np.asarray(lengths)[:, None] * rest[:, :3, 1])
-        angles, swings = twist_angles(motions, rest, twists)
+        heads, own = rest[:, :3, 3], np.tile([0.0, 1.0, 0.0], (len(rest), 1)) if axes is None else axes
+        limbs = np.einsum("bij,bj->bi", rest[:, :3, :3], own)
+        add_segments(buffer, heads, heads + np.asarray(lengths)[:, None] * limbs)
+        angles, swings = twist_angles(motions, rest, twists, limbs)
         add_twists(buffer, twists, np.asarray(amounts) * angles * fade(np.abs(angles)) * fade(swings), curves)
     return buffer
 
@@ -180,9 +183,14 @@ def add_turns(
         buffer[bone, 6, 3] = part
 
 
-def twist_angles(motions: np.ndarray, rest: np.ndarray, twists: Twists) -> tuple[np.ndarray, np.ndarray]:
-    """Of the rotation of each tip against its base: its angle about the bone's Y axis at rest, and that of
-    the rest of it, radians [twists]. Both fade, as a matrix does not tell which way round the tip went."""
+def twist_angles(
+    motions: np.ndarray, rest: np.ndarray, twists: Twists, limbs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of the rotation of each tip against its base: its angle about the bone's limb at rest, and that of the
+    rest of it, radians [twists]. Both fade, as a matrix does not tell which way round the tip went.
+
+    limbs  [bones, 3], along each, of any length
+    """
     if not len(twists):
         return np.empty(0), np.empty(0)
     bones, bases, tips, _from_parent = np.array(twists).T
@@ -192,7 +200,8 @@ def twist_angles(motions: np.ndarray, rest: np.ndarray, twists: Twists) -> tuple
     of_bases = np.where(is_flat[:, None, None], np.eye(3), motions[bases, :3, :3])
     relative = np.linalg.inv(of_bases) @ motions[tips, :3, :3] @ rest[tips, :3, :3]
     q = quaternions(perpendicular(relative) @ axes[tips].swapaxes(1, 2))
-    along = (q[:, :3] * axes[bones, :, 1]).sum(axis=1)
+    about = limbs[bones] / np.maximum(np.linalg.norm(limbs[bones], axis=1, keepdims=True), 1e-30)
+    along = (q[:, :3] * about).sum(axis=1)
     angles = 2 * np.arctan2(along, q[:, 3])
     swings = 2 * np.arccos(np.minimum(np.hypot(along, q[:, 3]), 1))
     return angles, swings

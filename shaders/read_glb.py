@@ -118,6 +118,7 @@ def _mesh_at(file, scene, node, world):
         [(each["bone"], each["base"], each["tip"], each["from"] == "parent") for each in twists],
         [each["amount"] * values.get("twist_spread.amount", 1.0) for each in twists],
         [each["curve"] for each in twists],
+        np.array(own["axes"]) if "axes" in own else None,
     )
     # trimesh has a geometry for each primitive, in the order of the file.
     before = sum(len(each["primitives"]) for each in file.header["meshes"][: node["mesh"]])

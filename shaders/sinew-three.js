@@ -27,6 +27,13 @@ function perpendicular(matrix) {
   return new Matrix4().makeBasis(x, y, x.clone().cross(y));
 }
 
+// Two vectors of length 1, perpendicular to each other and to the given one.
+function across(vector) {
+  const first = new Vector3(...(Math.abs(vector.x) < 0.9 * vector.length() ? [1, 0, 0] : [0, 1, 0]));
+  first.cross(vector).normalize();
+  return [first, vector.clone().cross(first).normalize()];
+}
+
 const rotation = (matrix) => new Quaternion().setFromRotationMatrix(perpendicular(matrix));
 
 // From 1 at 150 degrees to 0 at 180.
@@ -94,12 +101,18 @@ class SinewSkeleton extends Skeleton {
     this.bones.forEach(visit);
   }
 
-  // From the head to the tail at rest, and how much the motion stretches what is across the bone, at most.
+  // The direction of a bone's limb at rest: along its Y axis, where the file does not say otherwise.
+  limb(bone) {
+    return moved(this.rest[bone], new Vector3(...(this.own.axes?.[bone] ?? [0, 1, 0])));
+  }
+
+  // From the head to the tail at rest, and how much the motion stretches what is across the limb, at most.
   writeSegment(bone, length, motion) {
-    const rest = this.rest[bone], along = column(rest, 1).multiplyScalar(length), image = moved(motion, along);
-    const axes = perpendicular(rest), [a, y, b] = [0, 1, 2].map((axis) => moved(motion, column(axes, axis)));
-    let stretch = Math.hypot(a.length(), y.length(), b.length()) / Math.sqrt(3);
+    const rest = this.rest[bone], along = this.limb(bone).multiplyScalar(length), image = moved(motion, along);
+    const axes = perpendicular(rest), images = [0, 1, 2].map((axis) => moved(motion, column(axes, axis)));
+    let stretch = Math.hypot(...images.map((v) => v.length())) / Math.sqrt(3);
     if (length > 0) {
+      const [a, b] = across(along).map((axis) => moved(motion, axis));
       for (const v of [a, b]) v.addScaledVector(image, -v.dot(image) / (image.lengthSq() || 1));
       // The larger singular value of the two columns.
       const [sum, difference] = [a.lengthSq() + b.lengthSq(), a.lengthSq() - b.lengthSq()];
@@ -112,7 +125,7 @@ class SinewSkeleton extends Skeleton {
     // A base without volume: its scale is not known.
     const ofBase = motions[base].determinant() === 0 ? new Matrix4() : motions[base].clone().invert();
     const q = rotation(ofBase.multiply(motions[tip]).multiply(this.rest[tip])).multiply(this.fromRest[tip]);
-    const along = column(this.rest[bone], 1).normalize().dot(q) * Math.sign(q.w || 1), w = Math.abs(q.w);
+    const along = this.limb(bone).normalize().dot(q) * Math.sign(q.w || 1), w = Math.abs(q.w);
     const angle = 2 * Math.atan2(along, w), swing = 2 * Math.acos(Math.min(Math.hypot(along, w), 1));
     const spread = this.amount * amount * angle * fade(angle) * fade(swing);
     if (spread === 0) return;

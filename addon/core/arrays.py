@@ -14,10 +14,11 @@ def are_equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
 
 @dataclass(frozen=True)
 class OfArrays:
-    """A record whose fields are arrays, tuples or other such records; or None."""
+    """A record whose fields are arrays, tuples or other such records; or None. Fields that are not compared
+    are made of something else."""
 
     def equals(self, other: Self) -> bool:
-        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self) if f.compare)
         return all(
             a.equals(b) if isinstance(a, OfArrays) else a == b if isinstance(a, tuple) else are_equal(a, b)
             for a, b in pairs

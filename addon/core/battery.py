@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import sinew
 
+from .limbs import ARM, LEG, LOWER, OWN_TWIST, UPPER, words_of
 from .rig import Bones
-from .twists import LOWER, OWN_TWIST, UPPER, words_of
 
 Limits = Mapping[str, np.ndarray]
 """By the name of a bone: float [3, 2], least and most rotation about each of its axes, in radians; NaN where
@@ -118,7 +118,9 @@ SWING, TWIST = 60.0, 90.0
 MOST = 150.0
 LEAST = 5.0
 
-_ARM, _LEG = r"(?<![a-z])arm(?![a-z])", r"(?<![a-z])leg(?![a-z])"
+# The sine of an angle between a bone and its limb that is rounding.
+SAME = 1e-6
+
 _OTHERS = (
     ("thumb", r"thumb|finger_?1-"),
     ("finger", r"index|middle|ring|pinky|little|finger(?!_?base)"),
@@ -202,8 +204,9 @@ class Battery:
     def __init__(self, bones: Bones, limits: Limits, moving: np.ndarray) -> None:
         self._bones, self._limits = bones, limits
         count = len(bones.names)
-        rest = bones.rest[:count].astype(np.float64)
-        self._axes, self._heads = rest[:, :3, :3], rest[:, :3, 3]
+        self._heads = bones.rest[:count, :3, 3].astype(np.float64)
+        self._own_axes = bones.rest[:count, :3, :3].astype(np.float64)
+        self._axes = _along(self._own_axes, bones.limbs.vectors)
         self._along = self._axes[:, :, 1]
         self._joints = [int(bone) for bone in np.flatnonzero(moving) if bones.carriers[bone] >= 0]
         self._words = [words_of(name) for name in bones.names]
@@ -277,10 +280,11 @@ class Battery:
                 for bone in bones:
                     angle = float(self._limits[self._bones.names[bone]][axis, end])
                     if math.isnan(angle):
-                        angle = math.radians(TWIST if axis == 1 else SWING) * (2 * end - 1)
+                        is_along = np.abs(self._along[bone] @ self._own_axes[bone]).argmax() == axis
+                        angle = math.radians(TWIST if is_along else SWING) * (2 * end - 1)
                     angle = min(max(angle, -math.radians(MOST)), math.radians(MOST))
                     if abs(angle) >= math.radians(LEAST):
-                        rotations[bone] = _about(self._axes[bone][:, axis], angle)
+                        rotations[bone] = _about(self._own_axes[bone][:, axis], angle)
                 yield Pose(f"{letter} {word}", rotations)
 
     def _general(self, bones: Sequence[int]) -> Iterator[Pose]:
@@ -316,9 +320,9 @@ class Battery:
             role = "shin" if is_leg else "forearm"
         elif re.search(UPPER, word):
             role = "thigh" if is_leg else "upper_arm"
-        elif re.search(_ARM, word):
+        elif re.search(ARM, word):
             role = "forearm" if above == "upper_arm" else "upper_arm"
-        elif re.search(_LEG, word):
+        elif re.search(LEG, word):
             role = "shin" if above == "thigh" else "thigh"
         else:
             role = next((role for role, words in _OTHERS if re.search(words, word)), "")
@@ -420,6 +424,20 @@ class Battery:
 
 def _side_of(word: str) -> int:
     return int(bool(re.search(_LEFT, word))) - int(bool(re.search(_RIGHT, word)))
+
+
+def _along(axes: np.ndarray, limbs: np.ndarray) -> np.ndarray:
+    """float64 [bones, 3, 3]: the axes, rotated the shortest way to have Y along limbs [bones, 3]."""
+    found = axes.copy()
+    for bone, limb in enumerate(limbs):
+        y, wanted = _unit(axes[bone][:, 1]), _unit(limb)
+        normal = np.cross(y, wanted)
+        sine = float(np.linalg.norm(normal))
+        if sine > SAME and wanted.any():
+            found[bone] = _about(normal / sine, math.atan2(sine, float(y @ wanted))) @ axes[bone]
+        elif y @ wanted < 0.0:
+            found[bone][:, :2] *= -1.0
+    return found
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:

@@ -20,7 +20,7 @@ def segments(bones: Bones) -> tuple[np.ndarray, np.ndarray]:
     heads = bones.rest[:, :3, 3].copy()
     tails = heads.copy()
     count = len(bones.names)
-    tails[:count] += bones.lengths[:, None] * bones.rest_axes[:count, :3, 1]
+    tails[:count] += bones.limbs.vectors.astype(np.float32)
     for bone, number in bones.bending:
         first = bones.first_joints[bone]
         joints = bones.rest[first : first + number + 1, :3, 3]

@@ -639,7 +639,7 @@ def bone_axes(bones: Bones, matrices: np.ndarray) -> np.ndarray:
     matrices = matrices.astype(np.float64)
     heads, count = matrices[:, :3, 3], len(bones.names)
     tails = heads.copy()
-    tails[:count] += bones.lengths[:, None] * matrices[:count, :3, 1]
+    tails[:count] = bones.limb_ends(matrices)
     for bone in np.flatnonzero(bones.segments > 1):
         joints = slice(bones.first_joints[bone], bones.first_joints[bone] + bones.segments[bone] + 1)
         tails[joints] = np.concatenate([heads[joints][1:], heads[joints][-2:-1]])

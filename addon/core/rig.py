@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from .arrays import OfArrays
 from .bendy import spread_over_joints
 from .envelopes import Envelopes, fill_from_envelopes, multiply_by_envelopes
 from .influences import Entries, Influences
+from .limbs import Limbs, find_limbs, skin_of
 from .phrases import phrase
 from .twists import TwistFinder, Twists
 
@@ -25,7 +26,7 @@ class Bones(OfArrays):
 
     names         all bones, in Blender's order
     deform        bool [bones], those that may move vertices
-    rest          float32 [bones + joints, 4, 4], armature space, Y along the bone
+    rest          float32 [bones + joints, 4, 4], armature space, each in its own axes
     lengths       float32 [bones]
     segments      int32 [bones], 1 for a bone that does not bend
     curved        bool [bones], those that map vertices along their curve
@@ -33,6 +34,7 @@ class Bones(OfArrays):
     envelopes     of all bones
     parents       int32 [bones], -1 for none
     complete      False where Blender had not computed the joints yet; bendy bones then count as straight
+    skin          of a mesh, as from limbs.skin_of(); None: not known
     """
 
     names: tuple[str, ...]
@@ -45,6 +47,7 @@ class Bones(OfArrays):
     envelopes: Envelopes
     parents: np.ndarray
     complete: bool = True
+    skin: np.ndarray | None = field(default=None, compare=False)
 
     @classmethod
     def none(cls) -> Bones:
@@ -86,13 +89,42 @@ class Bones(OfArrays):
         return axes
 
     @cached_property
-    def _finder(self) -> TwistFinder:
-        return TwistFinder(self)
+    def limbs(self) -> Limbs:
+        """Where the limb of each bone goes, which may be across the bone."""
+        return find_limbs(self)
+
+    def limb_ends(self, matrices: np.ndarray) -> np.ndarray:
+        """float64 [bones, 3]: where the limb of each bone ends, in the space of `matrices`.
+
+        matrices  [bones or more, 4, 4], of the bones at rest or posed
+        """
+        of_bones = matrices[: len(self.names)].astype(np.float64)
+        return of_bones[:, :3, 3] + (of_bones[:, :3, :3] @ self.limbs_in_bones[..., None])[..., 0]
+
+    @cached_property
+    def limbs_in_bones(self) -> np.ndarray:
+        """float64 [bones, 3]: `limbs` in each bone's own axes: along Y unless it stands across."""
+        own = np.linalg.pinv(self.rest[: len(self.names), :3, :3].astype(np.float64))
+        return (own @ self.limbs.vectors[..., None])[..., 0]
+
+    def with_skin_of(self, other: Bones) -> Bones:
+        """Returns the same, whose skin is also that of the same bones for another mesh."""
+        skins = [bones.skin for bones in (self, other) if bones.skin is not None]
+        return replace(self, skin=np.sum(skins, axis=0) if skins else None)
 
     @cached_property
     def twists(self) -> Twists:
         """The bones that share the twist of another."""
-        return self._finder.find(self.owners[len(self.names) :])
+        return TwistFinder(self).find(self.owners[len(self.names) :])
+
+    @cached_property
+    def children(self) -> list[list[int]]:
+        """The deforming bones that each deforming one carries next."""
+        found: list[list[int]] = [[] for _name in self.names]
+        for bone in np.flatnonzero(self.deform):
+            if self.carriers[bone] >= 0:
+                found[self.carriers[bone]].append(int(bone))
+        return found
 
     @cached_property
     def carriers(self) -> np.ndarray:
@@ -105,16 +137,36 @@ class Bones(OfArrays):
         return np.array(found, dtype=np.int32).reshape(-1)
 
     def _carrier(self, bone: int) -> int:
-        """In rigs whose deforming bones hang on others of the same places, the one at the place of a bone
-        above."""
-        carrier, above = self._finder.carrier(bone), int(self.parents[bone])
-        places = self.rest[: len(self.names), :3, 1:4]
-        while carrier < 0 and above >= 0:
-            apart = np.abs(places - places[above]).max(axis=(1, 2))
-            alike = np.flatnonzero(self.deform & (apart <= 1e-3 * self.lengths))
-            alike = alike[alike != bone]
-            carrier, above = int(alike[0]) if len(alike) else -1, int(self.parents[above])
-        return carrier
+        """The nearest deforming bone above. In rigs whose deforming bones hang on others, the one at whose
+        tail the bone starts, else the one at the place of a bone above, or that alone starts there: bones
+        across their limb may have others along it."""
+        above = int(self.parents[bone])
+        while above >= 0 and not self.deform[above]:
+            above = int(self.parents[above])
+        if above >= 0:
+            return above
+        count = len(self.names)
+        heads, places = self.rest[:count, :3, 3], self.rest[:count, :3, 1:4]
+        near = 1e-3 * self.lengths
+
+        def others(apart: np.ndarray) -> np.ndarray:
+            found = np.flatnonzero(self.deform & (apart <= near))
+            return found[found != bone]
+
+        tails = heads + self.lengths[:, None] * self.rest[:count, :3, 1]
+        meets = others(np.linalg.norm(tails - heads[bone], axis=1))
+        if len(meets) == 1:
+            return int(meets[0])
+        above = int(self.parents[bone])
+        while above >= 0:
+            alike = others(np.abs(places - places[above]).max(axis=(1, 2)))
+            starting = others(np.linalg.norm(heads - heads[above], axis=1))
+            if len(alike):
+                return int(alike[0])
+            if len(starting) == 1:
+                return int(starting[0])
+            above = int(self.parents[above])
+        return -1
 
     @cached_property
     def from_the_root(self) -> list[int]:
@@ -175,6 +227,16 @@ class Weighting:
         if self.use_envelopes:
             entries = fill_from_envelopes(entries, envelopes, self.bones.deform, points)
         return entries.influences()
+
+    def with_skin(self, points: np.ndarray | None) -> Weighting:
+        """Returns the same, whose bones know the skin that they move.
+
+        points  float [vertices, 3] at rest, armature space; None where it has no size
+        """
+        if points is None:
+            return self
+        skin = skin_of(self.influences(points), points, len(self.bones.names))
+        return replace(self, bones=replace(self.bones, skin=skin))
 
     def influences_over_joints(self, points: np.ndarray) -> Influences:
         """Returns influences of bones and of the joints of bendy bones."""

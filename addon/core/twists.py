@@ -5,45 +5,22 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .names import MADE_BONES
+from .limbs import ARM, LEG, LOWER, MADE, NEAR, NEITHER, OWN_TWIST, STRAIGHT, UPPER, words_of
 from .phrases import phrase
 
 if TYPE_CHECKING:
     from .rig import Bones
-
-# Words of bones' names, in the common rigs: Rigify, Mixamo, Unreal, MakeHuman, MikuMikuDance.
-UPPER = r"upper_?arm|up_?arm|thigh|up_?leg|upper_?leg|femur|humerus"
-LOWER = r"fore_?arm|lower_?arm|low_?arm|shin|calf|lower_?leg|low_?leg|radius|ulna|tibia"
-NEITHER = (
-    r"shoulder|clavicle|collar|hand|wrist|foot|ankle|toe|heel|ball|thumb|index|middle|ring|pinky|little|finger|"
-    r"metacarpal|palm|pelvis|hips?|head|eye|jaw|tongue|root|breast"
-)
-OWN_TWIST = r"twist|roll"
-# Bones that Sinew makes, named as the limbs that they follow.
-MADE = rf"({'|'.join(MADE_BONES).lower()})_"
-# Mixamo has Arm above ForeArm and UpLeg above Leg.
-ARM, LEG = r"(?<![a-z])arm(?![a-z])", r"(?<![a-z])leg(?![a-z])"
-# A child starts at its parent's tail within so many of the parent's lengths.
-NEAR = 0.25
-# Without names, a chain goes on where the child points on within 45 degrees.
-STRAIGHT = np.cos(np.radians(45.0))
-
-
-def words_of(name: str) -> str:
-    """Returns a bone's name in lower case, its words divided."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
 @dataclass(frozen=True)
 class Twists:
     """
     rows          int32 [twists, 4] as sinew.TwistSpread takes them, a bone before those that it carries
-    heads, tails  float32 [twists, 3] of the twisted bones at rest, armature space
+    heads, tails  float32 [twists, 3] of the twisted bones' limbs at rest, armature space
     bones, tips   names, [twists]
     parents       int32 [bones + joints], -1 for none
     left_out      a sentence for each bone that gets no twist though others like it do
@@ -61,11 +38,10 @@ class Twists:
 class TwistFinder:
     def __init__(self, bones: Bones) -> None:
         self._names, self._deform, self._parents = bones.names, bones.deform, bones.parents
-        self._segments = bones.segments
+        self._segments, self._carriers, self._children = bones.segments, bones.carriers, bones.children
+        self._limbs, self._known = bones.limbs
         rest = bones.rest[: len(bones.names)].astype(np.float64)
-        self._heads, self._axes = rest[:, :3, 3], rest[:, :3, 1]
-        self._lengths = bones.lengths.astype(np.float64)
-        self._tails = self._heads + self._lengths[:, None] * self._axes
+        self._heads, self._own = rest[:, :3, 3], bones.lengths[:, None] * rest[:, :3, 1]
         self._left_out: list[str] = []
 
     def find(self, joints: np.ndarray) -> Twists:
@@ -76,35 +52,12 @@ class TwistFinder:
         return Twists(
             rows,
             self._heads[of].astype(np.float32),
-            self._tails[of].astype(np.float32),
+            (self._heads + self._limbs)[of].astype(np.float32),
             tuple(self._names[bone] for bone in of),
             tuple(self._names[bone] for bone in rows[:, 2]),
             np.concatenate([self._parents, joints]).astype(np.int32),
             tuple(self._left_out),
         )
-
-    @cached_property
-    def _children(self) -> list[list[int]]:
-        """The deforming bones that each bone carries next, by its chain."""
-        children: list[list[int]] = [[] for _name in self._names]
-        for bone in np.flatnonzero(self._deform):
-            parent = self.carrier(int(bone))
-            if parent >= 0:
-                children[parent].append(int(bone))
-        return children
-
-    def carrier(self, bone: int) -> int:
-        """The nearest deforming bone above. In rigs whose deforming bones hang on others, the one at whose
-        tail the bone starts. -1 for none."""
-        above = int(self._parents[bone])
-        while above >= 0 and not self._deform[above]:
-            above = int(self._parents[above])
-        if above >= 0:
-            return above
-        apart = np.linalg.norm(self._tails - self._heads[bone], axis=1)
-        meets = np.flatnonzero(self._deform & (apart <= 1e-3 * self._lengths))
-        meets = meets[meets != bone]
-        return int(meets[0]) if len(meets) == 1 else -1
 
     def _from_the_root(self) -> list[int]:
         depths = np.zeros(len(self._names), np.int32)
@@ -118,11 +71,15 @@ class TwistFinder:
     def _twist_of(self, bone: int) -> tuple[int, int, int, int] | None:
         """Returns its row, or None. Notes why, where it is a limb."""
         role = self._role(bone)
-        if role == NEITHER or not self._lengths[bone] > 0.0:
+        if role == NEITHER or not self._limbs[bone].any():
             return None
         if role == UPPER:
-            base = self.carrier(bone)
+            base = int(self._carriers[bone])
             base = int(self._parents[bone]) if base < 0 else base
+            if not self._known[bone]:
+                text = "{bone} carries no bone and moves no skin that its axis could be told from"
+                self._leave_out(bone, text)
+                return None
             if base < 0:
                 self._leave_out(bone, "{bone} has no parent to be twisted against")
                 return None
@@ -142,13 +99,12 @@ class TwistFinder:
 
     def _tip(self, bone: int, is_limb: bool) -> int | None:
         """The child whose twist the bone shares."""
-        at_tail = [
-            child
-            for child in self._children[bone]
-            if np.linalg.norm(self._heads[child] - self._tails[bone]) <= NEAR * self._lengths[bone]
-        ]
+        at_tail = self._starting_at(bone, self._limbs[bone])
         if not is_limb:
-            straight = [child for child in at_tail if self._axes[child] @ self._axes[bone] >= STRAIGHT]
+            if self._goes_on(self._own[bone], self._limbs[bone]):
+                # A bone along its limb says itself where the next of a chain starts.
+                at_tail = self._starting_at(bone, self._own[bone])
+            straight = [child for child in at_tail if self._goes_on(self._limbs[bone], self._limbs[child])]
             if len(at_tail) == 1 and not straight:
                 return None
         if len(at_tail) > 1:
@@ -159,6 +115,15 @@ class TwistFinder:
                 self._leave_out(bone, "{bone} carries no deforming bone at its tail")
             return None
         return at_tail[0]
+
+    def _starting_at(self, bone: int, limb: np.ndarray) -> list[int]:
+        """Which of those that the bone carries start at the end of a limb, [3] from its head."""
+        end, near = self._heads[bone] + limb, NEAR * np.linalg.norm(limb)
+        return [child for child in self._children[bone] if np.linalg.norm(self._heads[child] - end) <= near]
+
+    @staticmethod
+    def _goes_on(before: np.ndarray, after: np.ndarray) -> bool:
+        return bool(before @ after >= STRAIGHT * np.linalg.norm(before) * np.linalg.norm(after))
 
     def _role(self, bone: int) -> str:
         """UPPER, LOWER or NEITHER by its name, or empty."""

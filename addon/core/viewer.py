@@ -180,8 +180,8 @@ class Part:
         amounts, curves, channels = inputs[:, 0], inputs[:, 1], inputs[:, 2:]
         of, angles = stages.twists, stages.twist.angles(motions, channels)
         add_twists(buffer, of.rows, amounts * angles, curves)
-        rest = self.rest_bones.astype(np.float64)
-        shorter, _swings = twist_angles(motions.astype(np.float64), rest, of.rows)
+        rest, (heads, tails) = self.rest_bones.astype(np.float64), stages.segments
+        shorter, _swings = twist_angles(motions.astype(np.float64), rest, of.rows, tails - heads)
         # What fades leave of an angle, if it is so many turns beyond the shorter way: the most is right.
         turns = np.arange(-2, 3)[:, None]
         parts = angles / np.where(angles == 0.0, 1.0, shorter + 2.0 * np.pi * turns)

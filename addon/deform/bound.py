@@ -14,13 +14,15 @@ from ..attach import attach, properties, stage_settings
 from ..attach.modifier_options import ModifierOptions, are_animated
 from ..attach.properties import METHODS
 from ..core import sdef
+from ..core.arrays import are_equal
 from ..core.phrases import phrase
 from ..core.rig import Bones, RigFacts, Weighting
 from ..core.skin_stack import SkinDeformer, SkinStack, SkinStage
 from ..core.stage_mesh import StageMesh
 from ..core.stages import StagesAfter
+from ..core.vectors import transformed
 from ..core.vertex_data import VertexData
-from ..io import armature_io
+from ..io import armature_io, spaces
 from ..io.actions import animated_paths
 from . import source, survey
 from .plan import Normals
@@ -114,7 +116,8 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     groups = stage_settings.vertex_groups(properties.of(obj))
     if old is not None:
         read_now.keep_normals_of(old.source)
-    if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones):
+    spaces_now = [_bones_from_model(obj, replaced.armature, depsgraph) for _modifier, replaced in pairs]
+    if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones, spaces_now):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
                 stage.deformer.vertex_data = _vertex_data(stage.deformer.weighting, read_now, stage)
@@ -127,10 +130,11 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     masks = _masks(read_now, groups)
     stages = []
     before = () if old is None else old.skin_stack.skin_stages
-    for option, its_bones, its_old in itertools.zip_longest(options, bones, before):
+    for option, its_bones, space, its_old in itertools.zip_longest(options, bones, spaces_now, before):
         if option is None:
             break
         weighting = option.weighting(read_now.group_names, read_now.weights, its_bones)
+        weighting = _with_skin(weighting, read_now, space)
         deformer = SkinDeformer(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
         stages.append(
             SkinStage(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
@@ -196,11 +200,30 @@ def uid(data: bpy.types.ID | None) -> int:
     return 0 if data is None else data.session_uid
 
 
-def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> bool:
-    known = [stage.deformer.bones for stage in old.skin_stack.skin_stages]
+def _equals_but_for_points(
+    old: Bound, read_now: Source, bones: list[Bones], spaces_now: list[np.ndarray | None]
+) -> bool:
+    known = [stage.deformer.weighting for stage in old.skin_stack.skin_stages]
     return read_now.equals_but_for_points(old.source) and all(
-        now.equals(before) for now, before in zip(bones, known, strict=False)
+        now.equals(before.bones) and _has_same_limbs(before, read_now, space)
+        for now, before, space in zip(bones, known, spaces_now, strict=False)
     )
+
+
+def _has_same_limbs(before: Weighting, read_now: Source, space: np.ndarray | None) -> bool:
+    """Whether the limbs of bones, some of which only their skin tells, are where they were."""
+    vectors, known = _with_skin(before, read_now, space).bones.limbs
+    return are_equal(vectors, before.bones.limbs.vectors) and are_equal(known, before.bones.limbs.known)
+
+
+def _with_skin(weighting: Weighting, read_now: Source, space: np.ndarray | None) -> Weighting:
+    return weighting.with_skin(None if space is None else transformed(read_now.surface_points, space))
+
+
+def _bones_from_model(
+    obj: bpy.types.Object, armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph
+) -> np.ndarray | None:
+    return None if armature is None else spaces.bones_from_model_in(depsgraph, obj, armature)
 
 
 def _masks(read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:

@@ -316,16 +316,25 @@ func _write_rotation(bone: int, motions: Array[Transform3D], nearby: Dictionary)
 	return nearby[bone]
 
 
-# From the head to the tail at rest, and how much the motion stretches what is across the bone, at most.
+# The direction of a bone's limb at rest: along its Y axis, where the file does not say otherwise.
+func _limb(bind: int) -> Vector3:
+	var axes: Array = skin_content.get("axes", [])
+	var own: Array = axes[bind] if axes else [0.0, 1.0, 0.0]
+	return _rest[bind].basis * Vector3(own[0], own[1], own[2])
+
+
+# From the head to the tail at rest, and how much the motion stretches what is across the limb, at most.
 func _write_segment(bind: int, length: float, motion: Transform3D) -> void:
 	var head := _rest[bind].origin
-	var along := _rest[bind].basis.y * length
+	var along := _limb(bind) * length
 	var image := motion.basis * along
-	var axes := motion.basis * _perpendicular(_rest[bind].basis)
+	var axes := motion.basis
 	var stretch := sqrt((axes.x.length_squared() + axes.y.length_squared() + axes.z.length_squared()) / 3.0)
 	if length > 0.0:
-		var a := axes.x
-		var b := axes.z
+		var first := Vector3.RIGHT if absf(along.x) < 0.9 * along.length() else Vector3.UP
+		first = first.cross(along).normalized()
+		var a := motion.basis * first
+		var b := motion.basis * along.cross(first).normalized()
 		if image:
 			a -= a.project(image)
 			b -= b.project(image)
@@ -343,7 +352,7 @@ func _write_twist(twist: Dictionary, number: int, motions: Array[Transform3D]) -
 	var rest := _rest[int(twist["tip"])].basis
 	var q := _rotation(rest, base * motions[int(twist["tip"])].basis * rest)
 	q = -q if q.w < 0.0 else q
-	var along := _rest[int(twist["bone"])].basis.y.normalized().dot(Vector3(q.x, q.y, q.z))
+	var along := _limb(int(twist["bone"])).normalized().dot(Vector3(q.x, q.y, q.z))
 	var angle := 2.0 * atan2(along, q.w)
 	var swing := 2.0 * acos(minf(Vector2(along, q.w).length(), 1.0))
 	var spread: float = angle * _fade(angle) * _fade(swing) * twist["amount"]

@@ -88,6 +88,7 @@ FEATURES = (
     "refused behind",
     "seams",
     "hair",
+    "across",
 )
 # Blender's own methods, and whether each has Preserve Volume.
 ORACLES = (("lbs", False), ("dq", True))
@@ -174,6 +175,8 @@ def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
         bone.roll = rng.uniform(-np.pi, np.pi)
         bone.parent, bone.use_connect = parent, connected
     bpy.ops.object.mode_set(mode="OBJECT")
+    if has(seed, "across", features, share=0.2):
+        scenes.stand_across(armature, seed if numbers(seed, "across").random() < 0.5 else None)
     set_bone_options(seed, features, armature.data.bones)
     return armature
 

@@ -72,6 +72,28 @@ def make_arm(
     return obj, armature
 
 
+def stand_across(armature: bpy.types.Object, seed: int | None = None) -> None:
+    """Bones keep their heads, as files from other programs bring them: all upright, or each where a seed
+    says."""
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in armature.data.edit_bones:
+        bone.use_connect = False
+    for number, bone in enumerate(armature.data.edit_bones):
+        rng = np.random.default_rng((seed, number)) if seed is not None else None
+        direction = Vector((0.0, 0.0, 0.5) if rng is None else rng.normal(0.0, 1.0, 3))
+        bone.tail = bone.head + direction * bone.length
+        bone.roll = 0.0 if rng is None else rng.uniform(-np.pi, np.pi)
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def rotate_in_armature(bone: bpy.types.PoseBone, rotation: Quaternion) -> None:
+    """Rotates a bone against its parent, by a rotation in armature space at rest."""
+    rest = bone.bone.matrix_local.to_quaternion()
+    bone.rotation_mode = "QUATERNION"
+    bone.rotation_quaternion = rest.inverted() @ rotation @ rest
+
+
 def key_pose(armature: bpy.types.Object, degrees: float = 100.0) -> None:
     """Rest at frame 1; at frame 11 every bone but the first is bent and twisted."""
     for index, bone in enumerate(armature.pose.bones):

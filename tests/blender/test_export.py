@@ -167,6 +167,21 @@ def test_stages_play_elsewhere_as_here(tmp_path, method, mixed, form):
     assert scenes.worst(got[-1], scenes.world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.05
 
 
+@pytest.mark.parametrize("seed", [None, 1])
+def test_bones_across_their_limbs_play_elsewhere_as_here(tmp_path, seed):
+    obj = make_limb()
+    scenes.stand_across(obj.parent, seed)
+    use(obj, "dq")
+    for stage in ("twist_spread", "bulge_limit"):
+        scenes.set_stage(obj, stage)
+    file = write(tmp_path / "a.glb")
+    of_skin = file.header["skins"][0]["extensions"]["SINEW_skinning"]
+    jsonschema.validate(of_skin, SKIN_SCHEMA)
+    assert of_skin["version"] == 2
+    assert [twist["from"] for twist in of_skin["twists"]] == ["parent", "child"]
+    assert_plays(tmp_path / "a.glb", obj, FRAMES)
+
+
 def test_centres_matter_and_are_of_each_primitive(tmp_path):
     obj = make_character(materials=3)
     use(obj, "cor")

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 import routes
 import scenes
+from mathutils import Quaternion
 from sinew_addon.attach import properties, stage_settings
+from sinew_addon.core.twists import Twists
 from sinew_addon.deform import session
 
 
@@ -163,3 +165,74 @@ def test_bones_are_found_by_names_and_chains():
     assert tips["neck"] == "head"
     assert tips["thigh.L"] == "thigh.L"
     assert "hub carries 3 bones, which may twist apart" in twists.left_out
+
+
+NAMES = {
+    "chain": ("bone.0", "bone.1", "bone.2"),
+    "arm": ("LeftShoulder", "LeftArm", "LeftForeArm"),
+    "forearm": ("upperarm_l", "lowerarm_l", "hand_l"),
+}
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def limb(names: tuple[str, ...], seed: int | None, across: bool = True) -> bpy.types.Object:
+    """arm() with Twist Spread, whose bones stand across it."""
+    obj, armature = scenes.make_arm(bones=3)
+    scenes.forget_keys(armature)
+    if across:
+        scenes.stand_across(armature, seed)
+    for bone, name in zip(armature.pose.bones, names, strict=True):
+        bone.location = (0.0, 0.0, 0.0)
+        # Its vertex group follows.
+        bone.name = name
+    scenes.add_sinew(obj, "dq")
+    spread(obj)
+    return obj
+
+
+def twists_of(obj: bpy.types.Object) -> Twists:
+    return session.state_of(obj).bound.first_deformer.bones.twists
+
+
+def changed_by_the_stage(obj: bpy.types.Object) -> float:
+    shapes = []
+    for is_on in (False, True):
+        properties.of(obj).twist_spread.enabled = is_on
+        bpy.context.view_layer.update()
+        shapes.append(scenes.final_points(obj))
+    return scenes.worst(*shapes)
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2, 3])
+@pytest.mark.parametrize("naming", NAMES)
+def test_bones_across_their_limb_twist_as_those_along_it(naming, seed):
+    """A bend alone changes nothing, and a twist spreads along the limb, whatever the bones' own axes are."""
+    shapes = []
+    for across in (True, False):
+        obj = limb(NAMES[naming], seed, across)
+        armature = properties.of(obj).armature
+        for bone in armature.pose.bones[1:]:
+            scenes.rotate_in_armature(bone, Quaternion(Z, math.radians(80.0)))
+        bpy.context.view_layer.update()
+        assert changed_by_the_stage(obj) < 1e-5
+        for bone in armature.pose.bones[1:]:
+            scenes.rotate_in_armature(bone, Quaternion(X, math.radians(100.0)))
+        bpy.context.view_layer.update()
+        shapes.append(scenes.final_points(obj))
+        assert changed_by_the_stage(obj) > 0.05
+    assert scenes.worst(*shapes) < 1e-4
+
+
+def test_a_bone_whose_limb_nothing_tells_is_left_out():
+    """An upper arm across its limb that carries nothing is told by its skin, where it has some."""
+    obj = limb(("spine", "LeftShoulder", "LeftArm"), None)
+    assert "LeftArm" in twists_of(obj).bones
+    scenes.rotate_in_armature(properties.of(obj).armature.pose.bones[2], Quaternion(Z, math.radians(80.0)))
+    bpy.context.view_layer.update()
+    assert changed_by_the_stage(obj) < 1e-3
+    obj.vertex_groups.remove(obj.vertex_groups["LeftArm"])
+    scenes.rebind(obj)
+    assert "LeftArm" not in twists_of(obj).bones
+    assert twists_of(obj).left_out == (
+        "LeftArm carries no bone and moves no skin that its axis could be told from",
+    )

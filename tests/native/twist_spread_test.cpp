@@ -82,7 +82,8 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
                 split_scale(inverse(motion_of(twist.base)) * motion_of(twist.tip), tip_rest).rigid.linear;
             const Quat<double> rotation = glm::normalize(to_quat(relative));
             const auto bone_rest = cast<double>(scene.rest_bones[static_cast<std::size_t>(twist.bone)]);
-            const Vec3<double> axis = glm::normalize(bone_rest.linear[1]);
+            const Vec3<double> head(twist.head);
+            const Vec3<double> axis = glm::normalize(Vec3<double>(twist.tail) - head);
             double expected = 0.0;
             if (!options.channels.empty()) {
                 const TwistChannels<double> told{glm::normalize(Quat<double>(options.channels[i].rotation)),
@@ -95,9 +96,9 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
                 static_cast<double>(options.amount) * static_cast<double>(options.amounts[i]);
             const TwistSpreadStage::Bone<double> bone{
                 motion_of(twist.bone),
-                bone_rest.translation,
+                head,
                 axis,
-                Vec3<double>(twist.head),
+                head,
                 Vec3<double>(twist.tail),
                 static_cast<double>(options.curves[i]),
                 factor * angle,

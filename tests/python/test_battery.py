@@ -121,6 +121,25 @@ def directions(posed):
     return posed[:, :3, 1]
 
 
+def across(bones):
+    """The same, whose bones stand across their limbs, all alike."""
+    rest = bones.rest.copy()
+    rest[:, :3, :3] = bones.rest[:, :3, [1, 2, 0]]
+    return replace(bones, rest=rest)
+
+
+@pytest.mark.parametrize("naming", NAMES)
+def test_bones_across_their_limbs_bend_as_those_along_them(naming):
+    bones, _number = figure(naming)
+    stands = across(bones)
+    np.testing.assert_allclose(stands.limbs.vectors, bones.limbs.vectors, atol=1e-6)
+    expected, found = poses_of(bones), poses_of(stands)
+    assert found.keys() == expected.keys()
+    for name, pose in expected.items():
+        motions = [each @ np.linalg.inv(of.rest) for each, of in ((pose, bones), (found[name], stands))]
+        np.testing.assert_allclose(*motions, atol=1e-5, err_msg=name)
+
+
 @pytest.mark.parametrize("naming", NAMES)
 def test_a_figure_bends_as_people_do(naming):
     bones, number = figure(naming)

@@ -108,7 +108,9 @@ def spread(  # noqa: PLR0913 - as the library's
     result, margins = np.asarray(points, np.float64).copy(), np.full(len(points), np.pi)
     for number in range(len(twists))[::-1]:
         bone, base, tip, from_parent = twists[number]
-        axis, origin = rest_bones[bone, :3, 1], rest_bones[bone, :3, 3]
+        origin = np.asarray(heads[number], np.float64)
+        along = np.asarray(tails[number], np.float64) - origin
+        axis = along if along.any() else rest_bones[bone, :3, 1]
         axis = axis / np.linalg.norm(axis)
         turned = relative_rotation(transforms[base], transforms[tip], rest_bones[tip])
         axes = rest_bones[tip, :3, :3]
@@ -117,7 +119,7 @@ def spread(  # noqa: PLR0913 - as the library's
         angle, around, part, margin = reading(turned, axis, expected)
         factor = amount * (1.0 if amounts is None else np.clip(amounts[number], 0.0, 1.0))
         curve = 0.0 if curves is None else np.clip(curves[number], -1.0, 1.0)
-        motion, along = transforms[bone], np.asarray(tails[number], float) - heads[number]
+        motion = transforms[bone]
         linear, shift = motion[:3, :3], motion[:3, 3]
         beyond, posed_axis = are_below(tip, parents, len(rest_bones)), linear @ axis
         for vertex, x in enumerate(result.copy()):

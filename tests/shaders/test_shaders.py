@@ -61,7 +61,8 @@ class Mesh:
         add_segments(buffer, *reader_stages.segments(self.case))
         # The chain's last bone has nothing to share; bendy bones spread their roll themselves.
         twists = [(bone, bone, bone + 1, False) for bone in np.flatnonzero(self.case["segments"][:-1] == 1)]
-        angles, swings = twist_angles(self.case["posed"] @ np.linalg.inv(rest), rest, twists)
+        motions = self.case["posed"] @ np.linalg.inv(rest)
+        angles, swings = twist_angles(motions, rest, twists, rest[:, :3, 1])
         stage = result["stages"].get("twist_spread", {"amount": 0.0})
         around = np.full(len(twists), stage.get("turns", 0))
         angles = stage["amount"] * (angles * fade(np.abs(angles)) * fade(swings) + 2 * np.pi * around)

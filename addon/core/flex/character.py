@@ -20,8 +20,8 @@ class Skeleton:
     """The bones of all armatures, in world space.
 
     names    [bones]
-    rest     float64 [bones, 4, 4], Y along the bone
-    tails    float64 [bones, 3]
+    rest     float64 [bones, 4, 4], each in its own axes
+    tails    float64 [bones, 3], where their limbs end
     above    int [bones], what carries each; -1 for none
     deform   bool [bones], those that may move vertices
     roles    [bones], as battery.Battery.roles()

@@ -123,6 +123,9 @@ def _rigs(now: live.Moment) -> list[_Rig]:
         if armature.session_uid not in found:
             found[armature.session_uid] = _Rig(armature, deformer.bones, first, set(), world)
             first += len(deformer.bones.names)
+        else:
+            rig = found[armature.session_uid]
+            rig.bones = rig.bones.with_skin_of(deformer.bones)
         found[armature.session_uid].moving.update(deformer.moving_bones)
     return list(found.values())
 
@@ -155,7 +158,7 @@ def _skeleton(rigs: Sequence[_Rig]) -> Skeleton:
         parts.append(
             (
                 rest,
-                rest[:, :3, 3] + bones.lengths[:, None] * rest[:, :3, 1],
+                bones.limb_ends(rest),
                 np.where(bones.carriers >= 0, bones.carriers + rig.first, -1),
                 bones.deform,
                 side,

@@ -31,12 +31,17 @@ from ...io import armature_io, mesh_io, spaces
 
 # Raised when readers of earlier files could not read new ones correctly.
 VERSION = 1
+# Of a skin with limbs that are not along Y.
+WITH_AXES = 2
+# As far as that from Y a limb is along it.
+_ALONG = 1e-4
 CENTRE, SHARE = "_SINEW_CENTRE", "_SINEW_MIX"
 # The weights of the vertex groups of stages, where they have one.
 AMOUNTS = {"twist_spread": "_SINEW_TWIST_SPREAD", "bulge_limit": "_SINEW_BULGE_LIMIT"}
 ATTRIBUTES = (CENTRE, SHARE, *AMOUNTS.values())
 EXTENSION = "SINEW_skinning"
 
+_Y = np.array([0.0, 1.0, 0.0])
 # In glTF's axes: x, z, -y.
 _Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
 
@@ -62,12 +67,12 @@ class Skinning:
 class StageBones:
     """
     armature  the name of the object
-    lengths   of its bones, by their names
+    limbs     of its bones, by their names, [3] each in the bone's own axes
     twists    as in the file, with bones' names
     """
 
     armature: str
-    lengths: dict[str, float]
+    limbs: dict[str, np.ndarray]
     twists: list[dict[str, Any]]
 
     @classmethod
@@ -80,9 +85,8 @@ class StageBones:
             names = {"bone": bones.names[bone], "base": bones.names[base], "tip": bones.names[tip]}
             values = {"amount": round(amount, 6), "curve": round(curve, 6)}
             found.append({**names, "from": "parent" if is_from_parent else "child", **values})
-        return cls(
-            evaluated_armature.name, dict(zip(bones.names, bones.lengths.tolist(), strict=True)), found
-        )
+        limbs = dict(zip(bones.names, bones.limbs_in_bones, strict=True))
+        return cls(evaluated_armature.name, limbs, found)
 
     def content(self, joints: Sequence[str]) -> dict[str, Any]:
         """Of the extension of a skin with joints of these names."""
@@ -92,11 +96,15 @@ class StageBones:
             for twist in self.twists
             if {twist["bone"], twist["base"], twist["tip"]} <= numbers.keys()
         ]
-        return {
-            "version": VERSION,
-            "lengths": [self.lengths.get(name, 0.0) for name in joints],
-            "twists": twists,
-        }
+        limbs = np.array([self.limbs.get(name, np.zeros(3)) for name in joints]).reshape(-1, 3)
+        lengths = np.linalg.norm(limbs, axis=1)
+        axes = np.divide(
+            limbs, lengths[:, None], out=np.tile(_Y, (len(limbs), 1)), where=lengths[:, None] > 0.0
+        )
+        content = {"version": VERSION, "lengths": lengths.tolist(), "twists": twists}
+        if np.abs(axes - _Y).max(initial=0.0) > _ALONG:
+            content |= {"version": WITH_AXES, "axes": axes.round(7).tolist()}
+        return content
 
 
 @dataclass

@@ -48,7 +48,7 @@ class Edited:
         bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
         weights = mesh_io.read_group_weights(obj.data)
         points = _in_armature_space(obj, armature, obj.data, depsgraph)
-        weighting = _weighting(obj, obj, weights, bones)
+        weighting = _weighting(obj, obj, weights, bones).with_skin(points)
         return cls(obj, weighting, weights, points, PoseCheck(weighting.influences_over_joints(points)))
 
     def findings(self, most_influences: int) -> list[Finding]:

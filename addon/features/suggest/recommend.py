@@ -105,7 +105,9 @@ def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
         for stage, (_modifier, replaced) in zip(part.skin_stack.skin_stages, pairs, strict=False):
             if replaced.armature is not None:
                 limits = armature_io.read_limits(replaced.armature)
-                known = rigs.setdefault(replaced.armature.session_uid, (stage.deformer.bones, set(), limits))
+                uid, bones = replaced.armature.session_uid, stage.deformer.bones
+                known = rigs.get(uid, (bones, set(), limits))
+                rigs[uid] = (known[0].with_skin_of(bones) if uid in rigs else bones, *known[1:])
                 known[1].update(stage.deformer.moving_bones)
     found: dict[tuple[str, ...], list[battery.Pose]] = {}
     for bones, names, limits in rigs.values():

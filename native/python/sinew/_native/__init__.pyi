@@ -245,11 +245,12 @@ class TwistSpread:
     """
     def __init__(self, binding: Binding, twists: numpy.typing.ArrayLike, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike, *, parents: numpy.typing.ArrayLike | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None, mix: numpy.typing.ArrayLike | None = None) -> None:
         """binding: the mesh. Its memory is shared.
-        twists: int32 [twists, 4], a bone before those that it carries. The first bone's vertices share, about its Y axis,
-            the twist of the third bone relative to the second. The fourth number is 0 where it is added towards the tail
-            (the hand's twist to the forearm), 1 where it is taken back towards the head (an upper arm's own).
+        twists: int32 [twists, 4], a bone before those that it carries. The first bone's vertices share, about the line from
+            its head to its tail, the twist of the third bone relative to the second. The fourth number is 0 where it is
+            added towards the tail (the hand's twist to the forearm), 1 where it is taken back towards the head (an upper
+            arm's own).
         heads, tails: float32 [twists, 3], between which the share of the twist grows from 0 to 1, at rest, in the space of
-            the bone transforms.
+            the bone transforms. Where both are the same, the line is along the bone's Y axis.
         rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], each bone at rest in that space, Y along it.
         parents: None, or int32 [bones], -1 for none. Only twists beyond half a turn need them.
         bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.

@@ -63,6 +63,19 @@ std::vector<std::uint8_t> below(std::int32_t tip, std::span<const std::int32_t> 
     return result;
 }
 
+/// The line that a bone is twisted about, at rest: the axis has a length of 1.
+struct AxisAtRest {
+    Vec3<double> head;
+    Vec3<double> direction;
+};
+
+AxisAtRest axis_at_rest(const TwistBone& twist, std::span<const Affine<float>> rest_bones) {
+    const Vec3<double> head(twist.head);
+    const Vec3<double> along = Vec3<double>(twist.tail) - head;
+    if (glm::dot(along, along) > 0.0) return {head, glm::normalize(along)};
+    return {head, glm::normalize(Vec3<double>(rest_bones[static_cast<std::size_t>(twist.bone)].linear[1]))};
+}
+
 float within(float value, float least, float most, float otherwise) {
     return std::isnan(value) ? otherwise : std::clamp(value, least, most);
 }
@@ -95,13 +108,13 @@ struct TwistSpread::State {
         bones.resize(twists.size());
         list_blocks(data.parents);
         for (const TwistBone& twist : twists) {
-            const auto bone = cast<double>(rest_bones[static_cast<std::size_t>(twist.bone)]);
             const Vec3<double> along = Vec3<double>(twist.tail) - Vec3<double>(twist.head);
             const double squared = glm::dot(along, along);
             const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
             const Float4 row = float4(share.x, share.y, share.z, -glm::dot(share, Vec3<double>(twist.head)));
             TwistRest& of = rest.emplace_back();
-            of.line = twist_line(bone.translation, glm::normalize(bone.linear[1]));
+            axes.push_back(axis_at_rest(twist, rest_bones));
+            of.line = twist_line(axes.back().head, axes.back().direction);
             std::ranges::copy(row.value, of.share);
         }
         measure(data.bones_from_model);
@@ -138,16 +151,15 @@ struct TwistSpread::State {
         std::span<const TwistChannels<float>> channels) const noexcept {
         const TwistBone& of = twists[twist];
         const auto tip_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.tip)]);
-        const Vec3<double> axis =
-            glm::normalize(Vec3<double>(rest_bones[static_cast<std::size_t>(of.bone)].linear[1]));
+        const Vec3<double>& axis = axes[twist].direction;
         const Quat<double> rotation =
             rotation_between(motion(posed, of.base).linear, motion(posed, of.tip).linear, tip_rest.linear);
         double expected = 0.0;
         if (!channels.empty() && channels[twist].rotation != Quat<float>(0.0f, Vec3<float>(0.0f))) {
             const TwistChannels<double> told{glm::normalize(Quat<double>(channels[twist].rotation)),
                                              Vec3<double>(channels[twist].angles)};
-            const Quat<double> axes = to_quat(rotation_keeping_y(tip_rest.linear));
-            expected = TwistSpreadStage::expected(told, rotation, axes, axis);
+            const Quat<double> of_tip = to_quat(rotation_keeping_y(tip_rest.linear));
+            expected = TwistSpreadStage::expected(told, rotation, of_tip, axis);
         }
         return TwistSpreadStage::read(rotation, axis, expected);
     }
@@ -217,12 +229,12 @@ struct TwistSpread::State {
             bone.part = static_cast<float>(amount * own * part);
             if (is_linear) continue;
             const auto at_rest = cast<double>(rest_bones[static_cast<std::size_t>(of.bone)]);
-            const Vec3<double> posed_axis = by.linear * glm::normalize(at_rest.linear[1]);
+            const Vec3<double> posed_axis = by.linear * axes[twist].direction;
             const double length = glm::length(posed_axis);
             const double sign = glm::determinant(by.linear) < 0.0 ? -1.0 : 1.0;
             bone.has_axis = length > 0.0;
             if (bone.has_axis) {
-                bone.posed = twist_line(transform_point(by, at_rest.translation), sign / length * posed_axis);
+                bone.posed = twist_line(transform_point(by, axes[twist].head), sign / length * posed_axis);
             }
             std::array<Float4, kDisplacementRows> rows;
             write_displacement(by, rows.data());
@@ -238,7 +250,8 @@ struct TwistSpread::State {
     const PackedMesh& mesh = packed->mesh;
     std::vector<TwistBone> twists;
     std::vector<Affine<float>> rest_bones;
-    std::vector<TwistRest> rest;  // [twists]
+    std::vector<AxisAtRest> axes;  // [twists]
+    std::vector<TwistRest> rest;   // [twists]
     std::vector<TwistBlock> blocks;
     std::vector<BlockTwist> block_twists;
     std::vector<Lanes<float>> own_rest_points;  // empty: use those of the binding

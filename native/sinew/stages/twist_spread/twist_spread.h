@@ -15,12 +15,12 @@ namespace sinew {
 
 /// A bone whose vertices share a twist.
 struct TwistBone {
-    std::int32_t bone;  // its vertices are twisted about its Y axis
+    std::int32_t bone;  // its vertices are twisted about the line from head to tail
     std::int32_t base;  // the twist is that of `tip` relative to this bone
     std::int32_t tip;
     bool is_from_parent;  // false: added towards the tail; true: taken back towards the head
     Vec3<float> head;     // at rest, where the share of the twist is 0
-    Vec3<float> tail;     // at rest, where it is 1
+    Vec3<float> tail;     // at rest, where it is 1; at the head: the line is along the bone's Y axis
 };
 
 /// The rotation channels of a bone: how far they say that it went.
