@@ -89,6 +89,9 @@ FEATURES = (
     "seams",
     "hair",
     "across",
+    "pinned key",
+    "simplify",
+    "keyed options",
 )
 # Blender's own methods, and whether each has Preserve Volume.
 ORACLES = (("lbs", False), ("dq", True))
@@ -324,6 +327,9 @@ def add_shape_keys(seed: int, features: set[str], obj: bpy.types.Object) -> None
             key.vertex_group = obj.vertex_groups[0].name
         if index and rng.random() < 0.3:
             key.relative_key = obj.data.shape_keys.key_blocks[1]
+    if has(seed, "pinned key", features, share=0.2):
+        obj.active_shape_key_index = int(numbers(seed, "pinned key").integers(len(obj.data.shape_keys.key_blocks)))
+        obj.show_only_shape_key = True
     if has(seed, "absolute keys", features, share=0.2):
         obj.data.shape_keys.use_relative = False
         obj.data.shape_keys.eval_time = rng.uniform(0.0, 30.0)
@@ -352,6 +358,14 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
     pose(seed, features, armature)
     if has(seed, "stages", features):
         paint(numbers(seed, "painted"), obj)
+    if has(seed, "simplify", features, share=0.2):
+        render = bpy.context.scene.render
+        render.use_simplify, render.simplify_subdivision, render.simplify_subdivision_render = True, 0, 0
+    if has(seed, "keyed options", features, share=0.2):
+        for modifier in (each for each in obj.modifiers if each.type == "ARMATURE"):
+            value = modifier.invert_vertex_group
+            scenes.key(modifier, "invert_vertex_group", ((0, not value), (1, value)))
+        bpy.context.scene.frame_set(bpy.context.scene.frame_current)
     bpy.context.view_layer.update()
     return obj, armature
 

@@ -1483,6 +1483,18 @@ def key_modifier(w: Walker, r: random.Random) -> None:
     w.this_frame()
 
 
+@operation(0.5)
+def key_option(w: Walker, r: random.Random) -> None:
+    """Keys an option of an Armature modifier that Sinew reads when it is bound."""
+    obj = w.skinned(r)
+    w.skip_if(obj.override_library is not None or w.shares_action(obj))
+    modifier = w.one(r, armature_modifiers(obj))
+    option = r.choice(("invert_vertex_group", "use_multi_modifier"))
+    first, frames = r.random() < 0.5, sorted(r.sample(range(1, 12), 2))
+    key(obj, modifier.path_from_id(option), [(frames[0], float(first)), (frames[1], float(not first))])
+    w.this_frame()
+
+
 @operation(1)
 def another_armature(w: Walker, r: random.Random) -> None:
     obj, rig = w.skinned(r), w.armature(r)
@@ -1676,6 +1688,9 @@ def pin_shape_key(w: Walker, r: random.Random) -> None:
     obj = w.mesh(r, lambda o: bool(_keys(o)))
     obj.active_shape_key_index = r.randrange(len(obj.data.shape_keys.key_blocks))
     obj.show_only_shape_key = not obj.show_only_shape_key
+    if obj.override_library is None and obj.data.library is None:
+        group = w.one_or_none(r, obj.vertex_groups) if r.random() < 0.5 else None
+        obj.active_shape_key.vertex_group = group.name if group is not None else ""
 
 
 @operation(0.4)
@@ -1865,6 +1880,42 @@ def scene(w: Walker, r: random.Random) -> None:
     w.this_scene()
 
 
+@operation(0.5)
+def simplify(w: Walker, r: random.Random) -> None:
+    render = bpy.context.scene.render
+    render.use_simplify = not render.use_simplify
+    render.simplify_subdivision = render.simplify_subdivision_render = r.randint(0, 1)
+
+
+@operation(0.3)
+def edit_elsewhere(w: Walker, r: random.Random) -> None:
+    """Edits an object of a scene that no window shows, and evaluates that."""
+    others = [scene for scene in bpy.data.scenes if scene != bpy.context.scene]
+    found = [o for scene in others for o in scene.objects if o.type == "MESH" and not w.side.may_react(o)]
+    obj = w.one(r, sorted(found, key=lambda o: o.name_full))
+    w.skip_if(obj.library is not None or obj.data.library is not None or obj.data.is_editmode)
+    for index in r.sample(range(len(obj.data.vertices)), min(3, len(obj.data.vertices))):
+        obj.data.vertices[index].co.z += 0.1
+    obj.data.update()
+    others[0].view_layers[0].update()
+
+
+@operation(0.3)
+def rigid_body(w: Walker, r: random.Random) -> None:
+    """Makes it one that reads its deformed mesh, or none again."""
+    obj = w.mesh(r, lambda o: o.override_library is None and o.library is None)
+    w.skip_if(not w.select(obj))
+    if obj.rigid_body is not None:
+        bpy.ops.rigidbody.object_remove()
+        return
+    if bpy.context.scene.rigidbody_world is None:
+        bpy.ops.rigidbody.world_add()
+    bpy.ops.rigidbody.object_add(type="PASSIVE")
+    body = obj.rigid_body
+    body.kinematic, body.collision_shape, body.use_deform = True, "MESH", True
+    body.mesh_source = r.choice(("DEFORM", "BASE"))
+
+
 @operation(0.2)
 def copy_scene(w: Walker, r: random.Random) -> None:
     """As the menu does, with all objects or copies of them."""
@@ -2042,6 +2093,11 @@ def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: 
         obj.location.z += 0.1
     elif what == "name":
         obj.name = new
+    elif what == "mesh":
+        obj.data = obj.data.copy()
+        obj.data.name = new
+        for vertex in obj.data.vertices:
+            vertex.co.y *= 1.3
     elif what == "rename":
         obj.modifiers[modifier].name = new
     elif what == "toggle":
@@ -2082,7 +2138,7 @@ def neighbour(w: Walker, r: random.Random) -> None:
     """Another add-on's handler, called once, at a change of frame."""
     obj, when = w.mesh(r), r.choice(("frame_change_pre", "frame_change_post", "depsgraph_update_post"))
     what, number = (
-        r.choice(("rename", "toggle", "add", "delete", "weights", "move", "name")),
+        r.choice(("rename", "toggle", "add", "delete", "weights", "move", "name", "mesh")),
         r.randint(*FRAMES),
     )
     w.skip_if(obj.override_library is not None or obj.mode != "OBJECT" or obj.data.library is not None)
