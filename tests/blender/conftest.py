@@ -77,12 +77,9 @@ def pytest_sessionfinish(exitstatus):
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure():
-    # After an export of glTF, Blender as a module may crash (4.2, with or without Sinew) or hang (4.5) when
-    # it exits; on Windows under wine it always does. 4.2 also crashes after test_golden.py was imported: its
-    # own destructors free the classes of panels when Python is gone.
-    after_gltf = bpy.app.version < (5, 0) and "io_scene_gltf2.io.exp" in sys.modules
-    ends_badly = after_gltf or bpy.app.version < (4, 3)
-    if ends_badly or sys.platform == "win32":
+    # Blender as a module may crash (4.2) or hang (4.5) when it exits, with or without Sinew: after an export of
+    # glTF, after test modules were imported alone; on Windows under wine it always does.
+    if bpy.app.version < (5, 0) or sys.platform == "win32":
         sys.stdout.flush()
         sys.stderr.flush()
         if sys.platform == "win32":
