@@ -86,7 +86,8 @@ class _Event:
             changes.touched.add(obj.data.session_uid)
         facts = Facts(
             may_change=may_change,
-            is_due=skinned.needs_apply,
+            # What a method needs may have been computed since the evaluation.
+            is_due=skinned.needs_apply or skinned.has_new_data,
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
             is_other=skinned.noted.mode != apply_plan.mode_of(obj)

@@ -172,6 +172,25 @@ def test_a_result_that_comes_while_the_watcher_looks(gate, in_window):
     assert plan_of(obj).state is State.IN_DEPSGRAPH
 
 
+@pytest.mark.usefixtures("gate")
+def test_a_result_that_comes_between_two_events_is_no_failure():
+    """As where a script sets methods of several characters in a window: Blender has no reason yet to evaluate
+    this one."""
+    obj, _armature = scenes.skinned_arm("cor")
+    other, _armature = scenes.make_arm(name="Other")
+    scenes.add_sinew(other, "dq")
+    bpy.context.scene.frame_set(FRAME)
+    state = session.state_of(obj)
+    other.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert state.evaluation.mesh == 0
+    state.bound.first_deformer.vertex_data.version += 1
+    assert state.has_new_data
+    properties.of(other).method = "qv"
+    assert state.evaluation.failures == 0
+    assert not state.has_new_data
+
+
 def test_a_render_waits(gate, route, rendered_points):
     expected = shape_by_cor()
     precomputations.waits = False
