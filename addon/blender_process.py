@@ -35,7 +35,7 @@ INTERVAL = 0.1
 GREETINGS = (b'{"ready"', b'{"refused"')
 
 
-# What Windows, and so Blender's own message, calls the commonest. 11 is what Blender's handler of crashes ends with.
+# What Windows, and so Blender's own message, calls the commonest. Blender's handler of crashes ends with 11.
 CRASHES = {
     11: "EXCEPTION_ACCESS_VIOLATION",
     0xC0000005: "EXCEPTION_ACCESS_VIOLATION",

@@ -36,7 +36,7 @@ class Precomputations:
         self.waits = True
         self.cache = cache
         self.stopped: set[str] = set()
-        # With the time when each was started; time.monotonic() has steps of 16 ms on Windows before Python 3.13.
+        # With the time of its start. time.monotonic() has steps of 16 ms on Windows before Python 3.13.
         self._running: dict[str, tuple[sinew.Precomputation, float]] = {}
         self._made: OrderedDict[str, np.ndarray] = OrderedDict()
         self._lock = sinew.Lock()

@@ -337,8 +337,8 @@ def test_memory_is_reserved_for_one_thread(method):
     binding = sinew.Binding(rest, numbers, numbers[:-1], np.ones(count, np.float32), vertex_data=LINEAR)
 
     def reserved():
-        # What can be written: the C library sets 64 MiB more aside when a thread first allocates. On Windows what is
-        # reserved.
+        # What can be written: the C library sets 64 MiB more aside when a thread first allocates. On Windows
+        # what is reserved.
         memory = psutil.Process().memory_info()
         return memory.vms if sys.platform == "win32" else memory.data
 
