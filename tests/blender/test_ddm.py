@@ -92,7 +92,7 @@ def test_in_a_window_the_old_radius_stays_until_the_new_is_computed(in_window):
 @pytest.mark.parametrize("stage", ["ddm", "delta_mush"])
 @pytest.mark.parametrize("when", ["before", "after", "unequal"])
 def test_a_radius_is_in_units_of_the_scene(stage, when, route):
-    """A character a hundredth as large in the scene, with a radius a hundredth as large, has the same shape."""
+    """A character a hundredth as large, with a radius a hundredth as large, has the same shape."""
     scales = (0.01, 0.01, 0.01) if when != "unequal" else (0.005, 0.02, 0.01)
     shapes = []
     for is_small in (False, True):
