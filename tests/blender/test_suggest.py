@@ -17,6 +17,7 @@ from sinew_addon.features.heat import worst_frames
 from sinew_addon.features.suggest import recommend, suggest, worst_pictures
 from sinew_addon.features.suggest.crossings import crossing_triangles
 from sinew_addon.io import actions
+from sinew_addon.ui import stepped
 
 
 @pytest.fixture(autouse=True)
@@ -208,3 +209,12 @@ def test_what_is_recommended_again_has_no_table_of_before():
     bpy.ops.sinew.recommend()
     assert uid not in suggest.suggestions
     assert recommend.bases[uid].changes(bpy.context.scene, [obj]) == []
+
+
+def test_a_window_that_draws_slowly_does_so_less_often():
+    """A fifth of the time at most, as far as Esc can wait."""
+    between = stepped.seconds_between_redraws
+    assert between(0.001) == 0.1
+    for drawing in (0.1, 0.25):
+        assert drawing / (drawing + between(drawing)) <= 0.2 + 1e-9
+    assert between(5.0) == 1.0
