@@ -26,6 +26,7 @@ from . import (
     property_groups,
     setting_animation,
     stack,
+    stage_settings,
     stored_vertex_data,
     undeformed,
     upstream_proxy,
@@ -167,6 +168,7 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
     settings.before.had_animation = obj.animation_data is not None
     settings.method = method or method_of(run[0])
     properties.make_groups(settings)
+    stage_settings.note_scale(obj)
     for modifier, replaced in replaced_modifiers(obj):
         replaced.armature = modifier.object
         if method is None and method_of(modifier) != settings.method:

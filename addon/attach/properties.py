@@ -245,6 +245,11 @@ class SinewStorage(bpy.types.PropertyGroup):
         "The copy that has only the upstream modifiers (upstream_proxy.py)",
         type=bpy.types.Object,
     )
+    world_scale: _hidden(
+        bpy.props.FloatProperty,
+        "How many units of the world one of the mesh is, for settings that are lengths; 0 in files of "
+        "versions in which these were in units of the mesh",
+    )
 
 
 class SinewDriver(bpy.types.PropertyGroup):

@@ -44,7 +44,7 @@ def assign(group: bpy.types.PropertyGroup, name: str, value: object) -> None:
         setattr(group, name, value)
 
 
-def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) -> None:
+def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | float | str) -> None:
     """Sets a value that only Sinew uses, without Blender's update: that would touch the object's mesh, as a
     change of weights does."""
     if getattr(group, name) != value:

@@ -11,12 +11,21 @@ import bpy
 import sinew
 
 from ..core import engines, parameters
+from ..io import spaces
+from . import property_groups
 
 STAGES = {stage.name: stage for stage in sinew.stages()}
 # The parameter that switches each stage on: its first.
 _SWITCHES = {stage.name: stage.parameters[0].id for stage in STAGES.values()}
 # Methods that have parameters.
 METHODS = {name: method for name, method in engines.METHODS.items() if method.parameters}
+# Full names of parameters that are lengths.
+LENGTHS = {
+    f"{name}.{each.id}"
+    for name, owner in (STAGES | METHODS).items()
+    for each in owner.parameters
+    if each.unit == "length"
+}
 # What the library's list leaves open: of a choice, its label and its tooltip.
 _CHOICES = {
     "0": ("Nearest Rotation", "Variant 0 of the paper: the rotation that fits the neighbourhood best"),
@@ -25,6 +34,8 @@ _CHOICES = {
     "blender": ("Shorter Way", "As Blender: a vertex turns the shorter way between its bones"),
     "hierarchy": ("Along the Chain", "Turns add up from bone to bone, beyond half a turn"),
 }
+# Scales that differ by no more than this part are the same: matrices of objects that rotate are rounded.
+SAME_SCALE = 1e-4
 # Choice of a parameter that names a method: the stage is off.
 OFF = "OFF"
 # On a library override, Blender saves only properties with this flag.
@@ -52,12 +63,13 @@ def groups(
 
 
 def method_values(settings: bpy.types.PropertyGroup, methods: Iterable[str]) -> dict[str, parameters.Value]:
-    """Returns the parameters of some methods by their full names, as Deformer.deform() takes them.
+    """Returns the parameters of some methods by their full names, as Deformer.deform() takes them: lengths in
+    units of the mesh.
 
     settings  an object's
     """
     return {
-        f"{name}.{each.id}": getattr(getattr(settings, name), each.id)
+        f"{name}.{each.id}": _value(settings, name, each)
         for name in methods
         if name in METHODS
         for each in METHODS[name].parameters
@@ -85,9 +97,25 @@ def names_on(settings: bpy.types.PropertyGroup, among: Iterable[str] = STAGES) -
 
 
 def values_of(settings: bpy.types.PropertyGroup, name: str) -> dict[str, Any]:
-    """Returns the parameters of a stage by their ids, without vertex groups."""
-    group, stage = getattr(settings, name), STAGES[name]
-    return {each.id: getattr(group, each.id) for each in stage.parameters if each.kind != "vertex_group"}
+    """Returns the parameters of a stage by their ids, without vertex groups; lengths in units of the mesh."""
+    own = (each for each in STAGES[name].parameters if each.kind != "vertex_group")
+    return {each.id: _value(settings, name, each) for each in own}
+
+
+def _value(settings: bpy.types.PropertyGroup, name: str, parameter: sinew.Parameter) -> Any:
+    value = getattr(getattr(settings, name), parameter.id)
+    return value / (settings.storage.world_scale or 1.0) if parameter.unit == "length" else value
+
+
+def note_scale(obj: bpy.types.Object) -> None:
+    """Notes how large the object is in the world, for lengths."""
+    property_groups.store(obj.sinew.storage, "world_scale", spaces.scale_of(obj))
+
+
+def has_other_scale(obj: bpy.types.Object) -> bool:
+    """Whether it is not as it was noted."""
+    noted, scale = obj.sinew.storage.world_scale, spaces.scale_of(obj)
+    return noted > 0.0 and abs(noted - scale) > SAME_SCALE * scale
 
 
 def vertex_groups(settings: bpy.types.PropertyGroup) -> dict[str, str]:

@@ -21,6 +21,8 @@ NEITHER = (
     r"shoulder|clavicle|collar|hand|wrist|foot|ankle|toe|heel|ball|thumb|index|middle|ring|pinky|little|finger|"
     r"metacarpal|palm|pelvis|hips?|head|eye|jaw|tongue|root|breast"
 )
+# What a lower limb ends in.
+END = r"(?<![a-z])(hand|wrist|foot|ankle)(?![a-z])"
 OWN_TWIST = r"twist|roll"
 # Mixamo has Arm above ForeArm and UpLeg above Leg.
 ARM, LEG = r"(?<![a-z])arm(?![a-z])", r"(?<![a-z])leg(?![a-z])"

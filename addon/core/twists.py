@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .limbs import ARM, LEG, LOWER, MADE, NEAR, NEITHER, OWN_TWIST, STRAIGHT, UPPER, words_of
+from .limbs import ARM, END, LEG, LOWER, MADE, NEAR, NEITHER, OWN_TWIST, STRAIGHT, UPPER, words_of
 from .phrases import phrase
 
 if TYPE_CHECKING:
@@ -107,6 +107,10 @@ class TwistFinder:
             straight = [child for child in at_tail if self._goes_on(self._limbs[bone], self._limbs[child])]
             if len(at_tail) == 1 and not straight:
                 return None
+        ends = [child for child in at_tail if re.search(END, words_of(self._names[child]))]
+        if is_limb and len(ends) == 1:
+            # Others, as that of a weapon, go with it.
+            return ends[0]
         if len(at_tail) > 1:
             self._leave_out(bone, "{bone} carries {count} bones, which may twist apart", len(at_tail))
             return None

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import isclose
 
 import bpy
 import numpy as np
 import sinew
 
-from ..attach import attach, normals, properties, stack, undeformed, upstream_proxy
+from ..attach import attach, normals, properties, stack, stage_settings, undeformed, upstream_proxy
 from ..attach.modifier_options import ModifierOptions, are_animated
 from ..core.errors import SinewError
 from ..core.skin_stack import NO_STAGES, SkinStageFrame
@@ -102,6 +103,7 @@ class Noted:
     dependencies         the session_uid of everything that the shape depends on
     builtin_fingerprint  why its Armature modifiers deform it (small_meshes.fingerprint()); else empty
     data_versions        versions of the methods' vertex data, for each Armature modifier
+    volume               of one cubic unit of the object in the world
     """
 
     name: str
@@ -123,6 +125,7 @@ class Noted:
     dependencies: set[int]
     builtin_fingerprint: list[str]
     data_versions: list[int]
+    volume: float
 
     @classmethod
     def of(cls, obj: bpy.types.Object, plan: Plan, bound: Bound) -> Noted:
@@ -149,6 +152,7 @@ class Noted:
             dependencies=own | set(bound.armatures),
             builtin_fingerprint=small_meshes.fingerprint(obj) if plan.uses_builtin else [],
             data_versions=bound.data_versions,
+            volume=obj.matrix_world.determinant(),
         )
 
 
@@ -250,6 +254,7 @@ class SkinnedObject:
             self.was_deformed(obj, depsgraph)
             and self.noted.name == obj.name
             and self.noted.switches == switches_of(obj)
+            and isclose(obj.matrix_world.determinant(), self.noted.volume, rel_tol=stage_settings.SAME_SCALE)
             and not self.have_bones_changed(obj, depsgraph, changes)
         )
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ..attach import attach, normals, point_store, properties, stack, upstream_proxy
+from ..attach import attach, normals, point_store, properties, stack, stage_settings, upstream_proxy
 from ..attach.updates import may_change_file
 from ..core.errors import SinewError
 from ..io.actions import animated_paths
@@ -59,6 +59,8 @@ class _Event:
     def __post_init__(self) -> None:
         # Whether the upstream proxy's copy of the mesh has to be made again; None before it was compared.
         self.is_copy_outdated: bool | None = None
+        # Whether lengths among its settings are others for the mesh than before.
+        self.is_rescaled = False
         self.known = Known(self.old, is_bound=self.skinned is not None)
         self.bound_before = None if self.skinned is None else self.skinned.bound
         self.was_on = properties.of(self.obj).replaces_modifiers
@@ -87,7 +89,7 @@ class _Event:
         facts = Facts(
             may_change=may_change,
             # What a method needs may have been computed since the evaluation.
-            is_due=skinned.needs_apply or skinned.has_new_data,
+            is_due=skinned.needs_apply or skinned.has_new_data or (may_change and self._follows_scale()),
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
             is_other=skinned.noted.mode != apply_plan.mode_of(obj)
@@ -104,6 +106,19 @@ class _Event:
         # Blender lists an armature's bones with each change of its pose.
         has_shape = skinned.was_deformed(obj, self.depsgraph) and obj.data.session_uid not in changes.touched
         return replace(facts, has_shape=has_shape and not self._have_bones_changed())
+
+    def _follows_scale(self) -> bool:
+        """Notes another scale of the object. Not where animation scales it, which would have the mesh bound
+        anew with each frame."""
+        obj, changes = self.obj, self.changes
+        if changes.frame or obj.session_uid not in changes.moved or not obj.is_editable:
+            return False
+        if not stage_settings.has_other_scale(obj):
+            return False
+        for each in (obj, obj.evaluated_get(self.depsgraph)):
+            stage_settings.note_scale(each)
+        self.is_rescaled = True
+        return True
 
     def _find_outdated_copy(self) -> bool:
         """Whether the upstream proxy's copy of the mesh has to be made again."""
@@ -250,7 +265,7 @@ class _Event:
         # A render lists everything as new with each frame. Tagging the object makes Blender (4.2 to 5.2) copy
         # it again, without what animation had set.
         is_same = not is_of_another_stack and skinned.bound.source.equals(self.bound_before.source)
-        is_same &= not skinned.has_new_data
+        is_same &= not (skinned.has_new_data or self.is_rescaled)
         is_new_plan = self.bound_before is None or new != self.old
         if known.is_planned or is_of_another_stack:
             self._note(new)

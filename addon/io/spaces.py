@@ -63,6 +63,13 @@ def bones_from_object(evaluated_armature: bpy.types.Object, evaluated: bpy.types
     return evaluated_armature.matrix_world.inverted_safe() @ evaluated.matrix_world
 
 
+def scale_of(obj: bpy.types.Object) -> float:
+    """Returns how many units of the world one of the object is: of unequal scales the geometric mean. 1 where
+    a scale is 0 or not finite."""
+    volume = abs(obj.matrix_world.determinant())
+    return float(volume ** (1 / 3)) if 0.0 < volume < np.inf else 1.0
+
+
 def up_of(armature: bpy.types.Object) -> np.ndarray:
     """Returns [3]: the world's Z in armature space, of length 1."""
     up = np.array(armature.matrix_world.to_3x3().normalized().inverted_safe(), dtype=np.float64)[:, 2]

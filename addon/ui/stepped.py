@@ -15,8 +15,9 @@ from .operators import Acting
 from .sidebar import redraw
 from .translations import tr
 
-# The window redraws in between: rarely enough to cost little, often enough for Esc.
-SECONDS_BETWEEN_REDRAWS = 0.1
+# The window redraws in between: rarely enough to cost little, often enough for Esc. A large character without
+# a graphics card takes longer to draw than to measure.
+SECONDS_BETWEEN_REDRAWS, MOST_SECONDS, TIMES_DRAWING = 0.1, 1.0, 4.0
 OVER = [
     ("SCENE", "Scene's Frames", "The scene's frame range, or its preview range where that is on"),
     ("ACTION", "Action's Frames", "From the first to the last key of the armature's action"),
@@ -52,7 +53,7 @@ class Stepped(Acting):
         if bpy.app.background or context.window is None:
             return self.execute(context)
         precompute_watch.finish(context)
-        self._left = self.steps(context)
+        self._left, self._drawn_from = self.steps(context), time.perf_counter()
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.0, window=context.window)
         manager.progress_begin(0.0, 1.0)
@@ -91,9 +92,11 @@ class Stepped(Acting):
 
     def _advance(self) -> float | None:
         """Returns the progress after some steps; None at the end."""
-        until, share = time.perf_counter() + SECONDS_BETWEEN_REDRAWS, 0.0
+        now, share = time.perf_counter(), 0.0
+        until = now + seconds_between_redraws(now - self._drawn_from)
         while share is not None and time.perf_counter() < until:
             share = next(self._left, None)
+        self._drawn_from = time.perf_counter()
         return share
 
     def _end(self, context: bpy.types.Context) -> None:
@@ -104,6 +107,11 @@ class Stepped(Acting):
         clear_progress(context.workspace)
         for area in context.screen.areas:
             area.tag_redraw()
+
+
+def seconds_between_redraws(drawing: float) -> float:
+    """drawing: the seconds that the window took last, and all else between two calls"""
+    return min(max(SECONDS_BETWEEN_REDRAWS, TIMES_DRAWING * drawing), MOST_SECONDS)
 
 
 class WithDialog(Stepped):

@@ -87,3 +87,53 @@ def test_in_a_window_the_old_radius_stays_until_the_new_is_computed(in_window):
     assert scenes.worst(scenes.final_points(obj), before) < 1e-6
     look_until_done()
     assert_equal_to_reference(obj, 0.3)
+
+
+@pytest.mark.parametrize("stage", ["ddm", "delta_mush"])
+@pytest.mark.parametrize("when", ["before", "after", "unequal"])
+def test_a_radius_is_in_units_of_the_scene(stage, when, route):
+    """A character a hundredth as large, with a radius a hundredth as large, has the same shape."""
+    scales = (0.01, 0.01, 0.01) if when != "unequal" else (0.005, 0.02, 0.01)
+    shapes = []
+    for is_small in (False, True):
+        obj, armature = scenes.make_arm(bones=3)
+        obj.parent = armature
+        bpy.context.scene.frame_set(FRAME)
+        armature.scale = scales if is_small and when != "after" else (1.0, 1.0, 1.0)
+        bpy.context.view_layer.update()
+        scenes.add_sinew(obj, "ddm" if stage == "ddm" else "lbs")
+        group = getattr(properties.of(obj), stage)
+        if stage == "delta_mush":
+            group.enabled = True
+        group.radius = 0.002 if is_small else 0.2
+        bpy.context.view_layer.update()
+        armature.scale = scales if is_small else (1.0, 1.0, 1.0)
+        bpy.context.view_layer.update()
+        shapes.append(scenes.final_points(obj))
+        group.radius = 0.0
+        bpy.context.view_layer.update()
+        assert scenes.worst(shapes[-1], scenes.final_points(obj)) > 0.01
+    assert scenes.worst(*shapes) < 1e-5
+
+
+def test_a_radius_scales_along_with_animation_and_stays_in_earlier_files(tmp_path, route):
+    obj, armature = scenes.make_arm(bones=3)
+    obj.parent = armature
+    bpy.context.scene.frame_set(FRAME)
+    scenes.add_sinew(obj, "ddm")
+    properties.of(obj).ddm.radius = 0.2
+    bpy.context.view_layer.update()
+    before = scenes.final_points(obj)
+    scenes.key(armature, "scale", [(FRAME, (1.0, 1.0, 1.0)), (FRAME + 1, (3.0, 3.0, 3.0))])
+    for bone in armature.pose.bones:
+        bone.keyframe_insert("rotation_quaternion", frame=FRAME)
+        bone.keyframe_insert("location", frame=FRAME)
+    armature.animation_data.action.name = "Grows"
+    bpy.context.scene.frame_set(FRAME)
+    assert scenes.worst(scenes.final_points(obj), before) < 1e-6
+    # What earlier versions stored.
+    scenes.forget_keys(armature)
+    armature.scale = (0.1, 0.1, 0.1)
+    properties.of(obj).storage.property_unset("world_scale")
+    obj = scenes.reopened(scenes.save(tmp_path / "a.blend"))
+    assert_equal_to_reference(obj, 0.2)

@@ -12,18 +12,21 @@ import test_recommended
 from sinew_addon.attach import properties
 from sinew_addon.core import thumbnail
 from sinew_addon.core.suggestion import CRITERIA, MEASURED, Suggestion
+from sinew_addon.features.flex import feature as flex_feature
+from sinew_addon.features.heat import worst_frames
 from sinew_addon.features.suggest import recommend, suggest, worst_pictures
 from sinew_addon.features.suggest.crossings import crossing_triangles
+from sinew_addon.io import actions
+from sinew_addon.ui import stepped
 
 
 @pytest.fixture(autouse=True)
 def nothing_known():
-    suggest.suggestions.clear()
-    recommend.choices.clear()
+    suggest.forget()
 
 
 def found() -> Suggestion:
-    return suggest.suggestions[bpy.context.scene.session_uid]
+    return suggest.suggestions[bpy.context.scene.session_uid].suggestion
 
 
 def test_numbers_are_those_of_each_method():
@@ -112,3 +115,106 @@ def test_pictures_are_drawn_where_each_is_worst(monkeypatch):
     assert set(worst_pictures._pictures[scene.session_uid]) == set(found().methods)
     worst_pictures.clear()
     assert not worst_pictures.icon(scene, "lbs")
+
+
+def move_a_vertex(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.data.vertices[7].co.z += 0.1
+    obj.data.update()
+
+
+def weight_a_vertex(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.vertex_groups["bone.1"].add([3], 0.7, "REPLACE")
+
+
+def move_a_bone(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones[-1].tail.z += 0.3
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def key_a_bone(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    armature.pose.bones[1].location.x = 0.3
+    armature.pose.bones[1].keyframe_insert("location", frame=5)
+
+
+def play_another_action(_obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    actions.play(armature, armature.animation_data.action.copy())
+
+
+def choose_another_range(_obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    bpy.context.scene.frame_end += 3
+
+
+def switch_a_stage_on(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    properties.of(obj).bulge_limit.enabled = True
+
+
+CHANGES = {
+    "mesh": move_a_vertex,
+    "weights": weight_a_vertex,
+    "bones": move_a_bone,
+    "action": key_a_bone,
+    "action ": play_another_action,
+    "frames": choose_another_range,
+    "stages": switch_a_stage_on,
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_result_says_what_has_changed_since(what, route):
+    """Suggest's, those of Recommended, Flex and the worst frames; undone, all is as it was."""
+    obj, armature = scenes.skinned_arm("dq")
+    scene, word = bpy.context.scene, what.strip()
+    bpy.ops.sinew.suggest()
+    bpy.ops.sinew.flex()
+    bpy.ops.sinew.worst_frames()
+    uid = scene.session_uid
+    bases = {
+        "suggest": suggest.suggestions[uid].basis,
+        "recommended": recommend.bases[uid],
+        "flex": flex_feature.results[uid].basis,
+        "worst frames": worst_frames.scans[uid].basis,
+    }
+    assert not any(basis.changes(scene, [obj]) for basis in bases.values())
+    bpy.ops.ed.undo_push()
+    properties.of(obj).method = "cor"
+    scene.frame_set(4)
+    assert not any(bases[name].changes(scene, [obj]) for name in ("suggest", "recommended"))
+    properties.of(obj).method = "dq"
+    CHANGES[what](obj, armature)
+    bpy.context.view_layer.update()
+    told = {name for name, basis in bases.items() if basis.changes(scene, [obj]) == [word]}
+    unaware = {"action": {"flex"}, "frames": {"flex"}, "stages": {"recommended"}}
+    assert told == bases.keys() - unaware.get(word, set())
+    bpy.ops.ed.undo_push()
+    bpy.ops.ed.undo()
+    scene, obj = bpy.context.scene, bpy.data.objects["Arm"]
+    bpy.context.view_layer.update()
+    assert not any(basis.changes(scene, [obj]) for basis in bases.values())
+
+
+def test_what_is_recommended_again_has_no_table_of_before():
+    obj, _armature = test_recommended.arm(143.0, axis=1, sides=16, rings=41)
+    bpy.ops.sinew.suggest()
+    uid = bpy.context.scene.session_uid
+    bpy.ops.sinew.use_recommended()
+    properties.of(obj).twist_spread.enabled = False
+    bpy.ops.sinew.recommend()
+    # The same, of the same.
+    assert uid in suggest.suggestions or properties.of(obj).twist_spread.enabled
+    bpy.ops.sinew.suggest()
+    CHANGES["mesh"](obj, _armature)
+    bpy.context.view_layer.update()
+    bpy.ops.sinew.recommend()
+    assert uid not in suggest.suggestions
+    assert recommend.bases[uid].changes(bpy.context.scene, [obj]) == []
+
+
+def test_a_window_that_draws_slowly_does_so_less_often():
+    """A fifth of the time at most, as far as Esc can wait."""
+    between = stepped.seconds_between_redraws
+    assert between(0.001) == 0.1
+    for drawing in (0.1, 0.25):
+        assert drawing / (drawing + between(drawing)) <= 0.2 + 1e-9
+    assert between(5.0) == 1.0

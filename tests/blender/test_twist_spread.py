@@ -137,6 +137,8 @@ def test_bones_are_found_by_names_and_chains():
         bone("hand" + side, "forearm" + side, (0.8 * x, 0, 1), (0.9 * x, 0, 1))
         for number in range(2):
             bone(f"index.0{number}{side}", "hand" + side, (0.9 * x, 0.1 * number, 1), (x, 0.1 * number, 1))
+        # No reason to leave the forearm out.
+        bone("weapon" + side, "forearm" + side, (0.8 * x, 0, 1), (0.8 * x, 0.3, 1))
         bone("thigh" + side, "spine", (0.1 * x, 0, 0), (0.1 * x, 0, -0.5))
         bone("shin" + side, "thigh" + side, (0.1 * x, 0, -0.5), (0.1 * x, 0, -1))
         bone("foot" + side, "shin" + side, (0.1 * x, 0, -1), (0.1 * x, -0.2, -1))

@@ -140,6 +140,8 @@ class SINEW_OT_save_flex(SavesPage, bpy.types.Operator):
         objects = [found[name] for name in result.own if name in found]
         if len(objects) < len(result.own) or not all(map(properties.has_sinew, objects)):
             raise SinewError("A mesh that was bent is gone; press Flex again")
+        if result.basis.changes(context.scene, objects):
+            raise SinewError("The character has changed since it was bent; press Flex again")
         return page.page(context.scene, title, objects, result)
 
 
@@ -157,6 +159,9 @@ class SINEW_PT_flex(Sidebar, operators.OfSkinned, bpy.types.Panel):
         result = results.get(context.scene.session_uid)
         if result is None:
             return
+        is_old = result.basis.draw(layout, context.scene, sinew_targets(context))
+        layout = layout.column()
+        layout.active = not is_old
         is_good = result.verdict.is_good
         draw_text(layout, _headline(result), icon="CHECKMARK" if is_good else "ERROR")
         if not stepped.draw_progress(layout, SINEW_OT_save_flex.bl_idname):

@@ -22,6 +22,8 @@ from ...core.metrics import FrameOfRig
 from ...core.rig import Bones
 from ...io import armature_io
 from ..heat import live
+from ..heat.measured_on import OWN as OWN_METHOD
+from ..heat.measured_on import MeasuredOn
 from ..suggest.crossings import crossing_triangles
 
 
@@ -55,12 +57,14 @@ class Result:
     poses    by armature, joint and name: rotations of bones, as of battery.Pose, by the bones' names
     methods  those that were tried beside the objects' own
     own      the methods that the verdict is on, by the names of the objects
+    basis    what was measured
     """
 
     verdict: Verdict
     poses: Mapping[tuple[str, str, str], Mapping[str, np.ndarray]]
     methods: Sequence[str]
     own: Mapping[str, str]
+    basis: MeasuredOn
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,7 @@ def flex(
     Raises SinewError where there is nothing to bend.
     """
     subject = live.measure_now(objects, properties.BLENDER, "bend")
+    basis = MeasuredOn.of(bpy.context.scene, objects, OWN_METHOD)
     now = live.Moment.of(subject)
     rigs = _rigs(now)
     own_methods = [own.get(part.obj) for part in subject.parts]
@@ -110,7 +115,7 @@ def flex(
         part.obj.name: method or properties.of(part.obj).method
         for part, method in zip(subject.parts, own_methods, strict=True)
     }
-    return Result(verdict, rotations, methods, of_objects)
+    return Result(verdict, rotations, methods, of_objects, basis)
 
 
 def _rigs(now: live.Moment) -> list[_Rig]:

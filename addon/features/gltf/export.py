@@ -177,6 +177,10 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
         parameters |= {f"{name}.{key}": value for key, value in own.items() if key != "enabled"}
         if name in AMOUNTS and name in after.masks:
             skinning.values[AMOUNTS[name]] = after.masks[name]
+    # As the skin's positions, which the exporter writes in world space.
+    scale = spaces.scale_of(obj)
+    lengths = stage_settings.LENGTHS & parameters.keys()
+    parameters |= {name: round(scale * parameters[name], 6) for name in lengths}
     skinning.content |= {
         name: value for name, value in (("parameters", parameters), ("stages", stages)) if value
     }

@@ -9,7 +9,7 @@ from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...deform import session
-from . import bake_error, heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measures
+from . import bake_error, heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measured_on, measures
 
 
 def _begin() -> None:
@@ -70,6 +70,7 @@ FEATURE = Feature(
         (subscribers.objects_changed, _objects_changed),
         (subscribers.deformed, _colour),
         (measures.listeners, heat_view.sync_errors),
+        *measured_on.SUBSCRIPTIONS,
     ),
     overlays=(heat_legend.draw,),
     begin=_begin,

@@ -238,7 +238,9 @@ class SINEW_PT_worst_frames(Sidebar, operators.OfSkinned, bpy.types.Panel):
         draw_text(
             layout, "{measure}, {methods}, {count} frames", measure=measure, methods=methods, count=count
         )
+        is_old = scan.basis.draw(layout, context.scene, sinew_targets(context))
         column = layout.column(align=True)
+        column.active = not is_old
         unit = "length" if scan.metric.unit == "length" else "share"
         for frame, value in scan.worst():
             number = units.text(context.scene, unit, value)

@@ -14,6 +14,7 @@ from ...core.metrics import METRICS, Metric
 from ...deform import characters
 from ...ui import stepped
 from . import live
+from .measured_on import OWN, MeasuredOn
 
 SHOWN = 5
 
@@ -25,6 +26,7 @@ class Scan:
     frames   each with its badness, by the entry `metric.worst` of a summary
     scale    a range that covers all of them
     methods  the objects' methods
+    basis    what was measured
     """
 
     metric: Metric
@@ -32,6 +34,7 @@ class Scan:
     scale: HeatScale
     methods: tuple[str, ...]
     diagonal: float
+    basis: MeasuredOn
 
     def worst(self, count: int = SHOWN) -> list[tuple[float, float]]:
         """Returns at most `count` frames and values, the worst first, without rounding errors."""
@@ -77,6 +80,7 @@ def scan(
     check_measurable(objects)
     armatures, metric, found = armatures_of(objects), METRICS[quantity], []
     extremes: list[float] = []
+    basis = MeasuredOn.of(scene, objects, OWN, over)
     frames = stepped.frames_over(scene, armatures, over)
     with stepped.kept_frame(scene, armatures):
         for number, frame in enumerate(frames):
@@ -89,4 +93,4 @@ def scan(
     diagonal = measured.rest.diagonal
     methods = tuple(dict.fromkeys(properties.of(obj).method for obj in objects))
     scale = HeatScale.over_values(metric, min(extremes, default=0.0), max(extremes, default=0.0), diagonal)
-    scans[scene.session_uid] = Scan(metric, found, scale, methods, diagonal)
+    scans[scene.session_uid] = Scan(metric, found, scale, methods, diagonal, basis)

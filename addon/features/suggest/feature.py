@@ -10,6 +10,7 @@ import bpy
 
 from ...attach import properties, stage_settings
 from ...attach.feature import Feature
+from ...attach.subscribers import subscribers
 from ...core import parameters
 from ...core.errors import SinewError
 from ...core.recommendation import Choice
@@ -20,6 +21,7 @@ from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
+from ..heat.measured_on import CHOICE, MeasuredOn
 from . import recommend, suggest, worst_pictures
 
 BEST = "best"
@@ -59,10 +61,12 @@ class SINEW_OT_recommend(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         objects = character.followers(context)
         if not objects:
             raise SinewError("All meshes have settings of their own")
+        self.basis = MeasuredOn.of(context.scene, objects, CHOICE, recommend.OVER)
         self.choice = yield from recommend.search(context.scene, objects)
 
     def run(self, context: bpy.types.Context) -> None:
-        recommend.choices[context.scene.session_uid] = self.choice
+        recommend.keep(context.scene, self.choice, self.basis)
+        suggest.drop_old(context.scene, sinew_targets(context))
         _use(context, self.choice)
         self.report({"INFO"}, self.choice.text)
 
@@ -114,12 +118,21 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.active = operators.are_any_on(context)
-        choice = recommend.choices[context.scene.session_uid]
-        suggestion, used = suggest.suggestions.get(context.scene.session_uid), _used(context)
+        scene, chosen, used = context.scene, sinew_targets(context), _used(context)
+        choice, basis = recommend.choices[scene.session_uid], recommend.bases[scene.session_uid]
+        known = suggest.suggestions.get(scene.session_uid)
+        if known is None:
+            is_old = basis.draw(layout, scene, character.followers(context))
+        else:
+            is_old = known.basis.draw(layout, scene, chosen)
+            layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
         _draw_recommended(layout, choice, used)
+        layout = layout.column()
+        layout.active = not is_old
         draw_text(layout, tr(choice.text), icon="SOLO_ON")
-        if suggestion is None:
+        if known is None:
             return
+        suggestion = known.suggestion
         for method, why in suggestion.torn.items():
             draw_text(
                 layout,
@@ -138,7 +151,6 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         else:
             draw_text(layout, criterion.text)
             _draw_order(layout, suggestion, criterion, used)
-        layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
 
 
 class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
@@ -147,11 +159,12 @@ class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        suggestion = suggest.suggestions.get(context.scene.session_uid)
-        return suggestion is not None and worst_pictures.are_drawn()
+        return context.scene.session_uid in suggest.suggestions and worst_pictures.are_drawn()
 
     def draw(self, context: bpy.types.Context) -> None:
-        suggestion, used = suggest.suggestions[context.scene.session_uid], _used(context)
+        suggestion, _choice, basis = suggest.suggestions[context.scene.session_uid]
+        used = _used(context)
+        self.layout.active = not basis.changes(context.scene, sinew_targets(context))
         draw_text(self.layout, "Each where it stretches most, in its worst frame")
         grid = self.layout.grid_flow(row_major=True, columns=PICTURES_IN_A_ROW, even_columns=True)
         for method in suggestion.methods:
@@ -232,9 +245,7 @@ def _begin() -> None:
 
 def _end() -> None:
     del characters.choosers[RECOMMENDED]
-    suggest.suggestions.clear()
-    worst_pictures.clear()
-    recommend.choices.clear()
+    suggest.forget()
 
 
 (RECOMMENDED,) = parameters.PRESETS
@@ -248,6 +259,7 @@ FEATURE = Feature(
         SINEW_PT_suggest,
         SINEW_PT_suggest_pictures,
     ),
+    subscriptions=((subscribers.loading, suggest.forget),),
     begin=_begin,
     end=_end,
 )

@@ -21,9 +21,12 @@ from ...deform import characters
 from ...io import armature_io
 from ...ui import stepped
 from ..heat import live
+from ..heat.measured_on import MeasuredOn
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
 from .crossings import crossing_triangles
 
+# The frames that Recommended takes by itself.
+OVER = "ACTION"
 # Frames of an action that are looked at, and most of them that are measured.
 LOOKED_AT, MEASURED = 100, 12
 # The share of the time that this takes.
@@ -33,8 +36,18 @@ BENDS = np.radians(30.0)
 # Crossings take longest, and only strong bends have some.
 MOST_CROSSINGS = 6
 
-# What was recommended last, by the session_uid of the scene.
+# What was recommended last, and what was measured for it, by the session_uid of the scene.
 choices: dict[int, Choice] = {}
+bases: dict[int, MeasuredOn] = {}
+
+
+def keep(scene: bpy.types.Scene, choice: Choice, basis: MeasuredOn) -> None:
+    choices[scene.session_uid], bases[scene.session_uid] = choice, basis
+
+
+def forget() -> None:
+    choices.clear()
+    bases.clear()
 
 
 class Moment(NamedTuple):
@@ -46,7 +59,7 @@ class Moment(NamedTuple):
 
 
 def search(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str = "ACTION"
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str = OVER
 ) -> Generator[float, None, Choice]:
     """Yields the progress; returns the choice. Objects, actions and the scene's frame are as before.
 

@@ -2,6 +2,7 @@
 """Goes through frames, and measures the shapes that each method would give."""
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -14,7 +15,8 @@ from ...core.steps import as_part
 from ...core.suggestion import LONGEST, MEASURED, Suggestion
 from ...ui import stepped
 from ..heat import live
-from ..heat.worst_frames import armatures_of, measure_at
+from ..heat.measured_on import CHOICE, STAGES, MeasuredOn
+from ..heat.worst_frames import armatures_of, check_measurable, measure_at
 from . import recommend, worst_pictures
 from .crossings import crossings, frames_to_count
 
@@ -23,8 +25,20 @@ RECOMMENDED = "recommended"
 # The share of the time that the choice takes.
 CHOOSING = 0.5
 
+
+class Known(NamedTuple):
+    """
+    choice  what was recommended then: the row RECOMMENDED
+    basis   what was measured
+    """
+
+    suggestion: Suggestion
+    choice: Choice
+    basis: MeasuredOn
+
+
 # By the session_uid of the scene. Computed again when needed, so not stored in the file.
-suggestions: dict[int, Suggestion] = {}
+suggestions: dict[int, Known] = {}
 
 
 def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str) -> Iterator[float]:
@@ -35,6 +49,8 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     """
     armatures = armatures_of(objects)
     frames = stepped.frames_over(scene, armatures, over)
+    check_measurable(objects)
+    of_choice, basis = (MeasuredOn.of(scene, objects, depth, over) for depth in (CHOICE, STAGES))
     choice = yield from as_part(recommend.search(scene, objects, over), 0.0, CHOOSING)
     counted = frames_to_count(frames)
     labels = {method.name: method.label for method in sinew.methods()}
@@ -59,7 +75,23 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
         moment = moments[suggestion.worst[name, LONGEST].frame]
         worst_pictures.add(scene, name, _measured(name, moment, choice))
         yield 1.0
-    suggestions[scene.session_uid], recommend.choices[scene.session_uid] = suggestion, choice
+    suggestions[scene.session_uid] = Known(suggestion, choice, basis)
+    recommend.keep(scene, choice, of_choice)
+
+
+def drop_old(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> None:
+    """Forgets a result that what was recommended since does not belong to."""
+    known = suggestions.get(scene.session_uid)
+    choice = recommend.choices.get(scene.session_uid)
+    if known is not None and (known.choice != choice or known.basis.changes(scene, objects)):
+        del suggestions[scene.session_uid]
+        worst_pictures.remove(scene)
+
+
+def forget() -> None:
+    suggestions.clear()
+    worst_pictures.clear()
+    recommend.forget()
 
 
 def _measured(method: str, moment: live.Moment, choice: Choice) -> Measured:

@@ -25,10 +25,14 @@ def are_drawn() -> bool:
     return not bpy.app.background
 
 
-def begin(scene: bpy.types.Scene) -> None:
-    """Removes the pictures of an earlier suggestion."""
+def remove(scene: bpy.types.Scene) -> None:
     if scene.session_uid in _pictures:
         bpy.utils.previews.remove(_pictures.pop(scene.session_uid))
+
+
+def begin(scene: bpy.types.Scene) -> None:
+    """Removes the pictures of an earlier suggestion."""
+    remove(scene)
     if are_drawn():
         _pictures[scene.session_uid] = bpy.utils.previews.new()
 

@@ -41,7 +41,7 @@ struct Ddm : BlendsQuatVecs {
         {.id = "radius",
          .label = "Radius",
          .description =
-             "How far the smoothing reaches, in units of the object, however dense the mesh is; another "
+             "How far the smoothing reaches, in units of the scene, however dense the mesh is; another "
              "value has the mesh bound anew",
          .unit = "length",
          .kind = ParameterKind::number,

@@ -25,7 +25,7 @@ struct DeltaMushStage {
         {"iterations", "Iterations", "How often the mesh is smoothed; not used with a radius", "",
          ParameterKind::integer, 5.0, 0.0, kMaxIterations},
         {"radius", "Radius",
-         "How far the smoothing reaches, in units of the object, however dense the mesh is; 0 for so many "
+         "How far the smoothing reaches, in units of the scene, however dense the mesh is; 0 for so many "
          "iterations",
          "length", ParameterKind::number, 0.0, 0.0, 1e6},
         {"factor", "Factor", "How far one iteration moves a vertex: 1 to the middle of its neighbours",
