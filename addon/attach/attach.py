@@ -189,11 +189,13 @@ def _begin_with_icons(obj: bpy.types.Object) -> None:
 
 
 def notes(obj: bpy.types.Object) -> list[str]:
-    """Returns sentences on an animated method, on icons that were set back, on what Add found switched off, and
-    on what it switched off itself."""
+    """Returns sentences on an animated method, on icons that were set back, on what Add found switched off,
+    and on what it switched off itself."""
     found = []
     settings = properties.of(obj)
-    if settings.method in MODIFIERS_OWN and any(is_volume_followed(obj, m) for m, _ in replaced_modifiers(obj)):
+    if settings.method in MODIFIERS_OWN and any(
+        is_volume_followed(obj, m) for m, _ in replaced_modifiers(obj)
+    ):
         text = "Its Preserve Volume is animated, and chooses between Linear Blend and Dual Quaternion"
         found.append(phrase(text))
     if undeformed.was_switched(obj):

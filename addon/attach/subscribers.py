@@ -53,8 +53,8 @@ _reported: set[Callable] = set()
 
 
 def notify(functions: list[Callable], *arguments: object) -> list:
-    """Calls each of the functions, and returns their results. One that raises costs itself alone; it is reported
-    once."""
+    """Calls each of the functions, and returns their results. One that raises costs itself alone; it is
+    reported once."""
     results = []
     # A copy, as a function may remove itself.
     for function in list(functions):

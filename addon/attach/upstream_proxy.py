@@ -329,8 +329,8 @@ def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
 
 
 def _follow_simplify(copy: bpy.types.Object) -> None:
-    """Has Blender evaluate the copy again where Simplify changes, as it does for objects that a scene has, and
-    in each frame where Simplify is animated."""
+    """Has Blender evaluate the copy again where Simplify changes, as it does for objects that a scene has,
+    and in each frame where Simplify is animated."""
     for modifier in copy.modifiers:
         if modifier.type not in _SIMPLIFIED:
             continue

@@ -57,7 +57,8 @@ def has_builtin_shape(obj: bpy.types.Object) -> bool:
 
 
 def other_volume(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
-    """Returns the Armature modifiers whose Preserve Volume differs from Sinew's method and is not followed."""
+    """Returns the Armature modifiers whose Preserve Volume differs from Sinew's method and is not
+    followed."""
     method = properties.of(obj).method
     return [
         modifier

@@ -20,8 +20,8 @@ _FLAT = 1e-20
 
 
 def read_current_bones(armature: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Bones:
-    """Returns the rest bones of an armature object in this evaluation; where it was given other data since, the
-    bones of these, as its next evaluation has them."""
+    """Returns the rest bones of an armature object in this evaluation; where it was given other data since,
+    the bones of these, as its next evaluation has them."""
     evaluated = armature.evaluated_get(depsgraph)
     is_current = evaluated.data.session_uid == armature.data.session_uid
     return read_bones(evaluated if is_current else armature)

@@ -252,9 +252,7 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
     return ShapeKeys(tuple(points), points[basis.name], moves)
 
 
-def _mask_of(
-    block: bpy.types.ShapeKey, group_names: list[str], weights: GroupWeights
-) -> np.ndarray | None:
+def _mask_of(block: bpy.types.ShapeKey, group_names: list[str], weights: GroupWeights) -> np.ndarray | None:
     """Returns float32 [vertices, 1], the weights of the shape key's vertex group; None for all of it."""
     name = block.vertex_group
     return weights.of_group(group_names.index(name))[:, None] if name in group_names else None

@@ -77,8 +77,8 @@ def pytest_sessionfinish(exitstatus):
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure():
-    # Blender as a module may crash (4.2) or hang (4.5) when it exits, with or without Sinew: after an export of
-    # glTF, after test modules were imported alone; on Windows under wine it always does.
+    # Blender as a module may crash (4.2) or hang (4.5) when it exits, with or without Sinew: after an export
+    # of glTF, after test modules were imported alone; on Windows under wine it always does.
     if bpy.app.version < (5, 0) or sys.platform == "win32":
         sys.stdout.flush()
         sys.stderr.flush()

@@ -328,7 +328,9 @@ def add_shape_keys(seed: int, features: set[str], obj: bpy.types.Object) -> None
         if index and rng.random() < 0.3:
             key.relative_key = obj.data.shape_keys.key_blocks[1]
     if has(seed, "pinned key", features, share=0.2):
-        obj.active_shape_key_index = int(numbers(seed, "pinned key").integers(len(obj.data.shape_keys.key_blocks)))
+        obj.active_shape_key_index = int(
+            numbers(seed, "pinned key").integers(len(obj.data.shape_keys.key_blocks))
+        )
         obj.show_only_shape_key = True
     if has(seed, "absolute keys", features, share=0.2):
         obj.data.shape_keys.use_relative = False

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options of the Armature modifiers that keys or drivers set: each frame has the shape of its own. Vertex Groups,
-Bone Envelopes and the names of groups can not be animated."""
+"""Options of the Armature modifiers that keys or drivers set: each frame has the shape of its own. Vertex
+Groups, Bone Envelopes and the names of groups can not be animated."""
 
 from __future__ import annotations
 

@@ -474,9 +474,7 @@ def delete_scene(_obj):
     bpy.data.scenes.remove(bpy.context.scene)
 
 
-@pytest.mark.parametrize(
-    "act", [remove, delete_character, delete_by_hand, delete_armature, delete_scene]
-)
+@pytest.mark.parametrize("act", [remove, delete_character, delete_by_hand, delete_armature, delete_scene])
 def test_a_comparison_ends_with_its_character(act, tmp_path):
     obj, _armature = scenes.skinned_arm()
     before = names()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh, or an armature's bones, that another add-on's handler exchanges without any sign from Blender, as Keymesh
-does."""
+"""A mesh, or an armature's bones, that another add-on's handler exchanges without any sign from Blender, as
+Keymesh does."""
 
 from __future__ import annotations
 

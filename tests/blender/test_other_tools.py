@@ -532,8 +532,8 @@ WHOLE_FILES = {
 @pytest.mark.parametrize("prepare", [plain, with_front_and_keys])
 @pytest.mark.parametrize("ending", WHOLE_FILES)
 def test_nothing_of_sinews_is_in_a_file(ending, prepare, tmp_path):
-    """Whole files, with custom properties and attributes; of a character without Sinew, too. What is readable is the
-    same but for the rounding of points."""
+    """Whole files, with custom properties and attributes; of a character without Sinew, too. What is readable
+    is the same but for the rounding of points."""
     operator = WHOLE_FILES[ending]()
     try:
         options = _all_on(operator) | ({"export_format": "GLTF_SEPARATE"} if ending == ".gltf" else {})
@@ -565,4 +565,6 @@ def test_nothing_of_sinews_is_in_a_file(ending, prepare, tmp_path):
 def _without_numbers(content: bytes) -> list[str]:
     text = re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "0", content.decode())
     # Times, and points as glTF stores them.
-    return [line for line in text.splitlines() if not re.search(r"data:application|<created>|<modified>", line)]
+    return [
+        line for line in text.splitlines() if not re.search(r"data:application|<created>|<modified>", line)
+    ]

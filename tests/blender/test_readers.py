@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever of Blender's reads the mesh of a character from outside: simulations, particles, instances, parents and
-constraints get what they get from the Armature modifier."""
+"""Whatever of Blender's reads the mesh of a character from outside: simulations, particles, instances,
+parents and constraints get what they get from the Armature modifier."""
 
 from __future__ import annotations
 

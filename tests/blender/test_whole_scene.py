@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender changes for all objects of a scene at once, which what stands in front of the Armature modifier has to
-follow, and edits in a scene that no window shows."""
+"""What Blender changes for all objects of a scene at once, which what stands in front of the Armature
+modifier has to follow, and edits in a scene that no window shows."""
 
 from __future__ import annotations
 

@@ -21,8 +21,8 @@ import walk_script
 
 
 def coordinates_of(evaluated):
-    """The points that Generated texture coordinates are made from. Blender 5.3 leaves those of loose edges behind a
-    Subdivision as they lay in memory."""
+    """The points that Generated texture coordinates are made from. Blender 5.3 leaves those of loose edges
+    behind a Subdivision as they lay in memory."""
     import bpy
     import numpy as np
     import walk_sides

@@ -2,9 +2,8 @@
 """Checks whether normals that Sinew gave to an evaluated mesh belong to its current points, edges and faces.
 
 The oracle is the library, which test_normals.py compares with Blender. Here it gets the mesh's current data,
-so it detects normals of an earlier frame, of other sharp edges, or changed by later modifiers. At the corners of a
-face without area rounding decides: they are left out.
-"""
+so it detects normals of an earlier frame, of other sharp edges, or changed by later modifiers. At the corners
+of a face without area rounding decides: they are left out."""
 
 from __future__ import annotations
 

@@ -140,8 +140,8 @@ def _states() -> list[comparison_state.SinewComparison]:
 
 
 def is_without_original() -> bool:
-    """Whether copies are left of which no original is there, or none with an armature: the artist has deleted the
-    character, its armature or the scene."""
+    """Whether copies are left of which no original is there, or none with an armature: the artist has deleted
+    the character, its armature or the scene."""
     shown = {copy for state in _states() for copy in comparison_state.copies_of(state)}
     copies = [obj for obj in bpy.data.objects if properties.is_copy(obj) and obj.library is None]
     if not copies:

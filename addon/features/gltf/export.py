@@ -272,8 +272,8 @@ def _extend(of: Any, content: dict[str, Any]) -> None:
 
 
 def _remove_own(exported: Any, source: bpy.types.ID) -> None:
-    """Removes Sinew's settings from the custom properties that the exporter found, as Blender (up to 4.5) stores
-    registered properties among these.
+    """Removes Sinew's settings from the custom properties that the exporter found, as Blender (up to 4.5)
+    stores registered properties among these.
 
     exported  a node, mesh or scene of the exporter's
     """
