@@ -220,14 +220,19 @@ def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 def is_deformed_mesh_read(obj: bpy.types.Object) -> bool:
     """Whether Blender reads the mesh behind the leading modifiers that just deform, so without Sinew's: a
-    rigid body of source Deform, one of any source that is Deforming (rigidbody_get_mesh,
-    rigidbody_update_sim_ob), and brushes where a later modifier makes another mesh (sculpt_update_object), in
-    Blender's sources of 4.2 to 5.2."""
-    body = obj.rigid_body
-    if body is not None and (body.mesh_source == "DEFORM" or body.use_deform):
+    rigid body, and brushes where a later modifier makes another mesh (sculpt_update_object in Blender's
+    sources of 4.2 to 5.2)."""
+    if is_deforming_body(obj):
         return True
     is_painted = obj.mode in ("WEIGHT_PAINT", "VERTEX_PAINT")
     return is_painted and any(can_be_on(obj, m) and m.type not in ONLY_DEFORM for m in downstream(obj))
+
+
+def is_deforming_body(obj: bpy.types.Object) -> bool:
+    """Whether it is a rigid body of source Deform, or one of any source that is Deforming
+    (rigidbody_get_mesh, rigidbody_update_sim_ob in Blender's sources of 4.2 to 5.2)."""
+    body = obj.rigid_body
+    return body is not None and (body.mesh_source == "DEFORM" or body.use_deform)
 
 
 def parent_deforms(obj: bpy.types.Object) -> bool:

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import sinew
 
-from ..attach import point_store, properties
+from ..attach import point_store, properties, stack
 from ..attach.modifier_options import ModifierOptions
 from ..core.icons import VIEWS
 from ..io import mesh_io
@@ -91,11 +91,13 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         ModifierOptions.read(evaluated.modifiers[replaced.name]) for replaced, _armature in modifiers
     ]:
         return "an animation set options of its Armature modifiers"
+    if skinned.plan.leaves_out and stack.is_deforming_body(evaluated):
+        return "it has become a rigid body that reads its deformed mesh"
     memory = _memory_to_write(settings, mesh, skinned)
     if memory is None:
         return "its mesh changed"
     evaluation = skinned.evaluation
-    if evaluation.mesh_shown == mesh.as_pointer() and not skinned.noted.deformed_is_read:
+    if evaluation.mesh_shown == mesh.as_pointer() and skinned.plan.leaves_out:
         _leave_out(evaluated, modifiers)
     out, normals = memory
     _note_unannounced_change(out, skinned)

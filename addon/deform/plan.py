@@ -68,6 +68,8 @@ class Plan:
                     then: only within the evaluation can they be on and yet be left out
     normals         the normals given along with the points
     normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
+    leaves_out      Blender leaves the Armature modifiers out while Sinew deforms within its evaluation:
+                    nothing reads what they make
     viewport        what deforms it in the viewport, or would if Blender did not do it for Sinew
     render          the same in renders
     """
@@ -78,6 +80,7 @@ class Plan:
     after_update: bool = False
     normals: Normals = Normals()
     normals_reason: str = ""
+    leaves_out: bool = True
     viewport: Deformer = Deformer.SINEW
     render: Deformer = Deformer.SINEW
 
@@ -129,6 +132,7 @@ class ObjectFacts:
     is_comparison_copy          it is a copy that a comparison shows
     visibility_is_keyed         an animation switches one of the Armature modifiers on and off
     viewport, render            what the modifiers' icons say that deforms it in each view
+    deformed_is_read            Blender reads the mesh that the Armature modifiers make
     views_differ                one of several Armature modifiers is on only in the viewport or only in
                                 renders
     safe_mode                   nothing of Sinew may run within Blender's evaluation
@@ -156,6 +160,7 @@ class ObjectFacts:
     visibility_is_keyed: bool = False
     viewport: Deformer = Deformer.SINEW
     render: Deformer = Deformer.SINEW
+    deformed_is_read: bool = False
     views_differ: bool = False
     safe_mode: bool = False
     failure: str = ""
@@ -168,7 +173,8 @@ class ObjectFacts:
 
 
 def plan(facts: ObjectFacts) -> Plan:
-    return replace(_plan(facts), viewport=facts.viewport, render=facts.render)
+    leaves_out = not facts.deformed_is_read
+    return replace(_plan(facts), leaves_out=leaves_out, viewport=facts.viewport, render=facts.render)
 
 
 def _plan(facts: ObjectFacts) -> Plan:

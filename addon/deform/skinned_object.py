@@ -94,7 +94,6 @@ class Noted:
     volume_keyed         for each Armature modifier, whether an animation chooses between its two methods
     options_keyed        an animation sets other options of an Armature modifier
     rests                from rests_of()
-    deformed_is_read     as from stack.is_deformed_mesh_read()
     state                what the artist can change about the object itself, from state_of()
     switches             a part of the state, from switches_of()
     surroundings         from surroundings_of()
@@ -116,7 +115,6 @@ class Noted:
     volume_keyed: list[bool]
     options_keyed: bool
     rests: list[int | None]
-    deformed_is_read: bool
     state: list
     switches: list
     surroundings: list
@@ -143,7 +141,6 @@ class Noted:
             volume_keyed=[attach.is_volume_followed(obj, m) for m in modifiers],
             options_keyed=any(are_animated(obj, m) for m in modifiers),
             rests=rests_of(obj),
-            deformed_is_read=stack.is_deformed_mesh_read(obj),
             state=state_of(obj),
             switches=switches_of(obj),
             surroundings=surroundings_of(obj),

@@ -164,8 +164,9 @@ def test_it_reads_the_same_as_of_the_armature_modifier(reader):
 
 
 @pytest.mark.usefixtures("route")
+@pytest.mark.parametrize("is_late", [False, True], ids=["before Sinew", "after Sinew"])
 @pytest.mark.parametrize(("source", "height"), [("BASE", 1.3), ("DEFORM", 1.3), ("FINAL", 0.3)])
-def test_a_ball_falls_on_a_deforming_rigid_body(source, height):
+def test_a_ball_falls_on_a_deforming_rigid_body(source, height, is_late):
     """A plate that a bone lifts by 1 and then holds: of two runs of Blender's, moving ones can differ by a
     frame. One of source Final stays at rest, without Sinew, too (4.2 to 5.3)."""
     obj, armature = scenes.make_arm()
@@ -181,11 +182,17 @@ def test_a_ball_falls_on_a_deforming_rigid_body(source, height):
     bodies.objects.link(obj)
     body = obj.rigid_body
     body.type, body.kinematic, body.collision_shape = "PASSIVE", True, "MESH"
-    body.mesh_source, body.use_deform = source, True
+    body.mesh_source, body.use_deform = "BASE", False
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.3, location=(0.0, 0.0, 3.0))
     ball = bpy.context.object
     bodies.objects.link(ball)
     ball.rigid_body.collision_shape = "SPHERE"
-    scenes.add_sinew(obj)
+    if is_late:
+        scenes.add_sinew(obj)
+        scene.frame_set(3)
+        scene.frame_set(1)
+    body.mesh_source, body.use_deform = source, True
+    if not is_late:
+        scenes.add_sinew(obj)
     scenes.at_frames(range(1, 50), lambda: None)
     assert abs(place_of(ball)[2] - height) < 0.1

@@ -40,6 +40,7 @@ TABLE = [
         "animated",
     ),
     ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
+    ({"deformed_is_read": True}, State.IN_DEPSGRAPH, ""),
     ({"viewport": Deformer.NOTHING}, State.IN_DEPSGRAPH, ""),
     ({"viewport": Deformer.ARMATURE, "mesh_is_shared": True}, State.IN_DEPSGRAPH, ""),
     ({"render": Deformer.ARMATURE, "safe_mode": True}, State.AFTER_UPDATE, "Safe mode"),
@@ -63,6 +64,11 @@ def test_the_table(facts, state, reason):
     assert found.state is state
     assert reason in found.reason
     assert bool(found.reason) == bool(reason)
+
+
+def test_what_others_read_is_not_left_out():
+    assert plan(ObjectFacts()).leaves_out
+    assert not plan(ObjectFacts(deformed_is_read=True)).leaves_out
 
 
 @pytest.mark.parametrize(
