@@ -125,7 +125,6 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
             is_old = basis.draw(layout, scene, character.followers(context))
         else:
             is_old = known.basis.draw(layout, scene, chosen)
-            layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
         _draw_recommended(layout, choice, used)
         layout = layout.column()
         layout.active = not is_old
@@ -151,6 +150,7 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         else:
             draw_text(layout, criterion.text)
             _draw_order(layout, suggestion, criterion, used)
+        self.layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
 
 
 class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
