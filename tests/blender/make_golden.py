@@ -25,9 +25,10 @@ import scenes
 import sinew
 import sinew_addon
 from mathutils import Euler, Quaternion
+from sinew_addon.attach.stage_settings import LENGTHS
 from sinew_addon.core.parameters import Value
 from sinew_addon.deform import characters, session
-from sinew_addon.io import mesh_io
+from sinew_addon.io import mesh_io, spaces
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
 # Incremented if readers of earlier files would misread these.
@@ -198,7 +199,10 @@ def make(set_up: SetUp) -> tuple[dict, dict[str, np.ndarray]]:
         if result.by == "Blender":
             arrays[result.array] = scenes.modifier_shapes(obj, [1], result.method == "dq")[0]
             continue
-        characters.set_parameters(result.values)
+        # Lengths are in the unit of the mesh's positions, and settings in that of the scene.
+        scale = spaces.scale_of(obj)
+        values = {name: v * scale if name in LENGTHS else v for name, v in result.values.items()}
+        characters.set_parameters(values)
         characters.use_method(obj, result.method)
         arrays[result.array] = scenes.final_points(obj)
         data = vertex_data(obj, result.method)
