@@ -204,7 +204,7 @@ def _equals_but_for_points(
     old: Bound, read_now: Source, bones: list[Bones], spaces_now: list[np.ndarray | None]
 ) -> bool:
     known = [stage.deformer.weighting for stage in old.skin_stack.skin_stages]
-    # The space of the mesh moves with poses where a bone is its parent: the one in which it was bound decides.
+    # Where a bone is the mesh's parent, poses move its space: the one in which it was bound decides.
     has_same_skin = np.array_equal(read_now.surface_points, old.source.surface_points)
     return read_now.equals_but_for_points(old.source) and all(
         now.equals(before.bones) and (has_same_skin or _has_same_limbs(before, read_now, space))

@@ -469,12 +469,20 @@ def delete_armature(obj):
     bpy.ops.object.delete()
 
 
+def delete_modifier(obj):
+    """While Sinew is off, Sinew goes with it: its handler finds out."""
+    properties.of(obj).enabled = False
+    obj.modifiers.remove(obj.modifiers["Armature"])
+
+
 def delete_scene(_obj):
     bpy.data.scenes.new("Other")
     bpy.data.scenes.remove(bpy.context.scene)
 
 
-@pytest.mark.parametrize("act", [remove, delete_character, delete_by_hand, delete_armature, delete_scene])
+@pytest.mark.parametrize(
+    "act", [remove, delete_character, delete_by_hand, delete_armature, delete_modifier, delete_scene]
+)
 def test_a_comparison_ends_with_its_character(act, tmp_path):
     obj, _armature = scenes.skinned_arm()
     before = names()

@@ -1910,6 +1910,8 @@ def rigid_body(w: Walker, r: random.Random) -> None:
         return
     if bpy.context.scene.rigidbody_world is None:
         bpy.ops.rigidbody.world_add()
+        # It would move what comes into its collection, depending on how often Blender evaluates.
+        bpy.context.scene.rigidbody_world.enabled = False
     bpy.ops.rigidbody.object_add(type="PASSIVE")
     body = obj.rigid_body
     body.kinematic, body.collision_shape, body.use_deform = True, "MESH", True

@@ -2,6 +2,7 @@
 """Comparisons: a panel and its buttons, what a scene stores, labels in the 3D views."""
 
 from collections.abc import Generator
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ...attach import attach, properties, references
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
-from ...attach.updates import may_change_file
+from ...attach.updates import may_change_file, updates_suspended
 from ...core.errors import SinewError
 from ...deform import characters
 from ...ui import operators, stepped
@@ -262,14 +263,20 @@ def _end() -> None:
     comparison.end(bpy.context)
 
 
-def _on_objects_changed(_objects: list[bpy.types.Object]) -> None:
-    """Deleting objects within the handlers of an evaluation can crash Blender."""
+def _end_later() -> None:
+    """Has it ended by a timer, or without a window before the file is saved: deleting objects within the
+    handlers of an evaluation can crash Blender."""
     if not bpy.app.background and not bpy.app.timers.is_registered(_end_soon):
         bpy.app.timers.register(_end_soon)
 
 
-def _end_without_original() -> None:
-    if comparison.is_without_original():
+def _on_objects_changed(_objects: list[bpy.types.Object]) -> None:
+    _end_later()
+
+
+def _end_if_over() -> None:
+    is_over, _removal.is_last = _removal.is_last and comparison.is_of_none_with_sinew(), False
+    if is_over or comparison.is_without_original():
         _end()
 
 
@@ -278,25 +285,36 @@ def _end_soon() -> float | None:
     if not may_change_file():
         return 0.25
     with references.between_steps():
-        _end_without_original()
+        _end_if_over()
     return None
 
 
-# Whether Sinew is being taken off a compared object.
-_is_taken_off = False
+@dataclass
+class _Removal:
+    """is_original: Sinew is being taken off a compared object. is_last: it was taken off the last of them."""
+
+    is_original: bool = False
+    is_last: bool = False
+
+
+_removal = _Removal()
 
 
 def _before_removal(obj: bpy.types.Object) -> None:
-    global _is_taken_off
-    _is_taken_off = comparison.is_original(obj)
+    _removal.is_original = comparison.is_original(obj)
 
 
 def _after_removal() -> None:
     """With the last of a character's meshes its comparison goes, too."""
-    global _is_taken_off
-    was_original, _is_taken_off = _is_taken_off, False
-    if was_original and comparison.is_of_none_with_sinew():
+    was_original, _removal.is_original = _removal.is_original, False
+    if not (was_original and comparison.is_of_none_with_sinew()):
+        return
+    with updates_suspended() as is_by_artist:
+        _removal.is_last = not is_by_artist
+    if is_by_artist:
         _end()
+    else:
+        _end_later()
 
 
 FEATURE = Feature(
@@ -309,7 +327,7 @@ FEATURE = Feature(
     overlays=(comparison_labels.draw,),
     subscriptions=(
         (subscribers.objects_changed, _on_objects_changed),
-        (subscribers.saving, _end_without_original),
+        (subscribers.saving, _end_if_over),
         (subscribers.before_removal, _before_removal),
         (subscribers.after_removal, _after_removal),
     ),
