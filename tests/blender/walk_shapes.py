@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -19,6 +19,10 @@ import numpy as np
 import sinew
 import walk_sides
 import weld_reference
+from sinew_addon.core.influences import Influences
+from sinew_addon.core.limbs import skin_of
+from sinew_addon.core.vectors import transformed
+from sinew_addon.io import armature_io
 
 # Parameters, by their full names.
 DEFAULTS = {f"{m.name}.{p.id}": p.default for m in sinew.methods() for p in m.parameters}
@@ -235,19 +239,28 @@ def _read_armature(
     posed = np.array([np.array(rig.pose.bones[bone.name].matrix) for bone in bones]).reshape(-1, 4, 4)
     rest = np.array([np.array(bone.matrix_local) for bone in bones]).reshape(-1, 4, 4)
     place = np.array(obj.evaluated_get(depsgraph).matrix_world)
+    influences = _influences(mesh, [group.name for group in obj.vertex_groups], bones)
+    space = np.linalg.inv(np.array(rig.matrix_world, dtype=np.float64)) @ place
+    heads = np.array([bone.head_local[:] for bone in bones], dtype=np.float32).reshape(-1, 3)
     return _Armature(
-        _influences(mesh, [group.name for group in obj.vertex_groups], bones),
+        influences,
         posed.astype(np.float64) @ np.linalg.inv(rest.astype(np.float64)),
         rest,
-        (
-            np.array([bone.head_local[:] for bone in bones], dtype=np.float32).reshape(-1, 3),
-            np.array([bone.tail_local[:] for bone in bones], dtype=np.float32).reshape(-1, 3),
-        ),
-        np.linalg.inv(np.array(rig.matrix_world, dtype=np.float64)) @ place,
+        (heads, heads + _limbs(rig, mesh, influences, space)),
+        space,
         mask,
         modifier.use_multi_modifier,
         [obj.vertex_groups.find(bone.name) for bone in bones],
     )
+
+
+def _limbs(
+    rig: bpy.types.Object, mesh: bpy.types.Mesh, influences: _Influences, space: np.ndarray
+) -> np.ndarray:
+    """Where the limb of each bone goes, which test_twist_spread and test_battery check."""
+    bones, points = armature_io.read_bones(rig), walk_sides.points_of(mesh.vertices)
+    skin = skin_of(Influences(*influences.arrays), transformed(points, space), len(bones.names))
+    return replace(bones, skin=skin).limbs.vectors.astype(np.float32)
 
 
 def _influences(mesh: bpy.types.Mesh, names: list[str], bones: bpy.types.bpy_prop_collection) -> _Influences:

@@ -98,12 +98,13 @@ class SinewSide(Side):
 
     @staticmethod
     def _stages(obj: bpy.types.Object) -> dict[str, dict[str, object]]:
-        """All parameters of the enabled stages."""
+        """All parameters of the enabled stages; lengths in units of the mesh."""
         return {
             name: {
                 each.id: getattr(getattr(obj.sinew, name), each.id)
                 for each in stage_settings.STAGES[name].parameters
             }
+            | stage_settings.values_of(obj.sinew, name)
             for name in stage_settings.names_on(obj.sinew)
         }
 
