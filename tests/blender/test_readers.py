@@ -163,12 +163,8 @@ def test_it_reads_the_same_as_of_the_armature_modifier(reader):
         assert scenes.worst(mine, its) <= (1e-4 if frame <= 10 else 1e-2), frame
 
 
-@pytest.mark.usefixtures("route")
-@pytest.mark.parametrize("is_late", [False, True], ids=["before Sinew", "after Sinew"])
-@pytest.mark.parametrize(("source", "height"), [("BASE", 1.3), ("DEFORM", 1.3), ("FINAL", 0.3)])
-def test_a_ball_falls_on_a_deforming_rigid_body(source, height, is_late):
-    """A plate that a bone lifts by 1 and then holds: of two runs of Blender's, moving ones can differ by a
-    frame. One of source Final stays at rest, without Sinew, too (4.2 to 5.3)."""
+def height_of_the_ball(source, is_late):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj, armature = scenes.make_arm()
     plate = bpy.data.meshes.new("Plate")
     plate.from_pydata([(x, y, 0.0) for x in (-4.0, 4.0) for y in (-4.0, 4.0)], [], [(0, 2, 3, 1)])
@@ -195,4 +191,15 @@ def test_a_ball_falls_on_a_deforming_rigid_body(source, height, is_late):
     if not is_late:
         scenes.add_sinew(obj)
     scenes.at_frames(range(1, 50), lambda: None)
-    assert abs(place_of(ball)[2] - height) < 0.1
+    return place_of(ball)[2]
+
+
+@pytest.mark.usefixtures("route")
+@pytest.mark.parametrize("is_late", [False, True], ids=["before Sinew", "after Sinew"])
+@pytest.mark.parametrize(("source", "height"), [("BASE", 1.3), ("DEFORM", 1.3), ("FINAL", 0.3)])
+def test_a_ball_falls_on_a_deforming_rigid_body(source, height, is_late):
+    """A plate that a bone lifts by 1 and then holds: of two runs of Blender's, moving ones can differ by a
+    frame. One of source Final stays at rest, without Sinew, too (4.2 to 5.3)."""
+    # Once in some fifty runs Blender's body stays at rest, without Sinew, too; a fault would do so each time.
+    heights = (height_of_the_ball(source, is_late) for _run in range(3))
+    assert any(abs(found - height) < 0.1 for found in heights)
