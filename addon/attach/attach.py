@@ -199,7 +199,7 @@ def notes(obj: bpy.types.Object) -> list[str]:
         text = "Its Preserve Volume is animated, and chooses between Linear Blend and Dual Quaternion"
         found.append(phrase(text))
     if undeformed.was_switched(obj):
-        text = "The modifiers that Sinew needs beside its own stay as that is: switch the modifier Sinew"
+        text = "Sinew's two helping modifiers follow the icon of its own: switch the modifier Sinew"
         found.append(phrase(text))
     if was_off(obj):
         text = "Its Armature modifier was off before Sinew; Remove switches it off again"

@@ -207,8 +207,8 @@ class Child:
         self.bpy.context.view_layer.update()
         return found
 
-    def points_of(self, evaluated, name="co"):
-        return self.sides.points_of(evaluated.data.vertices, name)
+    def points_of(self, evaluated):
+        return self.sides.points_of(evaluated.data.vertices)
 
     def shapes(self, depsgraph) -> tuple[dict, list[str]]:
         """Points and matrix of each mesh in the visible view layer; the names of those whose shape the

@@ -289,6 +289,11 @@ def _end_soon() -> float | None:
     return None
 
 
+def _stop() -> None:
+    if bpy.app.timers.is_registered(_end_soon):
+        bpy.app.timers.unregister(_end_soon)
+
+
 @dataclass
 class _Removal:
     """is_original: Sinew is being taken off a compared object. is_last: it was taken off the last of them."""
@@ -325,6 +330,7 @@ FEATURE = Feature(
     ),
     {"Scene.sinew_comparison": bpy.props.PointerProperty(type=comparison_state.SinewComparison)},
     overlays=(comparison_labels.draw,),
+    end=_stop,
     subscriptions=(
         (subscribers.objects_changed, _on_objects_changed),
         (subscribers.saving, _end_if_over),
