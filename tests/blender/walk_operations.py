@@ -1161,8 +1161,12 @@ def join(w: Walker, r: random.Random) -> None:
     others = [o for o in w.meshes() if not w.side.has_sinew(o) and o.override_library is None]
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
     other = w.one(r, [o for o in others if o != obj and w.users(o.data) == 1])
+    is_shaped = bool(other.data.get(SHAPED))
+    w.skip_if(is_shaped and any(modifier.type == "DECIMATE" for modifier in obj.modifiers))
     w.skip_if(len(obj.data.vertices) > 200 or not w.select(other, obj))
     bpy.ops.object.join()
+    if is_shaped:
+        obj.data[SHAPED] = True
 
 
 @operation(0.4)

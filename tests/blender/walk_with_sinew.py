@@ -194,7 +194,11 @@ class SinewSide(Side):
                 said = ""
             except SinewError as error:
                 said = str(error)
-        sentences = (f"in front of {modifier.name} Blender permits", "its armature was deleted")
+        sentences = (
+            f"in front of {modifier.name} Blender permits",
+            "its armature was deleted",
+            "is a Multi Modifier",
+        )
         if not any(sentence in said for sentence in sentences):
             raise ValueError(f"{obj.name}: nothing says that Sinew can not be in front of {modifier.name}")
 
