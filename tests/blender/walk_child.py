@@ -214,8 +214,8 @@ class Child:
         """Points and matrix of each mesh in the visible view layer; the names of those whose shape the
         other side can not know."""
         found, skipped = {}, []
-        # Blender evaluates a rigid body that reads its deformed mesh before it places it: an Armature modifier
-        # deforms it where it was before, until the next evaluation (seen on 5.3 without Sinew).
+        # Blender evaluates a rigid body that reads its deformed mesh before it places it. An Armature
+        # modifier deforms it where it was before, until the next evaluation (seen on 5.3 without Sinew).
         bodies = [obj for obj in self.bpy.context.view_layer.objects if obj.rigid_body is not None]
         for obj in bodies:
             obj.update_tag(refresh={"DATA"})
