@@ -262,10 +262,20 @@ def copy_that_follows(obj: bpy.types.Object, name: str) -> bpy.types.Object:
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
     copy.name = name
+    _leave_simulations(copy)
     for constraint in list(copy.constraints):
         copy.constraints.remove(constraint)
     copy.constraints.new("COPY_TRANSFORMS").target = obj
     return copy
+
+
+def _leave_simulations(copy: bpy.types.Object) -> None:
+    """Takes a copy out of the collections of rigid bodies and their constraints, where Blender (4.2 to 5.3)
+    puts a copy of what is in them: it would be simulated, too."""
+    for world in (scene.rigidbody_world for scene in bpy.data.scenes):
+        for collection in (world.collection, world.constraints) if world is not None else ():
+            if collection is not None and copy.name_full in collection.objects:
+                collection.objects.unlink(copy)
 
 
 def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:

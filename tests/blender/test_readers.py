@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from sinew_addon.attach import properties
 
 FRAMES = range(1, 16)
 
@@ -203,3 +204,23 @@ def test_a_ball_falls_on_a_deforming_rigid_body(source, height, is_late):
     # Once in some fifty runs Blender's body stays at rest, without Sinew, too; a fault would do so each time.
     heights = (height_of_the_ball(source, is_late) for _run in range(3))
     assert any(abs(found - height) < 0.1 for found in heights)
+
+
+def test_no_copy_of_sinews_is_simulated():
+    """Blender adds a copy of a rigid body, or of a constraint of one, to the simulation."""
+    obj, _armature = scenes.make_arm()
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.rigidbody.world_add()
+    bpy.ops.rigidbody.object_add(type="PASSIVE")
+    bpy.ops.rigidbody.constraint_add()
+    world = bpy.context.scene.rigidbody_world
+    scenes.put_in_front(obj)
+    scenes.add_sinew(obj, "dq")
+    assert properties.of(obj).storage.upstream_proxy is not None, "nothing is tested"
+    assert bpy.ops.sinew.compare(methods={"lbs", "dq"}) == {"FINISHED"}
+    for collection in (world.collection, world.constraints):
+        assert [each.name for each in collection.objects] == ["Arm"]
+    bpy.ops.sinew.end_comparison()
+    bpy.ops.sinew.remove()
+    for collection in (world.collection, world.constraints):
+        assert [each.name for each in collection.objects] == ["Arm"]
