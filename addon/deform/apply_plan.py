@@ -48,6 +48,7 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
         has_upstream=upstream_proxy.is_needed(obj),
         visibility_is_keyed=stack.visibility_is_animated(obj),
         deformed_is_read=stack.is_deformed_mesh_read(obj),
+        is_deforming_body=stack.is_deforming_body(obj),
         viewport=viewport,
         render=render,
     )

@@ -133,6 +133,8 @@ class ObjectFacts:
     visibility_is_keyed         an animation switches one of the Armature modifiers on and off
     viewport, render            what the modifiers' icons say that deforms it in each view
     deformed_is_read            Blender reads the mesh that the Armature modifiers make
+    is_deforming_body           a rigid body reads that mesh: Blender simulates it before it places the object, and
+                                Sinew's points wait for that place
     views_differ                one of several Armature modifiers is on only in the viewport or only in
                                 renders
     safe_mode                   nothing of Sinew may run within Blender's evaluation
@@ -161,6 +163,7 @@ class ObjectFacts:
     viewport: Deformer = Deformer.SINEW
     render: Deformer = Deformer.SINEW
     deformed_is_read: bool = False
+    is_deforming_body: bool = False
     views_differ: bool = False
     safe_mode: bool = False
     failure: str = ""
@@ -240,6 +243,7 @@ def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
         (facts.is_comparison_copy, "A copy for comparison"),
         (facts.upstream_changes_weights, "Modifiers in front of the Armature modifier change weights"),
         (facts.has_heat_map, "It shows a heat map"),
+        (facts.is_deforming_body, "Its rigid body is simulated from the deformed mesh"),
         (facts.visibility_is_keyed, "The visibility of its Armature modifier is animated"),
         (facts.views_differ, "An Armature modifier is on in the viewport or in renders alone"),
     )

@@ -224,3 +224,24 @@ def test_no_copy_of_sinews_is_simulated():
     bpy.ops.sinew.remove()
     for collection in (world.collection, world.constraints):
         assert [each.name for each in collection.objects] == ["Arm"]
+
+
+def test_it_becomes_a_rigid_body_by_its_collection():
+    """Sinew's driver waits for the place of the object, and that for the simulation of its mesh."""
+    obj, armature = scenes.make_arm()
+    bpy.context.scene.frame_set(9)
+    expected = scenes.final_points(obj)
+    scenes.add_sinew(obj, "lbs")
+    bpy.ops.rigidbody.world_add()
+    bodies = bpy.context.scene.rigidbody_world.collection = bpy.data.collections.new("Bodies")
+    bodies.objects.link(obj)
+    bpy.context.view_layer.update()
+    near = scenes.TOLERANCE * scenes.diagonal(obj)
+    assert scenes.worst(scenes.final_points(obj), expected) <= near
+    armature.data.pose_position = "REST"
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= near
+    obj.rigid_body.use_deform, obj.rigid_body.mesh_source = False, "BASE"
+    armature.data.pose_position = "POSE"
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), expected) <= near

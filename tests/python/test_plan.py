@@ -41,6 +41,7 @@ TABLE = [
     ),
     ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
     ({"deformed_is_read": True}, State.IN_DEPSGRAPH, ""),
+    ({"is_deforming_body": True}, State.AFTER_UPDATE, "Its rigid body is simulated from the deformed mesh"),
     ({"viewport": Deformer.NOTHING}, State.IN_DEPSGRAPH, ""),
     ({"viewport": Deformer.ARMATURE, "mesh_is_shared": True}, State.IN_DEPSGRAPH, ""),
     ({"render": Deformer.ARMATURE, "safe_mode": True}, State.AFTER_UPDATE, "Safe mode"),
