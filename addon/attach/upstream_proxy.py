@@ -238,9 +238,14 @@ def _is_requested(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool
     as a constraint's target: then it does not evaluate the upstream modifiers, and the mesh is their
     input."""
     nodes = stack.sinew_modifier(obj.evaluated_get(depsgraph))
-    is_on = nodes is not None and (nodes.show_render if depsgraph.mode == "RENDER" else nodes.show_viewport)
-    is_visible = obj.visible_get(view_layer=depsgraph.view_layer)
-    return is_on and is_visible and node_group.get_input(nodes, "Upstream") is not None
+    if depsgraph.mode == "RENDER":
+        # visible_get() is of the viewport.
+        is_shown = nodes is not None and nodes.show_render and not obj.hide_render
+    else:
+        is_shown = (
+            nodes is not None and nodes.show_viewport and obj.visible_get(view_layer=depsgraph.view_layer)
+        )
+    return is_shown and node_group.get_input(nodes, "Upstream") is not None
 
 
 def known_weights(obj: bpy.types.Object) -> GroupWeights | None:

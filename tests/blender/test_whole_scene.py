@@ -7,6 +7,7 @@ from __future__ import annotations
 import bpy
 import pytest
 import scenes
+from sinew_addon.attach import properties
 
 FRAMES = (9, 10, 6)
 
@@ -157,3 +158,22 @@ def test_an_edit_in_a_scene_that_no_window_shows(front):
     assert scenes.worst(got, before) > 0.05
     bpy.context.window.scene = scene
     scenes.assert_as_without(obj, got)
+
+
+@pytest.mark.usefixtures("route")
+def test_a_render_of_what_the_viewport_hides(rendered_points):
+    """There, a Subdivision without levels makes no mesh of its own."""
+    obj, _armature = scenes.make_arm()
+    scenes.put_in_front(obj)
+    obj.hide_viewport = True
+    scenes.add_sinew(obj, "lbs")
+    set_simplify(0)(bpy.context.scene)
+    bpy.context.view_layer.update()
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        got = rendered_points(obj)
+        properties.of(obj).enabled = False
+        expected = rendered_points(obj)
+        properties.of(obj).enabled = True
+        assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+        assert scenes.worst(got, scenes.rest_points(obj)) > 0.05, "nothing is tested"
