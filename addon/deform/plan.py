@@ -133,8 +133,8 @@ class ObjectFacts:
     visibility_is_keyed         an animation switches one of the Armature modifiers on and off
     viewport, render            what the modifiers' icons say that deforms it in each view
     deformed_is_read            Blender reads the mesh that the Armature modifiers make
-    is_deforming_body           a rigid body reads that mesh: Blender simulates it before it places the object,
-                                and Sinew's points wait for that place
+    is_deforming_body           a rigid body reads that mesh: Blender simulates it before it places the
+                                object, and Sinew's points wait for that place
     views_differ                one of several Armature modifiers is on only in the viewport or only in
                                 renders
     safe_mode                   nothing of Sinew may run within Blender's evaluation
