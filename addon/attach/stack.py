@@ -91,6 +91,13 @@ def mark_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     return next(itertools.chain(marks, same, named), None)
 
 
+def has_mark(obj: bpy.types.Object) -> bool:
+    """Whether it has Sinew's modifier that marks the mesh, with its node group. Reads no settings, which
+    would make them."""
+    groups = (modifier.node_group for modifier in obj.modifiers if modifier.type == "NODES")
+    return any(group and group.get(node_group.MARK) == node_group.STACK_MARK for group in groups)
+
+
 def own_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Returns the modifiers that Sinew put on the object, in their order."""
     own = (mark_modifier(obj), sinew_modifier(obj), neutral_modifier(obj))

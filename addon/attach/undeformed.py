@@ -179,6 +179,13 @@ def remove_later(obj: bpy.types.Object) -> None:
         bpy.app.timers.register(remove_leftovers)
 
 
+def find_leftovers() -> None:
+    """Called after undo and redo, which can bring back what remove_later() left until later."""
+    for obj in bpy.data.objects:
+        if obj.type == "MESH" and not properties.has_sinew(obj) and stack.has_mark(obj):
+            remove_later(obj)
+
+
 def has_leftovers() -> bool:
     return bool(_to_remove)
 

@@ -53,6 +53,7 @@ def before_step(_may_react: bool) -> None:
 def after_step(_may_react: bool) -> None:
     for obj in filter(properties.has_sinew, bpy.data.objects):
         point_store.clear_references_to_itself(obj)
+    undeformed.find_leftovers()
     session.adopt_after_step()
     notify(subscribers.stepped)
 

@@ -270,6 +270,9 @@ class _Event:
         if known.is_planned or is_of_another_stack:
             self._note(new)
         else:
+            if known.is_read and new.is_in_depsgraph:
+                # Another add-on may have removed it since the last evaluation.
+                apply_plan.apply_driver(obj, skinned.bound, new)
             skinned.needs_apply |= facts.calls_for_plan
             versions = skinned.bound.data_versions
             skinned.noted = replace(skinned.noted, mode=obj.mode, data_versions=versions)
