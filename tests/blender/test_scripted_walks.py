@@ -298,8 +298,8 @@ CASES = {
     "undo; frame 4; redo; frame 11",
     "Sinew's modifier deleted, undone to what it leaves": "~add Arm; ~delete_sinew_modifier Arm; "
     "+~move_vertices Leg; +~weights Leg thigh; ~frame 10; ~undo; remove_all",
-    "its driver taken away after an undo": "+~add Arm; +~frame 6; ~remove Arm; ~undo; ~delete_points Arm driver; "
-    "move_vertices Arm",
+    "its driver taken away after an undo": "+~add Arm; +~frame 6; ~remove Arm; ~undo; "
+    "~delete_points Arm driver; move_vertices Arm",
     "applied and undone": "+add Arm dq; +frame 6; +apply_modifier Arm; frame 11; undo; frame 4; redo; "
     "frame 9",
     "drivers of what was applied": "drive_visibility Leg 'Other Rig' Armature; add Leg; apply_modifier Leg; "
