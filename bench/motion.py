@@ -124,7 +124,7 @@ def _same(a: np.ndarray, b: np.ndarray, close: float = 1e-9) -> None:
 
 def whole(seconds: float) -> dict:
     """Seconds per call for the parts of a blend of two walks with eight bones in Blender."""
-    from sinew_addon.features.blend import blend, blend_actions
+    from sinew_addon.features.blend import blend_actions, motion
     from sinew_addon.features.blend.align import align
     from sinew_addon.features.blend.root import grounded
 
@@ -134,13 +134,13 @@ def whole(seconds: float) -> dict:
     armature, chosen = _in_blender((walk, run))
 
     def make() -> None:
-        steps = blend_actions.make(armature, chosen, (1, 1), blend.Settings())
+        steps = blend_actions.make(armature, chosen, (1, 1), motion.Settings())
         bpy.data.actions.remove(result_of(steps).action)
 
     return common.alternate(
         {
             "align": lambda: align(*placed, bones),
-            "blend": lambda: blend.blend([walk, run], (1, 1)),
+            "blend": lambda: motion.blend([walk, run], (1, 1)),
             "read, blend and write": make,
         },
         seconds,

@@ -15,7 +15,7 @@ from .console import Console
 if TYPE_CHECKING:
     import bpy
 
-    from ..features.blend.motion_actions import Made
+    from ..features.blend.blend_actions import Made
 
 SUMMARY = "blend actions of an armature, such as a walk and a run, into a new action"
 HELP = """\
