@@ -17,10 +17,10 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from .core import pipes
-from .core.errors import SinewError
-from .core.scratch import ScratchFolder
-from .core.windows_job import end_all_with_this_process, end_with_this_process
+from .base import pipes
+from .base.errors import SinewError
+from .base.scratch import ScratchFolder
+from .base.windows_job import end_all_with_this_process, end_with_this_process
 
 # The name of the file in which a Blender reports what it is doing: a JSON object, padded with blanks.
 DOING = "doing"

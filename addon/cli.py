@@ -12,9 +12,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, NoReturn, Protocol, cast
 
 from . import native
-from .core import interrupt
-from .core.errors import SinewError, WrongUse
-from .core.output import sentence as output_sentence
+from .base import interrupt
+from .base.errors import SinewError, WrongUse
+from .base.output import sentence as output_sentence
 from .prepare import leave_blender, prepare_blender
 
 if TYPE_CHECKING:

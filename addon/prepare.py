@@ -5,8 +5,8 @@ import os
 import shutil
 from typing import NoReturn
 
-from .core import interrupt
-from .core.errors import SinewError
+from .base import interrupt
+from .base.errors import SinewError
 
 
 def prepare_blender() -> None:

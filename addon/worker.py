@@ -12,8 +12,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import MappingProxyType
 
+from .base.errors import SinewError
 from .blender_process import DOING, PROCESSORS
-from .core.errors import SinewError
 from .jobs.journal import content_hash
 
 Report = Callable[..., None]

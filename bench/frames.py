@@ -319,14 +319,14 @@ def measure_floor(case: Case, seconds: float) -> dict:
     """A frame by the modifier, by Sinew, and by Sinew without its arithmetic: it writes its first points and
     normals again and again, and all else is done."""
     # In a whole Blender the extension has another name: see window.py.
-    from sinew_addon.core import session
     from sinew_addon.deform import bound
+    from sinew_addon.skinning.skin_stack import SkinStack
 
     scene = Scene(case, leave_small=False)
-    deform, write_normals = session.SkinStack.deform, bound.Bound.write_normals
+    deform, write_normals = SkinStack.deform, bound.Bound.write_normals
     points, normals = {}, {}
 
-    def write_again(stack: session.SkinStack, rest_points, frames, out, values) -> bool:
+    def write_again(stack: SkinStack, rest_points, frames, out, values) -> bool:
         if stack not in points:
             deform(stack, rest_points, frames, out, values)
             points[stack] = out.copy()
@@ -343,7 +343,7 @@ def measure_floor(case: Case, seconds: float) -> dict:
         scene.switch(on)
         points.clear()
         normals.clear()
-        session.SkinStack.deform = deform if computes else write_again
+        SkinStack.deform = deform if computes else write_again
         bound.Bound.write_normals = write_normals if computes else write_normals_again
 
     choices = {"modifier": partial(by, False, True), "sinew": partial(by, True, True)}

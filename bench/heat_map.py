@@ -15,9 +15,9 @@ import common
 import numpy as np
 from limb import least_frame, make_limb
 from sinew_addon.attach import attach
-from sinew_addon.core.metrics import METRICS
 from sinew_addon.deform import session
 from sinew_addon.features.heat import measures
+from sinew_addon.features.measure.metrics import METRICS
 
 SIDES, RINGS, ROUNDS = 200, 500, 8
 

@@ -13,8 +13,8 @@ import matplotlib
 import numpy as np
 import sinew
 from sinew import affine, quat
-from sinew_addon.core import ik as core
 from sinew_addon.io import ik_io
+from sinew_addon.skinning import ik as core
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt

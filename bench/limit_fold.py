@@ -17,11 +17,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 import sinew
-from sinew_addon.core import battery
-from sinew_addon.core.rig import Bones
-from sinew_addon.core.vectors import transformed
-from sinew_addon.features.suggest.crossings import crossing_triangles
+from sinew_addon.features.measure import battery
+from sinew_addon.features.measure.crossings import crossing_triangles
 from sinew_addon.io import armature_io, mesh_io
+from sinew_addon.skinning.rig import Bones
+from sinew_addon.skinning.vectors import transformed
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
 from rigs import influences

@@ -18,7 +18,7 @@ import sinew
 from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 from sinew import interpolate, quat_vec
-from sinew_addon.core.steps import result_of
+from sinew_addon.base.steps import result_of
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
 import walks
@@ -124,10 +124,9 @@ def _same(a: np.ndarray, b: np.ndarray, close: float = 1e-9) -> None:
 
 def whole(seconds: float) -> dict:
     """Seconds per call for the parts of a blend of two walks with eight bones in Blender."""
-    from sinew_addon.core.motion import blend
-    from sinew_addon.core.motion.align import align
-    from sinew_addon.core.motion.root import grounded
-    from sinew_addon.features.blend import blend_actions
+    from sinew_addon.features.blend import blend_actions, motion
+    from sinew_addon.features.blend.align import align
+    from sinew_addon.features.blend.root import grounded
 
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
     placed = [grounded(clip, 0, walks.UP).clip for clip in (walk, run)]
@@ -135,13 +134,13 @@ def whole(seconds: float) -> dict:
     armature, chosen = _in_blender((walk, run))
 
     def make() -> None:
-        steps = blend_actions.make(armature, chosen, (1, 1), blend.Settings())
+        steps = blend_actions.make(armature, chosen, (1, 1), motion.Settings())
         bpy.data.actions.remove(result_of(steps).action)
 
     return common.alternate(
         {
             "align": lambda: align(*placed, bones),
-            "blend": lambda: blend.blend([walk, run], (1, 1)),
+            "blend": lambda: motion.blend([walk, run], (1, 1)),
             "read, blend and write": make,
         },
         seconds,
@@ -151,7 +150,7 @@ def whole(seconds: float) -> dict:
 
 def _in_blender(pair: tuple) -> tuple:
     """An armature with the walks' bones, and their actions."""
-    from sinew_addon.io import clips
+    from sinew_addon.features.blend import clips_io
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     armature = bpy.data.objects.new("Legs", bpy.data.armatures.new("Legs"))
@@ -167,7 +166,7 @@ def _in_blender(pair: tuple) -> tuple:
         if rig.parents[row] >= 0:
             bone.parent = armature.data.edit_bones[rig.names[rig.parents[row]]]
     bpy.ops.object.mode_set(mode="OBJECT")
-    return armature, [result_of(clips.write(armature, clip, clip.name, 1.0, set())) for clip in pair]
+    return armature, [result_of(clips_io.write(armature, clip, clip.name, 1.0, set())) for clip in pair]
 
 
 def main() -> None:

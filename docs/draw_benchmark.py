@@ -25,16 +25,16 @@ import sinew
 from draw_methods import CELL, REPOSITORY, Case, view_of, write_grid
 from mathutils import Matrix
 from sinew_addon.attach import attach
-from sinew_addon.core.battery import JOINTS, SWING, TWIST, Move
-from sinew_addon.core.flex.limits import LIMITS, Limit, Table
-from sinew_addon.core.flex.verdict import OWN
-from sinew_addon.core.parameters import PRESETS
-from sinew_addon.core.steps import result_of
+from sinew_addon.base.steps import result_of
 from sinew_addon.deform import characters
 from sinew_addon.features.flex import flex
+from sinew_addon.features.flex.limits import LIMITS, Limit, Table
+from sinew_addon.features.flex.verdict import OWN
+from sinew_addon.features.measure.battery import JOINTS, SWING, TWIST, Move
 from sinew_addon.features.pages import render
 from sinew_addon.io import files
 from sinew_addon.prepare import leave_blender, prepare_blender
+from sinew_addon.skinning.parameters import PRESETS
 
 MEASURES = tuple(limit for limit in LIMITS.values() if limit.posed)
 # Of bones that nothing is known of, Flex's own poses are too mild to tell methods apart.

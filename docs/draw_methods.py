@@ -22,10 +22,11 @@ import sinew
 import sinew_addon
 from PIL import Image, ImageDraw, ImageFont
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.metrics import Measured
-from sinew_addon.core.views import View, close_view, seen_extent, whole_view
 from sinew_addon.deform import characters
-from sinew_addon.features.pages import measure, render
+from sinew_addon.features.measure import subjects
+from sinew_addon.features.measure.metrics import Measured
+from sinew_addon.features.pages import render
+from sinew_addon.features.pages.views import View, close_view, seen_extent, whole_view
 from sinew_addon.io import files
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -156,12 +157,12 @@ def draw(case: Case, path: Path, out: Path) -> dict[str, Measured]:
     meshes, _left_out = characters.deformable_meshes(scene, path, ["dq"])
     for obj in meshes:
         obj.vertex_groups.new(name=GROUP).add(range(len(obj.data.vertices)), 0.5, "REPLACE")
-    subject = measure.gather(scene, meshes)
+    subject = subjects.gather(scene, meshes)
     chosen = variants()
     shapes, found = [], {}
     for variant in chosen:
         choose(meshes, variant)
-        points = measure.shapes_at(subject, [variant.method], case.frame)[variant.method]
+        points = subjects.shapes_at(subject, [variant.method], case.frame)[variant.method]
         found[variant.title] = subject.gauge.measure(points, points)
         shapes.append(points)
     view = view_of(case, meshes, shapes)

@@ -18,10 +18,10 @@ import sinew
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from sinew import affine, quat_vec
-from sinew_addon.core.inbetween import Poses
-from sinew_addon.core.motion.blend import KEYED, Blend, Settings, blend
-from sinew_addon.core.motion.clip import Clip, Rig
-from sinew_addon.core.plots import COLOURS
+from sinew_addon.features.blend.clip import Clip, Rig
+from sinew_addon.features.blend.motion import KEYED, Blend, Settings, blend
+from sinew_addon.features.pages.plots import COLOURS
+from sinew_addon.io.poses import Poses
 
 matplotlib.use("agg")
 import matplotlib.pyplot as plt

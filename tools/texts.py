@@ -14,13 +14,14 @@ import sinew
 import sinew_addon
 from bl_ui.utils import PresetPanel
 from sinew_addon import registration
-from sinew_addon.core import battery, metrics, recommendation, suggestion
-from sinew_addon.core.engines import METHODS
-from sinew_addon.core.export_check import CAUSES, NORMALS
-from sinew_addon.core.flex import limits
-from sinew_addon.core.vertex_data import PROVIDERS
 from sinew_addon.features.diagnose import mending
+from sinew_addon.features.flex import limits
+from sinew_addon.features.gltf.export_check import CAUSES, NORMALS
 from sinew_addon.features.heat import heat_panel
+from sinew_addon.features.measure import battery, metrics, suggestion
+from sinew_addon.features.suggest import recommendation
+from sinew_addon.skinning.engines import METHODS
+from sinew_addon.skinning.vertex_data import PROVIDERS
 from sinew_addon.ui import menus
 
 ADDON = Path(sinew_addon.__file__).parent

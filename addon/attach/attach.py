@@ -4,7 +4,7 @@
 While Sinew deforms, the Armature modifiers stay in the stack, switched on, where other tools look for them;
 in_depsgraph.py has Blender leave them out. In a saved file they deform, and Sinew's modifier is off, so that
 a Blender without Sinew can play it. What the artist or a tool does to the modifiers' icons has the meaning
-that core/icons.py gives it.
+that attach/icons.py gives it.
 """
 
 from collections.abc import Collection
@@ -12,14 +12,13 @@ from typing import TypeAlias
 
 import bpy
 
-from ..core import icons
-from ..core.errors import SinewError
-from ..core.icons import VIEWS, Deformer, Icons, Situation
-from ..core.phrases import phrase
+from ..base.errors import SinewError
+from ..base.phrases import phrase
 from ..io.actions import animated_paths, is_animated, is_visibility_animated
 from . import (
     baked,
     corrective_smooth,
+    icons,
     point_store,
     pose_driver,
     properties,
@@ -31,6 +30,7 @@ from . import (
     undeformed,
     upstream_proxy,
 )
+from .icons import VIEWS, Deformer, Icons, Situation
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended

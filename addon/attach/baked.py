@@ -6,7 +6,7 @@ import re
 
 import bpy
 
-from ..core.phrases import phrase
+from ..base.phrases import phrase
 from ..io.actions import curves_of
 from . import properties
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import bpy
 
-from ..core.errors import SinewError
-from ..core.phrases import Phrase, phrase
+from ..base.errors import SinewError
+from ..base.phrases import Phrase, phrase
 from ..io.actions import animated_paths
 from . import properties, property_groups, stack, stage_settings, upstream_proxy
 
@@ -113,7 +113,7 @@ def _values(modifier: bpy.types.CorrectiveSmoothModifier) -> dict[str, Any]:
 
 
 def stage_values(obj: bpy.types.Object) -> Mapping[str, Mapping[str, Any]]:
-    """Returns how the object's modifiers without Sinew smooth, as core.stages.StageValues."""
+    """Returns how the object's modifiers without Sinew smooth, as skinning.stages.StageValues."""
     modifier = replaced_modifier(obj)
     return {} if modifier is None else {"delta_mush": _values(modifier)}
 

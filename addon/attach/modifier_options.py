@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.influences import GroupWeights, entries_of_bones
-from ..core.phrases import phrase
-from ..core.rig import Bones, Weighting
+from ..base.phrases import phrase
 from ..io.actions import animated_paths
+from ..skinning.influences import GroupWeights, entries_of_bones
+from ..skinning.rig import Bones, Weighting
 from . import stack
 
 _NAMES = (

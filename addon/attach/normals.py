@@ -16,7 +16,7 @@ from functools import cache
 
 import bpy
 
-from ..core.phrases import phrase
+from ..base.phrases import phrase
 from ..io import mesh_io
 from ..io.actions import is_animated, is_visibility_animated
 from . import node_group, properties, stack, upstream_proxy

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import bpy
 
-from ..core.icons import Situation
-from ..core.phrases import phrase
+from ..base.phrases import phrase
 from . import properties, stack, upstream_proxy
+from .icons import Situation
 
 # Such a tool also applies Sinew's modifier, and Sinew then removes the Armature modifiers.
 APPLYING = phrase(

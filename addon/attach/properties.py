@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..core.engines import METHODS
-from ..core.icons import Situation
-from ..core.scale_rule import SCALE_RULES
+from ..skinning.engines import METHODS
+from ..skinning.scale_rule import SCALE_RULES
 from . import property_groups, stage_settings
 from .feature import Feature
+from .icons import Situation
 from .stage_settings import OFF, OVERRIDABLE, method_items
 
 # A choice in addition to Sinew's methods: the Armature modifier as it is in the file.
@@ -202,7 +202,7 @@ class SinewStack(bpy.types.PropertyGroup):
     neutral_uid: _hidden(bpy.props.IntProperty, "The modifier that changes nothing (undeformed.py)")
     mark_uid: _hidden(bpy.props.IntProperty, "The modifier that marks the mesh (undeformed.py)")
     situation: _hidden(
-        bpy.props.StringProperty, "Who deformed it when the modifiers' icons were last set (core/icons.py)"
+        bpy.props.StringProperty, "Who deformed it when the modifiers' icons were last set (attach/icons.py)"
     )
     # The artist switched the icon of Sinew's modifier off.
     hidden_viewport: _hidden(bpy.props.BoolProperty)

@@ -10,8 +10,8 @@ from typing import Any
 import bpy
 import sinew
 
-from ..core import engines, parameters
 from ..io import spaces
+from ..skinning import engines, parameters
 from . import property_groups
 
 STAGES = {stage.name: stage for stage in sinew.stages()}

@@ -8,10 +8,10 @@ Blender applies no modifier to a mesh with a second user, and other people's too
 
 import bpy
 
-from ..core.errors import SinewError
-from ..core.influences import GroupWeights
+from ..base.errors import SinewError
 from ..io import mesh_compare
 from ..io.actions import animated_paths
+from ..skinning.influences import GroupWeights
 from . import node_group, properties, references, stack, undeformed
 
 # A Multi Modifier directly behind one of these mixes with what it got, not with what it made.

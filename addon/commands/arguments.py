@@ -8,10 +8,10 @@ from pathlib import Path
 
 import sinew
 
-from ..core import parameters
-from ..core.errors import WrongUse
-from ..core.frames import parse_frames
-from ..core.output import file_to_write, folder_to_write
+from ..base.errors import WrongUse
+from ..base.frames import parse_frames
+from ..base.output import file_to_write, folder_to_write
+from ..skinning import parameters
 
 FILES = ".blend, .glb, .gltf or .fbx"
 

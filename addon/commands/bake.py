@@ -8,11 +8,11 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from ..core import interrupt
-from ..core.bake import FILES, KINDS
-from ..core.errors import SinewError, WrongUse, about
-from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
-from ..core.vat import AXES, DEFAULT_VAT, TEXELS, VatOptions
+from ..base import interrupt
+from ..base.errors import SinewError, WrongUse, about
+from ..features.bake.baked_files import FILES, KINDS
+from ..features.bake.helper_bones import KEYS, MOTIONS, HelperOptions, Report
+from ..features.bake.vat import AXES, DEFAULT_VAT, TEXELS, VatOptions
 from ..jobs.inputs import Job, plan_jobs
 from .arguments import add_copies, add_frames, add_method, add_set, count, percent
 from .console import Console

@@ -17,9 +17,9 @@ from typing import TypeAlias
 
 import sinew
 
+from ..base.errors import SinewError, WrongUse
+from ..base.output import folder_to_write, writing
 from ..blender_process import Limits
-from ..core.errors import SinewError, WrongUse
-from ..core.output import folder_to_write, writing
 from ..jobs.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..jobs.job_file import JobFile, Settings, read_job_file
 from ..jobs.journal import Journal, is_complete

@@ -6,9 +6,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from ..core.errors import SinewError, WrongUse
-from ..core.motion.blend import METHODS, Settings
-from ..core.steps import result_of
+from ..base.errors import SinewError, WrongUse
+from ..base.steps import result_of
+from ..features.blend.motion import METHODS, Settings
 from .arguments import add_file, count, file_named
 from .console import Console
 
@@ -26,7 +26,7 @@ Each action has a weight; with --weights-from they go from those in the first fr
 Aligned, the default, actions are brought to the same moment of their motion by the distance of their poses,
 and cycles to the weighted mean of their lengths. The root's steps on the ground are blended and added up."""
 
-# The names of core.motion.blend, as the options spell them.
+# The names of features.blend.motion, as the options spell them.
 ROOT_MOTIONS = {"travel": "travel", "in-place": "in_place", "keyed": "keyed"}
 
 
@@ -100,9 +100,9 @@ def _armature(args: argparse.Namespace) -> bpy.types.Object:
 def _actions(args: argparse.Namespace, armature: bpy.types.Object) -> list[bpy.types.Action]:
     import bpy
 
-    from ..io import clips
+    from ..features.blend import clips_io
 
-    names = [a.name for a in bpy.data.actions if clips.keyed_properties(armature, a)]
+    names = [a.name for a in bpy.data.actions if clips_io.keyed_properties(armature, a)]
     there = f"{armature.name} can play: {', '.join(names) or 'none'}"
     missing = [name for name in args.actions if name not in bpy.data.actions]
     if missing:

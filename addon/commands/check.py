@@ -5,8 +5,8 @@ import argparse
 from contextlib import closing
 from pathlib import Path
 
+from ..base.errors import WrongUse
 from ..blender_process import Limits
-from ..core.errors import WrongUse
 from ..jobs.inputs import blend_files_below
 from ..jobs.workers import run_one_by_one
 from .arguments import add_json, seconds

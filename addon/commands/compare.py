@@ -8,14 +8,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..core.comparison import USUAL_METHODS, Comparison, RestFacts
-from ..core.diagnostics import USUAL_INFLUENCES
-from ..core.errors import SinewError, WrongUse
-from ..core.names import as_file_name
-from ..core.output import folder_to_write, write_text
-from ..core.page import page, require_jinja
-from ..core.parameters import PRESETS
-from ..core.steps import result_of
+from ..base.errors import SinewError, WrongUse
+from ..base.names import as_file_name
+from ..base.output import folder_to_write, write_text
+from ..base.steps import result_of
+from ..features.measure.comparison import USUAL_METHODS, Comparison, RestFacts
+from ..features.measure.diagnostics import USUAL_INFLUENCES
+from ..features.pages.page import page
+from ..features.pages.templates import require_jinja
+from ..skinning.parameters import PRESETS
 from .arguments import (
     add_engine,
     add_files,
@@ -30,7 +31,7 @@ from .arguments import (
 from .console import Console
 
 if TYPE_CHECKING:
-    from ..features.pages.measure import Subject
+    from ..features.measure.subjects import Subject
 
 
 SUMMARY = "show and measure methods beside each other"
@@ -166,7 +167,8 @@ def _compare(
     import bpy
 
     from ..deform import characters
-    from ..features.pages import illustrate, measure, render
+    from ..features.measure import subjects
+    from ..features.pages import illustrate, render
     from ..io import files
 
     console.note_on(path, files.open_file(path))
@@ -177,7 +179,7 @@ def _compare(
     meshes, left_out = characters.deformable_meshes(scene, path, played, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
-    subject = measure.gather(scene, meshes)
+    subject = subjects.gather(scene, meshes)
     folder, sheets = args.out / as_file_name(path.stem), []
     with characters.kept_presets(meshes, played):
         console.note_on(path, characters.sentences())
@@ -207,13 +209,13 @@ def _measure(
 ) -> Comparison:
     from ..attach import properties
     from ..deform import characters
-    from ..features.pages import measure
+    from ..features.measure import subjects
 
-    batches = measure.batches(subject, frames, len(methods) + 1)
-    measured = measure.Measurements.of(methods)
+    batches = subjects.batches(subject, frames, len(methods) + 1)
+    measured = subjects.Measurements.of(methods)
     rest: RestFacts | None = None
     for batch in console.progress(batches, len(batches), f"Measuring {path.name}"):
-        measure.measure(subject, methods, args.reference, batch, measured)
+        subjects.measure(subject, methods, args.reference, batch, measured)
         rest = rest or RestFacts.of(subject.gauge)
     assert rest is not None, "there is at least one frame"
     return Comparison(

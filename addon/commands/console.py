@@ -14,8 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
-from ..core import interrupt
-from ..core.errors import SinewError
+from ..base import interrupt
+from ..base.errors import SinewError
 
 if TYPE_CHECKING:
     from rich.console import Console as RichConsole

@@ -7,8 +7,8 @@ import argparse
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from ..core.errors import SinewError, WrongUse
-from ..core.export_check import ENDINGS, FRAMES, Check
+from ..base.errors import SinewError, WrongUse
+from ..features.gltf.export_check import ENDINGS, FRAMES, Check
 from .arguments import add_file, add_frames, add_json, add_method, add_set, count, file_named, percent
 from .console import Console
 from .outcome import use_method

@@ -12,11 +12,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from ..core.errors import WrongUse
-from ..core.flex.limits import Table, read_table
-from ..core.flex.report import Report, junit, lines, markdown, of_file
-from ..core.output import folder_to_write, write_text
-from ..core.scratch import scratch_folder
+from ..base.errors import WrongUse
+from ..base.output import folder_to_write, write_text
+from ..base.scratch import scratch_folder
+from ..features.flex.limits import Table, read_table
+from ..features.flex.report import Report, junit, lines, markdown, of_file
 from ..jobs.inputs import files_of
 from ..jobs.journal import Journal, content_hash
 from . import batch

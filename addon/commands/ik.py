@@ -4,9 +4,9 @@
 import argparse
 from dataclasses import dataclass
 
-from ..core.errors import SinewError, WrongUse
-from ..core.frames import parse_frames
-from ..core.steps import result_of
+from ..base.errors import SinewError, WrongUse
+from ..base.frames import parse_frames
+from ..base.steps import result_of
 from ..jobs.inputs import plan_jobs
 from .arguments import add_copies
 from .console import Console

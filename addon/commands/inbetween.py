@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import sinew
 
-from ..core.errors import SinewError
-from ..core.steps import result_of
+from ..base.errors import SinewError
+from ..base.steps import result_of
 from ..jobs.inputs import plan_jobs
 from .arguments import add_copies, count, one_of
 from .console import Console
@@ -54,11 +54,10 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _inbetween(outcome: Inbetweened, args: argparse.Namespace) -> None:
     import bpy
 
-    from ..core import inbetween as core
-    from ..features.inbetween import inbetween_bake
+    from ..features.inbetween import inbetween_bake, interpolation
     from ..io import actions, files
 
-    source, path = outcome.job.source, core.SPLINE if args.spline else core.STRAIGHT
+    source, path = outcome.job.source, interpolation.SPLINE if args.spline else interpolation.STRAIGHT
     armatures = [
         obj
         for obj in bpy.data.objects

@@ -4,7 +4,7 @@
 import argparse
 from pathlib import Path
 
-from ..core.errors import SinewError
+from ..base.errors import SinewError
 from .arguments import add_files, add_json
 from .console import Console
 

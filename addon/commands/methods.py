@@ -6,8 +6,8 @@ import math
 
 import sinew
 
-from ..core.engines import METHODS, Engine
-from ..core.parameters import PRESETS
+from ..skinning.engines import METHODS, Engine
+from ..skinning.parameters import PRESETS
 from .arguments import add_json
 from .console import Console
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
-from ..core.errors import SinewError
+from ..base.errors import SinewError
 from ..jobs.inputs import Job
 from .console import Console
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.errors import SinewError, about
-from ..core.names import as_file_name
-from ..core.output import write_whole
-from ..core.parameters import PRESETS
+from ..base.errors import SinewError, about
+from ..base.names import as_file_name
+from ..base.output import write_whole
+from ..skinning.parameters import PRESETS
 from .arguments import add_file, add_frames, add_method, add_object, add_set, file_named
 from .console import Console
 from .outcome import use_method

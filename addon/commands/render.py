@@ -5,19 +5,12 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..core.errors import SinewError, WrongUse
-from ..core.golden import (
-    SETTINGS,
-    RenderSettings,
-    difference,
-    difference_picture,
-    differing_share,
-    picture_name,
-)
-from ..core.output import folder_to_write, remove, write_text
-from ..core.parameters import PRESETS, Value, as_texts, parse
+from ..base.errors import SinewError, WrongUse
+from ..base.output import folder_to_write, remove, write_text
+from ..skinning.parameters import PRESETS, Value, as_texts, parse
 from .arguments import add_engine, add_file, add_frames, add_method, add_object, add_set, pixels
 from .console import Console
+from .golden import SETTINGS, RenderSettings, difference, difference_picture, differing_share, picture_name
 
 # In percent of the pixels; between Blender 4.2 and 5.2 on one machine, no pixel differs.
 USUAL_TOLERANCE = 0.05
@@ -140,7 +133,7 @@ def _draw(
         if golden is not None:
             views = [golden.views[golden.frames.index(frame)] for frame in frames]
         else:
-            views = characters.whole_views(meshes, [method], frames)
+            views = render.whole_views(meshes, [method], frames)
         studio = render.Studio(scene, meshes, engine, size)
     console.note_on(args.file, characters.sentences())
     names = [obj.name for obj in meshes]

@@ -5,9 +5,9 @@ import argparse
 
 import sinew
 
-from ..core.frames import parse_frames
-from ..core.parameters import PRESETS, as_texts
+from ..base.frames import parse_frames
 from ..jobs.job_file import Settings, keys
+from ..skinning.parameters import PRESETS, as_texts
 from . import batch
 from .arguments import add_method, add_set
 from .console import Console

@@ -18,8 +18,8 @@ from ..attach import (
     stack,
     upstream_proxy,
 )
-from ..core.errors import SinewError
-from ..core.icons import VIEWS
+from ..attach.icons import VIEWS
+from ..base.errors import SinewError
 from ..io import armature_io
 from . import safe_mode, small_meshes
 from .bound import Bound

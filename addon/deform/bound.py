@@ -13,17 +13,17 @@ import numpy as np
 from ..attach import attach, properties, stage_settings
 from ..attach.modifier_options import ModifierOptions, are_animated
 from ..attach.properties import METHODS
-from ..core import sdef
-from ..core.arrays import are_equal
-from ..core.phrases import phrase
-from ..core.rig import Bones, RigFacts, Weighting
-from ..core.skin_stack import SkinDeformer, SkinStack, SkinStage
-from ..core.stage_mesh import StageMesh
-from ..core.stages import StagesAfter
-from ..core.vectors import transformed
-from ..core.vertex_data import VertexData
+from ..base.phrases import phrase
 from ..io import armature_io, spaces
 from ..io.actions import animated_paths
+from ..skinning import sdef
+from ..skinning.arrays import are_equal
+from ..skinning.rig import Bones, RigFacts, Weighting
+from ..skinning.skin_stack import SkinDeformer, SkinStack, SkinStage
+from ..skinning.stage_mesh import StageMesh
+from ..skinning.stages import StagesAfter
+from ..skinning.vectors import transformed
+from ..skinning.vertex_data import VertexData
 from . import source, survey
 from .plan import Normals
 from .source import Source

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from ..attach import node_group
-from ..core.rig import Bones
+from ..skinning.rig import Bones
 from .events import others_precede
 
 Find = Callable[[bpy.types.ID], bpy.types.ID | None]

@@ -12,12 +12,12 @@ import numpy as np
 
 from ..attach import attach, properties, setting_animation, stage_settings
 from ..attach.properties import BLENDER
-from ..core import interrupt, parameters
-from ..core.errors import SinewError, WrongUse
-from ..core.parameters import Value
-from ..core.vectors import transformed_axes
-from ..core.views import View, of_one_size, seen_extent, whole_view
+from ..base import interrupt
+from ..base.errors import SinewError, WrongUse
 from ..io import mesh_io
+from ..skinning import parameters
+from ..skinning.parameters import Value
+from ..skinning.vectors import transformed_axes
 from . import lifecycle, session
 
 
@@ -116,7 +116,7 @@ def use_methods_for_file(
 
 
 def set_parameters(values: Mapping[str, Value]) -> None:
-    """From now on every mesh that is given a method gets these values, as from core.parameters.parse()."""
+    """From now on every mesh that is given a method gets these values, as from parameters.parse()."""
     _values_of_all.clear()
     _values_of_all.update(values)
 
@@ -350,19 +350,6 @@ def at_rest(armatures: Iterable[bpy.types.Object]) -> Iterator[None]:
         for data, position in before.items():
             data.pose_position = position
         bpy.context.view_layer.update()
-
-
-def whole_views(
-    meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
-) -> list[View]:
-    """For each frame, a view that contains the final meshes under all methods; all views have one size."""
-    extents: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
-    for method in methods:
-        use_method_on(meshes, method)
-        for frame, own in extents.items():
-            set_frame(bpy.context.scene, frame)
-            own.append(seen_extent(world_points(meshes)))
-    return of_one_size([whole_view(own) for own in extents.values()])
 
 
 def final_points(obj: bpy.types.Object) -> np.ndarray:

@@ -14,8 +14,8 @@ import numpy as np
 import sinew
 
 from ..attach import point_store, properties, stack
+from ..attach.icons import VIEWS
 from ..attach.modifier_options import ModifierOptions
-from ..core.icons import VIEWS
 from ..io import mesh_io
 from ..io.actions import is_visibility_animated
 from . import pose, source

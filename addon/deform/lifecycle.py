@@ -15,8 +15,8 @@ from ..attach import note, overrides, point_store, properties, references, undef
 from ..attach.feature import Feature
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, phase, updates_suspended
-from ..core.precompute import precomputations
 from ..io.actions import animated_paths
+from ..skinning.precompute import precomputations
 from . import apply_plan, events, handlers, precompute_watch, precomputing, session
 from .changes import Changes
 

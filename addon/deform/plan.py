@@ -4,7 +4,7 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from ..core.icons import Deformer
+from ..attach.icons import Deformer
 
 # In these modes Blender's tools work through the Armature modifier, so it deforms the mesh meanwhile.
 ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})

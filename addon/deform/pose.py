@@ -7,17 +7,17 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..attach import attach, properties, stage_settings
-from ..core import icons, parameters
-from ..core.engines import ENGINES
-from ..core.errors import SinewError
-from ..core.rig import Bones
-from ..core.scale_rule import BLENDER_4
-from ..core.skin_stack import NO_STAGES, SkinStageFrame, follows_hierarchy
-from ..core.stages import ORDER, StageValues
-from ..core.twist_spread import TwistInputs
-from ..core.vectors import SAME_SPACE
+from ..attach import attach, icons, properties, stage_settings
+from ..base.errors import SinewError
 from ..io import armature_io, spaces
+from ..skinning import parameters
+from ..skinning.engines import ENGINES
+from ..skinning.rig import Bones
+from ..skinning.scale_rule import BLENDER_4
+from ..skinning.skin_stack import NO_STAGES, SkinStageFrame, follows_hierarchy
+from ..skinning.stages import ORDER, StageValues
+from ..skinning.twist_spread import TwistInputs
+from ..skinning.vectors import SAME_SPACE
 from .bound import Bound
 from .skinned_object import SkinnedObject
 

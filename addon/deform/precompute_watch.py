@@ -7,7 +7,7 @@ import bpy
 
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import phase
-from ..core.precompute import precomputations
+from ..skinning.precompute import precomputations
 from . import precomputing, session
 from .plan import State
 from .session import current

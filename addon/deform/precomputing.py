@@ -18,13 +18,13 @@ import sinew
 from ..attach import properties, stage_settings, stored_vertex_data
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread
-from ..core.errors import SinewError
-from ..core.file_cache import FileCache
-from ..core.phrases import phrase
-from ..core.precompute import precomputations
-from ..core.vectors import SAME_SPACE
-from ..core.vertex_data import PROVIDERS, VertexData
+from ..base.errors import SinewError
+from ..base.file_cache import FileCache
+from ..base.phrases import phrase
 from ..io import addon_preferences, spaces
+from ..skinning.precompute import precomputations
+from ..skinning.vectors import SAME_SPACE
+from ..skinning.vertex_data import PROVIDERS, VertexData
 from .bound import is_method_animated, methods_of
 from .skinned_object import SkinnedObject
 

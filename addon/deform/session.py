@@ -19,11 +19,11 @@ from ..attach import (
     stack,
     upstream_proxy,
 )
+from ..attach.icons import Deformer
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
-from ..core.errors import SinewError
-from ..core.icons import Deformer
-from ..core.precompute import precomputations
+from ..base.errors import SinewError
+from ..skinning.precompute import precomputations
 from . import after_update, apply_plan, events, undo
 from .bound import uid
 from .changes import GONE, Changes, Find

@@ -12,11 +12,11 @@ import sinew
 
 from ..attach import attach, normals, properties, stack, stage_settings, undeformed, upstream_proxy
 from ..attach.modifier_options import ModifierOptions, are_animated
-from ..core.errors import SinewError
-from ..core.skin_stack import NO_STAGES, SkinStageFrame
-from ..core.stages import StageValues
+from ..base.errors import SinewError
 from ..io import armature_io, mesh_io
 from ..io.actions import animated_paths, is_visibility_animated
+from ..skinning.skin_stack import NO_STAGES, SkinStageFrame
+from ..skinning.stages import StageValues
 from . import small_meshes
 from .bound import Bound, uid
 from .changes import Changes

@@ -9,8 +9,8 @@ import bpy
 
 from ..attach import attach, pose_driver, properties, stage_settings, upstream_proxy
 from ..attach.normals import Kind
-from ..core.scale_rule import BLENDER_4
 from ..io.actions import animated_paths
+from ..skinning.scale_rule import BLENDER_4
 
 # With fewer vertices an Armature modifier is faster (bench/README.md), by method.
 VERTICES = {"lbs": 10_000, "dq": 6_000}

@@ -11,12 +11,12 @@ import bpy
 import numpy as np
 
 from ..attach import normals, properties, stored_vertex_data, upstream_proxy
-from ..core.arrays import are_equal
-from ..core.influences import GroupWeights
-from ..core.shading import Shading, SurfaceNormals
-from ..core.shape_keys import ShapeKeys
-from ..core.stage_mesh import Topology
 from ..io import mesh_io
+from ..skinning.arrays import are_equal
+from ..skinning.influences import GroupWeights
+from ..skinning.shading import Shading, SurfaceNormals
+from ..skinning.shape_keys import ShapeKeys
+from ..skinning.stage_mesh import Topology
 from .changes import Changes
 
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from ..attach import attach, other_tools, properties, stack, stage_settings
 from ..attach.modifier_options import ModifierOptions, differences
-from ..core import sdef
-from ..core.errors import SinewError
-from ..core.phrases import phrase
-from ..core.rig import RigFacts, Weighting, describe_rig
-from ..core.vectors import transformed
+from ..base.errors import SinewError
+from ..base.phrases import phrase
 from ..io import armature_io, mesh_io, spaces
+from ..skinning import sdef
+from ..skinning.rig import RigFacts, Weighting, describe_rig
+from ..skinning.vectors import transformed
 from . import group_uses
 
 

@@ -7,7 +7,7 @@ import bpy
 
 from ..attach import attach, normals, point_store, properties, stack, stage_settings, upstream_proxy
 from ..attach.updates import may_change_file
-from ..core.errors import SinewError
+from ..base.errors import SinewError
 from ..io.actions import animated_paths
 from . import after_update, apply_plan, bound, events, precomputing, source
 from .bound import uid

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ..core.arrays import read
+from ..skinning.arrays import read
 
 # The first column of each of a bone's channels, as in pose_io.read_channels().
 COLUMNS = {

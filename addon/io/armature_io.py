@@ -7,10 +7,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
-from ..core.arrays import read
-from ..core.envelopes import Envelopes
-from ..core.rig import Bones
-from ..core.twist_spread import NOT_TOLD, TwistInputs
+from ..skinning.arrays import read
+from ..skinning.envelopes import Envelopes
+from ..skinning.rig import Bones
+from ..skinning.twist_spread import NOT_TOLD, TwistInputs
 
 _CURVED = bpy.types.Bone.bl_rna.properties["bbone_mapping_mode"].enum_items["CURVED"].value
 # Of axes of unit length: less is the rounding of poses.

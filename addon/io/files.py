@@ -11,8 +11,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.errors import SinewError
-from ..core.output import remove, writing
+from ..base.errors import SinewError
+from ..base.output import remove, writing
 from . import read_only
 
 IMPORTERS = {

@@ -8,8 +8,8 @@ import numpy as np
 from mathutils import Matrix, Vector
 from sinew.ik import Effector
 
-from ..core.errors import SinewError
-from ..core.ik import Posed, Tree
+from ..base.errors import SinewError
+from ..skinning.ik import Posed, Tree
 from . import spaces
 
 

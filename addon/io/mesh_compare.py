@@ -7,8 +7,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..core.arrays import read
-from ..core.influences import GroupWeights
+from ..skinning.arrays import read
+from ..skinning.influences import GroupWeights
 from . import mesh_io
 
 _SETTINGS = ("texspace_location", "texspace_size", "use_auto_texspace", "has_custom_normals")

@@ -13,14 +13,14 @@ import bmesh
 import bpy
 import numpy as np
 
-from ..core import sdef
-from ..core.arrays import read
-from ..core.errors import SinewError
-from ..core.influences import GroupWeights
-from ..core.shading import Shading
-from ..core.shape_keys import ShapeKeys
-from ..core.stage_mesh import Topology
-from ..core.surface import Surface, coincident_vertices
+from ..base.errors import SinewError
+from ..skinning import sdef
+from ..skinning.arrays import read
+from ..skinning.influences import GroupWeights
+from ..skinning.shading import Shading
+from ..skinning.shape_keys import ShapeKeys
+from ..skinning.stage_mesh import Topology
+from ..skinning.surface import Surface, coincident_vertices
 
 # The attribute with a mesh's vertices: as a whole it is read and written a hundred times as fast as the
 # vertices' "co".

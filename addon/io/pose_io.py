@@ -6,8 +6,8 @@ import numpy as np
 import sinew
 from mathutils import Euler, Quaternion
 
-from ..core.arrays import read
-from ..core.inbetween import Poses
+from ..skinning.arrays import read
+from .poses import Poses
 
 CHANNELS = 10
 

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.vectors import SAME_SPACE
+from ..skinning.vectors import SAME_SPACE
 
 # Before, a mesh object with a scale of 0 had no inverse, and Blender moved all its vertices to its origin.
 _MESH_HAS_INVERSE = bpy.app.version >= (5, 0)

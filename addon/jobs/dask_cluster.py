@@ -8,8 +8,8 @@ from collections.abc import Callable, Generator, Sequence
 import distributed
 import sinew
 
+from ..base.errors import SinewError
 from ..blender_process import Limits
-from ..core.errors import SinewError
 from .workers import do_task, end_blenders, failure, sentence, versions
 
 CONNECT_LIMIT = 30.0

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
-from ..core.errors import WrongUse
+from ..base.errors import WrongUse
 from .journal import UNFINISHED
 
 STANDARD_INPUT = "-"

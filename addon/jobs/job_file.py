@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any, TypeAlias
 
-from ..core.errors import WrongUse
-from ..core.parameters import parse
-from ..core.scale_rule import SCALE_RULES
+from ..base.errors import WrongUse
+from ..skinning.parameters import parse
+from ..skinning.scale_rule import SCALE_RULES
 
 Position: TypeAlias = tuple[str | int, ...]
 """The path to a value in a file: keys from the top, and an index for each entry of a list of tables."""

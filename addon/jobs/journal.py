@@ -15,9 +15,9 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path, PurePath
 
-from ..core.errors import SinewError, WrongUse
-from ..core.lock import try_lock
-from ..core.output import writing
+from ..base.errors import SinewError, WrongUse
+from ..base.lock import try_lock
+from ..base.output import writing
 
 NAME = "sinew-journal.jsonl"
 UNFINISHED = ".unfinished.blend"

@@ -6,11 +6,12 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..core.errors import SinewError
-from ..core.output import write_text
-from ..core.page import render, require_jinja
+from ..base.errors import SinewError
+from ..base.output import write_text
+from ..features.pages.templates import render, require_jinja
 
 PICTURES = "report-pictures"
+TEMPLATE = Path(__file__).with_name("report.html")
 
 
 def write_report(out: Path, summary: dict, rows: list[dict]) -> Path:
@@ -25,7 +26,7 @@ def write_report(out: Path, summary: dict, rows: list[dict]) -> Path:
     order = {"failed": 0, "written": 1, "unchanged": 2}
     rows = sorted(rows, key=lambda row: (order[row["status"]], not row.get("left_out")))
     values = {"summary": summary, "rows": rows, "facts": _facts, "table": _table, "folder": PICTURES}
-    write_text(out / "report.html", render("report.html", **values))
+    write_text(out / "report.html", render(TEMPLATE, **values))
     return out / "report.html"
 
 

@@ -16,9 +16,9 @@ from typing import TypeAlias
 
 import sinew
 
+from ..base.errors import SinewError
 from ..blender_process import BlenderLost, BlenderProcess, Limits, wait_for_any
-from ..core.errors import SinewError
-from ..core.opengl import default_engine
+from ..features.pages.opengl import default_engine
 from .journal import UNFINISHED, content_hash, stamp
 
 ATTEMPTS = 2

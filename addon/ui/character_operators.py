@@ -7,7 +7,7 @@ import bpy
 
 from ..attach import properties
 from ..attach.feature import Feature
-from ..core.errors import SinewError
+from ..base.errors import SinewError
 from ..deform import session
 from . import character
 from .operators import Named, OnSinewObjects, active_object, sinew_targets

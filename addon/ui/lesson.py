@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 from ..attach.feature import Feature
-from ..core.errors import SinewError
+from ..base.errors import SinewError
 from .operators import Named
 from .translations import tr
 

@@ -13,7 +13,7 @@ import rna_keymap_ui
 
 from ..attach import properties
 from ..attach.feature import Feature
-from ..core.engines import ENGINE_GROUP
+from ..skinning.engines import ENGINE_GROUP
 from . import character, operators
 from .stepped import OVER
 

@@ -10,7 +10,7 @@ from ..attach import attach, corrective_smooth, properties, stack, stage_setting
 from ..attach.feature import Feature
 from ..attach.stage_settings import method_items
 from ..attach.updates import is_rendering_in_window, updates_suspended
-from ..core.errors import SinewError
+from ..base.errors import SinewError
 from ..deform import session
 from ..io import addon_preferences
 from .translations import counted, tr

@@ -8,9 +8,9 @@ import bpy
 
 from ..attach.feature import Feature
 from ..attach.subscribers import subscribers
-from ..core.precompute import precomputations
 from ..deform import precompute_watch, precomputing
 from ..deform.skinned_object import SkinnedObject
+from ..skinning.precompute import precomputations
 from . import operators, sidebar, stepped
 from .translations import tr
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import bpy
 
 from ..attach import attach, other_tools, properties
-from ..core.icons import Deformer
+from ..attach.icons import Deformer
 from ..deform import lifecycle, session, small_meshes
 from ..deform.plan import ARMATURE_MODIFIER_MODES, State
 from . import operators

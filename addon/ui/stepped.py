@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.errors import SinewError
+from ..base.errors import SinewError
 from ..deform import characters, precompute_watch, session
 from ..io import pose_io
 from .operators import Acting

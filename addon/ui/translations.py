@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 
 from ..attach.feature import Feature
-from ..core.phrases import Phrase
+from ..base.phrases import Phrase
 
 _ENTRY = re.compile(r'^msgid ((?:".*"\n)+)msgstr ((?:".*"\n?)+)', re.MULTILINE)
 

@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 
 import sinew
+from sinew_addon.base.errors import SinewError, WrongUse
+from sinew_addon.base.output import folder_to_write
+from sinew_addon.base.scratch import scratch_folder
 from sinew_addon.commands.arguments import add_engine
-from sinew_addon.core.errors import SinewError, WrongUse
-from sinew_addon.core.output import folder_to_write
-from sinew_addon.core.scratch import scratch_folder
 from sinew_addon.prepare import leave_blender, prepare_blender
 
 from . import answers, joints, measure, meshes, page, paper, paths, studies, tables

@@ -13,9 +13,9 @@ import bpy
 import numpy as np
 import sinew
 from sinew_addon.attach import attach
-from sinew_addon.core.views import View, seen_extent, whole_view
 from sinew_addon.deform import characters
 from sinew_addon.features.pages.render import Studio
+from sinew_addon.features.pages.views import View, seen_extent, whole_view
 from sinew_addon.io import armature_io, files, mesh_io
 
 from . import meshes

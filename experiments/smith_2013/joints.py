@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import sinew
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.plots import new_figure, to_svg
+from sinew_addon.base.errors import SinewError
+from sinew_addon.features.pages.plots import new_figure, to_svg
 
 from .model import Fact, Figure, Picture
 from .paths import in_layout, layout

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "bench"))
 import common

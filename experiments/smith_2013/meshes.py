@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import sinew
-from sinew_addon.core.metrics import Shape
-from sinew_addon.core.surface import Surface
+from sinew_addon.features.measure.metrics import Shape
+from sinew_addon.skinning.surface import Surface
 
 from .model import Fact, Figure, Picture
 

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from html import escape
 from pathlib import Path
 
-from sinew_addon.core.output import write_text
+from sinew_addon.base.output import write_text
 
 from .model import Answer, Fact, Figure, Page, Picture, Row, Table
 

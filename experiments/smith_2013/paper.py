@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.output import write_text
-from sinew_addon.core.plots import COLOURS, new_figure, to_svg
+from sinew_addon.base.errors import SinewError
+from sinew_addon.base.output import write_text
+from sinew_addon.features.pages.plots import COLOURS, new_figure, to_svg
 
 NAMES = {"affine": "matrices", "quat_vec": "pairs", "dual_quat": "dual quaternions"}
 _COLOUR = dict(zip(NAMES, COLOURS, strict=False))

@@ -8,8 +8,8 @@ from types import ModuleType
 
 import numpy as np
 import sinew
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.plots import new_figure, to_svg
+from sinew_addon.base.errors import SinewError
+from sinew_addon.features.pages.plots import new_figure, to_svg
 
 from . import printed
 from .model import Fact, Figure, Picture

@@ -19,8 +19,8 @@ import routes
 import scenes
 import sinew_addon
 from sinew_addon.attach import normals
-from sinew_addon.core.precompute import precomputations
 from sinew_addon.deform import characters, precompute_watch, small_meshes
+from sinew_addon.skinning.precompute import precomputations
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 # The reader of glTF for engines, and what tests of Python have, too.

@@ -34,12 +34,12 @@ import scenes
 import whole_file
 from sinew_addon import cli, worker
 from sinew_addon.attach import attach
+from sinew_addon.base.errors import SinewError
 from sinew_addon.blender_process import Limits
 from sinew_addon.commands import info
 from sinew_addon.commands.console import Console
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.export_check import CAUSES
 from sinew_addon.deform import characters, session
+from sinew_addon.features.gltf.export_check import CAUSES
 from sinew_addon.io import files
 from sinew_addon.jobs import workers
 from sinew_addon.jobs.tasks import preflight

@@ -42,9 +42,9 @@ import routes
 import scenes
 from mathutils import Euler, Matrix, Vector
 from sinew_addon.attach import attach, node_group, properties, stage_settings, undeformed
-from sinew_addon.core import skin_stack
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.deform import session
+from sinew_addon.skinning import skin_stack
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import fuzz_reference

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import sinew
-from sinew_addon.core import skin_stack
+from sinew_addon.skinning import skin_stack
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import bulge_limit_reference
@@ -22,8 +22,8 @@ import delta_mush_reference
 import reference
 import twist_spread_reference
 import weld_reference
-from sinew_addon.core.bulge_limit import segments
-from sinew_addon.core.twist_spread import blend_of
+from sinew_addon.skinning.bulge_limit import segments
+from sinew_addon.skinning.twist_spread import blend_of
 
 METHODS = {method.name: method for method in sinew.methods()}
 MARGIN = 1e-3

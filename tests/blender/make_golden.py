@@ -26,9 +26,9 @@ import sinew
 import sinew_addon
 from mathutils import Euler, Quaternion
 from sinew_addon.attach.stage_settings import LENGTHS
-from sinew_addon.core.parameters import Value
 from sinew_addon.deform import characters, session
 from sinew_addon.io import mesh_io, spaces
+from sinew_addon.skinning.parameters import Value
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
 # Incremented if readers of earlier files would misread these.

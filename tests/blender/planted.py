@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.flex.limits import Table
-from sinew_addon.core.flex.verdict import Verdict
-from sinew_addon.core.steps import result_of
+from sinew_addon.base.steps import result_of
 from sinew_addon.deform import characters
 from sinew_addon.features.flex import flex
+from sinew_addon.features.flex.limits import Table
+from sinew_addon.features.flex.verdict import Verdict
 from sinew_addon.io import files, mesh_io
 
 _TRUNK = {"chest": "spine_03", "neck": "neck_01", "head": "head", "hips": "pelvis", "spine": "spine_02"}

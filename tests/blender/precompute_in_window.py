@@ -65,7 +65,7 @@ def make_hero() -> None:
 
 def forget() -> None:
     """Forgets all results."""
-    precomputations = sinew("core.precompute").precomputations
+    precomputations = sinew("skinning.precompute").precomputations
     precomputations._made.clear()
     precomputations.cache = None
     with window.in_view3d():
@@ -96,7 +96,7 @@ def add_sinew() -> Iterator[None]:
 
 
 def see_it_found() -> Generator[None, None, np.ndarray]:
-    sinew("core.precompute").precomputations.cache = None
+    sinew("skinning.precompute").precomputations.cache = None
     started = time.monotonic()
     hero().sinew.method = "cor"
     facts["seconds_to_set"] = time.monotonic() - started
@@ -122,7 +122,7 @@ def stop_and_go_on() -> Iterator[None]:
     )
     area = window.area_of("VIEW_3D")
     window.press("ESC", (area.width // 2, area.height // 2))
-    yield from window.until(lambda: not sinew("core.precompute").precomputations.running, "its end")
+    yield from window.until(lambda: not sinew("skinning.precompute").precomputations.running, "its end")
     yield from window.wait()
     facts["plan_stopped"] = plan()
     facts["reason_stopped"] = sinew("deform.session").state_of(hero()).plan.reason
@@ -163,7 +163,7 @@ def end_while_it_runs() -> Iterator[None]:
     yield
     forget()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    facts["running_after_load"] = len(sinew("core.precompute").precomputations.running)
+    facts["running_after_load"] = len(sinew("skinning.precompute").precomputations.running)
     yield
     make_hero()
     sinew("attach.attach").add(hero(), "cor")

@@ -14,9 +14,9 @@ import numpy as np
 from mathutils import Quaternion, Vector
 from sinew_addon.attach import attach, node_group, properties, stack
 from sinew_addon.attach.updates import updates_suspended
-from sinew_addon.core import sdef
 from sinew_addon.deform import session
-from sinew_addon.features.heat import live
+from sinew_addon.features.measure import live
+from sinew_addon.skinning import sdef
 
 # Documented tolerance against the Armature modifier, relative to the bounding box's diagonal.
 TOLERANCE = 1e-5

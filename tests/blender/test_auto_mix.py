@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.core.auto_mix import VertexErrors
 from sinew_addon.deform import session
 from sinew_addon.features.auto_mix import auto_mix
+from sinew_addon.features.auto_mix.shares import VertexErrors
 
 FRAMES = range(1, 12)
 SMOOTHING = 0.3

@@ -14,9 +14,8 @@ import pytest
 import scenes
 from program import checked, run_sinew, without_sinew
 from sinew_addon.attach import properties
-from sinew_addon.core import bake as core
-from sinew_addon.core.errors import SinewError
-from sinew_addon.features.bake import bake
+from sinew_addon.base.errors import SinewError
+from sinew_addon.features.bake import bake, baked_files
 from sinew_addon.io import actions
 
 FRAMES = list(range(1, 12))
@@ -24,8 +23,8 @@ TOLERANCE = 1e-6
 METHOD = "dq"
 # Bakes to bones only approximate the shape: test_bake_bones.py.
 # Textures have tests of their own, too.
-EXACT = [kind for kind in core.KINDS if kind not in (core.BONES, core.VAT)]
-SUFFIXES = core.FILES
+EXACT = [kind for kind in baked_files.KINDS if kind not in (baked_files.BONES, baked_files.VAT)]
+SUFFIXES = baked_files.FILES
 
 READ = """
 import sys, bpy, numpy as np
@@ -206,7 +205,7 @@ def small_disk(tmp_path):
 
 
 def test_a_disk_that_fills_up_meanwhile(small_disk):
-    cache = core.PointCache(small_disk / "a.mdd", "mdd", [1], 100_000, 24.0)
+    cache = baked_files.PointCache(small_disk / "a.mdd", "mdd", [1], 100_000, 24.0)
     with pytest.raises(SinewError, match=r"a\.mdd: can not be written: No space left on device"):
         cache.write(np.zeros((100_000, 3), dtype=np.float32))
     cache.discard()
@@ -216,11 +215,11 @@ def test_a_disk_that_fills_up_meanwhile(small_disk):
 def test_headers(tmp_path):
     points = np.arange(6, dtype=np.float32).reshape(2, 3)
     for kind in ("mdd", "pc2"):
-        cache = core.PointCache(tmp_path / f"a.{kind}", kind, [12, 14], 2, 24.0)
+        cache = baked_files.PointCache(tmp_path / f"a.{kind}", kind, [12, 14], 2, 24.0)
         cache.write(points)
         cache.write(points + 1)
         cache.close()
-        core.publish(cache.unfinished, cache.path)
+        baked_files.publish(cache.unfinished, cache.path)
     mdd = (tmp_path / "a.mdd").read_bytes()
     assert struct.unpack(">iiff12f", mdd) == (2, 2, 0.5, np.float32(14 / 24), *range(6), *range(1, 7))
     pc2 = (tmp_path / "a.pc2").read_bytes()
@@ -323,7 +322,7 @@ def test_several_moving_objects(arm, tmp_path, kind, stretched):
         assert scenes.worst(points, expected) <= 3e-6 * scenes.diagonal(first)
 
 
-@pytest.mark.parametrize("kind", core.EXPORTS)
+@pytest.mark.parametrize("kind", baked_files.EXPORTS)
 def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
     """A hat on a bone and a feather on the hat; not objects parented to the armature itself, nor hidden
     ones."""
@@ -405,7 +404,7 @@ def test_a_library_override_whose_library_keys_visibility(arm, tmp_path, kind):
     assert "a library override can not have shape keys of its own" in refused.stderr
 
 
-@pytest.mark.parametrize("kind", core.KINDS)
+@pytest.mark.parametrize("kind", baked_files.KINDS)
 def test_the_scene_stays_at_its_frame(arm, tmp_path, kind):
     obj, _path = arm
     scene = bpy.context.scene
@@ -439,7 +438,7 @@ LONG = 3000
 
 @pytest.mark.slow
 @program.needs_interrupts
-@pytest.mark.parametrize("kind", core.KINDS)
+@pytest.mark.parametrize("kind", baked_files.KINDS)
 def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
     """Also within an exporter's single call for all frames."""
     _obj, path = arm

@@ -12,9 +12,9 @@ import numpy as np
 import program
 import pytest
 import scenes
-from sinew_addon.core.bake import EXPORTS
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.features.bake import bake, bake_apart
+from sinew_addon.features.bake.baked_files import EXPORTS
 from test_bake import FRAMES, METHOD, read_elsewhere
 
 KINDS = list(EXPORTS)

@@ -13,9 +13,9 @@ import read_glb
 import scenes
 from program import checked, run_sinew, without_sinew
 from sinew_addon.attach import point_store
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.helper_bones import HelperOptions
+from sinew_addon.base.errors import SinewError
 from sinew_addon.features.bake import bake
+from sinew_addon.features.bake.helper_bones import HelperOptions
 from sinew_addon.features.heat import bake_error, measures
 from sinew_addon.io import actions
 from test_bake import FRAMES, read_elsewhere

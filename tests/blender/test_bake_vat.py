@@ -13,9 +13,8 @@ import pytest
 import read_glb
 import scenes
 from program import run_sinew
-from sinew_addon.core import vat
-from sinew_addon.core.errors import SinewError
-from sinew_addon.features.bake import bake
+from sinew_addon.base.errors import SinewError
+from sinew_addon.features.bake import bake, vat
 from whole_file import assert_same, content
 
 FRAMES = [1, 4, 6, 11]

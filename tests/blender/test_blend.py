@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blended actions of an armature: what Blender plays equals what the core computes from what Blender
+"""Blended actions of an armature: what Blender plays equals what the mathematics computes from what Blender
 played."""
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ import walks
 from mathutils import Matrix
 from program import complaint, run_sinew
 from sinew import quat_vec
-from sinew_addon.core.motion import blend as core
-from sinew_addon.core.motion.blend import Settings
-from sinew_addon.core.steps import result_of
-from sinew_addon.features.blend import blend_actions
-from sinew_addon.io import actions, clips, files
+from sinew_addon.base.steps import result_of
+from sinew_addon.features.blend import blend_actions, clips_io, motion
+from sinew_addon.features.blend.motion import Settings
+from sinew_addon.io import actions, files
 
 CLOSE = 2e-5
 MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
@@ -78,7 +77,7 @@ def make_walks(modes=("QUATERNION",)):
 
 def film(armature, frames):
     """float64 [frames, bones, 4, 4]: the evaluated pose in armature space, in the order of the rig."""
-    order = [armature.pose.bones.find(name) for name in clips.rig_of(armature).names]
+    order = [armature.pose.bones.find(name) for name in clips_io.rig_of(armature).names]
     return scenes.at_frames(frames, lambda: scenes.pose_of(armature)[order])
 
 
@@ -94,7 +93,7 @@ def played(armature, action, frames):
 def test_a_clip_is_what_blender_plays(modes):
     armature, (walk, run), pair = make_walks(modes)
     for action, source in ((walk, pair[0]), (run, pair[1])):
-        clip = result_of(clips.read(armature, action))
+        clip = result_of(clips_io.read(armature, action))
         assert clip.length == source.length
         assert not clip.is_cyclic
         shown = played(armature, action, range(1, 2 + round(clip.length)))
@@ -111,8 +110,8 @@ def test_random_poses_with_scale_come_back_in_every_rotation_mode():
     # A connected bone has no location.
     clip.poses.rigid[:, [walks.is_connected(name) for name in clip.rig.names], 4:] = 0.0
     action = key_clip(armature, clip)
-    read = result_of(clips.read(armature, action))
-    again = result_of(clips.write(armature, read, "again", 1.0, set()))
+    read = result_of(clips_io.read(armature, action))
+    again = result_of(clips_io.write(armature, read, "again", 1.0, set()))
     frames = range(1, 14)
     assert np.abs(played(armature, again, frames) - played(armature, action, frames)).max() < CLOSE
     for curve in actions.all_curves(again, actions.slot_for(again, armature)):
@@ -125,13 +124,13 @@ def test_random_poses_with_scale_come_back_in_every_rotation_mode():
 # --- Blending
 
 
-@pytest.mark.parametrize("method", core.METHODS)
+@pytest.mark.parametrize("method", motion.METHODS)
 def test_blender_plays_the_blend(method):
     armature, chosen, pair = make_walks(MODES)
     settings = Settings(method=method, cycles=2)
     made = result_of(blend_actions.make(armature, chosen, (0.4, 0.6), settings))
-    blend = core.blend(pair, (0.4, 0.6), settings)
-    order = [blend.rig.names.index(name) for name in clips.rig_of(armature).names]
+    blend = motion.blend(pair, (0.4, 0.6), settings)
+    order = [blend.rig.names.index(name) for name in clips_io.rig_of(armature).names]
     shown = played(armature, made.action, range(1, 1 + made.frames))
     wanted = quat_vec.to_affine(blend.rig.to_armature(blend.poses.rigid))[:, order]
     if method != "matrix_linear":
@@ -211,7 +210,7 @@ def test_the_command_writes_a_copy(walking, tmp_path):
     assert armature.animation_data.action.name == "Blend WALK RUN"
     assert {"WALK", "RUN"} < set(bpy.data.actions.keys())
     shown = film(armature, (1, 51))
-    hips = clips.rig_of(armature).names.index("hips")
+    hips = clips_io.rig_of(armature).names.index("hips")
     assert np.abs(shown[1, hips, :3, 3] - shown[0, hips, :3, 3] - (0, -1.9, 0)).max() < CLOSE
     assert "--overwrite" in run_sinew("blend", walking, *options, status=1).stderr
     run_sinew("blend", walking, *options, "--overwrite", "--weights-from", 1, 0, "--name", "To a Run")

@@ -11,8 +11,8 @@ import pytest
 import routes
 import scenes
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.bulge_limit import segments
 from sinew_addon.deform import session
+from sinew_addon.skinning.bulge_limit import segments
 
 
 def limit(obj: bpy.types.Object, **values: object) -> None:

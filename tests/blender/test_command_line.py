@@ -14,12 +14,12 @@ import pytest
 import scenes
 from program import complaint, run_program, run_sinew
 from sinew_addon.attach import properties
+from sinew_addon.base.steps import result_of
 from sinew_addon.cli import make_parser
-from sinew_addon.core.engines import METHODS
-from sinew_addon.core.steps import result_of
 from sinew_addon.features.action_copy import action_copy
 from sinew_addon.features.inbetween import inbetween_bake
 from sinew_addon.io import files
+from sinew_addon.skinning.engines import METHODS
 
 
 @pytest.fixture

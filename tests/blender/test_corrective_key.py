@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.features.corrective import corrective_key
 
 

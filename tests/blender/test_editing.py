@@ -11,7 +11,7 @@ import pytest
 import scenes
 import whole_file
 from sinew_addon.attach import attach, other_tools, point_store, properties, stack
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.deform import safe_mode, session, survey
 from sinew_addon.deform.plan import State
 from sinew_addon.io import armature_io

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.core import engines
 from sinew_addon.io import armature_io
+from sinew_addon.skinning import engines
 
 FRAME = 8
 

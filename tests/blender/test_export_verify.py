@@ -19,10 +19,9 @@ import scenes
 from mathutils import Matrix
 from program import run_sinew
 from scipy.spatial import cKDTree
-from sinew_addon.core import played
-from sinew_addon.core.export_check import CAUSES, EXPLAINED
 from sinew_addon.features.bake import bake_apart
-from sinew_addon.features.gltf import feature, verify
+from sinew_addon.features.gltf import feature, played, verify
+from sinew_addon.features.gltf.export_check import CAUSES, EXPLAINED
 from test_segment_bones import make_bendy, world_rest
 
 FRAMES = list(range(1, 12))

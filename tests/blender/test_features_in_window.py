@@ -10,7 +10,7 @@ from pathlib import Path
 
 import in_window
 import pytest
-from sinew_addon.core.bake import EXPORTS, KINDS
+from sinew_addon.features.bake.baked_files import EXPORTS, KINDS
 from sinew_addon.ui import translations
 
 pytestmark = pytest.mark.window

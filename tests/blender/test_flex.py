@@ -18,9 +18,9 @@ import scenes
 from planted import HUMAN, PLANTS, Plant, Rig
 from program import run_sinew
 from sinew_addon.attach import properties
-from sinew_addon.core.flex.limits import Table
-from sinew_addon.core.steps import result_of
+from sinew_addon.base.steps import result_of
 from sinew_addon.features.flex import flex
+from sinew_addon.features.flex.limits import Table
 from whole_file import assert_same, content
 
 ROOT = Path(__file__).resolve().parents[2]

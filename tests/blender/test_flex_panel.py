@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import read_page
 import scenes
-from sinew_addon.core.flex.verdict import Finding
 from sinew_addon.features.flex import feature
+from sinew_addon.features.flex.verdict import Finding
 from sinew_addon.io import armature_io
 from whole_file import assert_same, content
 

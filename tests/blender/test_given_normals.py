@@ -12,10 +12,10 @@ import pytest
 import routes
 import scenes
 from sinew_addon.attach import node_group, normals, properties, stack
-from sinew_addon.core.opengl import has_opengl
-from sinew_addon.core.shading import Shading, SurfaceNormals
-from sinew_addon.core.stage_mesh import Topology
 from sinew_addon.deform import session
+from sinew_addon.features.pages.opengl import has_opengl
+from sinew_addon.skinning.shading import Shading, SurfaceNormals
+from sinew_addon.skinning.stage_mesh import Topology
 
 LEAVE, GIVE = properties.LEAVE_NORMALS, properties.BY_SINEW
 NEAR = 1e-6

@@ -6,8 +6,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from sinew_addon.core.influences import GroupWeights
 from sinew_addon.io import mesh_io
+from sinew_addon.skinning.influences import GroupWeights
 
 
 def in_a_loop(mesh: bpy.types.Mesh) -> GroupWeights:

@@ -12,11 +12,11 @@ import test_linked_data
 import test_shown_colours
 import whole_file
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.heat import HeatScale, linear
-from sinew_addon.core.metrics import METRICS
 from sinew_addon.deform import characters, session
-from sinew_addon.features.heat import heat_legend, heat_map, heat_nodes, live, measures
-from sinew_addon.features.pages import measure
+from sinew_addon.features.heat import heat_legend, heat_map, heat_nodes, measures
+from sinew_addon.features.measure import live, subjects
+from sinew_addon.features.measure.heat_scale import HeatScale, linear
+from sinew_addon.features.measure.metrics import METRICS
 
 
 def shown_colours(obj: bpy.types.Object) -> np.ndarray:
@@ -33,8 +33,8 @@ def expected_fields(objects: list[bpy.types.Object], methods: tuple[str, str], f
     """Each measure at each vertex of all objects, from Blender's own evaluations, independently of how
     the heat map is made. Changes the methods."""
     scene = bpy.context.scene
-    subject = measure.gather(scene, objects)
-    shapes = measure.shapes_at(subject, methods, frame)
+    subject = subjects.gather(scene, objects)
+    shapes = subjects.shapes_at(subject, methods, frame)
     measured = subject.gauge.measure(*(shapes[method] for method in methods))
     return {name: measured.field(name) for name in METRICS} | {"diagonal": subject.gauge.rest.diagonal}
 

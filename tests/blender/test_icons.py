@@ -16,7 +16,7 @@ import pytest
 import scenes
 from conftest import halved
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.icons import Deformer
+from sinew_addon.attach.icons import Deformer
 from sinew_addon.ui import state_text
 
 VIEWS = ("viewport", "render")

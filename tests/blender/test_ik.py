@@ -13,7 +13,7 @@ import scenes
 import sinew
 from mathutils import Matrix, Vector
 from sinew_addon import cli
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.features.action_copy import action_copy
 from sinew_addon.io import files, ik_io
 

@@ -10,7 +10,7 @@ import routes
 import scenes
 from bpy.app.handlers import persistent
 from sinew_addon.attach import attach, properties
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.io import mesh_compare, mesh_io
 from test_against_armature_modifier import assert_equal_to_modifier
 

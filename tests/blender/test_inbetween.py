@@ -12,8 +12,8 @@ import scenes
 import sinew
 from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import Rotation
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.steps import result_of
+from sinew_addon.base.errors import SinewError
+from sinew_addon.base.steps import result_of
 from sinew_addon.features.action_copy import action_copy
 from sinew_addon.features.inbetween import inbetween_bake, keyed_poses
 from sinew_addon.io import actions

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import attach, properties, stack
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 
 FRAMES = [1, 4, 11]
 

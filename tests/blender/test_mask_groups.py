@@ -8,7 +8,7 @@ import pytest
 import scenes
 from sinew_addon.deform import session, survey
 from sinew_addon.features.diagnose import diagnose
-from sinew_addon.features.pages import measure
+from sinew_addon.features.measure import subjects
 
 GROUP = "a mask"
 
@@ -102,7 +102,7 @@ def reported(obj) -> dict[str, list[str]]:
     facts = survey.describe_in_file(obj).warnings
     diagnose.check(bpy.context.scene, [obj], 4)
     found = {finding.name: finding for finding in diagnose.of(obj).findings}
-    (part,) = measure.gather(bpy.context.scene, [obj]).parts
+    (part,) = subjects.gather(bpy.context.scene, [obj]).parts
     on_page = {finding.name: finding for finding in part.edited.findings(4)}
     return {
         "facts": [

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.features.diagnose import diagnose, mending
 from sinew_addon.io import mesh_io
 from test_diagnostics_panel import LEFTOVER, MANY, SMALL, UNWEIGHTED, faulty_arm, found, twisted_arm

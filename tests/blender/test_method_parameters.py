@@ -11,7 +11,7 @@ import scenes
 import sinew
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
-from sinew_addon.core.engines import METHODS
+from sinew_addon.skinning.engines import METHODS
 from test_sdef import make_model
 
 FRAME = 9

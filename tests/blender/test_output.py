@@ -20,9 +20,9 @@ import pytest
 import scenes
 from program import RUN, checked, complaint, disk, run_sinew, start_sinew, with_sinew
 from sinew_addon import cli
-from sinew_addon.core import output
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.names import as_file_name
+from sinew_addon.base import output
+from sinew_addon.base.errors import SinewError
+from sinew_addon.base.names import as_file_name
 
 oldest_and_newest = pytest.mark.skipif(
     bpy.app.version[:2] not in ((4, 2), (5, 2)), reason="long: runs with the oldest and the newest Blender"
@@ -358,7 +358,7 @@ def test_scratch_folders_of_killed_runs_go(tmp_path, inputs):
     (temporary / "sinew-of-an-older-version").mkdir()
     (temporary / "other").mkdir()
     program = (
-        "from sinew_addon.core.scratch import ScratchFolder\n"
+        "from sinew_addon.base.scratch import ScratchFolder\n"
         "folder = ScratchFolder(); (folder.path / 'deep').mkdir(); print(folder.path, flush=True); input()"
     )
 

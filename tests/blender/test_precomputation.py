@@ -19,11 +19,12 @@ from conftest import look_until_done
 from program import run_sinew
 from sinew_addon.attach import attach, properties, stored_vertex_data
 from sinew_addon.attach.subscribers import subscribers
-from sinew_addon.core import interrupt, vertex_data
-from sinew_addon.core.file_cache import FileCache
-from sinew_addon.core.precompute import precomputations
+from sinew_addon.base import interrupt
+from sinew_addon.base.file_cache import FileCache
 from sinew_addon.deform import characters, precompute_watch, precomputing, session
 from sinew_addon.deform.plan import State
+from sinew_addon.skinning import vertex_data
+from sinew_addon.skinning.precompute import precomputations
 
 FRAME = 8
 
@@ -516,7 +517,7 @@ def test_reskin_puts_it_into_the_file(gate, tmp_path):
 
 
 def test_the_folder_has_what_no_file_has(gate, monkeypatch):
-    monkeypatch.setattr("sinew_addon.core.precompute.SECONDS_WORTH_A_FILE", 0.0)
+    monkeypatch.setattr("sinew_addon.skinning.precompute.SECONDS_WORTH_A_FILE", 0.0)
     for _ in range(2):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         forget_made()

@@ -8,10 +8,10 @@ import bpy
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.core import precompute
-from sinew_addon.core.precompute import precomputations
 from sinew_addon.deform import precomputing, safe_mode, session
 from sinew_addon.io import addon_preferences, units
+from sinew_addon.skinning import precompute
+from sinew_addon.skinning.precompute import precomputations
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scenes
 from program import run_sinew
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from sinew_addon.deform import characters
 from sinew_addon.io import files
 

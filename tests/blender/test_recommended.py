@@ -14,8 +14,8 @@ import scenes
 from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
-from sinew_addon.core import battery
-from sinew_addon.core.steps import result_of
+from sinew_addon.base.steps import result_of
+from sinew_addon.features.measure import battery
 from sinew_addon.features.suggest import recommend
 from whole_file import assert_same, content
 

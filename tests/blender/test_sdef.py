@@ -9,8 +9,8 @@ import reference
 import routes
 import scenes
 from sinew_addon.attach import attach
-from sinew_addon.core import sdef
 from sinew_addon.deform import session
+from sinew_addon.skinning import sdef
 
 
 def make_model() -> tuple[bpy.types.Object, bpy.types.Object]:

@@ -15,8 +15,8 @@ import scenes
 from pygltflib import GLTF2
 from scipy.spatial import cKDTree
 from sinew_addon import cli
-from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake, bake_bones
+from sinew_addon.features.bake.helper_bones import HelperOptions
 from sinew_addon.features.gltf import export
 
 FRAMES = list(range(1, 12))

@@ -11,8 +11,8 @@ import pytest
 import scenes
 import whole_file
 from sinew_addon.attach import attach, normals, properties, stack
-from sinew_addon.core.scale_rule import IGNORED
 from sinew_addon.deform import session, small_meshes
+from sinew_addon.skinning.scale_rule import IGNORED
 from sinew_addon.ui import state_text
 
 FRAMES = [1, 6, 11]

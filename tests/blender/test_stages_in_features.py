@@ -18,12 +18,11 @@ import test_heat_map
 import trimesh
 from program import run_sinew
 from sinew_addon.attach import properties
-from sinew_addon.core.heat import HeatScale, linear
-from sinew_addon.core.metrics import METRICS, Measured
 from sinew_addon.deform import characters
 from sinew_addon.features.bake import bake
-from sinew_addon.features.heat import worst_frames
-from sinew_addon.features.pages import measure
+from sinew_addon.features.measure import subjects, worst_frames
+from sinew_addon.features.measure.heat_scale import HeatScale, linear
+from sinew_addon.features.measure.metrics import METRICS, Measured
 
 FRAMES = [1, 6, 11]
 GROUP = "painted"
@@ -80,8 +79,8 @@ def with_stage(obj: bpy.types.Object, stage: str) -> tuple[np.ndarray, np.ndarra
 def measured(obj: bpy.types.Object, frame: int, shape: np.ndarray) -> Measured:
     """The measures of the object's final mesh, which is `shape`, from Blender's own evaluations;
     distances are to the Armature modifier. Leaves the object under dq."""
-    subject = measure.gather(bpy.context.scene, [obj])
-    shapes = measure.shapes_at(subject, ("dq", characters.BLENDER), frame)
+    subject = subjects.gather(bpy.context.scene, [obj])
+    shapes = subjects.shapes_at(subject, ("dq", characters.BLENDER), frame)
     np.testing.assert_allclose(shapes["dq"], shape, atol=1e-6)
     found = subject.gauge.measure(shapes["dq"], shapes[characters.BLENDER])
     characters.use_method(obj, "dq")

@@ -19,9 +19,9 @@ import test_worst_frames
 from sinew_addon.features.auto_mix import auto_mix
 from sinew_addon.features.bake import bake
 from sinew_addon.features.blend import blend_actions
-from sinew_addon.features.heat import worst_frames
 from sinew_addon.features.ik import ik_bake
 from sinew_addon.features.inbetween import inbetween_bake
+from sinew_addon.features.measure import worst_frames
 from sinew_addon.features.suggest import recommend, suggest
 from sinew_addon.io import actions, ik_io
 from sinew_addon.ui import stepped

@@ -10,12 +10,11 @@ import scenes
 import sinew
 import test_recommended
 from sinew_addon.attach import properties
-from sinew_addon.core import thumbnail
-from sinew_addon.core.suggestion import CRITERIA, MEASURED, Suggestion
 from sinew_addon.features.flex import feature as flex_feature
-from sinew_addon.features.heat import worst_frames
-from sinew_addon.features.suggest import recommend, suggest, worst_pictures
-from sinew_addon.features.suggest.crossings import crossing_triangles
+from sinew_addon.features.measure import worst_frames
+from sinew_addon.features.measure.crossings import crossing_triangles
+from sinew_addon.features.measure.suggestion import CRITERIA, MEASURED, Suggestion
+from sinew_addon.features.suggest import recommend, suggest, thumbnail, worst_pictures
 from sinew_addon.io import actions
 from sinew_addon.ui import stepped
 

@@ -12,8 +12,8 @@ import routes
 import scenes
 from mathutils import Quaternion
 from sinew_addon.attach import properties, stage_settings
-from sinew_addon.core.twists import Twists
 from sinew_addon.deform import session
+from sinew_addon.skinning.twists import Twists
 
 
 def spread(obj: bpy.types.Object, **values: object) -> None:

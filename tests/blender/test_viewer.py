@@ -15,8 +15,9 @@ from bone_buffer import bone_buffer
 from conftest import REPOSITORY
 from mathutils import Euler
 from program import run_sinew
-from sinew_addon.core import heat, viewer
-from sinew_addon.core.influences import Influences
+from sinew_addon.features.measure import heat_scale
+from sinew_addon.features.pages import viewer_page
+from sinew_addon.skinning.influences import Influences
 
 FRAMES = [1, 6, 11]
 GROUP = "Painted"
@@ -281,7 +282,7 @@ def test_bones_are_as_the_shaders_read_them():
     nothing, none = np.empty((0, 3), np.float32), np.empty((0, 2), np.int32)
     each = np.arange(201, dtype=np.int32)
     influences = Influences(each, each[:-1], np.ones(200, np.float32))
-    part = viewer.Part("", np.zeros((200, 3), np.float32), influences, nothing, none, rest, "lbs")
+    part = viewer_page.Part("", np.zeros((200, 3), np.float32), influences, nothing, none, rest, "lbs")
     part.add_frame(posed, np.eye(4))
     mine, its = part.arrays()["palettes"][0], bone_buffer(posed, rest)
     np.testing.assert_allclose(mine[:, :3], its[:, :3], atol=1e-5)
@@ -294,12 +295,12 @@ def test_bones_are_as_the_shaders_read_them():
 def luminance(colour):
     digits = colour * 2 if len(colour) == 3 else colour
     shares = np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)]) / 255.0
-    return heat.linear(shares) @ (0.2126, 0.7152, 0.0722)
+    return heat_scale.linear(shares) @ (0.2126, 0.7152, 0.0722)
 
 
 def test_texts_have_contrast():
     """At least 4.5 to 1 (WCAG 2.2, 1.4.3), light and dark."""
-    style = (viewer.FOLDER / "style.css").read_text(encoding="utf-8")
+    style = (viewer_page.FOLDER / "style.css").read_text(encoding="utf-8")
     themes = re.findall(r":root \{(.*?)\}", style, re.DOTALL)
     assert len(themes) == 2
     for theme in themes:
@@ -312,4 +313,4 @@ def test_texts_have_contrast():
 
 @pytest.mark.parametrize("name", ["sinew.glsl", "sinew.wgsl"])
 def test_the_shader_is_that_of_engines(name):
-    assert (viewer.FOLDER / name).read_bytes() == (REPOSITORY / "shaders" / name).read_bytes()
+    assert (viewer_page.FOLDER / name).read_bytes() == (REPOSITORY / "shaders" / name).read_bytes()

@@ -7,9 +7,10 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.core.comparison import peaks
-from sinew_addon.core.metrics import METRICS
-from sinew_addon.features.heat import heat_map, heat_panel, live, measures, worst_frames
+from sinew_addon.features.heat import heat_map, heat_panel, measures
+from sinew_addon.features.measure import live, worst_frames
+from sinew_addon.features.measure.comparison import peaks
+from sinew_addon.features.measure.metrics import METRICS
 from sinew_addon.ui import stepped
 
 

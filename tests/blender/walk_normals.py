@@ -10,9 +10,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from sinew_addon.attach import properties, upstream_proxy
-from sinew_addon.core.arrays import read
-from sinew_addon.core.shading import Shading, SurfaceNormals
 from sinew_addon.io import mesh_io
+from sinew_addon.skinning.arrays import read
+from sinew_addon.skinning.shading import Shading, SurfaceNormals
 
 # In each component.
 NEAR = 1e-4

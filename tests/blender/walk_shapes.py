@@ -19,10 +19,10 @@ import numpy as np
 import sinew
 import walk_sides
 import weld_reference
-from sinew_addon.core.influences import Influences
-from sinew_addon.core.limbs import skin_of
-from sinew_addon.core.vectors import transformed
 from sinew_addon.io import armature_io
+from sinew_addon.skinning.influences import Influences
+from sinew_addon.skinning.limbs import skin_of
+from sinew_addon.skinning.vectors import transformed
 
 # Parameters, by their full names.
 DEFAULTS = {f"{m.name}.{p.id}": p.default for m in sinew.methods() for p in m.parameters}

@@ -339,10 +339,10 @@ class BlenderSide(Side):
         """What was found and repaired; None for nothing. Uses only the library's weights, not the
         add-on's interpretation."""
         from sinew_addon.attach.modifier_options import ModifierOptions
-        from sinew_addon.core.diagnostics import check_weights
-        from sinew_addon.core.mend import WeightMender
-        from sinew_addon.core.vectors import transformed
+        from sinew_addon.features.diagnose.mend import WeightMender
+        from sinew_addon.features.measure.diagnostics import check_weights
         from sinew_addon.io import armature_io, mesh_io, spaces
+        from sinew_addon.skinning.vectors import transformed
 
         depsgraph = bpy.context.evaluated_depsgraph_get()
         (modifier,) = armature_modifiers(obj)

@@ -17,14 +17,14 @@ import sinew
 import sinew_addon
 from sinew_addon.attach import attach, other_tools, properties, stack, stage_settings, undeformed
 from sinew_addon.attach.subscribers import notify, subscribers
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.helper_bones import HelperOptions
-from sinew_addon.core.precompute import precomputations
+from sinew_addon.base.errors import SinewError
 from sinew_addon.deform import handlers, precompute_watch, safe_mode, session, small_meshes
 from sinew_addon.features.bake import bake
+from sinew_addon.features.bake.helper_bones import HelperOptions
 from sinew_addon.features.compare import comparison, comparison_state
 from sinew_addon.features.corrective import corrective_key
 from sinew_addon.features.diagnose import diagnose, mending
+from sinew_addon.skinning.precompute import precomputations
 from sinew_addon.ui import presets
 from walk_sides import (
     MENDS,

@@ -3,12 +3,12 @@
 
 import numpy as np
 import pytest
-from sinew_addon.core import auto_mix
-from sinew_addon.core.auto_mix import VertexErrors
-from sinew_addon.core.influences import Influences
-from sinew_addon.core.metrics import FrameOfRig, Gauge
-from sinew_addon.core.steps import result_of
-from sinew_addon.core.surface import Surface
+from sinew_addon.base.steps import result_of
+from sinew_addon.features.auto_mix import shares as auto_mix
+from sinew_addon.features.auto_mix.shares import VertexErrors
+from sinew_addon.features.measure.metrics import FrameOfRig, Gauge
+from sinew_addon.skinning.influences import Influences
+from sinew_addon.skinning.surface import Surface
 from tube import Tube
 
 SMOOTHING, RADIUS = 0.8, 0.5

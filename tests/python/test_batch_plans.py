@@ -10,8 +10,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from sinew_addon.base.errors import SinewError, WrongUse
 from sinew_addon.commands import batch
-from sinew_addon.core.errors import SinewError, WrongUse
 from sinew_addon.jobs.inputs import plan_jobs
 from sinew_addon.jobs.job_file import ObjectRule, Settings, keys, markdown, read_job_file
 from sinew_addon.jobs.journal import NAME, Journal, stamp

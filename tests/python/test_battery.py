@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sinew_addon.core import battery
-from sinew_addon.core.rig import Bones
+from sinew_addon.features.measure import battery
+from sinew_addon.skinning.rig import Bones
 
 # Parent, head and tail of a figure that faces -Y, its left at +X.
 TRUNK = {

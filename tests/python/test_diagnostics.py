@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import reference
 from rigs import about, random_rig
-from sinew_addon.core.diagnostics import PoseCheck, check_weights
-from sinew_addon.core.influences import GroupWeights, Influences, entries_of_bones
-from sinew_addon.core.rig import Bones, Weighting
-from sinew_addon.core.vectors import rotations_of
+from sinew_addon.features.measure.diagnostics import PoseCheck, check_weights
+from sinew_addon.skinning.influences import GroupWeights, Influences, entries_of_bones
+from sinew_addon.skinning.rig import Bones, Weighting
+from sinew_addon.skinning.vectors import rotations_of
 
 NAMES = ("root", "arm", "hand", "finger", "thumb", "tip")
 

@@ -15,17 +15,17 @@ from rigs import about
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
-from sinew_addon.core import battery
-from sinew_addon.core.errors import WrongUse
-from sinew_addon.core.flex import weights as flex_weights
-from sinew_addon.core.flex.character import Character, Skeleton
-from sinew_addon.core.flex.limits import LIMITS, Table, read_table
-from sinew_addon.core.flex.measures import BENT, RINGS, SHORT, Region
-from sinew_addon.core.flex.report import junit, lines, markdown, of_file
-from sinew_addon.core.flex.verdict import OWN, Pose, judge
-from sinew_addon.core.flex.weights import WeightCheck
-from sinew_addon.core.steps import result_of
-from sinew_addon.core.surface import Surface, coincident_vertices, components
+from sinew_addon.base.errors import WrongUse
+from sinew_addon.base.steps import result_of
+from sinew_addon.features.flex import weights as flex_weights
+from sinew_addon.features.flex.character import Character, Skeleton
+from sinew_addon.features.flex.limits import LIMITS, Table, read_table
+from sinew_addon.features.flex.measures import BENT, RINGS, SHORT, Region
+from sinew_addon.features.flex.report import junit, lines, markdown, of_file
+from sinew_addon.features.flex.verdict import OWN, Pose, judge
+from sinew_addon.features.flex.weights import WeightCheck
+from sinew_addon.features.measure import battery
+from sinew_addon.skinning.surface import Surface, coincident_vertices, components
 from test_battery import figure
 from test_metrics import LENGTH, RADIUS, Tube, influences_of
 

@@ -8,10 +8,10 @@ import itertools
 import numpy as np
 import pytest
 from rigs import about
-from sinew_addon.core import helper_bones, simplex
-from sinew_addon.core import steps as core_steps
-from sinew_addon.core.helper_bones import HelperOptions, Motion, Report, Wanted
-from sinew_addon.core.influences import Influences
+from sinew_addon.base import steps as core_steps
+from sinew_addon.features.bake import helper_bones, simplex
+from sinew_addon.features.bake.helper_bones import HelperOptions, Motion, Report, Wanted
+from sinew_addon.skinning.influences import Influences
 from tube import Tube
 
 TUBE = Tube(29, 12)

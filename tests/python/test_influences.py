@@ -6,7 +6,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from sinew_addon.core.influences import GroupWeights, Influences, entries_of_bones
+from sinew_addon.skinning.influences import GroupWeights, Influences, entries_of_bones
 
 
 def random_groups(seed: int, zeros: bool, vertices: int = 200) -> GroupWeights:

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigs import about
-from sinew_addon.core.bendy import points_of_joints, spread_over_joints
-from sinew_addon.core.helper_bones import Motion, Wanted
-from sinew_addon.core.influences import Influences
-from sinew_addon.core.rig import Bones
+from sinew_addon.features.bake.helper_bones import Motion, Wanted
+from sinew_addon.skinning.bendy import points_of_joints, spread_over_joints
+from sinew_addon.skinning.influences import Influences
+from sinew_addon.skinning.rig import Bones
 from test_helper_bones import solved
 
 

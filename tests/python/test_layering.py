@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
+import without_blender
+from without_blender import ADDON, OF_BLENDER, files_of, runs_without_blender
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "native" / "sinew"
@@ -30,12 +32,9 @@ MAY_INCLUDE[""] = set(MAY_INCLUDE) | {""}
 
 # The rooms of addon/, lowest first: a file may import from its own room and from those before it. Files
 # directly in addon/ that start a process may be imported by all.
-ROOMS = ("core", "io", "attach", "deform", "ui", "features", "jobs", "commands")
+ROOMS = ("base", "skinning", "io", "attach", "deform", "ui", "features", "jobs", "commands")
 FOR_ALL = {"native", "blender_process"}
 FOR_COMMANDS = {"prepare", "worker"}
-
-# Modules that nothing in addon/core may import: Blender and what is built on it.
-OF_BLENDER = {"aud", "bgl", "blf", "bl_math", "bmesh", "bpy", "bpy_extras", "gpu", "imbuf", "mathutils"}
 
 
 def sources(folder, *suffixes):
@@ -83,11 +82,6 @@ def imports(text):
             joint = "." if node.module else ""
             names += [prefix + joint + alias.name for alias in node.names]
     return names
-
-
-def of_blender(text):
-    """Imports of Blender in `text`."""
-    return [name for name in imports(text) if name.lstrip(".").split(".")[0] in OF_BLENDER]
 
 
 def rooms_used(text, path):
@@ -175,20 +169,80 @@ def test_rooms_import_from_those_below_alone():
     assert wrong == {}
 
 
-def test_core_and_jobs_import_nothing_of_blender():
-    files = [path for path in room_files("core", "jobs") if "tasks" not in path.parts]
+def files_used(path):
+    """The files of addon/ that a file imports, also in functions."""
+    return {
+        each for node in without_blender.imports(path, in_functions=True) for each in files_of(node, path)
+    }
+
+
+def test_skinning_and_jobs_load_without_blender():
+    files = [path for path in room_files("base", "skinning", "jobs") if "tasks" not in path.parts]
     assert files
-    assert [path for path in files if of_blender(path.read_text(encoding="utf-8"))] == []
+    assert [path for path in files if not runs_without_blender(path)] == []
+
+
+def test_what_is_tested_without_blender_loads_without_it():
+    """Mathematics of features, above all, which stand beside files that need Blender."""
+    used = {file for path in sources(ROOT / "tests" / "python", ".py") for file in files_used(path)}
+    assert any("features" in path.parts for path in used)
+    assert [path for path in used if not runs_without_blender(path)] == []
 
 
 def test_jobs_hand_tasks_out_without_importing_them():
     files = [path for path in room_files("jobs") if "tasks" not in path.parts]
-    rooms = {
-        room
-        for path in files
-        for room in rooms_used(path.read_text(encoding="utf-8"), path.relative_to(ROOT / "addon"))
+    used = {each for path in files for each in files_used(path)}
+    assert [path for path in used if not runs_without_blender(path)] == []
+
+
+def public_files(feature):
+    """The files of a feature that others may import: those that its __init__.py names as PUBLIC, or all where
+    it adds nothing to Blender itself."""
+    folder = ADDON / "features" / feature
+    if not (folder / "feature.py").exists():
+        return set(folder.glob("*.py"))
+    for node in ast.parse((folder / "__init__.py").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and node.targets[0].id == "PUBLIC":
+            return {folder / f"{name}.py" for name in ast.literal_eval(node.value)}
+    return set()
+
+
+def feature_of(path):
+    parts = path.relative_to(ADDON).parts
+    return parts[1] if parts[0] == "features" and len(parts) > 2 else ""
+
+
+def test_features_import_what_others_say_is_public():
+    used = {}
+    for path in room_files("features"):
+        for other in map(feature_of, files_used(path)):
+            used.setdefault(other, set())
+        for file in files_used(path):
+            if feature_of(file) != feature_of(path):
+                used.setdefault(feature_of(file), set()).add(file)
+    del used[""]
+    assert {
+        each: files - public_files(each) for each, files in used.items() if files - public_files(each)
+    } == {}
+    declared = {
+        each: public_files(each) for each in used if (ADDON / "features" / each / "feature.py").exists()
     }
-    assert rooms <= {"core", "jobs"} | FOR_ALL
+    assert {each: files - used[each] for each, files in declared.items() if files - used[each]} == {}
+
+
+def test_features_import_each_other_one_way():
+    """Without a circle of folders."""
+    waiting = {path.parent.name: set() for path in (ADDON / "features").glob("*/__init__.py")}
+    for path in room_files("features"):
+        if feature_of(path):
+            waiting[feature_of(path)] |= {feature_of(file) for file in files_used(path)} - {
+                feature_of(path),
+                "",
+            }
+    while free := [name for name, needed in waiting.items() if not needed & waiting.keys()]:
+        for name in free:
+            del waiting[name]
+    assert waiting == {}
 
 
 def test_the_extension_checks_all_names_that_it_uses_of_the_library():

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sinew_addon.core.influences import GroupWeights
-from sinew_addon.core.mend import SMOOTH_FACTOR, SMOOTH_STEPS, WeightMender
+from sinew_addon.features.diagnose.mend import SMOOTH_FACTOR, SMOOTH_STEPS, WeightMender
+from sinew_addon.skinning.influences import GroupWeights
 
 GROUPS, VERTICES = 5, 12
 # A ring.

@@ -13,10 +13,10 @@ import sinew
 import trimesh
 import tube as tube_of_tests
 from rigs import about, influences, random_motion, transform
-from sinew_addon.core.flex.limits import LIMITS
-from sinew_addon.core.influences import Influences
-from sinew_addon.core.metrics import METRICS, FrameOfRig, Gauge, Measured, Shape
-from sinew_addon.core.surface import Parts, Surface, coincident_vertices, joined
+from sinew_addon.features.flex.limits import LIMITS
+from sinew_addon.features.measure.metrics import METRICS, FrameOfRig, Gauge, Measured, Shape
+from sinew_addon.skinning.influences import Influences
+from sinew_addon.skinning.surface import Parts, Surface, coincident_vertices, joined
 
 SIDES, RINGS, RADIUS, LENGTH = 24, 81, 0.25, 2.0
 IDENTITY = np.eye(4)

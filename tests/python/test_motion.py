@@ -10,12 +10,12 @@ import pytest
 import sinew
 import walks
 from sinew import affine, dual_quat, quat_vec
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.inbetween import Poses
-from sinew_addon.core.motion.align import PHASES, align
-from sinew_addon.core.motion.blend import IN_PLACE, KEYED, METHODS, TRAVEL, Settings, blend
-from sinew_addon.core.motion.clip import Clip
-from sinew_addon.core.motion.root import grounded, main_root
+from sinew_addon.base.errors import SinewError
+from sinew_addon.features.blend.align import PHASES, align
+from sinew_addon.features.blend.clip import Clip
+from sinew_addon.features.blend.motion import IN_PLACE, KEYED, METHODS, TRAVEL, Settings, blend
+from sinew_addon.features.blend.root import grounded, main_root
+from sinew_addon.io.poses import Poses
 
 UP = walks.UP
 matrices = quat_vec.to_affine

@@ -186,9 +186,9 @@ def test_the_wheel_has_every_module(tmp_path):
         "lesson.blend",
         "manual.html",
         "translations/de.po",
-        "core/templates/page.html",
-        "core/templates/report.html",
-        *(path.relative_to(ADDON).as_posix() for path in ADDON.glob("core/templates/viewer/*")),
+        "features/pages/page.html",
+        "jobs/report.html",
+        *(path.relative_to(ADDON).as_posix() for path in ADDON.glob("features/pages/web/*")),
         *(f"ui/pictures/{method.name}.png" for method in sinew.methods()),
     }
     assert inside == {f"sinew_addon/{name}" for name in files}

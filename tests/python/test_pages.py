@@ -8,14 +8,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from sinew_addon.core import golden
-from sinew_addon.core.comparison import Comparison, RestFacts
-from sinew_addon.core.errors import SinewError
-from sinew_addon.core.heat import HeatScale, diverging, linear, viridis
-from sinew_addon.core.metrics import METRICS, Summary
-from sinew_addon.core.page import legend_texts, page
-from sinew_addon.core.plots import line_plot
-from sinew_addon.core.views import View
+from sinew_addon.base.errors import SinewError
+from sinew_addon.commands import golden
+from sinew_addon.features.measure.comparison import Comparison, RestFacts
+from sinew_addon.features.measure.heat_scale import HeatScale, diverging, linear, viridis
+from sinew_addon.features.measure.metrics import METRICS, Summary
+from sinew_addon.features.pages.page import legend_texts, page
+from sinew_addon.features.pages.plots import line_plot
+from sinew_addon.features.pages.views import View
 
 
 def test_magnitudes_have_the_colours_of_matplotlib():

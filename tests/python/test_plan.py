@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 
 import pytest
-from sinew_addon.core.icons import Deformer, Icons, Situation, View, follow, icons
+from sinew_addon.attach.icons import Deformer, Icons, Situation, View, follow, icons
 from sinew_addon.deform.plan import ObjectFacts, State, plan
 
 _HIDDEN = {"viewport": Deformer.NOTHING, "render": Deformer.NOTHING}

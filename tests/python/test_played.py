@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from rigs import about
 from scipy.spatial.transform import Rotation, Slerp
-from sinew_addon.core.export_check import damaged_bones, spread_frames
-from sinew_addon.core.played import GltfFile, _matrix, _sampled
+from sinew_addon.features.gltf.export_check import damaged_bones, spread_frames
+from sinew_addon.features.gltf.played import GltfFile, _matrix, _sampled
 
 
 def glb(tmp_path, accessors, views, binary):

@@ -9,9 +9,9 @@ import pytest
 import sinew
 from rigs import LINEAR, about
 from scipy.spatial.transform import Rotation
-from sinew_addon.core import pose_helpers, pose_samples
-from sinew_addon.core.helper_bones import Motion, Wanted
-from sinew_addon.core.pose_samples import Joints
+from sinew_addon.features.bake import pose_helpers, pose_samples
+from sinew_addon.features.bake.helper_bones import Motion, Wanted
+from sinew_addon.features.bake.pose_samples import Joints
 from test_helper_bones import INFLUENCES, POSES, SEGMENTS, TUBE, errors_of, motion_by, played, result_of
 
 # Bones are along z, with Y along each bone.

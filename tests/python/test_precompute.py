@@ -10,7 +10,8 @@ import threading
 
 import numpy as np
 import pytest
-from sinew_addon.core import file_cache, precompute
+from sinew_addon.base import file_cache
+from sinew_addon.skinning import precompute
 
 RESULT = np.arange(12, dtype=np.float32).reshape(-1, 3)
 
@@ -192,7 +193,7 @@ WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
-from sinew_addon.core.file_cache import FileCache
+from sinew_addon.base.file_cache import FileCache
 cache = FileCache(Path(sys.argv[1]), 40_000)
 for number in range(300):
     key = f"key{number % 7}"

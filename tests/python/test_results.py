@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
-from sinew_addon.core.errors import SinewError
+from sinew_addon.base.errors import SinewError
 from smith_2013 import paper
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

@@ -4,7 +4,7 @@
 import math
 
 import pytest
-from sinew_addon.core.suggestion import CRITERIA, LONGEST, Suggestion
+from sinew_addon.features.measure.suggestion import CRITERIA, LONGEST, Suggestion
 
 BY_NAME = {criterion.name: criterion for criterion in CRITERIA}
 

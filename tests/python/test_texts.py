@@ -10,10 +10,10 @@ import pickle
 import sys
 
 import pytest
+from sinew_addon.base.errors import WrongUse
+from sinew_addon.base.phrases import Phrase, phrase
 from sinew_addon.commands import console
-from sinew_addon.core.errors import WrongUse
-from sinew_addon.core.parameters import as_texts, by_full_name, parse
-from sinew_addon.core.phrases import Phrase, phrase
+from sinew_addon.skinning.parameters import as_texts, by_full_name, parse
 
 
 def test_a_console_without_utf8_shows_what_it_can(monkeypatch):

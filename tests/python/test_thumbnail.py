@@ -2,10 +2,10 @@
 """Protects small pictures: they show the surface that is nearest, where it is, lit from the upper left."""
 
 import numpy as np
-from sinew_addon.core import thumbnail
-from sinew_addon.core.metrics import Shape
-from sinew_addon.core.surface import Surface
-from sinew_addon.core.views import View
+from sinew_addon.features.measure.metrics import Shape
+from sinew_addon.features.pages.views import View
+from sinew_addon.features.suggest import thumbnail
+from sinew_addon.skinning.surface import Surface
 
 FRONT = View(np.array([0.0, -1.0, 0.0]), np.zeros(3), 2.0, 2.0, 4.0)
 

@@ -24,7 +24,7 @@ for count in range(300):
 """
 PARENT = """
 import subprocess, sys, time
-from sinew_addon.core.windows_job import end_with_this_process
+from sinew_addon.base.windows_job import end_with_this_process
 child = subprocess.Popen([sys.executable, "-c", sys.argv[2], sys.argv[1]])
 if sys.argv[3] == "together":
     end_with_this_process(child)
@@ -54,7 +54,7 @@ def test_a_child_ends_with_its_parent(tmp_path):
 # Starts one child after the other until it is ended, each of which would stay for a minute.
 STARTER = """
 import subprocess, sys
-from sinew_addon.core.windows_job import end_all_with_this_process
+from sinew_addon.base.windows_job import end_all_with_this_process
 end_all_with_this_process()
 print("ready", flush=True)
 while True:

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 from sinew import affine, quat_vec
-from sinew_addon.core.inbetween import Poses
-from sinew_addon.core.motion.clip import Clip, Rig
+from sinew_addon.features.blend.clip import Clip, Rig
+from sinew_addon.io.poses import Poses
 
 THIGH = SHIN = 0.45
 ANKLE, WIDE = 0.08, 0.1

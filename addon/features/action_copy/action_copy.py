@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import bpy
 
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...io import actions, ik_io, pose_io
 
 

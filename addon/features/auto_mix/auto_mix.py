@@ -10,16 +10,16 @@ import numpy as np
 from mathutils.kdtree import KDTree
 
 from ...attach import properties, stage_settings
-from ...core.auto_mix import VertexErrors, shares
-from ...core.errors import SinewError
-from ...core.vectors import transformed
+from ...base.errors import SinewError
 from ...deform import group_uses, session
 from ...io import mesh_io
+from ...skinning.vectors import transformed
 from ...ui import stepped
 from ...ui.translations import tr
-from ..heat import live
-from ..heat.worst_frames import armatures_of, check_measurable, measure_at
-from ..suggest.crossings import crossings, frames_to_count
+from ..measure import live
+from ..measure.crossings import crossings, frames_to_count
+from ..measure.worst_frames import armatures_of, check_measurable, measure_at
+from .shares import VertexErrors, shares
 
 STAGE = stage_settings.STAGES["mix"]
 # The second method where none is chosen: linear blending collapses where rotations bulge, and the reverse.
@@ -49,7 +49,7 @@ class AutoMix:
     """One click: steps() measures, and changes nothing; then write() writes.
 
     objects    that can be written; those that share a mesh get the same group
-    smoothing  see core.auto_mix.shares()
+    smoothing  see features.auto_mix.shares.shares()
     """
 
     scene: bpy.types.Scene

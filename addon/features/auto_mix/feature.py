@@ -7,7 +7,7 @@ import bpy
 
 from ...attach import properties
 from ...attach.feature import Feature
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...ui import stepped
 from ...ui.operators import OfOneMesh, OnSinewObjects, sinew_targets
 from . import auto_mix

@@ -8,18 +8,17 @@ import bpy
 import numpy as np
 
 from ...attach import attach, stack, upstream_proxy
-from ...core import bake
-from ...core.errors import SinewError
-from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
-from ...core.names import as_file_name
-from ...core.vat import DEFAULT_VAT, VatOptions
+from ...base.errors import SinewError
+from ...base.names import as_file_name
 from ...deform import characters
 from ...io import files
 from ...io.actions import curves_of
-from . import bake_export, bake_state, shape_animation
+from . import bake_export, bake_state, baked_files, shape_animation
 from .bake_bones import BoneBake
 from .bake_state import Started, state_of, take_off
 from .bake_vat import VatBake
+from .helper_bones import DEFAULT_HELPERS, HelperOptions
+from .vat import DEFAULT_VAT, VatOptions
 
 SHAPE_KEYS = "shape-keys"
 
@@ -33,7 +32,9 @@ class ShapeKeys:
                 f"{obj.name}: a library override can not have shape keys of its own; bake a cache"
             )
         upstream_proxy.check_not_needed(obj, "where shape keys can not follow; bake to mdd or pc2")
-        bake.check_space(Path(bpy.data.filepath or ".").parent, 12 * len(obj.data.vertices) * len(frames))
+        baked_files.check_space(
+            Path(bpy.data.filepath or ".").parent, 12 * len(obj.data.vertices) * len(frames)
+        )
         self.obj, self.frames = obj, frames
         self.samples: list[np.ndarray] = []
 
@@ -64,10 +65,10 @@ class Cache:
 
     def __init__(self, obj: bpy.types.Object, frames: Sequence[float], path: Path, kind: str) -> None:
         vertices = len(state_of(obj).points)
-        bake.check_space(path.parent, 12 * vertices * len(frames))
+        baked_files.check_space(path.parent, 12 * vertices * len(frames))
         render = bpy.context.scene.render
         self.obj, self.frames, self.kind, self.vertices = obj, frames, kind, vertices
-        self.file = bake.PointCache(path, kind, frames, vertices, render.fps / render.fps_base)
+        self.file = baked_files.PointCache(path, kind, frames, vertices, render.fps / render.fps_base)
 
     def take(self, points: np.ndarray) -> None:
         if len(points) != self.vertices:
@@ -94,7 +95,7 @@ class Cache:
         # Blender's own axes, so nothing is converted.
         modifier.forward_axis, modifier.up_axis = "POS_Y", "POS_Z"
         times = shape_animation.key_times(self.frames)
-        if bake.is_even(times, 1):
+        if baked_files.is_even(times, 1):
             modifier.frame_start = times[0]
             return
         modifier.play_mode = "CUSTOM"
@@ -187,11 +188,11 @@ def start(
 
     Raises SinewError where it is not possible.
     """
-    if kind == bake.BONES:
+    if kind == baked_files.BONES:
         return BoneBake(meshes, frames, helpers)
-    if kind == bake.VAT:
+    if kind == baked_files.VAT:
         return VatBake(meshes, frames, target, overwrite, vat)
-    if kind in bake.EXPORTS:
+    if kind in baked_files.EXPORTS:
         files.check_free(target, overwrite)
         return bake_export.SceneExport(meshes, kind, frames, target)
     return Bake(meshes, kind, frames, target.with_name(f"{target.stem}_cache"), overwrite)

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import bpy
 
+from ...base.errors import SinewError
+from ...base.output import remove, sentence
 from ...blender_process import BlenderLost, BlenderProcess, Limits
-from ...core.errors import SinewError
-from ...core.output import remove, sentence
 from ...io import files
 from .bake_export import SceneExport
 

@@ -10,18 +10,17 @@ import bpy
 import numpy as np
 
 from ...attach import properties, stack, upstream_proxy
-from ...core import helper_bones, pose_helpers, pose_samples
-from ...core.errors import SinewError, about
-from ...core.helper_bones import POSE, Errors, HelperOptions, Motion, Report
-from ...core.influences import Influences, joined
-from ...core.segment_bones import SegmentErrors, SegmentReport
-from ...core.skin_stack import SkinDeformer, SkinStack, SkinStageFrame
-from ...core.stages import StageValues
-from ...core.vectors import transformed
+from ...base.errors import SinewError, about
 from ...deform import characters, session
-from ...io import helper_bones_io, mesh_io
-from . import bake_state, shape_animation
+from ...io import mesh_io
+from ...skinning.influences import Influences, joined
+from ...skinning.skin_stack import SkinDeformer, SkinStack, SkinStageFrame
+from ...skinning.stages import StageValues
+from ...skinning.vectors import transformed
+from . import bake_state, helper_bones, helper_bones_io, pose_helpers, pose_samples, shape_animation
 from .bake_state import Started, take_off
+from .helper_bones import POSE, Errors, HelperOptions, Motion, Report
+from .segment_bones import SegmentErrors, SegmentReport
 
 # Share of the time that reading the frames takes.
 _SAMPLING = 0.2

@@ -9,12 +9,11 @@ from pathlib import Path
 import bpy
 
 from ...attach import properties
-from ...core import bake as core
-from ...core.errors import SinewError
-from ...core.output import remove, unfinished_path, writing
+from ...base.errors import SinewError
+from ...base.output import remove, unfinished_path, writing
 from ...deform import characters
 from ...io import files
-from . import bake_state
+from . import bake_state, baked_files
 from .bake_state import Started
 
 
@@ -72,7 +71,7 @@ class SceneExport(Started):
     ) -> None:
         if not getattr(bpy.app, kind).supported:
             raise SinewError(f"This Blender is built without {kind}; bake to another kind")
-        core.check_frames(kind, frames)
+        baked_files.check_frames(kind, frames)
         self.meshes, self.kind, self.frames, self.path = meshes, kind, frames, path
         self.what, self.carried = str(path), carried_by(meshes)
         self.unfinished = self._prepare()
@@ -100,7 +99,7 @@ class SceneExport(Started):
             bake_state.check_on(obj)
         vertices = sum(len(characters.final_points(obj)) for obj in (*self.meshes, *self.carried))
         # Points and normals.
-        core.check_space(self.path.parent, 24 * vertices * len(self.frames))
+        baked_files.check_space(self.path.parent, 24 * vertices * len(self.frames))
         unfinished = unfinished_path(self.path)
         remove(unfinished)
         with writing(self.path):
@@ -118,7 +117,7 @@ class SceneExport(Started):
         if not self.unfinished.exists():
             raise SinewError(f"{self.path}: can not be written: Blender's exporter made no file")
         with writing(self.path):
-            if not core.is_whole(self.unfinished, self.kind):
+            if not baked_files.is_whole(self.unfinished, self.kind):
                 raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
 
     @contextmanager

@@ -11,12 +11,12 @@ from pathlib import Path
 import bpy
 
 from ...attach import attach, corrective_smooth, properties
-from ...core import bake
-from ...core.errors import SinewError
-from ...core.output import remove
+from ...base.errors import SinewError
+from ...base.output import remove
 from ...deform import session
 from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
+from . import baked_files
 
 
 class Started:
@@ -42,7 +42,7 @@ class Started:
 
     def publish(self) -> None:
         for unfinished, path in self.files:
-            bake.publish(unfinished, path)
+            baked_files.publish(unfinished, path)
 
     def discard(self) -> None:
         """Removes what was written."""

@@ -12,15 +12,13 @@ import bpy
 import numpy as np
 
 from ...attach import properties
-from ...core import bake as core
-from ...core import vat
-from ...core.arrays import read
-from ...core.errors import SinewError
-from ...core.output import unfinished_path, writing
-from ...core.vectors import transformed
+from ...base.errors import SinewError
+from ...base.output import unfinished_path, writing
 from ...deform import characters
 from ...io import files, mesh_io
-from . import bake_state
+from ...skinning.arrays import read
+from ...skinning.vectors import transformed
+from . import bake_state, baked_files, vat
 from .bake_export import carried_by, selected
 from .bake_state import Started
 
@@ -54,7 +52,7 @@ class VatBake(Started):
             files.check_free(each, overwrite)
         self.counts = [len(characters.final_points(obj)) for obj in self.meshes]
         self.layout = vat.Layout.of(sum(self.counts), len(frames))
-        core.check_space(path.parent, 24 * self.layout.width * self.layout.height)
+        baked_files.check_space(path.parent, 24 * self.layout.width * self.layout.height)
         self._points: list[np.ndarray] = []
         self._normals: list[np.ndarray] = []
 
@@ -161,7 +159,7 @@ class VatBake(Started):
                     export_skins=False,
                     export_morph=False,
                 )
-                if not core.is_whole(path, "gltf"):
+                if not baked_files.is_whole(path, "gltf"):
                     raise OSError("the disk did not take all of it; is it full?")
         except RuntimeError as error:
             raise SinewError(f"{self.path}: can not be written: {files.telling_line(error)}") from None

@@ -6,16 +6,16 @@ from collections.abc import Iterator
 import bpy
 
 from ...attach.feature import Feature
-from ...core.bake import BONES, EXPORTS, FILES, VAT
-from ...core.frames import parse_frames
-from ...core.helper_bones import KEYS, POSE, HelperOptions
-from ...core.vat import EXR, EXR_HALF, PNG, VatOptions
+from ...base.frames import parse_frames
 from ...deform import characters
 from ...ui import stepped
 from ...ui.operators import OfSkinned, OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from . import bake, bake_apart, bake_bones, bake_state
+from .baked_files import BONES, EXPORTS, FILES, VAT
+from .helper_bones import KEYS, POSE, HelperOptions
+from .vat import EXR, EXR_HALF, PNG, VatOptions
 
 INFLUENCES = {
     "name": "Influences",

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ...core import bake
 from ...io import actions
+from . import baked_files
 
 
 def add(obj: bpy.types.Object, frames: Sequence[float], shapes: Sequence[np.ndarray]) -> None:
@@ -19,7 +19,7 @@ def add(obj: bpy.types.Object, frames: Sequence[float], shapes: Sequence[np.ndar
     Keys are relative, with keyed values, as glTF, FBX and other programs do not support absolute keys.
     """
     obj.shape_key_add(name="Basis", from_mix=False)
-    ramps = bake.ramps(key_times(frames))
+    ramps = baked_files.ramps(key_times(frames))
     for frame, shape, (times, values) in zip(frames, shapes, ramps, strict=True):
         block = obj.shape_key_add(name=f"Frame {frame:g}", from_mix=False)
         block.points.foreach_set("co", shape.ravel())

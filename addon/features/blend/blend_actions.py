@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...core.errors import SinewError
-from ...core.motion import blend as core
-from ...core.steps import as_part
-from ...io import clips, spaces
+from ...base.errors import SinewError
+from ...base.steps import as_part
+from ...io import spaces
+from . import clips_io, motion
 
 # Share of the progress: reading curves takes as long as writing keys.
 READING = 0.5
@@ -20,7 +20,7 @@ class Made:
     """The new action, which nothing plays yet, and the blend."""
 
     action: bpy.types.Action
-    blend: core.Blend
+    blend: motion.Blend
 
     @property
     def frames(self) -> int:
@@ -48,27 +48,27 @@ def make(
     armature: bpy.types.Object,
     chosen: Sequence[bpy.types.Action],
     weights: Sequence,
-    settings: core.Settings,
+    settings: motion.Settings,
     name: str = "",
 ) -> Generator[float, None, Made]:
     """Yields the progress. The new action begins at the scene's first frame; if closed before the end,
     nothing has changed. Raises SinewError for what cannot be blended.
 
-    weights  as core.blend() takes them
+    weights  as motion.blend() takes them
     """
     if not armature.is_editable:
         raise SinewError(f"{armature.name} is linked: make a library override of it first")
     if len(chosen) < 2:
         raise SinewError(f"{armature.name}: choose two actions or more to blend")
-    rig, sources = clips.rig_of(armature), []
+    rig, sources = clips_io.rig_of(armature), []
     for number, action in enumerate(chosen):
-        steps = clips.read(armature, action, rig)
+        steps = clips_io.read(armature, action, rig)
         clip = yield from as_part(steps, READING * number / len(chosen), READING / len(chosen))
         sources.append(clip)
-    blend = core.blend(sources, weights, settings, spaces.up_of(armature))
-    keyed = set().union(*(clips.keyed_properties(armature, action) for action in chosen))
+    blend = motion.blend(sources, weights, settings, spaces.up_of(armature))
+    keyed = set().union(*(clips_io.keyed_properties(armature, action) for action in chosen))
     name = name or f"Blend {' '.join(action.name for action in chosen)}"
     first = float(bpy.context.scene.frame_start)
-    steps = clips.write(armature, blend.clip(name), name, first, keyed)
+    steps = clips_io.write(armature, blend.clip(name), name, first, keyed)
     made = yield from as_part(steps, READING, 1.0 - READING)
     return Made(made, blend)

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 import bpy
 
 from ...attach.feature import Feature
-from ...core.errors import SinewError
-from ...core.motion import blend as core
-from ...io import actions, clips
+from ...base.errors import SinewError
+from ...io import actions
 from ...ui import operators, stepped
 from ...ui.sidebar import draw_text
 from ...ui.translations import counted, tr
-from . import blend_actions
+from . import blend_actions, clips_io, motion
 
 
 class SinewBlendAction(bpy.types.PropertyGroup):
@@ -48,7 +47,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
     method: bpy.props.EnumProperty(
         name="Method",
         description="How poses of a bone are blended",
-        items=[(m.name, m.label, m.description, m.number) for m in core.METHODS.values()],
+        items=[(m.name, m.label, m.description, m.number) for m in motion.METHODS.values()],
         default="dlb",
     )
     align: bpy.props.BoolProperty(
@@ -73,11 +72,16 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
         name="Root Motion",
         description="What becomes of the way that the root goes over the ground",
         items=[
-            (core.TRAVEL, "Blended", "Steps of the root are blended and added up: speeds and turns blend", 0),
-            (core.IN_PLACE, "In Place", "The way over the ground is taken out", 1),
-            (core.KEYED, "As Keyed", "The root is blended as any other bone", 2),
+            (
+                motion.TRAVEL,
+                "Blended",
+                "Steps of the root are blended and added up: speeds and turns blend",
+                0,
+            ),
+            (motion.IN_PLACE, "In Place", "The way over the ground is taken out", 1),
+            (motion.KEYED, "As Keyed", "The root is blended as any other bone", 2),
         ],
-        default=core.TRAVEL,
+        default=motion.TRAVEL,
     )
     root: bpy.props.StringProperty(
         name="Root",
@@ -99,7 +103,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
             playing = armature.animation_data.action if armature.animation_data is not None else None
             found = dict.fromkeys(action for action in (playing, *bpy.data.actions) if action is not None)
             for action in found:
-                if clips.keyed_properties(armature, action):
+                if clips_io.keyed_properties(armature, action):
                     row = self.actions.add()
                     row.name, row.weight = action.name, float(len(self.actions) <= 2)
         return super().invoke(context, event)
@@ -116,7 +120,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
             draw_text(layout, "Blender has no two actions of this armature", icon="INFO")
         for name in ("changes", "method", "align", "cycles", "root_motion"):
             layout.prop(self, name)
-        if self.root_motion == core.TRAVEL or self.align:
+        if self.root_motion == motion.TRAVEL or self.align:
             layout.prop_search(self, "root", armature.data, "bones")
 
     def values(self) -> dict[str, object]:
@@ -138,7 +142,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
             armature,
             [bpy.data.actions[each.name] for each in chosen],
             weights,
-            core.Settings(self.method, self.align, self.root or None, self.root_motion, self.cycles),
+            motion.Settings(self.method, self.align, self.root or None, self.root_motion, self.cycles),
         )
 
     def run(self, context: bpy.types.Context) -> None:

@@ -23,12 +23,12 @@ from ...attach import (
     upstream_proxy,
 )
 from ...attach.updates import updates_suspended
-from ...core.errors import SinewError
-from ...core.stages import ORDER
-from ...core.vectors import transformed
+from ...base.errors import SinewError
 from ...deform import characters, session
 from ...io import actions
 from ...io.actions import players
+from ...skinning.stages import ORDER
+from ...skinning.vectors import transformed
 from . import comparison_state, offset_nodes
 
 # The space between two characters, as a share of a character's width.

@@ -11,7 +11,7 @@ from ...attach import attach, properties, references
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
 from ...attach.updates import may_change_file, updates_suspended
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...deform import characters
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, draw_text

@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 
 from ...attach import properties, upstream_proxy
-from ...core.arrays import read
-from ...core.corrective import NEAR, offsets
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...deform import pose, session
 from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
+from ...skinning.arrays import read
+from .offsets import NEAR, offsets
 
 # The bone's smallest rotation, in radians: below it, the key would be all or nothing.
 LEAST_TURN = 0.05

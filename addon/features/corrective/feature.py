@@ -5,7 +5,7 @@ import bpy
 
 from ...attach import properties
 from ...attach.feature import Feature
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...io import units
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.translations import tr

@@ -11,18 +11,18 @@ import numpy as np
 
 from ...attach import attach
 from ...attach.subscribers import subscribers
-from ...core.arrays import read
-from ...core.diagnostics import Finding
-from ...core.errors import SinewError
-from ...core.influences import GroupWeights
-from ...core.rig import Bones
-from ...core.vectors import rotations_of
+from ...base.errors import SinewError
 from ...deform import characters, session
 from ...io import armature_io, mesh_io
+from ...skinning.arrays import read
+from ...skinning.influences import GroupWeights
+from ...skinning.rig import Bones
+from ...skinning.vectors import rotations_of
 from ...ui import stepped
 from ...ui.operators import selected
 from ...ui.translations import tr
-from ..pages.measure import Edited
+from ..measure.diagnostics import Finding
+from ..measure.subjects import Edited
 
 
 @dataclass

@@ -8,11 +8,11 @@ import bpy
 
 from ...attach import attach, stack
 from ...attach.feature import Feature
-from ...core.diagnostics import Finding
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, characters, draw_text, names_text, shortened
 from ...ui.translations import counted, tip, tr
+from ..measure.diagnostics import Finding
 from . import diagnose, mending
 
 NAMES_SHOWN = 5

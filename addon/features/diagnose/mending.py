@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
 
-from ...core.diagnostics import Finding
-from ...core.errors import SinewError
-from ...core.mend import Rows, WeightMender
+from ...base.errors import SinewError
 from ...io import mesh_io
 from ...ui.translations import counted, tr
+from ..measure.diagnostics import Finding
 from . import diagnose
+from .mend import Rows, WeightMender
 
 # How far a vertex may be from the mirrored position, as a share of the mesh's diagonal.
 MIRROR_TOLERANCE = 1e-3

@@ -12,17 +12,17 @@ from mathutils import Matrix
 from ...attach import properties, stack
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
-from ...core.errors import SinewError
-from ...core.flex.limits import Table
-from ...core.flex.verdict import Finding, Joint
+from ...base.errors import SinewError
 from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from ..diagnose import diagnose
-from ..heat.worst_frames import check_measurable
+from ..measure.worst_frames import check_measurable
 from ..pages.save import SavesPage
 from . import flex, page
+from .limits import Table
+from .verdict import Finding, Joint
 
 # What is tried beside a character's own method.
 OTHERS = ("lbs", "dq", "cor")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads characters for core.flex, and bends them without their bones: no action, control or driver takes
+"""Reads characters for this folder, and bends them without their bones: no action, control or driver takes
 part, and the file stays as it is."""
 
 from __future__ import annotations
@@ -12,19 +12,18 @@ import bpy
 import numpy as np
 
 from ...attach import properties
-from ...core import battery
-from ...core.battery import Battery
-from ...core.errors import SinewError
-from ...core.flex.character import Character, Skeleton
-from ...core.flex.limits import Table
-from ...core.flex.verdict import OWN, Pose, Verdict, judge
-from ...core.metrics import FrameOfRig
-from ...core.rig import Bones
+from ...base.errors import SinewError
 from ...io import armature_io
-from ..heat import live
-from ..heat.measured_on import OWN as OWN_METHOD
-from ..heat.measured_on import MeasuredOn
-from ..suggest.crossings import crossing_triangles
+from ...skinning.rig import Bones
+from ..measure import battery, live
+from ..measure.battery import Battery
+from ..measure.crossings import crossing_triangles
+from ..measure.measured_on import OWN as OWN_METHOD
+from ..measure.measured_on import MeasuredOn
+from ..measure.metrics import FrameOfRig
+from .character import Character, Skeleton
+from .limits import Table
+from .verdict import OWN, Pose, Verdict, judge
 
 
 @dataclass
@@ -69,7 +68,7 @@ class Result:
 
 @dataclass(frozen=True)
 class _Posed:
-    """See core.flex.verdict.Posed. own: the methods of the meshes, as of live.Moment.points()."""
+    """See features.flex.verdict.Posed. own: the methods of the meshes, as of live.Moment.points()."""
 
     moment: live.Moment
     own: Sequence[str | None]

@@ -8,12 +8,12 @@ from typing import Any
 
 import bpy
 
-from ...core.errors import SinewError
-from ...core.flex.report import headline
-from ...core.flex.verdict import Finding, Joint
-from ...core.viewer import METHODS, Found
+from ...base.errors import SinewError
 from ..pages import viewer
+from ..pages.viewer_page import METHODS, Found
 from . import flex
+from .report import headline
+from .verdict import Finding, Joint
 
 AT_REST = "At rest"
 

@@ -21,13 +21,13 @@ import numpy as np
 
 from ...attach import properties, stage_settings
 from ...attach.updates import may_change_file
-from ...core.engines import ENGINES
-from ...core.errors import SinewError
-from ...core.rig import Bones
-from ...core.skin_stack import LINEAR
-from ...core.vectors import transformed
+from ...base.errors import SinewError
 from ...deform import pose, session
 from ...io import armature_io, mesh_io, spaces
+from ...skinning.engines import ENGINES
+from ...skinning.rig import Bones
+from ...skinning.skin_stack import LINEAR
+from ...skinning.vectors import transformed
 
 # Raised when readers of earlier files could not read new ones correctly.
 VERSION = 1

@@ -16,16 +16,16 @@ import addon_utils
 import bpy
 
 from ...attach import attach, properties
-from ...core.bake import is_whole
-from ...core.errors import SinewError
-from ...core.export_check import FRAMES, Check, spread_frames
-from ...core.output import write_whole
-from ...core.segment_bones import SegmentReport
+from ...base.errors import SinewError
+from ...base.output import write_whole
 from ...deform import characters
 from ...io import files
 from ..bake import bake_apart, bake_bones
 from ..bake.bake_export import TEXTURES_STAY
+from ..bake.baked_files import is_whole
+from ..bake.segment_bones import SegmentReport
 from . import export, verify
+from .export_check import FRAMES, Check, spread_frames
 
 # What the add-on for VRM writes of a vertex.
 _VRM_INFLUENCES = 4

@@ -10,8 +10,7 @@ import bpy
 from ...attach import attach, properties
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
-from ...core.export_check import Check
-from ...core.output import remove, unfinished_path
+from ...base.output import remove, unfinished_path
 from ...deform import characters
 from ...io import files
 from ...ui import stepped
@@ -21,6 +20,7 @@ from ...ui.translations import counted, tr
 from ..bake import bake_apart
 from ..bake.feature import INFLUENCES
 from . import export
+from .export_check import Check
 from .export_file import ExportOptions
 
 # What was verified last, the largest difference first, by the session_uid of the scene. Nothing is stored in

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compares what an exported file plays with what Blender showed: core/export_check.py has the arithmetic."""
+"""Compares what an exported file plays with what Blender showed: export_check.py has the arithmetic."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import numpy as np
 from mathutils.kdtree import KDTree
 
 from ...attach import properties, upstream_proxy
-from ...core import played as readers
-from ...core import read_fbx
-from ...core.errors import SinewError
-from ...core.export_check import EXPLAINED, Check, Comparison, Moment, Seen, damaged_bones, plain
-from ...core.influences import Influences
-from ...core.played import Played
-from ...core.vectors import transformed
+from ...base.errors import SinewError
 from ...deform import characters, session
 from ...deform.skinned_object import SkinnedObject
-from ...io import mesh_io, read_usd
+from ...io import mesh_io
+from ...skinning.influences import Influences
+from ...skinning.vectors import transformed
+from . import played as readers
+from . import read_fbx, read_usd
+from .export_check import EXPLAINED, Check, Comparison, Moment, Seen, damaged_bones, plain
+from .played import Played
 
 # The files that are glTF.
 GLTF = (".glb", ".vrm")

@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 
 from ...attach import properties
-from ...core.heat import HeatScale
 from ...io import mesh_io
-from ...io.helper_bones_io import ERRORS, ERRORS_BEFORE
 from ...ui.translations import tr
+from ..bake.helper_bones_io import ERRORS, ERRORS_BEFORE
+from ..measure.heat_scale import HeatScale
 from . import heat_nodes, measures
 
 AFTER, BEFORE = measures.BAKE_ERRORS

@@ -9,7 +9,8 @@ from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...deform import session
-from . import bake_error, heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measured_on, measures
+from ..measure import measured_on
+from . import bake_error, heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measures
 
 
 def _begin() -> None:

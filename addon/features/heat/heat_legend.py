@@ -7,9 +7,9 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ...core.heat import HeatScale
 from ...io import units
 from ...ui.sidebar import uncovered
+from ..measure.heat_scale import HeatScale
 from . import bake_error
 
 WIDTH, BAR, MARGIN, GAP, FONT_SIZE = 420, 14, 24, 8, 12

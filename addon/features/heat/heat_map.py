@@ -5,11 +5,12 @@ import bpy
 import numpy as np
 
 from ...attach import properties
-from ...core.heat import HeatScale
-from ...core.metrics import Measured
 from ...deform.skinned_object import SkinnedObject
 from ...ui.translations import joined, tr
-from . import bake_error, heat_legend, heat_nodes, live, measures
+from ..measure import live
+from ..measure.heat_scale import HeatScale
+from ..measure.metrics import Measured
+from . import bake_error, heat_legend, heat_nodes, measures
 from .measures import SinewMeasures
 
 # The inputs of the last colours, by the session_uid of the scene.

@@ -8,8 +8,7 @@ import bpy
 from ...attach import properties
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
-from ...core.errors import SinewError
-from ...core.metrics import Measured
+from ...base.errors import SinewError
 from ...deform import characters, session
 from ...io import units
 from ...ui import operators, sidebar, stepped
@@ -17,7 +16,9 @@ from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.settings_layout import named
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import joined, tr
-from . import bake_error, live, measures, worst_frames
+from ..measure import live, worst_frames
+from ..measure.metrics import Measured
+from . import bake_error, measures
 
 
 def meant(context: bpy.types.Context, quantity: str) -> list[bpy.types.Object]:

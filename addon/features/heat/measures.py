@@ -7,10 +7,10 @@ import bpy
 
 from ...attach import properties
 from ...attach.updates import is_rendering_in_window
-from ...core.diagnostics import USUAL_INFLUENCES
-from ...core.heat import HeatScale
-from ...core.metrics import METRICS, Metric
 from ...deform import session
+from ..measure.diagnostics import USUAL_INFLUENCES
+from ..measure.heat_scale import HeatScale
+from ..measure.metrics import METRICS, Metric
 
 PER_FRAME, FIXED = "FRAME", "FIXED"
 # Of meshes that were baked to bones.

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core import ik as core
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...deform import characters
 from ...io import actions, ik_io, pose_io, spaces
+from ...skinning import ik as core
 from ..action_copy import action_copy
 
 

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 import bpy
 
 from ...attach.feature import Feature
-from ...core import inbetween as core
 from ...ui import operators, stepped
 from ...ui.translations import tr
 from ..action_copy.feature import OnArmature, selected_bones
-from . import inbetween_bake
+from . import inbetween_bake, interpolation
 
 
 class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operator):
@@ -24,7 +23,7 @@ class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operato
     method: bpy.props.EnumProperty(
         name="Method",
         description="How the bones move between the keyed poses of the action",
-        items=[(m.name, m.label, m.description, m.number) for m in core.METHODS.values()],
+        items=[(m.name, m.label, m.description, m.number) for m in interpolation.METHODS.values()],
         default="qv_slerp",
     )
     path: bpy.props.EnumProperty(
@@ -32,12 +31,12 @@ class SINEW_OT_bake_inbetweens(OnArmature, stepped.WithDialog, bpy.types.Operato
         description="Which keyed poses shape the way from one to the next",
         items=[
             (
-                core.STRAIGHT,
+                interpolation.STRAIGHT,
                 "Key to Key",
                 "The two neighbours, at the pace of the keys' own interpolation",
             ),
             (
-                core.SPLINE,
+                interpolation.SPLINE,
                 "Spline",
                 "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace",
             ),

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ...core import inbetween as core
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...io import actions, pose_io
 from ..action_copy import action_copy
-from . import keyed_poses
+from . import interpolation, keyed_poses
 
 
 @dataclass
@@ -26,13 +25,13 @@ class Baked:
 
     def notes(self, path: str) -> list[str]:
         kept = [f"{bone} {reason}: it keeps its curves" for bone, reason in sorted(self.left.items())]
-        return [*kept, *(f"{bone} {core.TOO_FAR[path]}" for bone in sorted(self.far))]
+        return [*kept, *(f"{bone} {interpolation.TOO_FAR[path]}" for bone in sorted(self.far))]
 
 
 def steps(
     armature: bpy.types.Object,
     method: str,
-    path: str = core.STRAIGHT,
+    path: str = interpolation.STRAIGHT,
     step: int = 1,
     only: Collection[str] | None = None,
 ) -> Generator[float, None, Baked]:
@@ -42,12 +41,12 @@ def steps(
     The keyed poses stay, also those between whole frames; in-betweens are keys of type Breakdown. If closed
     before the end, everything is as before. Raises SinewError where there is nothing to do.
 
-    method  of core.METHODS
-    path    core.STRAIGHT or core.SPLINE
+    method  of interpolation.METHODS
+    path    interpolation.STRAIGHT or interpolation.SPLINE
     step    frames from one key to the next
     only    the bones that move by the method; None: all
     """
-    with action_copy.playing(armature, core.METHODS[method].label):
+    with action_copy.playing(armature, interpolation.METHODS[method].label):
         groups, left = keyed_poses.read(armature, only)
         baked = Baked(armature, left=left)
         wanted = [_times(group, step) for group in groups]

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ...core import inbetween as core
 from ...io import actions, pose_io
+from ...io.poses import Poses
+from . import interpolation
 
 
 @dataclass
@@ -126,7 +127,7 @@ def pose_at(
     apart: the method does not define a unique result, or the angles mean a longer way than it takes.
 
     groups  from read()
-    method  of core.METHODS
+    method  of interpolation.METHODS
     """
     channels, far = pose_io.read_channels(armature.pose.bones), []
     names = armature.pose.bones.keys()
@@ -181,15 +182,17 @@ def _between(
             for key, number in zip(span.keys, span.rounds, strict=True)
         ]
     )
-    if path == core.STRAIGHT:
+    if path == interpolation.STRAIGHT:
         a, b = _poses(group, keys[1]), _poses(group, keys[2])
-        found = core.straight(a, b, core.progress(now.astype(np.float64), keys[1], keys[2]), method)
+        found = interpolation.straight(
+            a, b, interpolation.progress(now.astype(np.float64), keys[1], keys[2]), method
+        )
     else:
         rigid, scale = zip(*(_poses(group, key) for key in keys), strict=True)
-        poses = core.Poses(np.stack(rigid), np.stack(scale))
-        found = core.on_spline(poses, span.times, span.time, method)
+        poses = Poses(np.stack(rigid), np.stack(scale))
+        found = interpolation.on_spline(poses, span.times, span.time, method)
     channels = pose_io.channels_of(found.poses, group.modes, near=keys[1])
-    if path == core.SPLINE:
+    if path == interpolation.SPLINE:
         channels = np.where(group.still[span.keys[1]][:, None], keys[1], channels)
     # Angles say how far they mean to rotate; quaternions do not. The method takes the shorter way.
     angles = np.abs(keys[2] - keys[1])[:, 3:7].max(axis=1)
@@ -208,7 +211,7 @@ def _channels_at(group: Group, key: int, number_of_round: int) -> np.ndarray:
     return channels + number_of_round * group.gains[number_of_round > 0]
 
 
-def _poses(group: Group, channels: np.ndarray) -> core.Poses:
+def _poses(group: Group, channels: np.ndarray) -> Poses:
     """Converts channels to poses. Channels without keys are left out: otherwise a bone that is only rotated
     would swing around the position where it was moved by hand."""
     poses = pose_io.poses_of(channels, group.modes)

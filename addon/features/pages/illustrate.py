@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.comparison import Comparison, Worst
-from ...core.heat import HeatScale
-from ...core.metrics import METRICS, Metric
-from ...core.page import Row, Sheet
-from ...core.views import View, close_view
 from ...deform import characters
-from . import measure
-from .measure import Subject
+from ..measure import subjects
+from ..measure.comparison import Comparison, Worst
+from ..measure.heat_scale import HeatScale
+from ..measure.metrics import METRICS, Metric
+from ..measure.subjects import Subject
+from . import render
+from .page import Row, Sheet
 from .render import Studio
+from .views import View, close_view
 
 
 @dataclass
@@ -53,7 +54,7 @@ class Illustrator:
             if comparison.shows(metric.worst, (worst := comparison.worst(metric.worst)).value)
         ]
         drawn = sorted({*self.frames, *(heat.frame for heat in self._heat)})
-        views = characters.whole_views(self._subject.meshes, self._methods, drawn)
+        views = render.whole_views(self._subject.meshes, self._methods, drawn)
         self._whole = dict(zip(drawn, views, strict=True))
 
     @property
@@ -74,7 +75,7 @@ class Illustrator:
                 self._pose(method, plan.frame)
                 clay.append(self._picture(plan.close, f"{name} close clay"))
                 yield
-                with measure.skinning_alone(self._subject.meshes):
+                with subjects.skinning_alone(self._subject.meshes):
                     self._pose(method, plan.frame)
                     copies = self._studio.painted(
                         self._subject.meshes, self._subject.split(plan.colours[method])
@@ -99,7 +100,7 @@ class Illustrator:
     def _plan_heat(self, metric: Metric, worst: Worst) -> HeatPlan:
         comparison, subject = self._comparison, self._subject
         scale = HeatScale.over(metric, [*comparison.summaries.values()], comparison.rest.diagonal)
-        shapes = measure.shapes_at(subject, [*self._methods, comparison.reference], worst.frame)
+        shapes = subjects.shapes_at(subject, [*self._methods, comparison.reference], worst.frame)
         reference = shapes[comparison.reference]
         fields = {
             method: subject.gauge.measure(shapes[method], reference).field(metric.name)

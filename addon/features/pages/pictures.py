@@ -6,8 +6,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.errors import SinewError
-from ...core.output import write_whole
+from ...base.errors import SinewError
+from ...base.output import write_whole
 from ...io.files import telling_line
 
 

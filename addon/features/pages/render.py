@@ -7,7 +7,7 @@ afterwards.
 """
 
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
@@ -15,14 +15,15 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core.errors import SinewError
-from ...core.heat import linear
-from ...core.opengl import default_engine
-from ...core.output import write_whole
-from ...core.scratch import scratch_folder
-from ...core.views import View, camera_axes
+from ...base.errors import SinewError
+from ...base.output import write_whole
+from ...base.scratch import scratch_folder
+from ...deform import characters
 from ...io import read_only
 from ...io.files import telling_line
+from ..measure.heat_scale import linear
+from .opengl import default_engine
+from .views import View, camera_axes, of_one_size, seen_extent, whole_view
 
 CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
@@ -40,6 +41,19 @@ def chosen_engine(wanted: str) -> str:
     if wanted not in ("auto", engine):
         raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
     return engine
+
+
+def whole_views(
+    meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
+) -> list[View]:
+    """For each frame, a view that contains the final meshes under all methods; all views have one size."""
+    extents: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
+    for method in methods:
+        characters.use_method_on(meshes, method)
+        for frame, own in extents.items():
+            characters.set_frame(bpy.context.scene, frame)
+            own.append(seen_extent(characters.world_points(meshes)))
+    return of_one_size([whole_view(own) for own in extents.values()])
 
 
 class Studio:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.output import file_to_write, write_text
+from ...base.output import file_to_write, write_text
 from ...ui import stepped
 from ...ui.translations import tr
 

@@ -11,20 +11,20 @@ import bpy
 import numpy as np
 
 from ...attach import attach, properties, stage_settings, upstream_proxy
-from ...core import battery
-from ...core.bulge_limit import segments
-from ...core.errors import SinewError
-from ...core.influences import Influences
-from ...core.rig import Bones
-from ...core.scale_rule import BLENDER_4
-from ...core.twist_spread import NOT_TOLD, TwistInputs
-from ...core.vectors import transformed
-from ...core.vertex_data import VertexData
-from ...core.viewer import BLENDER, METHODS, MIX, Found, Part, Stages, Viewer
+from ...base.errors import SinewError
 from ...deform import characters, session, source
 from ...deform.bound import Bound
 from ...deform.pose import stage_values
 from ...io import armature_io, mesh_io, spaces
+from ...skinning.bulge_limit import segments
+from ...skinning.influences import Influences
+from ...skinning.rig import Bones
+from ...skinning.scale_rule import BLENDER_4
+from ...skinning.twist_spread import NOT_TOLD, TwistInputs
+from ...skinning.vectors import transformed
+from ...skinning.vertex_data import VertexData
+from ..measure import battery
+from .viewer_page import BLENDER, METHODS, MIX, Found, Part, Stages, Viewer
 
 # The method of meshes that have none of their own; any of Sinew's would do.
 PLAYED = "dq"

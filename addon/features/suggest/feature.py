@@ -11,18 +11,18 @@ import bpy
 from ...attach import properties, stage_settings
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
-from ...core import parameters
-from ...core.errors import SinewError
-from ...core.recommendation import Choice
-from ...core.suggestion import CRITERIA, Criterion, Suggestion
+from ...base.errors import SinewError
 from ...deform import characters, session
 from ...io import units
+from ...skinning import parameters
 from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
-from ..heat.measured_on import CHOICE, MeasuredOn
+from ..measure.measured_on import CHOICE, MeasuredOn
+from ..measure.suggestion import CRITERIA, Criterion, Suggestion
 from . import recommend, suggest, worst_pictures
+from .recommendation import Choice
 
 BEST = "best"
 PICTURES_IN_A_ROW = 2

@@ -10,20 +10,20 @@ import bpy
 import numpy as np
 
 from ...attach import attach, properties, property_groups, stage_settings
-from ...core import battery, recommendation
-from ...core.errors import SinewError
-from ...core.parameters import OFF, Value
-from ...core.phrases import phrase
-from ...core.recommendation import Choice
-from ...core.rig import Bones
-from ...core.steps import as_part, result_of
+from ...base.errors import SinewError
+from ...base.phrases import phrase
+from ...base.steps import as_part, result_of
 from ...deform import characters
 from ...io import armature_io
+from ...skinning.parameters import OFF, Value
+from ...skinning.rig import Bones
 from ...ui import stepped
-from ..heat import live
-from ..heat.measured_on import MeasuredOn
-from ..heat.worst_frames import armatures_of, check_measurable, measure_at
-from .crossings import crossing_triangles
+from ..measure import battery, live
+from ..measure.crossings import crossing_triangles
+from ..measure.measured_on import MeasuredOn
+from ..measure.worst_frames import armatures_of, check_measurable, measure_at
+from . import recommendation
+from .recommendation import Choice
 
 # The frames that Recommended takes by itself.
 OVER = "ACTION"

@@ -9,16 +9,16 @@ import numpy as np
 import sinew
 
 from ...attach import properties
-from ...core.metrics import Measured
-from ...core.recommendation import Choice
-from ...core.steps import as_part
-from ...core.suggestion import LONGEST, MEASURED, Suggestion
+from ...base.steps import as_part
 from ...ui import stepped
-from ..heat import live
-from ..heat.measured_on import CHOICE, STAGES, MeasuredOn
-from ..heat.worst_frames import armatures_of, check_measurable, measure_at
+from ..measure import live
+from ..measure.crossings import crossings, frames_to_count
+from ..measure.measured_on import CHOICE, STAGES, MeasuredOn
+from ..measure.metrics import Measured
+from ..measure.suggestion import LONGEST, MEASURED, Suggestion
+from ..measure.worst_frames import armatures_of, check_measurable, measure_at
 from . import recommend, worst_pictures
-from .crossings import crossings, frames_to_count
+from .recommendation import Choice
 
 RECOMMENDED = "recommended"
 """In Suggestion.methods: the recommended method with its stages, where it has any."""

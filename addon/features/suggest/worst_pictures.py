@@ -9,9 +9,9 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from ...core import thumbnail
-from ...core.metrics import Measured
-from ...core.views import close_view
+from ..measure.metrics import Measured
+from ..pages.views import close_view
+from . import thumbnail
 
 PIXELS = 128
 # Of what other close-ups show: these pictures are smaller.

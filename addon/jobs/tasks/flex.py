@@ -9,12 +9,12 @@ from pathlib import Path
 import bpy
 
 from ...attach import properties
-from ...core.flex.limits import Table, read_table
-from ...core.output import write_text
-from ...core.steps import result_of
+from ...base.output import write_text
+from ...base.steps import result_of
 from ...deform import characters
 from ...features.flex import flex as bending
 from ...features.flex import page as flex_page
+from ...features.flex.limits import Table, read_table
 from ...io import files
 
 

@@ -9,7 +9,7 @@ import bpy
 
 from ...attach import attach, other_tools, properties, stack, upstream_proxy
 from ...attach.updates import updates_suspended
-from ...core.errors import SinewError
+from ...base.errors import SinewError
 from ...deform import characters, session
 from ...io import files
 

@@ -13,15 +13,15 @@ import numpy as np
 
 from ...attach import attach, properties, stack
 from ...attach.updates import updates_suspended
-from ...core import parameters
-from ...core.errors import SinewError
-from ...core.frames import parse_frames
-from ...core.names import fits
-from ...core.views import seen_extent, whole_view
+from ...base.errors import SinewError
+from ...base.frames import parse_frames
+from ...base.names import fits
 from ...deform import characters, lifecycle, session
 from ...features.compare import comparison
 from ...features.pages import render
+from ...features.pages.views import seen_extent, whole_view
 from ...io import files
+from ...skinning import parameters
 
 # Twice the size in the report.
 PICTURE_SIZE = 720

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
-"""Computations on top of the native library, without Blender: numpy in, numpy out."""

@@ -1,1 +1,0 @@
-../../shaders/bone_buffer.py

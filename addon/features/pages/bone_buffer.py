@@ -1,0 +1,1 @@
+../../../shaders/bone_buffer.py

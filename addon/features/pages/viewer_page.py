@@ -1,0 +1,413 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A page with a character that turns: one HTML file in which the browser skins and draws it by the shaders
+for engines (web/).
+
+Its arrays are zlib-compressed, in base64, at the offsets that the header says: docs/viewer.md.
+"""
+
+import base64
+import json
+import re
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import sinew
+
+from ...base.errors import SinewError
+from ...skinning.influences import Influences
+from ...skinning.twist_spread import NOT_TOLD, TwistInputs, blend_of
+from ...skinning.twists import Twists
+from ...skinning.vectors import rotations_of, transformed
+from ..measure.heat_scale import HeatScale
+from ..measure.metrics import METRICS
+from .bone_buffer import (
+    add_segments,
+    add_turns,
+    add_twists,
+    along_chain,
+    of_motions,
+    quaternions,
+    twist_angles,
+)
+from .page import legend_texts
+
+# Methods that the shaders have, in the order of the page's lists.
+METHODS = ("lbs", "dq", "cor")
+Form: TypeAlias = Literal["continuous", "kim_han"]
+BLENDER, MIX = "blender", "mix"
+FOLDER = Path(__file__).parent / "web"
+_SHADERS = (".glsl", ".vert", ".frag", ".wgsl")
+_COMMENTS = re.compile("^ *//.*\n", re.MULTILINE)
+_SCRIPTS = ("gl.js", "gpu.js", "viewer.js")
+_RAMP_STOPS = 64
+_TEXTS = {"distance": "The distance of each vertex from where Blender's Armature modifier takes it."}
+
+
+@dataclass
+class Stages:
+    """The stages of a mesh after the blend that the shaders have.
+
+    names     of those that are on
+    amounts   float32 [vertices, 2], how much each vertex gets of Twist Spread and of Limit Bulge, 0 to 1
+    form      of Limit Bulge
+    twists    of the bones
+    segments  float32 [bones, 3] each: heads and tails at rest, armature space
+    twist, bulge  those of the library, after bind()
+    """
+
+    names: list[str]
+    amounts: np.ndarray
+    form: Form
+    twists: Twists
+    segments: tuple[np.ndarray, np.ndarray]
+    twist: sinew.TwistSpread = field(init=False)
+    bulge: sinew.BulgeLimit = field(init=False)
+
+    def bind(self, binding: sinew.Binding, rest_bones: np.ndarray, mix: np.ndarray | None) -> None:
+        of, (spread, limited) = self.twists, self.amounts.T
+        self.twist = sinew.TwistSpread(
+            binding, of.rows, of.heads, of.tails, rest_bones, parents=of.parents, weights=spread, mix=mix
+        )
+        self.bulge = sinew.BulgeLimit(binding, *self.segments, weights=limited)
+
+
+@dataclass
+class Part:
+    """A mesh of the character and its motion, in armature space.
+
+    rest        float32 [vertices, 3], of the first frame
+    rest_bones  float32 [bones, 4, 4], from each bone's own axes
+    blender     the method of its Armature modifier, one of METHODS
+    centres     float32 [vertices, 3], for `cor`; None without it
+    mix         the two methods of the painted mix, and float32 [vertices], the share of the second; None
+                without it
+    by_hierarchy  the methods whose signs are from the hierarchy
+    parents       int32 [bones], -1 for none; given where there are such methods
+    stages        None without any
+    """
+
+    name: str
+    rest: np.ndarray
+    influences: Influences
+    triangles: np.ndarray
+    edges: np.ndarray
+    rest_bones: np.ndarray
+    blender: str
+    centres: np.ndarray | None = None
+    mix: tuple[str, str, np.ndarray] | None = None
+    by_hierarchy: Sequence[str] = ()
+    parents: np.ndarray | None = None
+    stages: Stages | None = None
+    _palettes: list[np.ndarray] = field(default_factory=list)
+    _worlds: list[np.ndarray] = field(default_factory=list)
+    _rests: list[np.ndarray] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        # Only bones that move a vertex are in the page.
+        self._used, bones = np.unique(self.influences.bones, return_inverse=True)
+        self._bones = bones.reshape(-1).astype(np.uint16)
+        self._rest_inverses = np.linalg.inv(self.rest_bones.astype(np.float64))
+        data = {} if self.centres is None else {"cor": self.centres}
+        self._binding = sinew.Binding(
+            self.rest,
+            self.influences.offsets,
+            self.influences.bones,
+            self.influences.weights,
+            rest_bones=self.rest_bones,
+            vertex_data=data,
+        )
+        self._deformers: dict[str, sinew.Deformer] = {}
+        if self.stages is not None:
+            self.stages.bind(self._binding, self.rest_bones, None if self.mix is None else self.mix[2])
+
+    def has(self, method: str) -> bool:
+        wanted = {MIX: self.mix, "cor": self.centres}
+        return wanted.get(method, self.rest) is not None
+
+    def add_frame(
+        self,
+        posed: np.ndarray,
+        world: np.ndarray,
+        rest: np.ndarray | None = None,
+        twists: TwistInputs = (),
+        turns: np.ndarray | None = None,
+    ) -> None:
+        """
+        posed   float32 [bones, 4, 4], in armature space
+        world   [4, 4], from armature space
+        rest    as that of the first frame, which it is where it is None
+        twists  of those of the bones
+        turns   as sinew.Deformer.deform takes them
+        """
+        self._rests.append(self.rest if rest is None else rest)
+        of_stages = () if self.stages is None else (self.stages.twist, self.stages.bulge)
+        for each in (*self._deformers.values(), *of_stages):
+            each.set_rest_points(self._rests[-1])
+        # Not with numpy's product: see vectors.transformed().
+        motions = np.einsum("bij,bjk->bik", posed.astype(np.float64), self._rest_inverses)
+        split = sinew.affine.split_scale(motions, self.rest_bones.astype(np.float64))
+        rotations = np.roll(rotations_of(split.rigid[:, :3, :3]), -1, axis=0).T
+        if self.parents is not None:
+            rotations = self._signed(rotations, motions, turns)
+        buffer = of_motions(motions, rotations)
+        if self.stages is not None:
+            add_segments(buffer, *self.stages.segments)
+            self._add_twists(self.stages, buffer, motions.astype(np.float32), twists)
+        self._palettes.append(buffer[self._used])
+        self._posed, self._turns = posed, turns
+        self._worlds.append(np.asarray(world, dtype=np.float64))
+
+    def _signed(self, rotations: np.ndarray, motions: np.ndarray, turns: np.ndarray | None) -> np.ndarray:
+        """Returns quaternions [bones, 4] with the signs of the library's, which takes them from the axes as
+        they are where a bone is sheared."""
+        assert self.parents is not None
+        mirrors = np.linalg.det(motions[:, :3, :3]) < 0.0
+        lengths = np.linalg.norm(motions[:, :3, :3], axis=1, keepdims=True)
+        of_axes = quaternions(motions[:, :3, :3] / np.where(lengths > 0.0, lengths, 1.0))
+        of_axes[mirrors] = rotations[mirrors]
+        along = along_chain(of_axes, self.parents, mirrors, turns)
+        return np.where((along * rotations).sum(axis=1, keepdims=True) < 0.0, -rotations, rotations)
+
+    def _add_twists(
+        self, stages: Stages, buffer: np.ndarray, motions: np.ndarray, twists: TwistInputs
+    ) -> None:
+        inputs = np.array(twists, np.float32).reshape(-1, 2 + len(NOT_TOLD))
+        amounts, curves, channels = inputs[:, 0], inputs[:, 1], inputs[:, 2:]
+        of, angles = stages.twists, stages.twist.angles(motions, channels)
+        add_twists(buffer, of.rows, amounts * angles, curves)
+        rest, (heads, tails) = self.rest_bones.astype(np.float64), stages.segments
+        shorter, _swings = twist_angles(motions.astype(np.float64), rest, of.rows, tails - heads)
+        # What fades leave of an angle, if it is so many turns beyond the shorter way: the most is right.
+        turns = np.arange(-2, 3)[:, None]
+        parts = angles / np.where(angles == 0.0, 1.0, shorter + 2.0 * np.pi * turns)
+        parts[parts > 1.0 + 1e-3] = 0.0
+        around = turns[parts.argmax(axis=0), 0] * (angles != 0.0)
+        if around.any():
+            add_turns(buffer, of.rows, around, amounts * parts.max(axis=0, initial=0.0), of.parents)
+        self._motions, self._inputs = motions, (amounts, curves, channels)
+
+    def world_points(self, method: str) -> np.ndarray:
+        """float64 [vertices, 3], of the frame that was added last; those of Blender's method where it lacks
+        what `method` needs."""
+        is_own = method != BLENDER and self.has(method)
+        first = second = method if is_own else self.blender
+        mix = None
+        if method == MIX and self.mix is not None:
+            first, second, shares = self.mix
+            mix = second, shares
+        if method not in self._deformers:
+            self._deformers[method] = sinew.Deformer(self._binding, first, mix=mix)
+            self._deformers[method].set_rest_points(self._rests[-1])
+        points = self._deformers[method].deform(
+            self._posed,
+            rest_inverses=self._rest_inverses,
+            parameters={f"{name}.signs": "hierarchy" for name in self.by_hierarchy if name in (first, second)}
+            if is_own
+            else None,
+            parents=self.parents,
+            turns=self._turns,
+        )
+        if is_own and self.stages is not None:
+            amounts, curves, channels = self._inputs
+            self.stages.twist.apply(
+                points,
+                self._motions,
+                points,
+                amounts=amounts,
+                curves=curves,
+                channels=channels,
+                blend=blend_of(first),
+                mix_blend=blend_of(second),
+            )
+            self.stages.bulge.apply(points, self._motions, points, form=self.stages.form)
+        return transformed(points, self._worlds[-1])
+
+    def world_rest(self) -> np.ndarray:
+        """float64 [vertices, 3], where the frame that was added last has the mesh without its bones."""
+        return transformed(self._rests[-1], self._worlds[-1])
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What the page has of it."""
+        found = {
+            "rest": self.rest,
+            "offsets": self.influences.offsets,
+            "bones": self._bones,
+            "weights": self.influences.weights,
+            "triangles": self.triangles.astype(np.uint32),
+            "edges": self.edges.astype(np.uint32),
+            "palettes": np.array(self._palettes),
+            "worlds": np.array(self._worlds, dtype=np.float32),
+        }
+        if self.centres is not None:
+            found["centres"] = self.centres
+        if self.mix is not None:
+            found["shares"] = self.mix[2]
+        if self.stages is not None:
+            found["amounts"] = self.stages.amounts
+        has_moved = np.zeros(len(self.rest), dtype=bool)
+        for rest in self._rests:
+            if rest is not self.rest:
+                has_moved |= (rest != self.rest).any(axis=1)
+        if has_moved.any():
+            found["moving"] = np.flatnonzero(has_moved).astype(np.uint32)
+            found["moved"] = np.array([rest[has_moved] for rest in self._rests])
+        return found
+
+
+class _Range:
+    """The least and the largest value of a measure."""
+
+    def __init__(self, neutral: float) -> None:
+        self.least = self.most = neutral
+
+    def add(self, values: np.ndarray) -> None:
+        self.least = min(self.least, float(values.min(initial=self.least)))
+        self.most = max(self.most, float(values.max(initial=self.most)))
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the page lists of Flex.
+
+    verdict   one sentence
+    findings  each as the page has it: docs/viewer.md
+    """
+
+    verdict: str
+    findings: Sequence[Mapping[str, Any]]
+
+
+class Viewer:
+    """The parts and frames of a page.
+
+    methods  the names of those to choose from, of METHODS, MIX and BLENDER, with their labels
+    rate     frames a second
+    unit     of lengths: "m", or "units"
+    notes    sentences on what the page leaves out
+    found    where frames are poses of Flex
+    """
+
+    def __init__(
+        self,
+        title: str,
+        parts: Sequence[Part],
+        methods: dict[str, str],
+        rate: float,
+        unit: str,
+        notes: Sequence[str] = (),
+        found: Found | None = None,
+    ) -> None:
+        self.title, self.parts, self.methods, self.rate, self.unit = title, parts, methods, rate, unit
+        self.notes, self.found = list(notes), found
+        self.frames: list[float | str] = []
+        self._distance, self._stretch = _Range(0.0), _Range(1.0)
+        self._worst, self._start = -1.0, 0
+        self._boxes: list[np.ndarray] = []
+        self._diagonal = 0.0
+
+    def add_frame(self, frame: float | str) -> None:
+        """Call it when all parts have it. frame: its number, or the name of a pose"""
+        rest = [part.world_rest() for part in self.parts]
+        self._diagonal = self._diagonal or float(np.linalg.norm(np.ptp(np.concatenate(rest), axis=0)))
+        references = [part.world_points(BLENDER) for part in self.parts]
+        shape = np.concatenate(references)
+        self._boxes.append(np.array([shape.min(axis=0), shape.max(axis=0)]))
+        worst = 0.0
+        for method in self.methods:
+            for part, at_rest, reference in zip(self.parts, rest, references, strict=True):
+                points = part.world_points(method)
+                if not np.isfinite(points).all():
+                    raise SinewError(f"{part.name}: its shape under {method} is not finite at frame {frame}")
+                distances = np.linalg.norm(points - reference, axis=1)
+                self._distance.add(distances)
+                worst = max(worst, float(distances.max(initial=0.0)))
+                self._stretch.add(_stretches(part.edges, points, at_rest))
+        if worst > self._worst:
+            self._worst, self._start = worst, len(self.frames)
+        self.frames.append(frame)
+
+    def page(self) -> str:
+        """The text of the file."""
+        blob, places = bytearray(), []
+        for part in self.parts:
+            of_part = {}
+            for name, array in part.arrays().items():
+                array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
+                of_part[name] = {"type": array.dtype.name, "shape": array.shape, "offset": len(blob)}
+                blob += array.tobytes()
+                # Each begins where the browser can look at it as numbers.
+                blob += bytes(-len(blob) % 4)
+            places.append(of_part)
+        data = base64.b64encode(zlib.compress(bytes(blob), 9)).decode("ascii")
+        texts = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.iterdir()}
+        shaders = {name: _COMMENTS.sub("", text) for name, text in texts.items() if name.endswith(_SHADERS)}
+        values = {
+            "TITLE": escape(self.title),
+            "STYLE": texts["style.css"],
+            "HEADER": _in_script(self._header(places)),
+            "ARRAYS": data,
+            "SHADERS": _in_script(shaders),
+            "SCRIPT": "\n".join(texts[name] for name in _SCRIPTS),
+        }
+        return re.sub("%([A-Z]+)%", lambda match: values[match[1]], texts["viewer.html"])
+
+    def _header(self, places: list[dict[str, Any]]) -> dict[str, Any]:
+        scales = [
+            HeatScale.over_values(METRICS[name], own.least, own.most, self._diagonal)
+            for name, own in (("distance", self._distance), ("stretch", self._stretch))
+        ]
+        boxes = np.array(self._boxes)
+        return {
+            "title": self.title,
+            "methods": self.methods,
+            "frames": self.frames,
+            # Flex begins at rest.
+            "start": 0 if self.found else self._start,
+            "rate": self.rate,
+            "low": boxes[:, 0].tolist(),
+            "high": boxes[:, 1].tolist(),
+            "notes": self.notes,
+            "flex": asdict(self.found) if self.found else None,
+            "measures": [self._measure(scale) for scale in scales],
+            "parts": [
+                {
+                    "name": part.name,
+                    "blender": part.blender,
+                    "mix": part.mix and part.mix[:2],
+                    "hierarchy": part.by_hierarchy,
+                    "stages": part.stages.names if part.stages else [],
+                    "form": part.stages.form if part.stages else "",
+                    "arrays": arrays,
+                }
+                for part, arrays in zip(self.parts, places, strict=True)
+            ],
+        }
+
+    def _measure(self, scale: HeatScale) -> dict[str, Any]:
+        stops = np.round(255 * scale.ramp(np.linspace(0.0, 1.0, _RAMP_STOPS))).astype(int)
+        return {
+            "name": scale.metric.name,
+            "label": scale.metric.label,
+            "text": _TEXTS.get(scale.metric.name, scale.metric.text),
+            "low": scale.low,
+            "high": scale.high,
+            "isLogarithmic": scale.metric.scale == "log",
+            "ramp": stops.ravel().tolist(),
+            "ticks": legend_texts(scale, self.unit),
+        }
+
+
+def _stretches(edges: np.ndarray, points: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """[edges]: length / length at rest, 1 where that is 0."""
+    now, before = (np.linalg.norm(of[edges[:, 0]] - of[edges[:, 1]], axis=1) for of in (points, rest))
+    return np.divide(now, before, out=np.ones_like(now), where=before > 0.0)
+
+
+def _in_script(value: object) -> str:
+    """JSON that can not end a <script>."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The preset Recommended: which method and stages suit a character.
+
+A short row of candidates, each measured in the same moments: first methods, the plainest first, then stages.
+A candidate takes the place of what was best before it where it is clearly better in the moments that it
+changes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import sinew
+
+from ...base.phrases import Phrase, phrase
+from ...skinning import parameters
+from ...skinning.influences import Influences, owners_of
+from ...skinning.parameters import Value
+from ...skinning.stages import StageValues
+from ..measure.metrics import Measured
+from ..measure.suggestion import LONGEST, TEARS
+
+Values = Mapping[str, np.ndarray]
+"""By the names of MEASURES, float64 [bones] of each limb; LONGEST of all, [1]."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What may be kept.
+
+    name   of a method or of a stage
+    gain   how much better it has to be: the logarithm of a value that sums up all measures
+    why    what it does where it is kept
+    crude  it is tried only where weights are
+    often  in which share of the moments it has to be better
+    """
+
+    name: str
+    gain: float
+    why: str
+    crude: bool = False
+    often: float = 0.0
+
+
+METHODS = (
+    Candidate("lbs", 0.0, "the plain blend is as good as any here"),
+    Candidate("dq", 0.1, "joints keep their volume"),
+    Candidate("cor", 0.05, "joints keep their volume and bulge less"),
+)
+STAGES = (
+    Candidate("twist_spread", 0.05, "twists spread along the limbs"),
+    Candidate("bulge_limit", 0.05, "bent joints bulge less"),
+    Candidate("delta_mush", 0.2, "creases are smoothed", crude=True, often=0.25),
+)
+# The weights of a vertex differ from those of its neighbour by so much, in the mean over where they differ:
+# joints have no more than two edges to bend in.
+CRUDE = 0.45
+
+
+class Measure(NamedTuple):
+    """weight  in the sum of logarithms
+    seen    smaller values are hardly seen, so they count little; of a bulge as a part of the mesh's diagonal
+    """
+
+    weight: float
+    seen: float
+
+
+MEASURES = {
+    "stretch": Measure(1.0, 0.05),
+    "volume": Measure(2.0, 0.03),
+    "folded": Measure(1.0, 0.02),
+    "bulge": Measure(2.0, 0.005),
+    "pinch": Measure(2.0, 0.1),
+    "crossings": Measure(1.0, 20.0),
+}
+"""Of a limb: those of metrics.Measured.by_limb(), and how many of its triangles cross others."""
+# Values whose logarithms differ by less are the same.
+SAME = 0.01
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A method, stages with their parameters as they are by default.
+
+    why  a sentence for the method and for each stage; empty where nothing bends
+    """
+
+    method: str
+    stages: tuple[str, ...] = ()
+    why: tuple[Phrase, ...] = ()
+
+    @property
+    def stage_values(self) -> StageValues:
+        return {name: values_on(name) for name in self.stages}
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Every parameter of every stage but vertex groups, by its full name."""
+        found: dict[str, Value] = {}
+        for stage in sinew.stages():
+            if stage.name == "mix":
+                found["mix.method"] = parameters.OFF
+                continue
+            own = values_on(stage.name) | {stage.parameters[0].id: stage.name in self.stages}
+            found |= {f"{stage.name}.{name}": value for name, value in own.items()}
+        return found
+
+    @property
+    def label(self) -> Phrase:
+        """As "Centres of Rotation with Twist Spread and Limit Bulge"."""
+        owners: list[sinew.Method | sinew.Stage] = [*sinew.methods(), *sinew.stages()]
+        labels = {each.name: each.label for each in owners}
+        method, stages = phrase(labels[self.method]), [phrase(labels[name]) for name in self.stages]
+        if not stages:
+            return method
+        text = stages[0]
+        for label in stages[1:-1]:
+            text = phrase("{first}, {second}", first=text, second=label)
+        if len(stages) > 1:
+            text = phrase("{first} and {second}", first=text, second=stages[-1])
+        return phrase("{method} with {stages}", method=method, stages=text)
+
+    @property
+    def text(self) -> Phrase:
+        """One sentence."""
+        text = self.why[0] if self.why else phrase("nothing bends here")
+        for each in self.why[1:]:
+            text = phrase("{first}; {second}", first=text, second=each)
+        return phrase("{method}: {why}", method=self.label, why=text)
+
+
+def values_on(stage: str) -> dict[str, Value]:
+    """Returns the parameters of a stage as they are by default, but on; without vertex groups."""
+    found = next(each for each in sinew.stages() if each.name == stage)
+    switch, *others = found.parameters
+    values: dict[str, Value] = {switch.id: True}
+    return values | {each.id: each.default for each in others if each.default is not None}
+
+
+def search(
+    measure: Callable[[Choice, int], Values],
+    moments: Sequence[tuple[str, np.ndarray]],
+    diagonal: float,
+    is_crude: bool,
+) -> Generator[float, None, Choice]:
+    """Yields the progress; returns the choice.
+
+    measure   the values of a choice in a moment, as from values_of()
+    moments   names, for people, with the weights of the limbs
+    diagonal  of the rest shape
+    is_crude  the weights are
+    """
+    candidates = [each for each in (*METHODS, *STAGES) if is_crude or not each.crude]
+    best, whys = Choice(METHODS[0].name), {"": phrase(METHODS[0].why)}
+    known: list[Values] = []
+    done, of_all = 0, len(candidates) * len(moments)
+    for candidate in candidates:
+        is_method = candidate in METHODS
+        tried = replace(best, method=candidate.name) if is_method else best
+        if not is_method:
+            tried = replace(best, stages=(*best.stages, candidate.name))
+        values = []
+        for moment in range(len(moments)):
+            values.append(measure(tried, moment))
+            done += 1
+            yield done / of_all
+        gains = [
+            gain(before, after, diagonal, weights)
+            for before, after, (_name, weights) in zip(known, values, moments, strict=False)
+        ]
+        if not known:
+            known = values
+        elif _is_kept(candidate, gains):
+            best, known = tried, values
+            place = phrase(moments[gains.index(max(gains))][0])
+            why = phrase("{why} (most: {place})", why=phrase(candidate.why), place=place)
+            whys["" if is_method else candidate.name] = why
+    return replace(best, why=tuple(whys.values()) if moments else ())
+
+
+def _is_kept(candidate: Candidate, gains: Sequence[float]) -> bool:
+    """Whether the candidate is better, by its gains in all moments."""
+    changed = [each for each in gains if abs(each) > SAME]
+    better = sum(each > SAME for each in gains)
+    return (
+        better > 0
+        and better >= candidate.often * len(gains)
+        and sum(changed) / len(changed) >= candidate.gain
+    )
+
+
+def gain(before: Values, after: Values, diagonal: float, weights: np.ndarray) -> float:
+    """How much better the second values are, in the mean over the limbs that differ; minus infinity where
+    they are those of a torn shape.
+
+    weights  float64 [bones], of the limbs
+    """
+    tear, longest = TEARS[LONGEST], after[LONGEST].max()
+    if not math.isfinite(longest) or longest > max(tear.least, tear.times * before[LONGEST].max()):
+        return -math.inf
+    gains = np.zeros(len(weights))
+    for name, measure in MEASURES.items():
+        if name in before:
+            least = measure.seen * (diagonal if name == "bulge" else 1.0)
+            gain_of_limbs = np.log((before[name] + least) / (after[name] + least))
+            gains += measure.weight * np.nan_to_num(gain_of_limbs)
+    counts = weights * (np.abs(gains) > SAME)
+    return float((counts * gains).sum() / max(counts.sum(), 1e-30))
+
+
+def values_of(measured: Measured, crossing: np.ndarray | None) -> Values:
+    """Returns what gain() compares.
+
+    crossing  int, the triangles that cross others, each as often as it does; None: they were not counted
+    """
+    longest = measured.entry("stretch_max") if np.isfinite(measured.shape.points).all() else math.inf
+    if not math.isfinite(longest):
+        return {LONGEST: np.array([math.inf])}
+    found = measured.by_limb()
+    found[LONGEST] = np.array([longest])
+    if crossing is not None:
+        limbs = measured.pose.skin.limb_of_triangles[crossing]
+        found["crossings"] = np.bincount(limbs[limbs >= 0], minlength=measured.pose.bone_count)
+    return found
+
+
+def is_crude(influences: Influences, edges: np.ndarray) -> bool:
+    """Whether weights jump from a vertex to the next, instead of changing over some edges.
+
+    edges  int [edges, 2]
+    """
+    owners, jumps = owners_of(influences.counts), np.zeros(len(edges))
+    for bone in np.unique(influences.bones):
+        own = influences.bones == bone
+        weights = np.zeros(len(influences.counts))
+        weights[owners[own]] = influences.weights[own]
+        jumps += 0.5 * np.abs(np.diff(weights[edges], axis=1)[:, 0])
+    # Each edge counts by how much changes over it.
+    return bool((jumps * jumps).sum() > CRUDE * jumps.sum())
