@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Observes what an event shows of an object, and performs what react.py decides."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import bpy
@@ -8,6 +9,7 @@ import bpy
 from ..attach import attach, normals, point_store, properties, stack, stage_settings, upstream_proxy
 from ..attach.updates import may_change_file
 from ..base.errors import SinewError
+from ..io import armature_io
 from ..io.actions import animated_paths
 from . import after_update, apply_plan, bound, events, precomputing, source
 from .bound import uid
@@ -180,8 +182,9 @@ class _Event:
             return False
         if source.has_changed(obj, skinned.bound.source, depsgraph, self.changes, touched=True):
             return False
-        with skinned.lock:
+        with skinned.lock, suppress(armature_io.NotPosedError):
             return skinned.shown.frames is not None and after_update.shape(obj, skinned, depsgraph)
+        return False
 
     def _may_be_other(self, skinned: SkinnedObject) -> bool:
         """Whether the object, or what is around it, may not be as it was when its plan was applied."""
@@ -323,7 +326,11 @@ class _Event:
             is_first = self.known.differs or not self.old.is_written
             with skinned.lock:
                 is_planned = self.known.is_planned
-                after_update.deform(obj, skinned, self.depsgraph, self.changes, is_planned, is_first)
+                try:
+                    after_update.deform(obj, skinned, self.depsgraph, self.changes, is_planned, is_first)
+                except armature_io.NotPosedError:
+                    # It belongs to another scene: the next evaluation of that gives it its shape.
+                    skinned.needs_apply = True
         self.known = replace(self.known, is_given=True)
 
     # --- The result

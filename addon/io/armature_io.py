@@ -234,6 +234,10 @@ def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarra
     return read(bones, name, 16).reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
+class NotPosedError(Exception):
+    """Blender evaluated an armature without its pose, as for its place alone."""
+
+
 def _read_joints(
     evaluated_armature: bpy.types.Object,
     matrices: np.ndarray,
@@ -244,13 +248,19 @@ def _read_joints(
 
     matrices  of the bones in armature space
     bending   the index of each bendy bone and its number of segments
+
+    Raises NotPosedError.
     """
     pose_bones, owners, flat = evaluated_armature.pose.bones, [], []
     for bone, segments in bending:
         joint = pose_bones[bone].bbone_segment_matrix
         for k in range(segments + 1):
+            try:
+                rows = joint(k, rest=at_rest)
+            except RuntimeError as error:
+                raise NotPosedError(str(error)) from error
             # Unpacking a matrix is faster than having numpy read it.
-            for row in joint(k, rest=at_rest):
+            for row in rows:
                 flat.extend(row)
         owners += [bone] * (segments + 1)
     joints = np.array(flat, dtype=np.float64).reshape(-1, 4, 4)

@@ -300,6 +300,8 @@ CASES = {
     "+~move_vertices Leg; +~weights Leg thigh; ~frame 10; ~undo; remove_all",
     "its driver taken away after an undo": "+~add Arm; +~frame 6; ~remove Arm; ~undo; "
     "~delete_points Arm driver; move_vertices Arm",
+    "bendy bones of a scene that is copied": "add_modifier Arm NODES; bone_options Rig hand segments 3; "
+    "add Arm; copy_scene 0.2; frame 6",
     "applied and undone": "+add Arm dq; +frame 6; +apply_modifier Arm; frame 11; undo; frame 4; redo; "
     "frame 9",
     "drivers of what was applied": "drive_visibility Leg 'Other Rig' Armature; add Leg; apply_modifier Leg; "
