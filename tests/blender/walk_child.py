@@ -281,7 +281,7 @@ class Child:
         if claim is None or not side.is_on(obj) or obj.data.is_editmode:
             return None
         return self.shapes_of.expected(
-            obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render
+            obj, claim["run"], claim["method"], claim["stages in mesh"], claim["parameters"], render
         )
 
     def has_other_scale(self, obj) -> bool:

@@ -98,14 +98,20 @@ class SinewSide(Side):
 
     @staticmethod
     def _stages(obj: bpy.types.Object) -> dict[str, dict[str, object]]:
-        """All parameters of the enabled stages; lengths in units of the mesh."""
+        """All parameters of the enabled stages, as the panel shows them."""
         return {
             name: {
                 each.id: getattr(getattr(obj.sinew, name), each.id)
                 for each in stage_settings.STAGES[name].parameters
             }
-            | stage_settings.values_of(obj.sinew, name)
             for name in stage_settings.names_on(obj.sinew)
+        }
+
+    def _stages_in_mesh(self, obj: bpy.types.Object) -> dict[str, dict[str, object]]:
+        """The same with lengths in units of the mesh."""
+        return {
+            name: shown | stage_settings.values_of(obj.sinew, name)
+            for name, shown in self._stages(obj).items()
         }
 
     def preserve_volume(self, modifier: bpy.types.Modifier) -> bool:
@@ -383,6 +389,7 @@ class SinewSide(Side):
                 "method": obj.sinew.method,
                 "rule": obj.sinew.scale_rule,
                 "stages": self._stages(obj),
+                "stages in mesh": self._stages_in_mesh(obj),
                 "parameters": stage_settings.method_values(obj.sinew, METHODS),
                 "error": obj.sinew.error,
                 "run": [each.name for each in self._run(obj)],
