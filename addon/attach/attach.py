@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Puts Sinew in the place of an object's Armature modifiers, and takes it off again.
 
-While Sinew deforms, the Armature modifiers stay in the stack, switched on, where other tools look for them;
-in_depsgraph.py has Blender leave them out. In a saved file they deform, and Sinew's modifier is off, so that
-a Blender without Sinew can play it. What the artist or a tool does to the modifiers' icons has the meaning
-that attach/icons.py gives it.
+While Sinew deforms, the Armature modifiers stay in the stack, as the artist switched them, where other tools
+look for them; in_depsgraph.py has Blender leave them out. In a saved file they deform, and Sinew's modifier
+is off, so that a Blender without Sinew can play it.
 """
 
 from collections.abc import Collection
@@ -18,7 +17,6 @@ from ..io.actions import animated_paths, is_animated, is_visibility_animated
 from . import (
     baked,
     corrective_smooth,
-    icons,
     point_store,
     pose_driver,
     properties,
@@ -30,7 +28,7 @@ from . import (
     undeformed,
     upstream_proxy,
 )
-from .icons import VIEWS, Deformer, Icons, Situation
+from .icons import VIEWS, Deformer, Icons
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
@@ -136,7 +134,7 @@ def _add(obj: bpy.types.Object, method: str | None, is_shown: bool) -> None:
     try:
         _replace_modifiers(obj, method)
         if is_shown and not stack.visibility_is_animated(obj):
-            _begin_with_icons(obj)
+            _switch_on_where_off(obj)
     except Exception as error:
         parent_type = properties.of(obj).before.parent_type
         properties.clear(obj)
@@ -175,16 +173,15 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
             replaced.method = method_of(modifier)
 
 
-def _begin_with_icons(obj: bpy.types.Object) -> None:
-    """Has Sinew deform in both views where the Armature modifiers are off in both: what replaces them, such
-    as a bake, is switched off then."""
+def _switch_on_where_off(obj: bpy.types.Object) -> None:
+    """Switches the Armature modifiers on where they are off in both views, and off what replaces them, such
+    as a bake."""
     pairs = replaced_modifiers(obj)
-    views = {name: _view(obj, pairs, name) for name in VIEWS}
-    if any(any(view.shown) for view in views.values()):
+    if any(stack.is_on(modifier) for modifier, _replaced in pairs):
         return
-    for name, view in views.items():
-        _store(obj, pairs, name, view.switched_on())
-    _set_icons(obj, Situation.OFF)
+    for modifier, replaced in pairs:
+        replaced.was_off = True
+        _show(modifier, viewport=True, render=True)
     baked.switch_off(obj)
 
 
@@ -201,7 +198,7 @@ def notes(obj: bpy.types.Object) -> list[str]:
     if undeformed.was_switched(obj):
         text = "Sinew's two helping modifiers follow the icon of its own: switch the modifier Sinew"
         found.append(phrase(text))
-    if was_off(obj):
+    if any(replaced.was_off for replaced in settings.replaced_modifiers):
         text = "Its Armature modifier was off before Sinew; Remove switches it off again"
         found += [phrase(text), *baked.notes(obj)]
     return found
@@ -267,13 +264,13 @@ def take_off(obj: bpy.types.Object, is_by_others: bool = False) -> None:
 
 
 def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
-    follow_icons(obj)
     switch(obj, on=False)
     restore_volume(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     for modifier, replaced in replaced_modifiers(obj):
-        if not _is_keyed(obj, modifier, replaced):
-            _show(modifier, *own_visibility(replaced))
+        # What was switched since is the artist's own choice.
+        if replaced.was_off and modifier.show_viewport and modifier.show_render:
+            _show(modifier, viewport=False, render=False)
     baked.switch_on(obj)
     notify(subscribers.before_removal, obj)
     (undeformed.remove_later if is_by_others else undeformed.remove)(obj)
@@ -295,161 +292,89 @@ def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
     properties.clear(obj)
 
 
-def switch(obj: bpy.types.Object, on: bool, is_alone: bool = False) -> None:
-    """On: Sinew deforms where the icons say so. Off: the Armature modifiers deform, and Sinew's modifier is
-    off.
-
-    is_alone  where Sinew deforms, the Armature modifiers are off
-    """
-    settings = properties.of(obj)
+def switch(obj: bpy.types.Object, on: bool) -> None:
+    """On: Sinew's modifier has the icons that the artist gave it. Off: its icons are off, and the Armature
+    modifiers deform by themselves."""
+    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    was_on = settings.replaces_modifiers
     if on:
         restore_volume(obj)
         adopt_pointers(obj)
-        _note_keyed_visibility(obj)
-        # Where an animation switches Sinew's modifier off, Armature modifiers that are on would deform.
-        nodes = sinew_modifier(obj)
-        is_alone = is_alone or (nodes is not None and is_visibility_animated(obj, nodes))
-        # Tools for weights find the deforming bones through Armature modifiers that are on.
-        is_alone = is_alone and obj.mode != "WEIGHT_PAINT" and not stack.is_deformed_mesh_read(obj)
-        _set_icons(obj, Situation.ALONE if is_alone else Situation.SINEW)
-        return
-    if settings.replaces_modifiers:
+    elif was_on:
         restore_builtin(obj)
-    elif settings.enabled:
-        _note_keyed_visibility(obj)
-    _set_icons(obj, Situation.BUILT_IN if settings.enabled else Situation.OFF)
+    smooths = {}
+    for name in VIEWS:
+        _switch_own(obj, nodes, f"show_{name}", on, was_on)
+        smooths[name] = not on or _icons(obj, nodes, on, name).deformer is Deformer.ARMATURE
+    undeformed.mark(obj, on)
+    corrective_smooth.switch(obj, **smooths)
+    property_groups.store(settings.stack, "replaces_modifiers", on)
+
+
+def _switch_own(
+    obj: bpy.types.Object, nodes: bpy.types.NodesModifier | None, icon: str, on: bool, was_on: bool
+) -> None:
+    """Switches an icon of Sinew's modifiers, unless an animation does."""
+    known, is_shown, is_clicked = properties.of(obj).stack, on, on != was_on
+    if nodes is not None and not is_animated(obj, nodes, icon):
+        if was_on:
+            is_clicked |= getattr(known, icon) != getattr(nodes, icon)
+            property_groups.store(known, icon, getattr(nodes, icon))
+        is_shown = on and getattr(known, icon)
+        _set_icon(nodes, icon, is_shown)
+    undeformed.switch(obj, icon, is_shown, is_clicked)
 
 
 def is_off(obj: bpy.types.Object) -> bool:
     """Whether its modifiers are as they have to be while Sinew is off."""
     settings = properties.of(obj)
-    return not settings.enabled and Situation(settings.stack.situation) is Situation.OFF
+    return not (settings.enabled or settings.replaces_modifiers)
 
 
-def follow_icons(obj: bpy.types.Object) -> None:
-    """Takes over what the artist or a tool did to the icons since they were set."""
-    _follow_ended_keys(obj)
-    settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
-    situation = Situation(settings.stack.situation)
-    # With a modifier that is gone, Sinew's icon was another.
-    is_any_gone = len(settings.replaced_modifiers) > len(pairs)
-    for name in VIEWS:
-        view = _view(obj, pairs, name)
-        before = icons.icons(view, situation)
-        undeformed.note_switched(obj, name, before.sinew)
-        modifiers = tuple(
-            was_on if _is_keyed(obj, modifier, replaced) else getattr(modifier, f"show_{name}")
-            for (modifier, replaced), was_on in zip(pairs, before.modifiers, strict=True)
-        )
-        is_unknown = is_any_gone or nodes is None or is_animated(obj, nodes, f"show_{name}")
-        # Where an Armature modifier that was off is animated now, Sinew's icon is off until it is set below.
-        is_unknown |= any(
-            is_visibility_animated(obj, modifier)
-            and not (replaced.visibility_is_keyed or getattr(replaced, f"show_{name}"))
-            for modifier, replaced in pairs
-        )
-        now = Icons(before.sinew if is_unknown else getattr(nodes, f"show_{name}"), modifiers)
-        if now == before:
-            continue
-        is_left = situation is Situation.BUILT_IN and view.deformer is Deformer.SINEW
-        if is_left and now.sinew and obj.mode not in ("EDIT", "SCULPT"):
-            # The artist wants Sinew to deform it, though it is small.
-            property_groups.store(settings, "leave_small", False)
-        _store(obj, pairs, name, icons.follow(view, situation, now))
-    # So that what was taken over is not taken for another click.
-    _set_icons(obj, situation)
-
-
-def _follow_ended_keys(obj: bpy.types.Object) -> None:
-    """Where an animation does not set an Armature modifier's icons any more, they stay as it left them."""
-    ended = [
-        (modifier, replaced)
-        for modifier, replaced in replaced_modifiers(obj)
-        if replaced.visibility_is_keyed and not is_visibility_animated(obj, modifier)
-    ]
-    if not ended:
+def follow_own_icons(obj: bpy.types.Object) -> None:
+    """Takes over that the artist switched Sinew's modifier on where a small mesh is left to Blender."""
+    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    if settings.replaces_modifiers or nodes is None or obj.mode in ("EDIT", "SCULPT"):
         return
-    for modifier, replaced in ended:
-        property_groups.store(replaced, "visibility_is_keyed", False)
-        for name in VIEWS:
-            property_groups.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
-        for name in VIEWS:
-            property_groups.store(replaced, f"was_off_{name}", False)
-    _set_icons(obj, Situation(properties.of(obj).stack.situation))
+    for name in VIEWS:
+        if getattr(nodes, f"show_{name}") and not is_animated(obj, nodes, f"show_{name}"):
+            property_groups.store(settings, "leave_small", False)
+            property_groups.store(settings.stack, f"show_{name}", True)
 
 
 def show(obj: bpy.types.Object) -> None:
     """Has Sinew deform it in both views, whatever was switched before."""
-    pairs = replaced_modifiers(obj)
+    settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
     for name in VIEWS:
-        _store(obj, pairs, name, _view(obj, pairs, name).switched_on())
-    _set_icons(obj, Situation(properties.of(obj).stack.situation))
+        property_groups.store(settings.stack, f"show_{name}", True)
+        if settings.replaces_modifiers and nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
+            _set_icon(nodes, f"show_{name}", True)
+        if Deformer.NOTHING is _icons(obj, nodes, settings.replaces_modifiers, name).deformer:
+            for modifier, _replaced in pairs:
+                _set_icon(modifier, f"show_{name}", True)
 
 
-def deformers(obj: bpy.types.Object) -> tuple[Deformer, Deformer]:
-    """Returns what deforms it in the viewport and in renders while Sinew is on. What animated icons do is not
-    known."""
-    pairs = replaced_modifiers(obj)
-    viewport, render = (_view(obj, pairs, name).deformer for name in VIEWS)
+def icons_of(obj: bpy.types.Object) -> tuple[Icons, Icons]:
+    """Returns the icons in the viewport and in renders, with those that Sinew's modifier has while Sinew is
+    on. One that is animated may be on in any frame."""
+    nodes, is_in_place = sinew_modifier(obj), properties.of(obj).replaces_modifiers
+    viewport, render = (_icons(obj, nodes, is_in_place, name) for name in VIEWS)
     return viewport, render
+
+
+def _icons(
+    obj: bpy.types.Object, nodes: bpy.types.NodesModifier | None, is_in_place: bool, name: str
+) -> Icons:
+    icon = f"show_{name}"
+    own = nodes if is_in_place and nodes is not None else properties.of(obj).stack
+    is_own_shown = getattr(own, icon) or (nodes is not None and is_animated(obj, nodes, icon))
+    shown = (getattr(m, icon) or is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
+    return Icons(is_own_shown, tuple(shown))
 
 
 def deforms(obj: bpy.types.Object) -> bool:
     """Whether Sinew deforms it in one of the views while it is on."""
-    return Deformer.SINEW in deformers(obj)
-
-
-def do_views_differ(obj: bpy.types.Object) -> bool:
-    """Whether Sinew deforms by other Armature modifiers in the viewport than in renders."""
-    pairs = replaced_modifiers(obj)
-    viewport, render = (_view(obj, pairs, name).taking_part for name in VIEWS)
-    return any(viewport) and any(render) and viewport != render
-
-
-def _view(obj: bpy.types.Object, pairs: Pairs, name: str) -> icons.View:
-    shown, forced, switched = (
-        tuple(getattr(replaced, f"{kind}_{name}") for _modifier, replaced in pairs)
-        for kind in ("show", "was_off", "switched")
-    )
-    # One that an animation switches may be on in any frame.
-    shown = tuple(is_shown or _is_keyed(obj, *pair) for is_shown, pair in zip(shown, pairs, strict=True))
-    return icons.View(shown, forced, getattr(properties.of(obj).stack, f"hidden_{name}"), switched)
-
-
-def _store(obj: bpy.types.Object, pairs: Pairs, name: str, view: icons.View) -> None:
-    property_groups.store(properties.of(obj).stack, f"hidden_{name}", view.hidden)
-    none = (False,) * len(pairs)
-    for pair, shown, forced, switched in zip(
-        pairs, view.shown, view.forced or none, view.switched or none, strict=True
-    ):
-        _modifier, replaced = pair
-        if not _is_keyed(obj, *pair):
-            property_groups.store(replaced, f"show_{name}", shown)
-        property_groups.store(replaced, f"was_off_{name}", forced)
-        property_groups.store(replaced, f"switched_{name}", switched)
-
-
-def _set_icons(obj: bpy.types.Object, situation: Situation) -> None:
-    settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
-    helping, smooth = stack.helping_modifiers(obj), {}
-    # Where Sinew deformed until now, an animation that came meanwhile has not set the icons yet.
-    is_animation_known = situation.is_by_sinew or Situation(settings.stack.situation) is Situation.OFF
-    for name in VIEWS:
-        view = _view(obj, pairs, name)
-        wanted = icons.icons(view, situation)
-        for (modifier, replaced), is_on in zip(pairs, wanted.modifiers, strict=True):
-            is_keyed = is_visibility_animated(obj, modifier)
-            if not (is_keyed if is_animation_known else replaced.visibility_is_keyed):
-                _show_in(modifier, name, is_on)
-        if nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
-            _show_in(nodes, name, wanted.sinew)
-        for modifier in helping:
-            # Where an animation switches Sinew's, they stay on, as they change nothing.
-            _show_in(modifier, name, wanted.sinew)
-        smooth[name] = not situation.is_by_sinew or view.deformer is Deformer.ARMATURE
-    undeformed.mark(obj, situation.is_by_sinew)
-    corrective_smooth.switch(obj, **smooth)
-    property_groups.store(settings.stack, "situation", situation.value)
+    return any(icons.deformer is Deformer.SINEW for icons in icons_of(obj))
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:
@@ -503,55 +428,15 @@ def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> No
         modifier.use_deform_preserve_volume = preserve
 
 
-def _note_keyed_visibility(obj: bpy.types.Object) -> None:
-    """Notes which Armature modifiers' icons an animation sets from now on."""
-    is_first = not properties.of(obj).replaces_modifiers
-    for modifier, replaced in replaced_modifiers(obj):
-        if not is_visibility_animated(obj, modifier):
-            continue
-        if is_first or replaced.visibility_is_keyed:
-            for name in VIEWS:
-                property_groups.store(replaced, f"show_{name}", getattr(modifier, f"show_{name}"))
-        # While the object is hidden, no animation sets icons that Sinew has switched off.
-        elif obj.visible_get():
-            # Where one sets only the other icon, this one is restored.
-            for name in VIEWS:
-                if not is_animated(obj, modifier, f"show_{name}"):
-                    _show_in(modifier, name, getattr(replaced, f"show_{name}"))
-        if obj.visible_get():
-            property_groups.store(replaced, "visibility_is_keyed", True)
+def _show(modifier: bpy.types.Modifier, viewport: bool, render: bool) -> None:
+    _set_icon(modifier, "show_viewport", viewport)
+    _set_icon(modifier, "show_render", render)
 
 
-def _is_keyed(
-    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
-) -> bool:
-    """Whether an animation sets its icons, or did so last, and not Sinew."""
-    return replaced.visibility_is_keyed or is_visibility_animated(obj, modifier)
-
-
-def own_visibility(replaced: properties.SinewReplacedModifier) -> tuple[bool, bool]:
-    """Returns an Armature modifier's icons without Sinew: in the viewport, and in renders."""
-    viewport, render = (
-        getattr(replaced, f"show_{name}") and not getattr(replaced, f"was_off_{name}") for name in VIEWS
-    )
-    return viewport, render
-
-
-def was_off(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifiers were off in both views before Sinew."""
-    kept = properties.of(obj).replaced_modifiers
-    return any(replaced.was_off_viewport and replaced.was_off_render for replaced in kept)
-
-
-def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:
-    _show_in(modifier, "viewport", viewport)
-    _show_in(modifier, "render", render)
-
-
-def _show_in(modifier: bpy.types.Modifier | None, name: str, value: bool) -> None:
+def _set_icon(modifier: bpy.types.Modifier, icon: str, value: bool) -> None:
     # Setting an unchanged value makes Blender evaluate the object, too.
-    if modifier is not None and getattr(modifier, f"show_{name}") != value:
-        setattr(modifier, f"show_{name}", value)
+    if getattr(modifier, icon) != value:
+        setattr(modifier, icon, value)
 
 
 def _replaced_modifier(
@@ -561,24 +446,7 @@ def _replaced_modifier(
     replaced_modifiers = properties.of(obj).replaced_modifiers
     found = next((s for s in replaced_modifiers if stack.modifier_of(obj, s) == modifier), None)
     if found is None:
-        situation, nodes = Situation(properties.of(obj).stack.situation), sinew_modifier(obj)
-        is_alone = situation is Situation.ALONE
-        pairs = ((stack.modifier_of(obj, each), each) for each in replaced_modifiers)
-        known = [pair for pair in pairs if pair[0] is not None]
-        for name in VIEWS if situation.is_by_sinew and known else ():
-            view = _view(obj, known, name)
-            if view.deformer is Deformer.NOTHING and not view.hidden and getattr(modifier, f"show_{name}"):
-                # Sinew's icon is off because nothing deformed the mesh here. This modifier does.
-                _show_in(nodes, name, True)
         found = replaced_modifiers.add()
-        found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
-        found.visibility_is_keyed = is_visibility_animated(obj, modifier)
-        for name in () if found.visibility_is_keyed else VIEWS:
-            if getattr(properties.of(obj).stack, f"hidden_{name}"):
-                # Whoever added it while Sinew is hidden means it to deform.
-                setattr(found, f"switched_{name}", getattr(modifier, f"show_{name}"))
-            elif is_alone and nodes is not None and getattr(nodes, f"show_{name}"):
-                _show_in(modifier, name, False)
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
     property_groups.store(found, "name", modifier.name)
     property_groups.store(found, "uid", modifier.persistent_uid)
@@ -602,7 +470,6 @@ def follow_stack(obj: bpy.types.Object) -> None:
     Armature modifier keeps its method; one that no longer follows the first without a gap deforms by itself
     again."""
     settings = properties.of(obj)
-    follow_icons(obj)
     stack.position_own(obj)
     kept = settings.replaced_modifiers
     names = [replaced.name for _modifier, replaced in replaced_modifiers(obj)]
@@ -613,8 +480,6 @@ def follow_stack(obj: bpy.types.Object) -> None:
         modifier = obj.modifiers.get(name)
         if settings.replaces_modifiers and modifier is not None and modifier.type == "ARMATURE":
             _restore_pointer(modifier, kept[name])
-            if not kept[name].visibility_is_keyed:
-                _show(modifier, *own_visibility(kept[name]))
         kept.remove(kept.find(name))
     for place, name in enumerate(names):
         kept.move(kept.find(name), place)

@@ -8,7 +8,6 @@ import bpy
 
 from ..base.phrases import phrase
 from . import properties, stack, upstream_proxy
-from .icons import Situation
 
 # Such a tool also applies Sinew's modifier, and Sinew then removes the Armature modifiers.
 APPLYING = phrase(
@@ -21,10 +20,6 @@ def notes(obj: bpy.types.Object) -> list[str]:
     if not properties.of(obj).replaces_modifiers:
         return []
     found, own = [], stack.own_modifiers(obj)
-    if Situation(properties.of(obj).stack.situation) is Situation.ALONE:
-        found.append(
-            phrase("Switch Sinew off before other tools look for its Armature modifier: that is off")
-        )
     if upstream_proxy.shares_mesh(obj) and obj.data.users - obj.data.use_fake_user == 2:
         text = "Switch Sinew off before a script applies its modifiers: Sinew also uses its mesh meanwhile"
         found.append(phrase(text))

@@ -12,7 +12,6 @@ from ..skinning.engines import METHODS
 from ..skinning.scale_rule import SCALE_RULES
 from . import property_groups, stage_settings
 from .feature import Feature
-from .icons import Situation
 from .stage_settings import OFF, OVERRIDABLE, method_items
 
 # A choice in addition to Sinew's methods: the Armature modifier as it is in the file.
@@ -131,17 +130,9 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         "By which the Armature modifier is known however it is moved and renamed; 0 where it is "
         "known by its name",
     )
-    # The Armature modifier's own icons, restored on removal.
-    show_viewport: _hidden(bpy.props.BoolProperty, default=True)
-    show_render: _hidden(bpy.props.BoolProperty, default=True)
-    # Its icons were off before Sinew, which deforms by it nevertheless; removal switches them off again.
-    was_off_viewport: _hidden(bpy.props.BoolProperty)
-    was_off_render: _hidden(bpy.props.BoolProperty)
-    # The artist switched its icon while Sinew is on, or after Sinew's icon was switched off.
-    switched_viewport: _hidden(bpy.props.BoolProperty)
-    switched_render: _hidden(bpy.props.BoolProperty)
-    visibility_is_keyed: _hidden(
-        bpy.props.BoolProperty, "An animation has set the Armature modifier's flags, and not Sinew"
+    was_off: _hidden(
+        bpy.props.BoolProperty,
+        "It was off in both views before Sinew, which switched it on; removal switches it off again",
     )
     preserve_volume: _hidden(
         bpy.props.BoolProperty, "The Armature modifier's own choice, while it has the one nearest to Sinew's"
@@ -201,12 +192,10 @@ class SinewStack(bpy.types.PropertyGroup):
     modifier_uid: _hidden(bpy.props.IntProperty)
     neutral_uid: _hidden(bpy.props.IntProperty, "The modifier that changes nothing (undeformed.py)")
     mark_uid: _hidden(bpy.props.IntProperty, "The modifier that marks the mesh (undeformed.py)")
-    situation: _hidden(
-        bpy.props.StringProperty, "Who deformed it when the modifiers' icons were last set (attach/icons.py)"
-    )
-    # The artist switched the icon of Sinew's modifier off.
-    hidden_viewport: _hidden(bpy.props.BoolProperty)
-    hidden_render: _hidden(bpy.props.BoolProperty)
+    replaces_modifiers: _hidden(bpy.props.BoolProperty, "Sinew deforms now, wherever its icon is on")
+    # The icons that the artist gave Sinew's modifier, while Sinew has them off.
+    show_viewport: _hidden(bpy.props.BoolProperty, default=True)
+    show_render: _hidden(bpy.props.BoolProperty, default=True)
 
 
 class SinewBefore(bpy.types.PropertyGroup):
@@ -334,8 +323,8 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def replaces_modifiers(self) -> bool:
-        """Whether Sinew deforms now, wherever the icons of its modifier say so."""
-        return Situation(self.stack.situation).is_by_sinew
+        """Whether Sinew deforms now, wherever the icons say so."""
+        return self.stack.replaces_modifiers
 
     @property
     def mixed_method(self) -> str:

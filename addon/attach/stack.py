@@ -197,8 +197,9 @@ def move_behind(obj: bpy.types.Object, modifier: bpy.types.Modifier, other: bpy.
 
 
 def visibility_is_animated(obj: bpy.types.Object) -> bool:
-    """Whether an animation switches one of the Armature modifiers on and off."""
-    return any(is_visibility_animated(obj, modifier) for modifier in armature_modifiers(obj))
+    """Whether an animation switches one of the Armature modifiers, or one of Sinew's, on and off."""
+    modifiers = (*armature_modifiers(obj), *own_modifiers(obj))
+    return any(is_visibility_animated(obj, modifier) for modifier in modifiers)
 
 
 def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:

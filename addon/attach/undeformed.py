@@ -120,14 +120,18 @@ def _new(obj: bpy.types.Object, name: str, kind: str) -> bpy.types.Modifier:
 _switched: set[int] = set()
 
 
-def note_switched(obj: bpy.types.Object, view: str, are_on: bool) -> None:
-    """Notes where the icon of a helping modifier in a view was switched since Sinew set it: it is set back.
+def switch(obj: bpy.types.Object, icon: str, is_on: bool, is_clicked: bool) -> None:
+    """Switches the helping modifiers on or off, and notes where somebody has switched one.
 
-    view  viewport or render
+    icon        show_viewport or show_render
+    is_clicked  Sinew's own modifier was switched, which they follow
     """
-    helping = stack.helping_modifiers(obj)
-    if any(getattr(modifier, f"show_{view}") != are_on for modifier in helping):
-        _switched.add(obj.session_uid)
+    for modifier in stack.helping_modifiers(obj):
+        # Setting an unchanged value makes Blender evaluate the object, too.
+        if getattr(modifier, icon) != is_on:
+            setattr(modifier, icon, is_on)
+            if not is_clicked:
+                _switched.add(obj.session_uid)
 
 
 def was_switched(obj: bpy.types.Object) -> bool:

@@ -56,12 +56,13 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
     armatures = [each.armature and each.armature.evaluated_get(depsgraph) for each in replaced_modifiers]
     evaluated = obj.evaluated_get(depsgraph)
     settings = properties.of(evaluated)
-    if _own_values(settings.replaced_modifiers) != _own_values(replaced_modifiers):
-        # Sinew was added, or modifiers were moved or switched, since Blender evaluated the object: animated
+    if _names(settings.replaced_modifiers) != _names(replaced_modifiers):
+        # Sinew was added, or modifiers were moved, since Blender evaluated the object: animated
         # settings are available only after the next evaluation.
         settings = properties.of(obj)
     modifiers = list(zip(settings.replaced_modifiers, armatures, strict=False))
-    frames = pose.read(evaluated, settings, modifiers, skinned, depsgraph.mode)
+    icons = pose.icons_of(evaluated, modifiers, skinned)
+    frames = pose.read(evaluated, settings, modifiers, skinned, icons, depsgraph.mode)
     rest_points = source.rest_points(obj, skinned.bound.source, depsgraph)
     values = pose.stage_values(settings)
     differs = skinned.bound.skin_stack.deform(rest_points, frames, values=values)
@@ -72,9 +73,8 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
     return differs
 
 
-def _own_values(replaced_modifiers: Iterable[properties.SinewReplacedModifier]) -> list[tuple]:
-    """What Sinew itself stores about the modifiers."""
-    return [(each.name, each.show_viewport, each.show_render) for each in replaced_modifiers]
+def _names(replaced_modifiers: Iterable[properties.SinewReplacedModifier]) -> list[str]:
+    return [each.name for each in replaced_modifiers]
 
 
 def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> None:

@@ -18,7 +18,7 @@ from ..attach import (
     stack,
     upstream_proxy,
 )
-from ..attach.icons import VIEWS
+from ..attach.icons import VIEWS, Deformer
 from ..base.errors import SinewError
 from ..io import armature_io
 from . import safe_mode, small_meshes
@@ -35,11 +35,10 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
     """
     settings, is_linked = properties.of(obj), obj.library is not None
     if attach.is_off(obj):
-        # What the artist does to its modifiers meanwhile is taken over when it is switched on.
         return ObjectFacts(enabled=False)
     if not is_linked:
-        attach.follow_icons(obj)
-    viewport, render = attach.deformers(obj)
+        attach.follow_own_icons(obj)
+    viewport, render = (icons.deformer for icons in attach.icons_of(obj))
     return ObjectFacts(
         enabled=settings.enabled,
         error=error,
@@ -73,7 +72,7 @@ def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFact
         mesh_is_editable=mesh.is_editable,
         is_comparison_copy=properties.is_copy(obj),
         has_heat_map=settings.heat,
-        views_differ=attach.do_views_differ(obj),
+        views_differ=_do_views_differ(obj),
         safe_mode=safe_mode.is_on(),
         failure=failure,
         waits_for=waits_for,
@@ -85,6 +84,13 @@ def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFact
     )
 
 
+def _do_views_differ(obj: bpy.types.Object) -> bool:
+    """Whether Sinew deforms by other Armature modifiers in the viewport than in renders."""
+    viewport, render = attach.icons_of(obj)
+    is_by_sinew = viewport.deformer is render.deformer is Deformer.SINEW
+    return is_by_sinew and viewport.modifiers != render.modifiers
+
+
 def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
     """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
     if obj.library is not None:
@@ -93,12 +99,12 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
     if wanted.uses_builtin:
         is_given_up = wanted.state in (State.OFF, State.REFUSED)
         is_same = old.state is wanted.state and not properties.of(obj).replaces_modifiers
-        if attach.is_off(obj) or (wanted.state is State.REFUSED and is_same):
+        # While it is edited, what Sinew stores stays.
+        is_off = attach.is_off(obj) and old.state is not State.EDITING
+        if is_off or (wanted.state is State.REFUSED and is_same):
             stack.position_own(obj)
             return
-        attach.switch(obj, wanted.state is State.ASIDE, wanted.after_update)
-        if wanted.state is State.ASIDE:
-            attach.restore_builtin(obj)
+        attach.switch(obj, on=False)
         stack.position_own(obj)
         attach.adopt_pointers(obj)
         if is_given_up:
@@ -114,7 +120,7 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         return
     given = wanted.normals
     point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
-    attach.switch(obj, on=True, is_alone=wanted.after_update)
+    attach.switch(obj, on=True)
     attach.restore_pointers(obj)
 
 
@@ -140,7 +146,6 @@ def apply_saved(obj: bpy.types.Object, plan: Plan) -> None:
     settings = properties.of(obj)
     if not (settings.replaces_modifiers or settings.enabled):
         return
-    attach.follow_icons(obj)
     attach.switch(obj, on=False)
     # What was set for a mode may not be the nearest.
     attach.restore_volume(obj)
@@ -148,12 +153,12 @@ def apply_saved(obj: bpy.types.Object, plan: Plan) -> None:
         attach.use_nearest_volume(obj)
 
 
-def apply_resumed(obj: bpy.types.Object, was_on: bool, is_alone: bool) -> None:
-    """was_on: Sinew deformed it before it was saved. is_alone: as its plan says."""
+def apply_resumed(obj: bpy.types.Object, was_on: bool) -> None:
+    """was_on: Sinew deformed it before it was saved."""
     attach.restore_volume(obj)
-    # One that is off was not changed, and animations may have set its icons since.
+    # One that is off was not changed.
     if stack.sinew_modifier(obj) is not None and (was_on or not attach.is_off(obj)):
-        attach.switch(obj, was_on, is_alone)
+        attach.switch(obj, was_on)
 
 
 def mode_of(obj: bpy.types.Object) -> str:
@@ -211,22 +216,20 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
             continue
         if modifier.object is None:
             modifier.object = replaced.armature
-        # Where Sinew is off, or an animation sets the flags, they are the artist's own.
-        if properties.of(origin).replaces_modifiers and not replaced.visibility_is_keyed:
-            modifier.show_viewport, modifier.show_render = attach.own_visibility(replaced)
     if origin is None or attach.armature_of(obj) is None:
         return True
     try:
-        # Where keys had the original's modifiers off, the copy's are off.
-        attach.add(obj, properties.of(origin).method, attach.was_off(origin))
+        attach.add(obj, properties.of(origin).method, is_shown=False)
     except SinewError as error:
         log.error("%s", error)
         return True
     settings, others = properties.of(obj), properties.of(origin)
     properties.share(origin, obj)
     property_groups.copy(others.before.smooth, settings.before.smooth)
-    for name in VIEWS:
-        property_groups.store(settings.stack, f"hidden_{name}", getattr(others.stack, f"hidden_{name}"))
+    for name, icons in zip(VIEWS, attach.icons_of(origin), strict=True):
+        property_groups.store(settings.stack, f"show_{name}", icons.sinew)
+    for replaced in settings.replaced_modifiers:
+        replaced.was_off = replaced.name in kept and kept[replaced.name].was_off
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
     return True

@@ -14,10 +14,10 @@ import numpy as np
 import sinew
 
 from ..attach import point_store, properties, stack
-from ..attach.icons import VIEWS
+from ..attach.icons import VIEWS, Deformer, Icons
 from ..attach.modifier_options import ModifierOptions
 from ..io import mesh_io
-from ..io.actions import is_visibility_animated
+from ..io.actions import animated_paths
 from . import pose, source
 from .plan import State
 from .skinned_object import Shown, SkinnedObject
@@ -97,11 +97,12 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     if memory is None:
         return "its mesh changed"
     evaluation = skinned.evaluation
-    if evaluation.mesh_shown == mesh.as_pointer() and skinned.plan.leaves_out:
-        _leave_out(evaluated, modifiers)
+    icons = pose.icons_of(evaluated, modifiers, skinned)
+    is_for_viewports = evaluation.mesh_shown == mesh.as_pointer()
+    _leave_out(evaluated, modifiers if is_for_viewports and skinned.plan.leaves_out else [], skinned, icons)
     out, normals = memory
     _note_unannounced_change(out, skinned)
-    frames = pose.read(evaluated, settings, modifiers, skinned, "VIEWPORT")
+    frames = pose.read(evaluated, settings, modifiers, skinned, icons)
     rest_points = source.evaluated_points(evaluated, mesh, bound.source)
     if rest_points is None:
         return "what modifiers in front make of its mesh changed"
@@ -119,23 +120,28 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     return "what its method needs is not computed" if is_new_need else ""
 
 
-def _leave_out(evaluated: bpy.types.Object, modifiers: pose.Modifiers) -> None:
-    """Switches the Armature modifiers off in evaluated data, where Sinew's modifier comes after them and sets
-    each vertex: on a large mesh they take as long as Sinew. Blender copies their icons from the original
-    again before it requests points again. foreach_set() tags nothing, which is not allowed here.
+def _leave_out(
+    evaluated: bpy.types.Object, modifiers: pose.Modifiers, skinned: SkinnedObject, icons: tuple[Icons, Icons]
+) -> None:
+    """Switches these Armature modifiers off in evaluated data, where Sinew's modifier comes after them and
+    sets each vertex: on a large mesh they take as long as Sinew. Sinew's own go off where all Armature
+    modifiers are off. foreach_set() tags nothing, which is not allowed here.
 
     Exporters evaluate for themselves, and find them as they are: USD writes a skin where one is on.
     """
-    # An animation that was just added decides from now on.
-    names = {
-        replaced.name
-        for replaced, _armature in modifiers
-        if not is_visibility_animated(evaluated, evaluated.modifiers[replaced.name])
-    }
-    for view in VIEWS:
-        if not getattr(evaluated.sinew.stack, f"hidden_{view}"):
-            shown = [getattr(m, f"show_{view}") and m.name not in names for m in evaluated.modifiers]
-            evaluated.modifiers.foreach_set(f"show_{view}", shown)
+    if any(".show_" in path for path in animated_paths(evaluated)):
+        # An animation that was just added decides from now on.
+        return
+    stack_now, own = evaluated.modifiers, {skinned.noted.modifier, *skinned.noted.helping}
+    left_out = {replaced.name for replaced, _armature in modifiers}
+    for view, of_view in zip(VIEWS, icons, strict=True):
+        if of_view.sinew:
+            names = own if of_view.deformer is Deformer.NOTHING else left_out
+            shown = [getattr(m, f"show_{view}") and m.name not in names for m in stack_now]
+            stack_now.foreach_set(f"show_{view}", shown)
+    # A mark, which goes when Blender copies the icons from the original again (pose.icons_of).
+    marked = [m.show_in_editmode or m.name == skinned.noted.modifier for m in stack_now]
+    stack_now.foreach_set("show_in_editmode", marked)
 
 
 def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:

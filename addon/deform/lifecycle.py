@@ -174,8 +174,7 @@ def resume_after_save(context: bpy.types.Context) -> None:
             if not obj.is_editable:
                 continue
             with _logging_failure("Not as before it was saved; press Rebind", obj):
-                was_on, plan = obj.session_uid in _saving.on_before, session.plan_of(obj)
-                apply_plan.apply_resumed(obj, was_on, plan.after_update)
+                apply_plan.apply_resumed(obj, obj.session_uid in _saving.on_before)
     session.refresh(context)
 
 

@@ -18,7 +18,6 @@ class State(Enum):
     LINKED = "linked"  # the Armature modifier: the object belongs to another file
     EDITING = "editing"  # the Armature modifier: tools of the object's mode need it
     BUILT_IN = "built-in"  # the Armature modifier: it has the same shape in less time, or the mode needs it
-    ASIDE = "aside"  # the Armature modifier or nothing, in both views, as the modifiers' icons say
     WAITING_UPSTREAM = "waiting upstream"  # Sinew, once Blender has evaluated what it deforms
     WAITING = "waiting"  # Sinew, with the Armature modifier's method until the chosen one's data is computed
     IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the usual case
@@ -44,16 +43,16 @@ class Normals:
 
 
 _IN_BOTH = {
-    Deformer.NOTHING: "Hidden by its modifier's icons",
-    Deformer.ARMATURE: "Its Armature modifier deforms: its icons are on",
+    Deformer.NOTHING: "Not deformed: the icons of its Armature modifier are off",
+    Deformer.ARMATURE: "Its Armature modifier deforms: the icons of Sinew's modifier are off",
 }
 _IN_VIEWPORT = {
-    Deformer.NOTHING: "Hidden in the viewport by its modifier's icon",
-    Deformer.ARMATURE: "Its Armature modifier deforms in the viewport: its icon is on",
+    Deformer.NOTHING: "Not deformed in the viewport: the icon of its Armature modifier is off",
+    Deformer.ARMATURE: "Its Armature modifier deforms in the viewport: the icon of Sinew's modifier is off",
 }
 _IN_RENDERS = {
-    Deformer.NOTHING: "Hidden in renders by its modifier's icon",
-    Deformer.ARMATURE: "Its Armature modifier deforms in renders: its icon is on",
+    Deformer.NOTHING: "Not deformed in renders: the icon of its Armature modifier is off",
+    Deformer.ARMATURE: "Its Armature modifier deforms in renders: the icon of Sinew's modifier is off",
 }
 
 
@@ -64,8 +63,7 @@ class Plan:
     reason          one clause for the panel; the error of REFUSED; empty for the usual case and for what the
                     user chose
     in_buffer       a separate object stores the points (point_buffer.py), not an attribute of the mesh
-    after_update    Sinew deforms after Blender's evaluation, not within it. Its Armature modifiers are off
-                    then: only within the evaluation can they be on and yet be left out
+    after_update    Sinew deforms after Blender's evaluation, not within it
     normals         the normals given along with the points
     normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
     leaves_out      Blender leaves the Armature modifiers out while Sinew deforms within its evaluation:
@@ -87,7 +85,7 @@ class Plan:
     @property
     def uses_builtin(self) -> bool:
         """Whether Sinew does not deform it: its Armature modifiers do, where their icons are on."""
-        return not self.is_read or self.state in (State.BUILT_IN, State.ASIDE)
+        return not self.is_read or self.state is State.BUILT_IN
 
     @property
     def is_read(self) -> bool:
@@ -130,7 +128,7 @@ class ObjectFacts:
     mesh_is_shared              other objects use the mesh
     mesh_is_editable            attributes can be added to the mesh: it is not linked
     is_comparison_copy          it is a copy that a comparison shows
-    visibility_is_keyed         an animation switches one of the Armature modifiers on and off
+    visibility_is_keyed         an animation switches one of the Armature modifiers, or one of Sinew's
     viewport, render            what the modifiers' icons say that deforms it in each view
     deformed_is_read            Blender reads the mesh that the Armature modifiers make
     is_deforming_body           a rigid body reads that mesh: Blender simulates it before it places the
@@ -192,18 +190,10 @@ def _plan(facts: ObjectFacts) -> Plan:
         return Plan(State.REFUSED, facts.error)
     if facts.mode in ARMATURE_MODIFIER_MODES:
         return Plan(State.EDITING, "In this mode the Armature modifier deforms it")
-    # Weight Paint finds bones through an Armature modifier that is on, and here the animation switches it.
-    if facts.mode == "WEIGHT_PAINT" and facts.visibility_is_keyed:
-        reason = "The visibility of its Armature modifier is animated: in this mode that shows its own shape"
-        # What comes from upstream is not evaluated then.
-        return Plan(State.EDITING if facts.has_upstream else State.BUILT_IN, reason)
-    views = {facts.viewport, facts.render}
-    if facts.builtin_is_faster and Deformer.ARMATURE not in views:
+    if facts.builtin_is_faster and Deformer.ARMATURE not in (facts.viewport, facts.render):
         reason = "Small: the Armature modifier has the same shape in less time, and deforms it"
         return Plan(State.BUILT_IN, reason)
     reason = _why_not_in_depsgraph(facts)
-    if Deformer.SINEW not in views and not facts.has_upstream:
-        return Plan(State.ASIDE, after_update=bool(reason))
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
     normals, normals_reason = _normals(facts)
@@ -244,7 +234,7 @@ def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
         (facts.upstream_changes_weights, "Modifiers in front of the Armature modifier change weights"),
         (facts.has_heat_map, "It shows a heat map"),
         (facts.is_deforming_body, "Its rigid body is simulated from the deformed mesh"),
-        (facts.visibility_is_keyed, "The visibility of its Armature modifier is animated"),
+        (facts.visibility_is_keyed, "The visibility of its modifier is animated"),
         (facts.views_differ, "An Armature modifier is on in the viewport or in renders alone"),
     )
     return next((reason for holds, reason in reasons if holds), "")

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads the inputs of each Armature modifier in one evaluation: pose, method, scale rule."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
-from ..attach import attach, icons, properties, stage_settings
+from ..attach import attach, properties, stage_settings
+from ..attach.icons import Deformer, Icons
 from ..base.errors import SinewError
 from ..io import armature_io, spaces
 from ..skinning import parameters
@@ -33,13 +33,15 @@ def read(
     settings: properties.SinewSettings,
     modifiers: Modifiers,
     skinned: SkinnedObject,
-    mode: str,
+    icons: tuple[Icons, Icons],
+    mode: str = "",
 ) -> Frames:
     """What Blender can not compute with, Sinew leaves at rest: bones and transforms that are not finite.
 
     settings   the object's, evaluated
     modifiers  evaluated
-    mode       the depsgraph's
+    icons      of the viewport and of renders
+    mode       the depsgraph's; empty within an evaluation, which does not know it
 
     Raises SinewError where a driver sets a method or a scale rule that does not exist.
     """
@@ -53,7 +55,7 @@ def read(
     for stage, (replaced, armature), takes_part in zip(
         skinned.bound.skin_stack.skin_stages,
         modifiers,
-        _taking_part(evaluated, modifiers, skinned.noted.visibility_keyed, mode),
+        _taking_part(icons, mode),
         strict=False,
     ):
         if armature is None or armature.data.is_editmode or not takes_part:
@@ -152,22 +154,26 @@ def stage_values(settings: properties.SinewSettings) -> StageValues:
     return values
 
 
-def _taking_part(
-    evaluated: bpy.types.Object, modifiers: Modifiers, are_keyed: list[bool], mode: str
-) -> Sequence[bool]:
-    """Returns which of the modifiers deform in a view; where an animation sets their icons, it decides."""
-    viewport, render = (
-        [
-            getattr(evaluated.modifiers[replaced.name], f"show_{name}")
-            if is_keyed
-            else icons.takes_part(
-                getattr(replaced, f"show_{name}"),
-                getattr(evaluated.sinew.stack, f"hidden_{name}"),
-                getattr(replaced, f"switched_{name}"),
-            )
-            for (replaced, _armature), is_keyed in zip(modifiers, are_keyed, strict=False)
-        ]
-        for name in icons.VIEWS
-    )
-    shown, other = (render, viewport) if mode == "RENDER" else (viewport, render)
-    return shown if any(are_keyed) else icons.taking_part(shown, other)
+def icons_of(
+    evaluated: bpy.types.Object, modifiers: Modifiers, skinned: SkinnedObject
+) -> tuple[Icons, Icons]:
+    """Returns the icons in the viewport and in renders, as the artist or an animation set them."""
+    own = evaluated.modifiers[skinned.noted.modifier]
+    # Otherwise in_depsgraph.py has switched them since Blender copied them.
+    if not own.show_in_editmode or skinned.evaluation.icons is None:
+        replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]
+        viewport, render = (
+            Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced))
+            for icon in ("show_viewport", "show_render")
+        )
+        skinned.evaluation.icons = viewport, render
+    return skinned.evaluation.icons
+
+
+def _taking_part(icons: tuple[Icons, Icons], mode: str) -> tuple[bool, ...]:
+    """Returns which of the modifiers Sinew deforms by. Without a mode it may be for both views: where Sinew
+    deforms in both, they agree."""
+    if mode:
+        return icons[mode == "RENDER"].modifiers
+    by_sinew = (each.modifiers for each in icons if each.deformer is Deformer.SINEW)
+    return next(by_sinew, (False,) * len(icons[0].modifiers))

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..attach import (
+    attach,
     node_group,
     normals,
     orphans,
@@ -19,7 +20,6 @@ from ..attach import (
     stack,
     upstream_proxy,
 )
-from ..attach.icons import Deformer
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
 from ..base.errors import SinewError
@@ -359,8 +359,8 @@ def waiting() -> set[tuple[int, int]]:
         (obj.session_uid, uid(properties.of(obj).storage.upstream_proxy))
         for obj in objects_with_sinew(Changes())
         if plan_of(obj).state is State.WAITING_UPSTREAM
-        and plan_of(obj).viewport is Deformer.SINEW
         and properties.of(obj).replaces_modifiers
+        and attach.icons_of(obj)[0].sinew
     }
 
 

@@ -11,10 +11,11 @@ import numpy as np
 import sinew
 
 from ..attach import attach, normals, properties, stack, stage_settings, undeformed, upstream_proxy
+from ..attach.icons import Icons
 from ..attach.modifier_options import ModifierOptions, are_animated
 from ..base.errors import SinewError
 from ..io import armature_io, mesh_io
-from ..io.actions import animated_paths, is_visibility_animated
+from ..io.actions import animated_paths
 from ..skinning.skin_stack import NO_STAGES, SkinStageFrame
 from ..skinning.stages import StageValues
 from . import small_meshes
@@ -51,6 +52,7 @@ class Evaluation:
     mesh                 the address of the evaluated mesh that was given points, or 0; compared only within
                          the same event, while Blender keeps the mesh
     mesh_shown           the address of the evaluated mesh that viewports showed last, or 0
+    icons                of the viewport and of renders, as the artist or an animation set them
     is_event_known       Blender called handlers before the evaluation, or Sinew caused it
     was_tagged           Sinew has tagged the object for another evaluation since
     changed_unannounced  the mesh was replaced without any event before the evaluation
@@ -63,6 +65,7 @@ class Evaluation:
     is_only_user: bool = True
     mesh: int = 0
     mesh_shown: int = 0
+    icons: tuple[Icons, Icons] | None = None
     is_event_known: bool = True
     was_tagged: bool = False
     changed_unannounced: bool = False
@@ -87,10 +90,10 @@ class Noted:
     """An object as it was when its plan was applied. Immutable: it is replaced as a whole.
 
     modifier             the name of Sinew's modifier, by which it is found again
+    helping              the names of those around it that change nothing
     attribute            the mesh's point attribute; empty where the point buffer has the points
     normals_domain       the normals that drew the mesh, as from normals.domain_of()
     mesh_users           the number of users of the mesh; with several, another could read while Sinew writes
-    visibility_keyed     for each Armature modifier, whether an animation switches it on and off
     volume_keyed         for each Armature modifier, whether an animation chooses between its two methods
     options_keyed        an animation sets other options of an Armature modifier
     rests                from rests_of()
@@ -108,10 +111,10 @@ class Noted:
     name: str
     mode: str
     modifier: str
+    helping: list[str]
     attribute: str
     normals_domain: str
     mesh_users: int
-    visibility_keyed: list[bool]
     volume_keyed: list[bool]
     options_keyed: bool
     rests: list[int | None]
@@ -134,10 +137,10 @@ class Noted:
             name=obj.name,
             mode=obj.mode,
             modifier=stack.sinew_modifier(obj).name,
+            helping=[modifier.name for modifier in stack.helping_modifiers(obj)],
             attribute=storage.attribute,
             normals_domain=normals.domain_of(mesh),
             mesh_users=mesh.users,
-            visibility_keyed=[is_visibility_animated(obj, m) for m in modifiers],
             volume_keyed=[attach.is_volume_followed(obj, m) for m in modifiers],
             options_keyed=any(are_animated(obj, m) for m in modifiers),
             rests=rests_of(obj),
@@ -189,7 +192,10 @@ class SkinnedObject:
                 # Earlier failures still count.
                 old = self.evaluation
                 self.evaluation = Evaluation(
-                    failures=old.failures, failure=old.failure, failures_in_a_row=old.failures_in_a_row
+                    icons=old.icons,
+                    failures=old.failures,
+                    failure=old.failure,
+                    failures_in_a_row=old.failures_in_a_row,
                 )
             self.bound = bound
 

@@ -19,7 +19,6 @@ ICONS = {
     State.LINKED: "MOD_ARMATURE",
     State.EDITING: "MOD_ARMATURE",
     State.BUILT_IN: "MOD_ARMATURE",
-    State.ASIDE: "HIDE_ON",
     State.WAITING_UPSTREAM: "SORTTIME",
     State.WAITING: "SORTTIME",
     State.IN_DEPSGRAPH: "CHECKMARK",
@@ -75,7 +74,7 @@ def icon_of(obj: bpy.types.Object) -> str:
     if plan.state is not State.OFF and problems_of(obj):
         return ICONS[State.REFUSED]
     if plan.is_read and plan.viewport is Deformer.NOTHING:
-        return ICONS[State.ASIDE]
+        return "HIDE_ON"
     if plan.is_read and plan.viewport is Deformer.ARMATURE:
         return ICONS[State.BUILT_IN]
     return ICONS[plan.state]

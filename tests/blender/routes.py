@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import bpy
-from sinew_addon.attach import properties
+from sinew_addon.attach import properties, stack
 from sinew_addon.deform import safe_mode, session, small_meshes
 
 EVALUATION, UPDATE = "evaluation", "update"
@@ -41,10 +41,13 @@ def taken(obj: bpy.types.Object, shapes_before: int) -> str:
     if state is None or state.shown.frames is None:
         raise NotBySinewError("Sinew has not deformed it")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    for modifier in obj.evaluated_get(depsgraph).modifiers:
+    modifiers, is_within = obj.evaluated_get(depsgraph).modifiers, bool(state.evaluation.mesh)
+    if not modifiers[stack.sinew_modifier(obj).name].show_viewport:
+        raise NotBySinewError("its modifier is off")
+    for modifier in modifiers:
         replaced = modifier.type == "ARMATURE" and modifier.name in settings.replaced_modifiers
-        if replaced and modifier.show_viewport:
+        if is_within and replaced and modifier.show_viewport:
             raise NotBySinewError(f"the Armature modifier {modifier.name} is on")
     if state.shown.number <= shapes_before:
         raise NotBySinewError("Sinew made no shape for this pose")
-    return EVALUATION if state.evaluation.mesh else UPDATE
+    return EVALUATION if is_within else UPDATE

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The icons of Sinew's modifier and of the Armature modifier: whatever is switched, in any order, one of
-three things deforms in each view, and the panel says which."""
+"""The icons of Sinew's modifier and of the Armature modifier mean what they mean in any stack, in each view
+and in any order, and the panel says what deforms."""
 
 from __future__ import annotations
 
@@ -26,32 +26,23 @@ SINEW, ARMATURE, NOTHING = Deformer.SINEW, Deformer.ARMATURE, Deformer.NOTHING
 
 @dataclass
 class Rule:
-    """What the icons should mean, apart from Sinew's own code: for each view, whether Sinew's was switched
-    off, and whether the Armature modifier's is on, which goes off with it. After the update, that is off
-    while Sinew deforms, too, and deforms in Sinew's place when it is switched on."""
+    """What the icons should mean, apart from Sinew's own code: each is as it was clicked, and what deforms
+    is what the stack shows."""
 
-    after_update: bool = False
-    hidden: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, False))
+    sinew: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, True))
     armature: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(VIEWS, True))
 
     def click(self, modifier: str, view: str) -> None:
-        if modifier == "Armature" and self.after_update:
-            self.hidden[view], self.armature[view] = self.deformer(view) is not ARMATURE, True
-        elif modifier == "Armature":
-            self.armature[view] = not self.armature[view]
-        else:
-            self.hidden[view] = self.deformer(view) is SINEW
-            self.armature[view] = not self.hidden[view]
+        icons = self.sinew if modifier == "Sinew" else self.armature
+        icons[view] = not icons[view]
 
     def deformer(self, view: str) -> Deformer:
         if not self.armature[view]:
             return NOTHING
-        return ARMATURE if self.hidden[view] else SINEW
+        return SINEW if self.sinew[view] else ARMATURE
 
     def icons(self) -> dict[str, tuple[bool, bool]]:
-        views = [self.deformer(view) for view in VIEWS]
-        of = {"Sinew": (SINEW,), "Armature": (ARMATURE,) if self.after_update else (SINEW, ARMATURE)}
-        return {name: tuple(view in meant for view in views) for name, meant in of.items()}
+        return {"Sinew": tuple(self.sinew.values()), "Armature": tuple(self.armature.values())}
 
 
 class Character:
@@ -95,7 +86,7 @@ class Character:
         is_plain = all(rule.deformer(view) is SINEW for view in VIEWS)
         assert (state_text.switch_text([self.obj]) == "On") == is_plain
         said = state_text.sentence_of(self.obj)
-        words = {ARMATURE: "Its Armature modifier deforms", NOTHING: "Hidden", SINEW: "in the place of"}
+        words = {ARMATURE: "Its Armature modifier deforms", NOTHING: "Not deformed", SINEW: "in the place of"}
         assert all(words[rule.deformer(view)] in said for view in VIEWS)
         if rendered_points is not None:
             assert self.deformer(rendered_points(self.obj)) is rule.deformer("render")
@@ -112,10 +103,11 @@ def _with_keys(obj: bpy.types.Object) -> None:
     obj.data.shape_keys.key_blocks["Key"].value = 0.7
 
 
-def _switch(character: Character, _rule: Rule, _chosen: tuple[str, str], _path: Path) -> None:
+def _switch(character: Character, rule: Rule, _chosen: tuple[str, str], _path: Path) -> None:
     properties.of(character.obj).enabled = False
-    assert character.icons() == {"Sinew": (False, False), "Armature": (True, True)}
-    assert character.deformer(scenes.final_points(character.obj)) is ARMATURE
+    assert character.icons() == rule.icons() | {"Sinew": (False, False)}
+    shown = ARMATURE if rule.armature["viewport"] else NOTHING
+    assert character.deformer(scenes.final_points(character.obj)) is shown
     properties.of(character.obj).enabled = True
 
 
@@ -149,10 +141,8 @@ def _paint(character: Character, rule: Rule, chosen: tuple[str, str], _path: Pat
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     bpy.context.view_layer.update()
     assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
-    # After the update, the Armature modifier's icon has another meaning in this mode, where it is on.
-    if not (rule.after_update and chosen[0] == "Armature"):
-        character.click(*chosen)
-        rule.click(*chosen)
+    character.click(*chosen)
+    rule.click(*chosen)
     assert character.deformer(scenes.final_points(character.obj)) is rule.deformer("viewport")
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
@@ -172,7 +162,7 @@ def _edit(_character: Character, _rule: Rule, _chosen: tuple[str, str], _path: P
 @pytest.mark.usefixtures("route")
 def test_clicks_among_everything_else(prepare, rendered_points, tmp_path):
     """A long walk: clicks, Sinew off and on, saving and loading, undo, duplicates, modes."""
-    character, rule, dice = Character(prepare), Rule(prepare is _with_keys), random.Random(7)
+    character, rule, dice = Character(prepare), Rule(), random.Random(7)
     others = (_switch, _reopen, _undo, _duplicate, _paint, _edit)
     for step in range(60):
         chosen = dice.choice(CLICKS)
@@ -183,7 +173,7 @@ def test_clicks_among_everything_else(prepare, rendered_points, tmp_path):
             rule.click(*chosen)
         character.check(rule, rendered_points if step % 5 == 0 else None)
     attach.remove(character.obj)
-    assert character.icons() == {"Armature": (True, True)}
+    assert character.icons() == {"Armature": rule.icons()["Armature"]}
 
 
 @pytest.mark.parametrize("shown", [(False, False), (True, False), (False, True)])
@@ -201,17 +191,17 @@ def test_add_to_what_is_off(shown, rendered_points, capfd):
     assert scenes.worst(scenes.final_points(obj), shapes[deforms[0]]) <= near
     assert scenes.worst(rendered_points(obj), shapes[deforms[1]]) <= near
     assert ("was off before Sinew" in printed) == (not any(shown))
-    assert ("Hidden" in state_text.sentence_of(obj)) == any(shown)
+    assert ("Not deformed" in state_text.sentence_of(obj)) == any(shown)
     properties.of(obj).enabled = False
     assert (modifier.show_viewport, modifier.show_render) == deforms
     properties.of(obj).enabled = True
-    # Sinew's own icon puts it where the Armature modifier was off.
-    obj.modifiers["Sinew"].show_viewport = obj.modifiers["Sinew"].show_render = True
+    # Sinew deforms wherever the Armature modifier is switched on.
+    modifier.show_viewport = modifier.show_render = True
     bpy.context.view_layer.update()
     assert scenes.worst(scenes.final_points(obj), shapes[True]) <= near
     assert scenes.worst(rendered_points(obj), shapes[True]) <= near
     bpy.ops.sinew.remove()
-    assert (modifier.show_viewport, modifier.show_render) == shown
+    assert (modifier.show_viewport, modifier.show_render) == (shown if not any(shown) else (True, True))
 
 
 @pytest.mark.parametrize("kind", ["shape-keys", "mdd"])
@@ -255,14 +245,16 @@ def test_keys_on_sinews_icon(view, rendered_points):
     character = Character()
     obj = character.obj
     sinews, frames = obj.modifiers["Sinew"], (9, 10, 11)
-    shapes = {frame: (scenes.shapes(obj, [frame])[0], scenes.rest_points(obj)) for frame in frames}
+    shapes = {frame: scenes.shapes(obj, [frame])[0] for frame in frames}
+    sinews.show_viewport = False
+    alone = {frame: scenes.shapes(obj, [frame])[0] for frame in frames}
+    sinews.show_viewport = True
     scenes.key(sinews, f"show_{view}", ((1, True), (10, False), (11, True)))
     bpy.context.view_layer.update()
     for frame in (9, 10, 11, 10, 9):
         bpy.context.scene.frame_set(frame)
         for each, points in (("viewport", scenes.final_points(obj)), ("render", rendered_points(obj))):
-            expected = shapes[frame][each == view and frame == 10]
+            expected = (alone if each == view and frame == 10 else shapes)[frame]
             assert scenes.worst(points, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-        assert not obj.modifiers["Armature"].show_viewport
     attach.remove(obj)
     assert character.icons() == {"Armature": (True, True)}

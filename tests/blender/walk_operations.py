@@ -486,7 +486,7 @@ def icons(w: Walker, r: random.Random) -> None:
             and o.override_library is None
             and len(armature_modifiers(o)) == 1
             and armature_modifiers(o)[0].object is not None
-            and w.side.is_in_both_views(o)
+            and all(m.show_viewport and m.show_render for m in armature_modifiers(o))
             and not w.side.has_other_shape(o)
             and not w.side.is_method_keyed(o)
             and not any(".show_" in path for path in animated_paths(o))
@@ -496,17 +496,14 @@ def icons(w: Walker, r: random.Random) -> None:
     w.object_mode()
     # One that is left to Blender has a meaning of its own for them.
     w.side.set_option(obj, "leave_small", False)
-    hidden, armature = dict.fromkeys(VIEWS, False), dict.fromkeys(VIEWS, True)
+    sinew, armature = dict.fromkeys(VIEWS, True), dict.fromkeys(VIEWS, True)
 
     def deformers() -> dict[str, str]:
-        return {v: "" if not armature[v] else "Armature" if hidden[v] else "Sinew" for v in VIEWS}
+        return {v: "" if not armature[v] else "Sinew" if sinew[v] else "Armature" for v in VIEWS}
 
     def click(modifier: str, view: str) -> None:
-        if modifier == "Armature":
-            armature[view] = not armature[view]
-        else:
-            hidden[view] = deformers()[view] == "Sinew"
-            armature[view] = not hidden[view]
+        icons = sinew if modifier == "Sinew" else armature
+        icons[view] = not icons[view]
         w.side.click(obj, modifier, view, deformers())
         bpy.context.view_layer.update()
 
@@ -517,8 +514,9 @@ def icons(w: Walker, r: random.Random) -> None:
     w.side.before_render(obj, deformers())
     bpy.ops.render.render()
     for view in VIEWS:
-        if deformers()[view] != "Sinew":
-            click("Sinew", view)
+        for modifier, icons in (("Sinew", sinew), ("Armature", armature)):
+            if not icons[view]:
+                click(modifier, view)
 
 
 @operation(1)

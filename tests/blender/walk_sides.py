@@ -253,11 +253,6 @@ class BlenderSide(Side):
             self._use_keyed_flags(obj)
         self._set(obj, ON, on)
 
-    def is_in_both_views(self, obj: bpy.types.Object) -> bool:
-        """Whether its one Armature modifier is on in both, apart from Sinew."""
-        (modifier,) = armature_modifiers(obj)
-        return modifier.show_viewport and modifier.show_render
-
     def click(self, obj: bpy.types.Object, which: str, view: str, deformers: dict[str, str]) -> None:
         """A click on one of the icons.
 

@@ -154,20 +154,8 @@ class SinewSide(Side):
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
         obj.sinew.enabled = on
 
-    def is_in_both_views(self, obj: bpy.types.Object) -> bool:
-        (kept,) = obj.sinew.replaced_modifiers
-        return kept.show_viewport and kept.show_render
-
     def click(self, obj: bpy.types.Object, which: str, view: str, deformers: dict[str, str]) -> None:
-        own, (armature,) = self.own_modifier(obj), armature_modifiers(obj)
-        if obj.sinew.stack.situation == "alone":
-            # The Armature modifier's icon is off while Sinew deforms: other clicks come to the same. Switched
-            # off again, it brings Sinew back.
-            setattr(armature, f"show_{view}", deformers[view] == "Armature")
-            bpy.context.view_layer.update()
-            setattr(own, f"show_{view}", deformers[view] == "Sinew")
-            return
-        modifier = own if which == "Sinew" else armature
+        modifier = self.own_modifier(obj) if which == "Sinew" else armature_modifiers(obj)[0]
         setattr(modifier, f"show_{view}", not getattr(modifier, f"show_{view}"))
 
     def check_said_gone(self, meshes: list[bpy.types.Object], rig: bpy.types.Object) -> None:

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import pytest
-from sinew_addon.attach.icons import Deformer, Icons, Situation, View, follow, icons
+from sinew_addon.attach.icons import Deformer, Icons
 from sinew_addon.deform.plan import ObjectFacts, State, plan
 
 _HIDDEN = {"viewport": Deformer.NOTHING, "render": Deformer.NOTHING}
@@ -33,20 +33,13 @@ TABLE = [
     ({"has_upstream": True, "upstream_changes_weights": True}, State.AFTER_UPDATE, "change weights"),
     ({"has_heat_map": True}, State.AFTER_UPDATE, "heat map"),
     ({"visibility_is_keyed": True}, State.AFTER_UPDATE, "animated"),
-    ({"visibility_is_keyed": True, "mode": "WEIGHT_PAINT"}, State.BUILT_IN, "animated"),
-    (
-        {"visibility_is_keyed": True, "mode": "WEIGHT_PAINT", "has_upstream": True},
-        State.EDITING,
-        "animated",
-    ),
     ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
     ({"deformed_is_read": True}, State.IN_DEPSGRAPH, ""),
     ({"is_deforming_body": True}, State.AFTER_UPDATE, "Its rigid body is simulated from the deformed mesh"),
     ({"viewport": Deformer.NOTHING}, State.IN_DEPSGRAPH, ""),
     ({"viewport": Deformer.ARMATURE, "mesh_is_shared": True}, State.IN_DEPSGRAPH, ""),
     ({"render": Deformer.ARMATURE, "safe_mode": True}, State.AFTER_UPDATE, "Safe mode"),
-    ({"viewport": Deformer.NOTHING, "render": Deformer.ARMATURE}, State.ASIDE, ""),
-    ({"viewport": Deformer.NOTHING, "render": Deformer.NOTHING, "safe_mode": True}, State.ASIDE, ""),
+    ({"viewport": Deformer.NOTHING, "render": Deformer.ARMATURE}, State.IN_DEPSGRAPH, ""),
     ({**_HIDDEN, "has_upstream": True}, State.IN_DEPSGRAPH, ""),
     ({**_HIDDEN, "builtin_is_faster": True}, State.BUILT_IN, "Small"),
     ({"render": Deformer.ARMATURE, "builtin_is_faster": True}, State.IN_DEPSGRAPH, ""),
@@ -124,100 +117,18 @@ def test_who_computes_normals(facts, domain, reason):
     assert bool(found.normals_reason) == bool(reason)
 
 
-CLICKS = [
-    # Sinew's icon (S) and that of the Armature modifier (A) in one view, as clicked: what deforms.
-    ("", Deformer.SINEW),
-    ("A", Deformer.NOTHING),
-    ("AA", Deformer.SINEW),
-    ("AS", Deformer.SINEW),
-    ("S", Deformer.NOTHING),
-    ("SS", Deformer.SINEW),
-    ("SA", Deformer.ARMATURE),
-    ("SAA", Deformer.NOTHING),
-    ("SAAS", Deformer.SINEW),
-    ("SASA", Deformer.NOTHING),
-    ("SASAA", Deformer.SINEW),
-]
-
-
-def _after(clicks: str, situation: Situation, view: View) -> View:
-    for click in clicks:
-        before = icons(view, situation)
-        sinew, (modifier,) = before.sinew ^ (click == "S"), before.modifiers
-        view = follow(view, situation, Icons(sinew, (modifier ^ (click == "A"),)))
-        # What Sinew sets then is not taken for a click.
-        assert follow(view, situation, icons(view, situation)) == view
-    return view
-
-
-@pytest.mark.parametrize(("clicks", "deformer"), CLICKS)
-def test_the_order_of_clicks(clicks, deformer):
-    view = _after(clicks, Situation.SINEW, View((True,)))
-    assert view.deformer is deformer
-    assert icons(view, Situation.SINEW) == Icons(
-        deformer is Deformer.SINEW, (deformer is not Deformer.NOTHING,)
-    )
-    assert view.shown == (True,)
-    # While Sinew is off, the Armature modifier is as before.
-    assert icons(view, Situation.OFF) == Icons(False, (True,))
-
-
-def test_a_tool_that_hides_all_but_one_armature_modifier_gets_that_one():
-    view, situation = View((True, True)), Situation.SINEW
-    view = follow(view, situation, Icons(False, (False, True)))
-    assert view.deformer is Deformer.ARMATURE
-    assert icons(view, situation) == Icons(False, (False, True))
-    view = follow(view, situation, Icons(True, (True, True)))
-    assert view == View((True, True))
-
-
 @pytest.mark.parametrize(
-    ("situation", "clicks", "deformer"),
+    ("sinew", "modifiers", "deformer"),
     [
-        (Situation.BUILT_IN, "A", Deformer.NOTHING),
-        (Situation.BUILT_IN, "AA", Deformer.SINEW),
-        (Situation.BUILT_IN, "AS", Deformer.SINEW),
-        (Situation.OFF, "A", Deformer.NOTHING),
-        (Situation.OFF, "AA", Deformer.SINEW),
-        (Situation.ALONE, "A", Deformer.ARMATURE),
-        (Situation.ALONE, "AA", Deformer.SINEW),
-        (Situation.ALONE, "S", Deformer.NOTHING),
-        (Situation.ALONE, "SA", Deformer.ARMATURE),
+        (True, (True,), Deformer.SINEW),
+        (True, (False, True), Deformer.SINEW),
+        (True, (False, False), Deformer.NOTHING),
+        (False, (False, True), Deformer.ARMATURE),
+        (False, (False,), Deformer.NOTHING),
     ],
 )
-def test_clicks_while_the_icons_are_otherwise(situation, clicks, deformer):
-    assert _after(clicks, situation, View((True,))).deformer is deformer
-
-
-def test_several_armature_modifiers():
-    """Each icon is for its own modifier; by Sinew, those deform that are on."""
-    view = View((True, False))
-    assert icons(view, Situation.BUILT_IN).modifiers == (True, False)
-    both = follow(view, Situation.SINEW, Icons(True, (True, True)))
-    assert (both.deformer, both.taking_part) == (Deformer.SINEW, (True, True))
-    second = follow(both, Situation.SINEW, Icons(True, (False, True)))
-    assert (second.deformer, second.taking_part) == (Deformer.SINEW, (False, True))
-    assert follow(second, Situation.SINEW, Icons(True, (False, False))).deformer is Deformer.NOTHING
-    aside = replace(view, hidden=True, switched=(False, True))
-    assert icons(aside, Situation.SINEW) == Icons(False, (False, True))
-    assert aside.taking_part == (True, False)
-
-
-def test_modifiers_that_were_off():
-    """Where none was on, Sinew's icon has it deform by all of them, which Remove takes back."""
-    off = View((False, False))
-    assert off.deformer is Deformer.NOTHING
-    assert icons(off, Situation.SINEW) == Icons(False, (False, False))
-    on = follow(off, Situation.SINEW, Icons(True, (False, False)))
-    assert on == View((True, True), forced=(True, True))
-    hidden = follow(on, Situation.SINEW, Icons(False, (False, False)))
-    assert hidden == replace(on, hidden=True)
-    # What the artist switches while Sinew is off is not taken back.
-    kept = follow(on, Situation.OFF, Icons(False, (True, False)))
-    assert kept == View((True, False), forced=(True, False))
-    none = follow(on, Situation.OFF, Icons(False, (False, False)))
-    again = follow(none, Situation.OFF, Icons(False, (True, False)))
-    assert again == View((True, False), forced=(False, False))
+def test_what_icons_mean(sinew, modifiers, deformer):
+    assert Icons(sinew, modifiers).deformer is deformer
 
 
 @pytest.mark.parametrize("viewport", Deformer)
@@ -229,8 +140,8 @@ def test_the_panel_says_what_deforms_in_each_view(viewport, render):
         assert (f"in {'the ' if name == 'viewport' else ''}{name}" in said) == (
             deformer is not Deformer.SINEW
         )
-    assert ("Hidden" in said) == (Deformer.NOTHING in of_views.values())
-    assert ("Armature modifier" in said) == (Deformer.ARMATURE in of_views.values())
+    assert ("Not deformed" in said) == (Deformer.NOTHING in of_views.values())
+    assert ("Its Armature modifier deforms" in said) == (Deformer.ARMATURE in of_views.values())
 
 
 def test_every_fact_matters():

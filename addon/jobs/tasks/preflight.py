@@ -30,9 +30,6 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
     objects = [obj for obj in bpy.data.objects if obj not in overridden and not properties.is_copy(obj)]
     skinned = [obj for obj in objects if properties.has_sinew(obj)]
-    for obj in skinned:
-        if obj.is_editable:
-            attach.follow_icons(obj)
     # Read before they are tried, which switches them on.
     enabled = [obj for obj in skinned if properties.of(obj).enabled]
     meshes = [
