@@ -39,7 +39,7 @@ from .updates import updates_suspended
 MODIFIERS_OWN = ("lbs", "dq")
 
 # Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about it.
-Pairs: TypeAlias = list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]
+Replaced: TypeAlias = list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -406,7 +406,7 @@ def do_views_differ(obj: bpy.types.Object) -> bool:
     return any(viewport) and any(render) and viewport != render
 
 
-def _view(obj: bpy.types.Object, pairs: Pairs, name: str) -> icons.View:
+def _view(obj: bpy.types.Object, pairs: Replaced, name: str) -> icons.View:
     shown, forced, switched = (
         tuple(getattr(replaced, f"{kind}_{name}") for _modifier, replaced in pairs)
         for kind in ("show", "was_off", "switched")
@@ -416,7 +416,7 @@ def _view(obj: bpy.types.Object, pairs: Pairs, name: str) -> icons.View:
     return icons.View(shown, forced, getattr(properties.of(obj).stack, f"hidden_{name}"), switched)
 
 
-def _store(obj: bpy.types.Object, pairs: Pairs, name: str, view: icons.View) -> None:
+def _store(obj: bpy.types.Object, pairs: Replaced, name: str, view: icons.View) -> None:
     property_groups.store(properties.of(obj).stack, f"hidden_{name}", view.hidden)
     none = (False,) * len(pairs)
     for pair, shown, forced, switched in zip(
@@ -585,7 +585,7 @@ def _replaced_modifier(
     return found
 
 
-def replaced_modifiers(obj: bpy.types.Object) -> Pairs:
+def replaced_modifiers(obj: bpy.types.Object) -> Replaced:
     """Returns the Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about
     it."""
     run, kept = stack.armature_modifiers(obj), properties.of(obj).replaced_modifiers

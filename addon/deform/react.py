@@ -90,7 +90,7 @@ class Known:
     is_given: bool = False
 
 
-def is_at_end(facts: Facts, known: Known) -> bool:
+def needs_nothing(facts: Facts, known: Known) -> bool:
     """Whether nothing is done for an object whose plan was not made in this event."""
     if not known.is_bound or facts.calls_for_plan:
         # While the file may not be changed, a new plan waits.
@@ -104,7 +104,7 @@ def react(facts: Facts, known: Known) -> Action:
     if known.is_settled:
         return _show(facts, known)
     if not (known.is_planned or known.is_read):
-        if is_at_end(facts, known):
+        if needs_nothing(facts, known):
             return Action.NOTHING
         if facts.may_change and (not known.is_bound or facts.calls_for_plan):
             return Action.REPLAN

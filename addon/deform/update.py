@@ -15,7 +15,7 @@ from . import after_update, apply_plan, bound, events, precomputing, source
 from .bound import uid
 from .changes import Changes
 from .plan import Plan, State, plan
-from .react import Action, Facts, Known, is_at_end, react
+from .react import Action, Facts, Known, needs_nothing, react
 from .skinned_object import Noted, SkinnedObject
 
 # How often the node group is restored after another add-on removed it.
@@ -79,7 +79,7 @@ class _Event:
             facts = Facts(may_change=may_change, is_prevented=is_prevented)
         else:
             facts = self._of_bound(skinned, may_change)
-        if is_at_end(facts, self.known) or (may_change and (skinned is None or facts.calls_for_plan)):
+        if needs_nothing(facts, self.known) or (may_change and (skinned is None or facts.calls_for_plan)):
             return facts
         return self._with_rest(facts)
 

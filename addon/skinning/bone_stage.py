@@ -46,7 +46,7 @@ class BoneStage(ABC, Generic[Native]):
         """Applies it in place.
 
         motions  float32 [bones + joints, 4, 4], armature space
-        frame    SkinStageFrame
+        frame    ModifierFrame
         """
 
     def apply(

@@ -214,8 +214,8 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         raise SinewError("Sinew deforms neither it nor a copy of it")
     obj_of_state, state = found[0]
     settings, bound = properties.of(obj_of_state), state.bound
-    stages = bound.skin_stack.skin_stages
-    if len(stages) != 1 or stages[0].mask is not None:
+    skins = bound.skin_stack.skins
+    if len(skins) != 1 or skins[0].mask is not None:
         raise SinewError("several Armature modifiers deform it, or one with a vertex group")
     if settings.scale_rule != BLENDER_4.name:
         raise SinewError(f"its rule for scale is not {BLENDER_4.label}")
