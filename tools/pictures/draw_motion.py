@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws what blends of motions do, for docs/motion.md; prints the numbers that it quotes.
 
-    python docs/draw_motion.py [--out docs]
+    python tools/pictures/draw_motion.py [--out docs]
 
 An arm between two poses, skinned by the library, and the walks of tests/python/walks.py. Without Blender.
 """
@@ -26,7 +26,7 @@ from sinew_addon.io.poses import Poses
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPOSITORY / "tests" / "python"))
 import walks  # noqa: E402 - it is found there
 
@@ -229,7 +229,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder for the pictures")
+    parser.add_argument("--out", type=Path, default=REPOSITORY / "docs", help="folder for the pictures")
     arguments = parser.parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
     draw_arms(arguments.out / "motion-arms.png")
