@@ -44,8 +44,8 @@ Replaced: TypeAlias = list[tuple[bpy.types.ArmatureModifier, properties.SinewRep
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     """Returns the armature that deforms a mesh object: by its first Armature modifier, whose armature Sinew
-    keeps, or as its parent. It is that of the stack as it is now, which Sinew itself follows later, and
-    while the mesh is hidden not at all."""
+    keeps, or as its parent. Reads the stack as it is now; Sinew's record follows at the next event, and
+    never while the mesh is hidden."""
     if obj.type != "MESH":
         return None
     modifier = armature_modifier(obj)

@@ -36,7 +36,7 @@ class Facts:
     has_other_modifiers   than those that were read, or other options
     have_bones_changed    since they were read
     has_other_mesh        points, weights, groups or shape keys may differ from those read
-    is_slider_moved       values of shape keys differ, which explains that the mesh is listed
+    is_slider_moved       Blender lists the mesh only because values of shape keys changed
     lacks_surface         one of its methods needs triangles, which were not read
     """
 

@@ -363,7 +363,7 @@ def _error_of(obj: bpy.types.Object, old: Plan, skinned: SkinnedObject | None) -
     """Returns why it can not be deformed, as a sentence; empty where it can."""
     if old.state is State.REFUSED:
         return old.reason
-    # A driver that gives a number without a method has a sentence of its own.
+    # pose.read() reports drivers whose number names no method.
     if not properties.has_known_methods(properties.of(obj)) and "sinew.method" not in animated_paths(obj):
         return f"{obj.name}: its method is of a newer Sinew; update Sinew, or choose another method"
     if skinned is not None and skinned.evaluation.user_error is not None:

@@ -201,7 +201,7 @@ class Moment:
         return cls(subject, inputs, subject.worlds, subject.armatures)
 
     def posed(self, poses: Callable[[Bones], np.ndarray]) -> Self:
-        """Returns the same in other poses, which tell no turns.
+        """Returns the same in other poses. Rotations beyond half a turn are unknown there.
 
         poses  returns float32 [bones + joints, 4, 4], armature space
         """

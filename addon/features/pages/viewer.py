@@ -119,13 +119,13 @@ class _Attached:
 
     def add_frame(self, depsgraph: bpy.types.Depsgraph, chosen: Pose | None) -> None:
         world = np.array(self.obj.evaluated_get(depsgraph).matrix_world)
-        carrier = self.obj
-        while carrier is not None and carrier.parent_type != "BONE":
-            carrier = carrier.parent
-        if chosen is not None and carrier is not None:
-            armature = carrier.parent.evaluated_get(depsgraph)
+        on_bone = self.obj
+        while on_bone is not None and on_bone.parent_type != "BONE":
+            on_bone = on_bone.parent
+        if chosen is not None and on_bone is not None:
+            armature = on_bone.parent.evaluated_get(depsgraph)
             bones, place = armature_io.read_bones(armature), np.array(armature.matrix_world)
-            bone = bones.names.index(carrier.parent_bone)
+            bone = bones.names.index(on_bone.parent_bone)
             posed, now = chosen.of(armature, bones)[bone], armature_io.read_pose(armature, bones)[bone]
             world = place @ posed @ np.linalg.pinv(place @ now) @ world
         self.part.add_frame(_STILL, world)
