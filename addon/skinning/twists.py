@@ -38,11 +38,8 @@ class Twists:
 class TwistFinder:
     def __init__(self, bones: Bones) -> None:
         self._names, self._deform, self._parents = bones.names, bones.deform, bones.parents
-        self._segments, self._deforming_parents, self._children = (
-            bones.segments,
-            bones.deforming_parents,
-            bones.children,
-        )
+        self._segments, self._children = bones.segments, bones.children
+        self._deforming_parents = bones.deforming_parents
         self._limbs, self._known = bones.limbs
         rest = bones.rest[: len(bones.names)].astype(np.float64)
         self._heads, self._own = rest[:, :3, 3], bones.lengths[:, None] * rest[:, :3, 1]

@@ -3,8 +3,8 @@
 
     python tools/website/make_reference.py commands|python|cpp
 
-tools/website/mkdocs_hook.py calls this when the site is built. The parsers are asked, so Sinew's library must be
-installed; Python and C++ are read, not run.
+mkdocs_hook.py calls this when the site is built. The parsers are asked, so Sinew's library must be installed;
+Python and C++ are read, not run.
 """
 
 from __future__ import annotations
