@@ -194,12 +194,12 @@ def draw_sliding(path: Path) -> None:
 def draw_strips(path: Path) -> None:
     """Legs from the side: the clips, and their blend, aligned or not."""
     walk, run = pair()
-    still = Settings(root_motion="in_place")
+    still = Settings(root_motion="in-place")
     rows = {
         "walk": blend([walk, run], (1, 0), still),
         "run": blend([run, walk], (1, 0), still),
         "blend, aligned": blend([walk, run], (1, 1), still),
-        "blend, not aligned": blend([walk, run], (1, 1), Settings(root_motion="in_place", align=False)),
+        "blend, not aligned": blend([walk, run], (1, 1), Settings(root_motion="in-place", align=False)),
     }
     figure, grid = plt.subplots(len(rows), 1, figsize=(12.6, 7.2), layout="constrained")
     for axes, (title, made) in zip(grid, rows.items(), strict=True):

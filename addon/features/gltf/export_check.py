@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ...base.options import option, same_option
 from ...base.phrases import Phrase, phrase
 from ...skinning.influences import Influences
 from ...skinning.vectors import unit
+from ..bake.helper_bones import HelperOptions
 from .played import Played, blended, padded
 
 # Of the diagonal: a smaller distance is rounding.
@@ -41,6 +43,20 @@ NORMALS = "normals, which engines skin as they were at rest"
 # The files that can be written and verified, and how many frames are, unless they are chosen.
 ENDINGS = (".glb", ".usdc", ".fbx", ".vrm")
 FRAMES = 25
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """frames: to verify; None for some of the scene's"""
+
+    influences: int = same_option(HelperOptions, "influences")
+    verify: bool = option(
+        False,
+        "Verify",
+        "Read the file again, play it as an engine does, and say how far that is from what is seen here, and "
+        "why",
+    )
+    frames: Sequence[float] | None = None
 
 
 @dataclass(frozen=True)
