@@ -53,8 +53,8 @@ class Settings:
     align: bool = option(
         True,
         "Align",
-        "Bring the actions to the same moment of their motion, and cycles to a common length; else each plays "
-        "from its first frame",
+        "Bring the actions to the same moment of their motion, and cycles to a common length; "
+        "else each plays from its first frame",
     )
     cycles: int = option(
         1, "Cycles", "How often actions that repeat go round in the blend", least=1, soft_most=20
