@@ -548,8 +548,8 @@ PROGRAMS = {
     "walk": "tests/blender/walk.py",
     "soak": "tests/blender/soak.py",
     "corpus": "tests/blender/corpus.py",
-    "pictures": "docs/draw_methods.py",
-    "benchmark": "docs/draw_benchmark.py",
+    "pictures": "tools/pictures/draw_methods.py",
+    "benchmark": "tools/pictures/draw_benchmark.py",
     "golden": "tests/blender/make_golden.py",
 }
 COMMANDS: dict[str, Callable[[list[str]], int]] = {

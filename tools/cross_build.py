@@ -134,9 +134,9 @@ def collect_python_headers(python: Python) -> Path:
     if not target.exists():
         unfinished = Path(tempfile.mkdtemp(dir=BUILD))
         shutil.copytree(python.include, unfinished, dirs_exist_ok=True)
-        shutil.copy(ROOT / "cmake/python/pyconfig.h", unfinished / "pyconfig.h")
+        shutil.copy(ROOT / "native/cmake/python/pyconfig.h", unfinished / "pyconfig.h")
         unfinished.rename(target)
-    shutil.copy(ROOT / "cmake/python/pyconfig.h", target / "pyconfig.h")
+    shutil.copy(ROOT / "native/cmake/python/pyconfig.h", target / "pyconfig.h")
     return target
 
 
@@ -251,7 +251,7 @@ def build_module(platform: Platform, python: Python, log: Path) -> Path:
         "pybind11_DIR": pybind11.get_cmake_dir(),
     }
     if platform.system == "Darwin":
-        options["CMAKE_USER_MAKE_RULES_OVERRIDE_CXX"] = str(ROOT / "cmake/zig_macos.cmake")
+        options["CMAKE_USER_MAKE_RULES_OVERRIDE_CXX"] = str(ROOT / "native/cmake/zig_macos.cmake")
     if platform.is_windows:
         options["Python_LIBRARY"] = str(import_library(platform, python, include))
     build = configure(platform, log, options)

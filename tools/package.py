@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 ADDON = ROOT / "addon"
 NOT_SHIPPED = re.compile(
-    r"pyproject\.toml|(setup|dask_cluster)\.py|__pycache__|build|dist|\..*|"
+    r"pyproject\.toml|(setup|dask_cluster)\.py|sinew_reskin\.js|__pycache__|build|dist|\..*|"
     r".*\.(pyc|egg-info|blend\d+|orig|rej)"
 )
 WHEEL_NAME = re.compile(r"[^-]+-(?P<version>[^-]+)(-\d[^-]*)?-(?P<python>[^-]+)-[^-]+-(?P<system>[^-]+)\.whl")

@@ -37,13 +37,13 @@ from .updates import updates_suspended
 MODIFIERS_OWN = ("lbs", "dq")
 
 # Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about it.
-Pairs: TypeAlias = list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]
+Replaced: TypeAlias = list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     """Returns the armature that deforms a mesh object: by its first Armature modifier, whose armature Sinew
-    keeps, or as its parent. It is that of the stack as it is now, which Sinew itself follows later, and
-    while the mesh is hidden not at all."""
+    keeps, or as its parent. Reads the stack as it is now; Sinew's record follows at the next event, and
+    never while the mesh is hidden."""
     if obj.type != "MESH":
         return None
     modifier = armature_modifier(obj)
@@ -453,7 +453,7 @@ def _replaced_modifier(
     return found
 
 
-def replaced_modifiers(obj: bpy.types.Object) -> Pairs:
+def replaced_modifiers(obj: bpy.types.Object) -> Replaced:
     """Returns the Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about
     it."""
     run, kept = stack.armature_modifiers(obj), properties.of(obj).replaced_modifiers

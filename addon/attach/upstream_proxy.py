@@ -183,7 +183,7 @@ def _follows_keys(obj: bpy.types.Object, proxy: bpy.types.Object) -> bool:
     keys = proxy.data.shape_keys
     animation = None if keys is None else keys.animation_data
     drivers = () if animation is None else animation.drivers
-    targets = (driven.driver.variables[0].targets[0].id for driven in drivers)
+    targets = (curve.driver.variables[0].targets[0].id for curve in drivers)
     # All have the same target.
     return next(targets, obj.data.shape_keys) == obj.data.shape_keys
 

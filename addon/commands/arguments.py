@@ -5,11 +5,13 @@ import argparse
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import sinew
 
 from ..base.errors import WrongUse
 from ..base.frames import parse_frames
+from ..base.options import options_of
 from ..base.output import file_to_write, folder_to_write
 from ..skinning import parameters
 
@@ -23,11 +25,19 @@ def count(text: str, least: int = 1) -> int:
     return number
 
 
+def count_or_none(text: str) -> int:
+    return count(text, 0)
+
+
 def percent(text: str) -> float:
     number = float(text)
     if not 0.0 < number <= 100.0:
         raise argparse.ArgumentTypeError(f"expected more than 0 and at most 100, got {text}")
     return number
+
+
+def percent_or_none(text: str) -> float:
+    return percent(text) if float(text) else 0.0
 
 
 def seconds(text: str) -> float:
@@ -138,6 +148,32 @@ def add_copies(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for what is written"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
+
+
+def add_options(parser: argparse.ArgumentParser, options: type, before: str = "") -> None:
+    """Adds an argument for each option of a dataclass.
+
+    before  each one's help
+    """
+    for name, (default, shown) in options_of(options).items():
+        text = f"{before}{shown.text[:1].lower()}{shown.text[1:]}".replace("%", "%%")
+        known: dict[str, Any] = {"default": default, "help": f"{text} (default: %(default)s)"}
+        if isinstance(default, bool):
+            known |= {"help": text, "action": argparse.BooleanOptionalAction if default else "store_true"}
+        elif len(shown.choices) > 4:
+            known |= {
+                "type": one_of(shown.names),
+                "help": f"one of {', '.join(shown.names)} (default: {default})",
+            }
+        elif shown.choices:
+            known["choices"] = shown.names
+        elif isinstance(default, str):
+            known |= {"metavar": shown.label.upper(), "help": text}
+        elif shown.kind == "percent":
+            known |= {"type": percent_or_none, "metavar": "PERCENT", "help": text}
+        else:
+            known |= {"type": count if shown.least else count_or_none, "metavar": "N"}
+        parser.add_argument(f"--{name.replace('_', '-')}", **known)
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:

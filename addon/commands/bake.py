@@ -10,11 +10,12 @@ from typing import Any
 
 from ..base import interrupt
 from ..base.errors import SinewError, WrongUse, about
+from ..base.options import read_options
 from ..features.bake.baked_files import FILES, KINDS
-from ..features.bake.helper_bones import KEYS, MOTIONS, HelperOptions, Report
-from ..features.bake.vat import AXES, DEFAULT_VAT, TEXELS, VatOptions
+from ..features.bake.helper_bones import HelperOptions, Report
+from ..features.bake.vat import VatOptions
 from ..jobs.inputs import Job, plan_jobs
-from .arguments import add_copies, add_frames, add_method, add_set, count, percent
+from .arguments import add_copies, add_frames, add_method, add_options, add_set, count
 from .console import Console
 from .outcome import Outcome, conclude, of_each, use_method
 
@@ -44,40 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     add_frames(parser, "such as 1,12,40-48 (default: the scene's frames)")
     parser.add_argument("--step", type=count, default=1, metavar="N", help="every Nth of the frames")
-    parser.add_argument(
-        "--helpers",
-        type=count,
-        metavar="N",
-        help="bones: helper bones of each armature, at most (default: two a joint)",
-    )
-    parser.add_argument(
-        "--error",
-        type=percent,
-        default=0.0,
-        metavar="PERCENT",
-        help="bones: add no more once the rms error is this much of the meshes' diagonal",
-    )
-    parser.add_argument(
-        "--influences", type=count, default=4, metavar="N", help="bones: of a vertex, at most (default: 4)"
-    )
-    parser.add_argument(
-        "--motion",
-        choices=MOTIONS,
-        default=KEYS,
-        help="bones: helper bones have keys (default), or follow the pose by constraints",
-    )
-    parser.add_argument(
-        "--axes",
-        choices=tuple(AXES),
-        default=DEFAULT_VAT.axes,
-        help="vat: axes and units of the textures (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--texels",
-        choices=TEXELS,
-        default=DEFAULT_VAT.texels,
-        help="vat: of the textures (default: %(default)s)",
-    )
+    add_options(parser, HelperOptions, "bones: ")
+    add_options(parser, VatOptions, "vat: ")
     parser.add_argument("--json", action="store_true", help="print JSON, with the errors of bones")
     add_set(parser)
 
@@ -150,10 +119,9 @@ def _bake(outcome: Baked, args: argparse.Namespace, console: Console) -> None:
         console.note_on(source, characters.sentences())
         if not taken:
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
-        helpers = HelperOptions(args.helpers or 0, args.error, args.influences, args.motion)
-        vat = VatOptions(args.axes, args.texels)
+        options = read_options(HelperOptions, args), read_options(VatOptions, args)
         with about(source):
-            started = bake.start(taken, args.to, chosen, target, args.overwrite, helpers, vat)
+            started = bake.start(taken, args.to, chosen, target, args.overwrite, *options)
         # An exporter writes all frames in one call, which cannot be interrupted and can crash on a full disk:
         # so it runs in a separate process.
         if isinstance(started, bake_export.SceneExport):

@@ -7,9 +7,10 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ..base.errors import SinewError, WrongUse
+from ..base.options import read_options
 from ..base.steps import result_of
-from ..features.blend.motion import METHODS, Settings
-from .arguments import add_file, count, file_named
+from ..features.blend.motion import Settings
+from .arguments import add_file, add_options, file_named
 from .console import Console
 
 if TYPE_CHECKING:
@@ -26,9 +27,6 @@ Each action has a weight; with --weights-from they go from those in the first fr
 Aligned, the default, actions are brought to the same moment of their motion by the distance of their poses,
 and cycles to the weighted mean of their lengths. The root's steps on the ground are blended and added up."""
 
-# The names of features.blend.motion, as the options spell them.
-ROOT_MOTIONS = {"travel": "travel", "in-place": "in_place", "keyed": "keyed"}
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
@@ -39,23 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--weights-from", "those of the first frame, if --weights are of the last"),
     ):
         parser.add_argument(name, nargs="+", type=float, metavar="W", help=text)
-    parser.add_argument("--method", default="dlb", help=f"one of {', '.join(METHODS)} (default: dlb)")
-    parser.add_argument(
-        "--align",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="to the same moment of the motion, or each from its first frame at its own pace",
-    )
-    parser.add_argument("--root", metavar="BONE", help="that carries the others (default: found)")
-    parser.add_argument(
-        "--root-motion",
-        choices=tuple(ROOT_MOTIONS),
-        default="travel",
-        help="blended and added up, taken out, or blended as any bone's pose (default: travel)",
-    )
-    parser.add_argument(
-        "--cycles", type=count, default=1, metavar="N", help="how often cycles go round (default: 1)"
-    )
+    add_options(parser, Settings)
     parser.add_argument("--name", default="", help="of the new action")
     parser.add_argument("--out", required=True, type=file_named(".blend"), metavar="NEW.blend")
     parser.add_argument("--overwrite", action="store_true", help="replace NEW.blend where it exists already")
@@ -118,7 +100,7 @@ def _make(
 ) -> Made:
     from ..features.blend import blend_actions
 
-    settings = Settings(args.method, args.align, args.root, ROOT_MOTIONS[args.root_motion], args.cycles)
+    settings = read_options(Settings, args)
     weights = args.weights or [1.0] * len(chosen)
     if args.weights_from is not None:
         weights = [args.weights_from, weights]

@@ -8,8 +8,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from ..base.errors import SinewError, WrongUse
-from ..features.gltf.export_check import ENDINGS, FRAMES, Check
-from .arguments import add_file, add_frames, add_json, add_method, add_set, count, file_named, percent
+from ..base.options import read_options
+from ..features.gltf.export_check import ENDINGS, FRAMES, Check, ExportOptions
+from .arguments import add_file, add_frames, add_json, add_method, add_options, add_set, file_named, percent
 from .console import Console
 from .outcome import use_method
 
@@ -31,10 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file(parser)
     parser.add_argument("--out", required=True, type=file_named(*ENDINGS), metavar="OUT.glb")
     add_method(parser, "a method of `sinew methods`, for all meshes (default: each as the file has it)")
-    parser.add_argument(
-        "--influences", type=count, default=4, metavar="N", help=".glb: of a vertex, at most (default: 4)"
-    )
-    parser.add_argument("--verify", action="store_true", help="say how far the file plays from what is seen")
+    add_options(parser, ExportOptions)
     add_frames(parser, f"to verify, such as 1,12 (default: {FRAMES} of the scene's)")
     parser.add_argument(
         "--at-most",
@@ -58,7 +56,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         raise WrongUse("--frames and --at-most go with --verify")
     console.note_on(args.file, files.open_file(args.file))
     meshes = attach.deformed_meshes(list(bpy.context.scene.objects))
-    options = export_file.ExportOptions(args.influences, args.verify, args.frames)
+    options = read_options(ExportOptions, args, frames=args.frames)
     # Blender does not evaluate hidden objects.
     with characters.shown(meshes):
         left_out, skinned = _skinned(args, meshes, console)

@@ -3,14 +3,14 @@
 Sinew."""
 
 import argparse
-from dataclasses import dataclass
-
-import sinew
+from dataclasses import asdict, dataclass
 
 from ..base.errors import SinewError
+from ..base.options import read_options
 from ..base.steps import result_of
+from ..features.inbetween.interpolation import InbetweenOptions
 from ..jobs.inputs import plan_jobs
-from .arguments import add_copies, count, one_of
+from .arguments import add_copies, add_options
 from .console import Console
 from .outcome import Outcome, conclude, of_each
 
@@ -27,14 +27,7 @@ have several layers, and bones whose curves have modifiers other than Cycles, ke
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_copies(parser)
-    names = sinew.interpolate.METHODS
-    parser.add_argument("--method", required=True, type=one_of(names), help=f"one of {', '.join(names)}")
-    parser.add_argument(
-        "--spline", action="store_true", help="a Catmull-Rom spline through the keyed poses, not key to key"
-    )
-    parser.add_argument(
-        "--step", type=count, default=1, metavar="FRAMES", help="from one baked key to the next (default: 1)"
-    )
+    add_options(parser, InbetweenOptions)
 
 
 @dataclass
@@ -54,10 +47,10 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _inbetween(outcome: Inbetweened, args: argparse.Namespace) -> None:
     import bpy
 
-    from ..features.inbetween import inbetween_bake, interpolation
+    from ..features.inbetween import inbetween_bake
     from ..io import actions, files
 
-    source, path = outcome.job.source, interpolation.SPLINE if args.spline else interpolation.STRAIGHT
+    source, options = outcome.job.source, read_options(InbetweenOptions, args)
     armatures = [
         obj
         for obj in bpy.data.objects
@@ -67,13 +60,13 @@ def _inbetween(outcome: Inbetweened, args: argparse.Namespace) -> None:
         raise SinewError(f"{source}: no armature plays an action with keyed bones; nothing written")
     for armature in armatures:
         try:
-            baked = result_of(inbetween_bake.steps(armature, args.method, path, args.step))
+            baked = result_of(inbetween_bake.steps(armature, **asdict(options)))
         except SinewError as error:
             outcome.left_out.append(str(error))
             continue
         outcome.armatures += 1
         outcome.bones += baked.bones
-        outcome.notes += baked.notes(path)
+        outcome.notes += baked.notes(options.path)
     if not outcome.armatures:
         raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
     files.save_copy(source, outcome.job.target)

@@ -129,11 +129,11 @@ def apply_driver(obj: bpy.types.Object, bound: Bound, wanted: Plan) -> None:
     the plan says so."""
     poses = [
         (replaced.armature, path)
-        for (_modifier, replaced), stage in zip(
-            attach.replaced_modifiers(obj), bound.skin_stack.skin_stages, strict=False
+        for (_modifier, replaced), skin in zip(
+            attach.replaced_modifiers(obj), bound.skin_stack.skins, strict=False
         )
         if replaced.armature is not None
-        for path in armature_io.paths_to_wait_for(replaced.armature, stage.deformer.moving_bones)
+        for path in armature_io.paths_to_wait_for(replaced.armature, skin.deformer.moving_bones)
         # One that moves no vertex collapses all of them where it has no size.
         or [pose_driver.WORLD_MATRIX]
     ]

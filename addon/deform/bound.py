@@ -19,7 +19,7 @@ from ..io.actions import animated_paths
 from ..skinning import sdef
 from ..skinning.arrays import are_equal
 from ..skinning.rig import Bones, RigFacts, Weighting
-from ..skinning.skin_stack import SkinDeformer, SkinStack, SkinStage
+from ..skinning.skin_stack import ModifierSkin, SkinDeformer, SkinStack
 from ..skinning.stage_mesh import StageMesh
 from ..skinning.stages import StagesAfter
 from ..skinning.vectors import transformed
@@ -55,7 +55,7 @@ class Bound:
     @property
     def data_versions(self) -> list[int]:
         """The version of the methods' vertex data, for each Armature modifier."""
-        data = (stage.deformer.vertex_data for stage in self.skin_stack.skin_stages)
+        data = (skin.deformer.vertex_data for skin in self.skin_stack.skins)
         return [0 if each is None else each.version for each in data]
 
     def lacks(self, methods: Iterable[str]) -> list[str]:
@@ -100,7 +100,7 @@ class Bound:
     @property
     def first_deformer(self) -> SkinDeformer:
         """Deforms by the first Armature modifier."""
-        return self.skin_stack.skin_stages[0].deformer
+        return self.skin_stack.skins[0].deformer
 
 
 def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | None = None) -> Bound:
@@ -119,35 +119,35 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     spaces_now = [_bones_from_model(obj, replaced.armature, depsgraph) for _modifier, replaced in pairs]
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones, spaces_now):
         if not read_now.has_same_surface(old.source):
-            for stage in old.skin_stack.skin_stages:
-                stage.deformer.vertex_data = _vertex_data(stage.deformer.weighting, read_now, stage)
+            for skin in old.skin_stack.skins:
+                skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, read_now, skin)
         if np.array_equal(read_now.points, old.source.points):
             # An identical array signals that nothing moved.
             read_now.points = old.source.points
-        old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skin_stages))
+        old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skins))
         return replace(old, source=read_now)
     options = _options_of(obj, depsgraph)
     masks = _masks(read_now, groups)
-    stages = []
-    before = () if old is None else old.skin_stack.skin_stages
+    skins = []
+    before = () if old is None else old.skin_stack.skins
     for option, its_bones, space, its_old in itertools.zip_longest(options, bones, spaces_now, before):
         if option is None:
             break
         weighting = option.weighting(read_now.group_names, read_now.weights, its_bones)
         weighting = _with_skin(weighting, read_now, space)
         deformer = SkinDeformer(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
-        stages.append(
-            SkinStage(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
+        skins.append(
+            ModifierSkin(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
         )
-    weighting = stages[0].deformer.weighting
+    weighting = skins[0].deformer.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
-    skin_stack = SkinStack(stages, StagesAfter(_stage_mesh(read_now, stages), masks))
+    skin_stack = SkinStack(skins, StagesAfter(_stage_mesh(read_now, skins), masks))
     return Bound(armatures, options, read_now, skin_stack, facts, groups)
 
 
-def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | None) -> VertexData:
-    """before: the stage of the same modifier as it was last bound."""
+def _vertex_data(weighting: Weighting, read_now: Source, before: ModifierSkin | None) -> VertexData:
+    """before: the skin of the same modifier as it was last bound."""
     old = None if before is None else before.deformer.vertex_data
     given = {}
     if read_now.sdef_keys is not None:
@@ -165,8 +165,8 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
     """
     read_now = source.with_surface(obj, depsgraph, old.source)
     read_now.keep_normals_of(old.source)
-    for stage in old.skin_stack.skin_stages:
-        stage.deformer.vertex_data = _vertex_data(stage.deformer.weighting, read_now, stage)
+    for skin in old.skin_stack.skins:
+        skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, read_now, skin)
     return replace(old, source=read_now)
 
 
@@ -203,7 +203,7 @@ def uid(data: bpy.types.ID | None) -> int:
 def _equals_but_for_points(
     old: Bound, read_now: Source, bones: list[Bones], spaces_now: list[np.ndarray | None]
 ) -> bool:
-    known = [stage.deformer.weighting for stage in old.skin_stack.skin_stages]
+    known = [skin.deformer.weighting for skin in old.skin_stack.skins]
     # Where a bone is the mesh's parent, poses move its space: the one in which it was bound decides.
     has_same_skin = np.array_equal(read_now.surface_points, old.source.surface_points)
     return read_now.equals_but_for_points(old.source) and all(
@@ -239,12 +239,10 @@ def _masks(read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:
     }
 
 
-def _stage_mesh(read_now: Source, stages: list[SkinStage]) -> StageMesh:
-    weightings = [stage.deformer.weighting for stage in stages]
-    masks = [stage.mask for stage in stages]
-    return StageMesh(
-        read_now.topology, read_now.own_points, weightings, masks, stages[0].deformer.mix_weights
-    )
+def _stage_mesh(read_now: Source, skins: list[ModifierSkin]) -> StageMesh:
+    weightings = [skin.deformer.weighting for skin in skins]
+    masks = [skin.mask for skin in skins]
+    return StageMesh(read_now.topology, read_now.own_points, weightings, masks, skins[0].deformer.mix_weights)
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:

@@ -14,7 +14,7 @@ from ..skinning import parameters
 from ..skinning.engines import ENGINES
 from ..skinning.rig import Bones
 from ..skinning.scale_rule import BLENDER_4
-from ..skinning.skin_stack import NO_STAGES, SkinStageFrame, follows_hierarchy
+from ..skinning.skin_stack import NO_STAGES, ModifierFrame, follows_hierarchy
 from ..skinning.stages import ORDER, StageValues
 from ..skinning.twist_spread import TwistInputs
 from ..skinning.vectors import SAME_SPACE
@@ -24,7 +24,7 @@ from .skinned_object import SkinnedObject
 Modifiers = list[tuple[properties.SinewReplacedModifier, bpy.types.Object | None]]
 """What Sinew stores about each Armature modifier, and its armature."""
 
-Frames = list[SkinStageFrame | None]
+Frames = list[ModifierFrame | None]
 """One for each Armature modifier, None for one that takes no part."""
 
 
@@ -52,8 +52,8 @@ def read(
             f"methods are {', '.join(f'{m.number} {m.label}' for m in properties.METHODS.values())}"
         )
     frames: Frames = []
-    for stage, (replaced, armature), takes_part in zip(
-        skinned.bound.skin_stack.skin_stages,
+    for skin, (replaced, armature), takes_part in zip(
+        skinned.bound.skin_stack.skins,
         modifiers,
         _taking_part(icons, mode),
         strict=False,
@@ -67,14 +67,14 @@ def read(
             if not spaces.is_usable(back):
                 frames.append(None)
                 continue
-        pose = _finite(armature_io.read_pose(armature, stage.deformer.bones), stage.deformer.bones)
+        pose = _finite(armature_io.read_pose(armature, skin.deformer.bones), skin.deformer.bones)
         number = len(frames)
         own = properties.method_of_modifier(method, replaced.method, is_first=number == 0)
-        is_mixed = stage.deformer.mix_weights is not None and own == method
+        is_mixed = skin.deformer.mix_weights is not None and own == method
         if skinned.noted.volume_keyed[number] and own in attach.MODIFIERS_OWN:
             own = attach.method_of(evaluated.modifiers[replaced.name])
         mix = settings.mixed_method if is_mixed else ""
-        data = stage.deformer.vertex_data
+        data = skin.deformer.vertex_data
         if data is not None and not data.is_ready(own):
             # The modifier's own method, until what the chosen one needs is computed.
             own, mix = attach.method_of(evaluated.modifiers[replaced.name]), ""
@@ -84,15 +84,15 @@ def read(
         own_rule = scale_rule
         if own in ENGINES:
             mix, own_rule = "", BLENDER_4.name
-            pose = armature_io.decomposed(pose, stage.deformer.bones.parents)
+            pose = armature_io.decomposed(pose, skin.deformer.bones.parents)
         twists: TwistInputs = ()
         if settings.twist_spread.enabled and all(frame is None for frame in frames):
             # The stage follows the bones of the first that takes part.
-            twists = armature_io.read_twists(armature, stage.deformer.bones)
+            twists = armature_io.read_twists(armature, skin.deformer.bones)
         turns = None
         if follows_hierarchy(own, mix, values):
-            turns = armature_io.read_turns(armature, stage.deformer.bones)
-        frames.append(SkinStageFrame(own, pose, space, own_rule, mix, values, back, twists, turns))
+            turns = armature_io.read_turns(armature, skin.deformer.bones)
+        frames.append(ModifierFrame(own, pose, space, own_rule, mix, values, back, twists, turns))
     return frames
 
 
@@ -129,8 +129,8 @@ def _parameters(
 
 def lacks_data(bound: Bound, frames: Frames) -> bool:
     """Whether one of the methods needed vertex data that it does not have."""
-    for stage, frame in zip(bound.skin_stack.skin_stages, frames, strict=False):
-        data = stage.deformer.vertex_data
+    for skin, frame in zip(bound.skin_stack.skins, frames, strict=False):
+        data = skin.deformer.vertex_data
         if data is not None and data.missed and frame is not None and not all(map(data.has, data.missed)):
             return True
     return False

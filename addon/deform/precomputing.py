@@ -164,9 +164,9 @@ def _needed(obj: bpy.types.Object, skinned: SkinnedObject) -> list[tuple[bpy.typ
     found = []
     methods = methods_of(obj)
     replaced_modifiers = properties.of(obj).replaced_modifiers
-    for stage, replaced in zip(skinned.bound.skin_stack.skin_stages, replaced_modifiers, strict=False):
-        data = stage.deformer.vertex_data
-        if data is None or replaced.armature is None or not stage.deformer.bones.names:
+    for skin, replaced in zip(skinned.bound.skin_stack.skins, replaced_modifiers, strict=False):
+        data = skin.deformer.vertex_data
+        if data is None or replaced.armature is None or not skin.deformer.bones.names:
             continue
         for name in methods:
             data.take_parameters(name, stage_settings.method_values(properties.of(obj), (name,)))

@@ -36,7 +36,7 @@ class Facts:
     has_other_modifiers   than those that were read, or other options
     have_bones_changed    since they were read
     has_other_mesh        points, weights, groups or shape keys may differ from those read
-    is_slider_moved       values of shape keys differ, which explains that the mesh is listed
+    is_slider_moved       Blender lists the mesh only because values of shape keys changed
     lacks_surface         one of its methods needs triangles, which were not read
     """
 
@@ -90,7 +90,7 @@ class Known:
     is_given: bool = False
 
 
-def is_at_end(facts: Facts, known: Known) -> bool:
+def needs_nothing(facts: Facts, known: Known) -> bool:
     """Whether nothing is done for an object whose plan was not made in this event."""
     if not known.is_bound or facts.calls_for_plan:
         # While the file may not be changed, a new plan waits.
@@ -104,7 +104,7 @@ def react(facts: Facts, known: Known) -> Action:
     if known.is_settled:
         return _show(facts, known)
     if not (known.is_planned or known.is_read):
-        if is_at_end(facts, known):
+        if needs_nothing(facts, known):
             return Action.NOTHING
         if facts.may_change and (not known.is_bound or facts.calls_for_plan):
             return Action.REPLAN

@@ -34,7 +34,7 @@ from .update import update
 
 log = logging.getLogger("sinew")
 
-Pairs = list[tuple[bpy.types.Object, SkinnedObject]]
+SkinnedObjects = list[tuple[bpy.types.Object, SkinnedObject]]
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Session:
     objects: list[bpy.types.Object] | None = None
     objects_seen: tuple[int, int] = (0, 0)
     skinned: dict[int, SkinnedObject] = field(default_factory=dict)
-    pairs: Pairs = field(default_factory=list)
+    pairs: SkinnedObjects = field(default_factory=list)
     armatures: set[int] = field(default_factory=set)
     plans: dict[int, Plan] = field(default_factory=dict)
     told: dict[int, str] = field(default_factory=dict)

@@ -16,7 +16,7 @@ from ..attach.modifier_options import ModifierOptions, are_animated
 from ..base.errors import SinewError
 from ..io import armature_io, mesh_io
 from ..io.actions import animated_paths
-from ..skinning.skin_stack import NO_STAGES, SkinStageFrame
+from ..skinning.skin_stack import NO_STAGES, ModifierFrame
 from ..skinning.stages import StageValues
 from . import small_meshes
 from .bound import Bound, uid
@@ -36,7 +36,7 @@ class Shown:
     milliseconds  time that computing it took
     """
 
-    frames: list[SkinStageFrame | None] | None = None
+    frames: list[ModifierFrame | None] | None = None
     rest_points: np.ndarray | None = None
     stage_values: StageValues = field(default_factory=lambda: NO_STAGES)
     first_point: bytes | None = None
@@ -97,7 +97,7 @@ class Noted:
     volume_keyed         for each Armature modifier, whether an animation chooses between its two methods
     options_keyed        an animation sets other options of an Armature modifier
     rests                from rests_of()
-    state                what the artist can change about the object itself, from state_of()
+    state                what the artist can change about the object itself, from _own_facts()
     switches             a part of the state, from switches_of()
     surroundings         from surroundings_of()
     groups               the names of its vertex groups
@@ -144,7 +144,7 @@ class Noted:
             volume_keyed=[attach.is_volume_followed(obj, m) for m in modifiers],
             options_keyed=any(are_animated(obj, m) for m in modifiers),
             rests=rests_of(obj),
-            state=state_of(obj),
+            state=_own_facts(obj),
             switches=switches_of(obj),
             surroundings=surroundings_of(obj),
             groups=obj.vertex_groups.keys(),
@@ -242,7 +242,7 @@ class SkinnedObject:
         if self.needs_recheck or obj.data.session_uid in meshes:
             return False
         # Where vertex groups are added, removed or renamed, Blender lists the scene as changed, too.
-        return self.noted.mode == obj.mode and self.noted.state == state_of(obj)
+        return self.noted.mode == obj.mode and self.noted.state == _own_facts(obj)
 
     def was_only_posed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> bool:
         """Whether the last evaluation gave the object its shape, and nothing else has to be checked.
@@ -275,10 +275,8 @@ class SkinnedObject:
         """
         settings: properties.SinewSettings = obj.sinew
         changed, are_unknown = False, are_unknown or self.noted.rests != rests_of(obj)
-        for stage, replaced in zip(
-            self.bound.skin_stack.skin_stages, settings.replaced_modifiers, strict=False
-        ):
-            armature, known = replaced.armature, stage.deformer.bones
+        for skin, replaced in zip(self.bound.skin_stack.skins, settings.replaced_modifiers, strict=False):
+            armature, known = replaced.armature, skin.deformer.bones
             if armature is None or armature.data.is_editmode:
                 continue
             if are_unknown or armature.data.session_uid in changes.armatures or not known.complete:
@@ -291,7 +289,7 @@ class SkinnedObject:
 
     def is_as_noted(self, obj: bpy.types.Object) -> bool:
         """Whether the object itself is as it was when the plan was applied."""
-        if self.noted.state != state_of(obj) or self.noted.groups != obj.vertex_groups.keys():
+        if self.noted.state != _own_facts(obj) or self.noted.groups != obj.vertex_groups.keys():
             return False
         # Going through the nodes in front takes long; without a proxy there are none.
         has_proxy = properties.of(obj).storage.upstream_proxy is not None
@@ -324,7 +322,7 @@ class SkinnedObject:
         return getattr(modifier, "node_group", None) is not None
 
 
-def state_of(obj: bpy.types.Object) -> list:
+def _own_facts(obj: bpy.types.Object) -> list:
     """Everything about the object itself that the artist can change and that decides how it is deformed, but
     for its vertex groups."""
     settings = properties.of(obj)

@@ -15,7 +15,7 @@ from . import after_update, apply_plan, bound, events, precomputing, source
 from .bound import uid
 from .changes import Changes
 from .plan import Plan, State, plan
-from .react import Action, Facts, Known, is_at_end, react
+from .react import Action, Facts, Known, needs_nothing, react
 from .skinned_object import Noted, SkinnedObject
 
 # How often the node group is restored after another add-on removed it.
@@ -79,7 +79,7 @@ class _Event:
             facts = Facts(may_change=may_change, is_prevented=is_prevented)
         else:
             facts = self._of_bound(skinned, may_change)
-        if is_at_end(facts, self.known) or (may_change and (skinned is None or facts.calls_for_plan)):
+        if needs_nothing(facts, self.known) or (may_change and (skinned is None or facts.calls_for_plan)):
             return facts
         return self._with_rest(facts)
 
@@ -363,7 +363,7 @@ def _error_of(obj: bpy.types.Object, old: Plan, skinned: SkinnedObject | None) -
     """Returns why it can not be deformed, as a sentence; empty where it can."""
     if old.state is State.REFUSED:
         return old.reason
-    # A driver that gives a number without a method has a sentence of its own.
+    # pose.read() reports drivers whose number names no method.
     if not properties.has_known_methods(properties.of(obj)) and "sinew.method" not in animated_paths(obj):
         return f"{obj.name}: its method is of a newer Sinew; update Sinew, or choose another method"
     if skinned is not None and skinned.evaluation.user_error is not None:

@@ -46,7 +46,7 @@ class BoneStage(ABC, Generic[Native]):
         """Applies it in place.
 
         motions  float32 [bones + joints, 4, 4], armature space
-        frame    SkinStageFrame
+        frame    ModifierFrame
         """
 
     def apply(
@@ -87,7 +87,7 @@ class BoneStage(ABC, Generic[Native]):
 
     def _weights(self, modifier: int) -> np.ndarray | None:
         """Returns the vertex group's weights, with 0 where the Armature modifier's own mask keeps a vertex
-        from following its bones: where they are means nothing to it."""
+        from following its bones: their position does not affect it."""
         follows = self._mesh.modifier_masks[modifier] if self._mesh.modifier_masks else None
         if follows is None:
             return self._mask

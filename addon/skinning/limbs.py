@@ -87,7 +87,7 @@ class _Finder:
         # Whether each stands across its limb, or the nearest above whose joint tells it.
         stands_across: dict[int, bool] = {}
         for bone in self._bones.from_the_root:
-            joint, above = self._joints[bone], int(self._bones.carriers[bone])
+            joint, above = self._joints[bone], int(self._bones.deforming_parents[bone])
             is_across = stands_across.get(above, False) if above >= 0 else self._are_most_across(bone)
             if joint is not None and (is_across or not self._is_no_limb(bone)):
                 limbs.vectors[bone] = joint
@@ -138,12 +138,12 @@ class _Finder:
     def _told_around(self, bone: int) -> list[int]:
         """Those whose joints tell their limbs: of the bones that carry it, the nearest first; of one that
         nothing carries, of those that it carries."""
-        found, above = [], int(self._bones.carriers[bone])
+        found, above = [], int(self._bones.deforming_parents[bone])
         if above < 0:
             return [child for child in self._bones.children[bone] if self._joints[child] is not None]
         while above >= 0 and above not in found:
             found.append(above)
-            above = int(self._bones.carriers[above])
+            above = int(self._bones.deforming_parents[above])
         return [other for other in found if self._joints[other] is not None]
 
     def _as(self, other: int, bone: int) -> np.ndarray:

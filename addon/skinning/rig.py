@@ -122,21 +122,21 @@ class Bones(OfArrays):
         """The deforming bones that each deforming one carries next."""
         found: list[list[int]] = [[] for _name in self.names]
         for bone in np.flatnonzero(self.deform):
-            if self.carriers[bone] >= 0:
-                found[self.carriers[bone]].append(int(bone))
+            if self.deforming_parents[bone] >= 0:
+                found[self.deforming_parents[bone]].append(int(bone))
         return found
 
     @cached_property
-    def carriers(self) -> np.ndarray:
-        """int32 [bones]: the deforming bone that carries each deforming one, and the parent of each other; -1
+    def deforming_parents(self) -> np.ndarray:
+        """int32 [bones]: the deforming bone above each deforming one, and the parent of each other; -1
         for none."""
         found = [
-            self._carrier(bone) if deforms else int(self.parents[bone])
+            self._deforming_parent(bone) if deforms else int(self.parents[bone])
             for bone, deforms in enumerate(self.deform)
         ]
         return np.array(found, dtype=np.int32).reshape(-1)
 
-    def _carrier(self, bone: int) -> int:
+    def _deforming_parent(self, bone: int) -> int:
         """The nearest deforming bone above. In rigs whose deforming bones hang on others, the one at whose
         tail the bone starts, else the one at the place of a bone above, or that alone starts there: bones
         across their limb may have others along it."""
@@ -177,7 +177,7 @@ class Bones(OfArrays):
             # Rigs whose bones hang on others may carry each other in a circle.
             while bone >= 0 and bone not in order and bone not in chain:
                 chain.append(bone)
-                bone = int(self.carriers[bone])
+                bone = int(self.deforming_parents[bone])
             order.update(dict.fromkeys(reversed(chain)))
         return list(order)
 

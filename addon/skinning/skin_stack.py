@@ -30,8 +30,8 @@ NO_STAGES: StageValues = MappingProxyType({})
 
 
 @dataclass
-class SkinStageFrame:
-    """Everything that the deformation by a skin stage depends on in one frame, but its input.
+class ModifierFrame:
+    """Everything that the deformation by an Armature modifier depends on in one frame, but its input.
 
     method            name of a method
     pose              float32 [bones + joints, 4, 4], armature space, as Blender gives it
@@ -60,7 +60,7 @@ class SkinStageFrame:
 class _MethodDeformer:
     """A deformer, what it was made for, and its rest points.
 
-    method, mix  as in SkinStageFrame: reading the deformer's own takes longer
+    method, mix  as in ModifierFrame: reading the deformer's own takes longer
     kept         from _kept()
     """
 
@@ -97,7 +97,7 @@ class SkinDeformer:
         self._deformers: dict[str, _MethodDeformer] = {}
         # Skinned normals, with the deformer and the rest normals that they were made for.
         self._skinned: tuple[sinew.SkinnedNormals, sinew.Deformer, np.ndarray] | None = None
-        self.last_frame: SkinStageFrame | None = None
+        self.last_frame: ModifierFrame | None = None
         # The version of the vertex data in the packed meshes.
         self._data_version = 0
         self._points = self.rest_points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
@@ -132,7 +132,7 @@ class SkinDeformer:
         self._points_outdated = False
         return self._points
 
-    def deform(self, rest_points: np.ndarray, frame: SkinStageFrame, out: np.ndarray | None = None) -> bool:
+    def deform(self, rest_points: np.ndarray, frame: ModifierFrame, out: np.ndarray | None = None) -> bool:
         """Computes `points`. Returns False where the frame equals the last one.
 
         rest_points  float32 [vertices, 3], object space, shape keys applied
@@ -191,7 +191,7 @@ class SkinDeformer:
         )
         return True
 
-    def _shape(self, frame: SkinStageFrame, out: np.ndarray) -> None:
+    def _shape(self, frame: ModifierFrame, out: np.ndarray) -> None:
         weights = self.mix_weights
         if frame.mix and (weights is None or frame.mix == frame.method):
             frame = replace(frame, mix="")
@@ -205,7 +205,7 @@ class SkinDeformer:
         self._shape_with_one_kind(replace(frame, method=frame.mix, mix=""), second, "second motion")
         out += weights[:, None] * (second - out)
 
-    def _shape_with_one_kind(self, frame: SkinStageFrame, out: np.ndarray, purpose: str) -> None:
+    def _shape_with_one_kind(self, frame: ModifierFrame, out: np.ndarray, purpose: str) -> None:
         """Writes the shape for methods that take the same kind of bone matrices."""
         rest_points, bones = self.rest_points, frame.pose
         rest_inverses: np.ndarray | None = self._rest_from_armature
@@ -225,7 +225,7 @@ class SkinDeformer:
     def _deform(
         self,
         purpose: str,
-        frame: SkinStageFrame,
+        frame: ModifierFrame,
         rest_points: np.ndarray,
         bones: np.ndarray,
         rest_inverses: np.ndarray | None,
@@ -249,7 +249,7 @@ class SkinDeformer:
             bound.rest_points = rest_points
         bound.deformer.deform(bones, out=out, rest_inverses=rest_inverses, **self._arguments_of(frame))
 
-    def _arguments_of(self, frame: SkinStageFrame) -> dict[str, Any]:
+    def _arguments_of(self, frame: ModifierFrame) -> dict[str, Any]:
         """Returns those that the library takes for points and for normals alike."""
         same_space = is_same_space(frame.bones_from_model)
         along = follows_hierarchy(frame.method, frame.mix, frame.parameters)
@@ -260,7 +260,7 @@ class SkinDeformer:
             "turns": frame.turns,
         }
 
-    def _take_new_data(self, frame: SkinStageFrame) -> bool:
+    def _take_new_data(self, frame: ModifierFrame) -> bool:
         """Whether the methods' vertex data has changed; meshes are then packed again."""
         if self.vertex_data is None:
             return False
@@ -274,7 +274,7 @@ class SkinDeformer:
         self._deformers.clear()
         return True
 
-    def _vertex_data_of(self, frame: SkinStageFrame) -> dict[str, np.ndarray | None]:
+    def _vertex_data_of(self, frame: ModifierFrame) -> dict[str, np.ndarray | None]:
         """Returns the data by the name of the method. None for a mesh without data of MikuMikuDance: it is
         blended linearly."""
         names = [name for name in (frame.method, frame.mix) if name and METHODS[name].vertex_floats]
@@ -285,7 +285,7 @@ class SkinDeformer:
         return {name: self.vertex_data.of(name, frame.bones_from_model) for name in names}
 
     def _pack(
-        self, frame: SkinStageFrame, rest_points: np.ndarray, vertex_data: dict[str, np.ndarray | None]
+        self, frame: ModifierFrame, rest_points: np.ndarray, vertex_data: dict[str, np.ndarray | None]
     ) -> sinew.Binding:
         points = self.rest_points
         if self.weighting.depends_on_points:
@@ -310,7 +310,7 @@ def _native(method: str) -> str:
     return LINEAR if method in ENGINES else method
 
 
-def _kept(frame: SkinStageFrame) -> tuple[str, int]:
+def _kept(frame: ModifierFrame) -> tuple[str, int]:
     """Returns the engine, and how many influences of a vertex it keeps; of nothing where it is none."""
     if frame.method not in ENGINES:
         return "", 0
@@ -322,7 +322,7 @@ def follows_hierarchy(method: str, mix: str, parameters: Mapping[str, Value]) ->
     return any(parameters.get(f"{name}.signs") == "hierarchy" for name in (method, mix))
 
 
-def _same(a: SkinStageFrame, b: SkinStageFrame) -> bool:
+def _same(a: ModifierFrame, b: ModifierFrame) -> bool:
     return (
         (a.method, a.mix, a.parameters) == (b.method, b.mix, b.parameters)
         and a.scale_rule == b.scale_rule
@@ -333,7 +333,7 @@ def _same(a: SkinStageFrame, b: SkinStageFrame) -> bool:
 
 
 @dataclass
-class SkinStage:
+class ModifierSkin:
     """One of the Armature modifiers that deform a mesh one after the other.
 
     mask   float32 [vertices], the share of the deformation that each vertex gets; None for all of it
@@ -345,25 +345,25 @@ class SkinStage:
     multi: bool = False
 
 
-def _twists(frames: Sequence[SkinStageFrame | None]) -> list[TwistInputs]:
+def _twists(frames: Sequence[ModifierFrame | None]) -> list[TwistInputs]:
     return [() if frame is None else frame.twists for frame in frames]
 
 
 class SkinStack:
-    """The skin stages of one mesh, in the order of its modifiers, and the stages that follow the last.
+    """The Armature modifiers of one mesh, in their order, and the stages that follow the last.
 
     stages_after  None for none
     """
 
-    def __init__(self, skin_stages: Sequence[SkinStage], stages_after: StagesAfter | None = None) -> None:
-        self.skin_stages = skin_stages
+    def __init__(self, skins: Sequence[ModifierSkin], stages_after: StagesAfter | None = None) -> None:
+        self.skins = skins
         self.stages_after = stages_after
-        # The last active skin stage, if it has no mask: its points are the result.
+        # The last active modifier, if it has no mask: its points are the result.
         self._end: SkinDeformer | None = None
         self._points: np.ndarray | None = None
         self._rest_points: np.ndarray | None = None
         self._active: list[int] = []
-        self._frames: Sequence[SkinStageFrame | None] = ()
+        self._frames: Sequence[ModifierFrame | None] = ()
         self._values = NO_STAGES
         # The shape of the last frame after the stages; None where they are off, or it was not needed yet.
         self._staged: np.ndarray | None = None
@@ -387,8 +387,8 @@ class SkinStack:
 
     def another(self) -> SkinStack:
         """Returns a copy with results of its own."""
-        stages = [SkinStage(one.deformer.another(), one.mask, one.multi) for one in self.skin_stages]
-        return SkinStack(stages, None if self.stages_after is None else self.stages_after.another())
+        skins = [ModifierSkin(one.deformer.another(), one.mask, one.multi) for one in self.skins]
+        return SkinStack(skins, None if self.stages_after is None else self.stages_after.another())
 
     def set_stage_mesh(self, mesh: StageMesh) -> None:
         """Sets a mesh with other points or faces."""
@@ -398,14 +398,14 @@ class SkinStack:
     def deform(
         self,
         rest_points: np.ndarray,
-        frames: Sequence[SkinStageFrame | None],
+        frames: Sequence[ModifierFrame | None],
         out: np.ndarray | None = None,
         values: StageValues = NO_STAGES,
     ) -> bool:
         """Computes `points`. Returns False where nothing differs from the last call.
 
         rest_points  float32 [vertices, 3], object space
-        frames       one for each skin stage, None for one that is switched off or has no pose
+        frames       one for each modifier, None for one that is switched off or has no pose
         out          see SkinDeformer.deform
         values       the parameters of the stages that follow
         """
@@ -423,7 +423,7 @@ class SkinStack:
     def write_skinned_normals(
         self, points: np.ndarray, rest_normals: np.ndarray, vertices: np.ndarray | None, out: np.ndarray
     ) -> bool:
-        """As SkinDeformer's; also returns False for several skin stages, a mask or stages after them."""
+        """As SkinDeformer's; also returns False for several modifiers, a mask or stages after them."""
         is_one = self._end is not None and sum(frame is not None for frame in self._frames) == 1
         if self._values or self._end is None or not is_one:
             return False
@@ -435,9 +435,9 @@ class SkinStack:
         self.stages_after.apply(points, self._values, self._rest_points, self._frames)
 
     def _deform_skin(
-        self, rest_points: np.ndarray, frames: Sequence[SkinStageFrame | None], out: np.ndarray | None
+        self, rest_points: np.ndarray, frames: Sequence[ModifierFrame | None], out: np.ndarray | None
     ) -> bool:
-        """Deforms by the skin stages alone."""
+        """Deforms by the Armature modifiers alone."""
         active = [number for number, frame in enumerate(frames) if frame is not None]
         changed = self._rest_points is None or active != self._active
         if active:
@@ -453,33 +453,33 @@ class SkinStack:
     def _run(
         self,
         rest_points: np.ndarray,
-        frames: Sequence[SkinStageFrame | None],
+        frames: Sequence[ModifierFrame | None],
         active: list[int],
         out: np.ndarray | None,
     ) -> bool:
-        """active: the numbers of the skin stages that have a frame, at least one."""
+        """active: the numbers of the modifiers that have a frame, at least one."""
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
-        last, last_frame = self.skin_stages[active[-1]], frames[active[-1]]
+        last, last_frame = self.skins[active[-1]], frames[active[-1]]
         assert last_frame is not None
         is_whole = last.mask is None and last_frame.model_from_bones is None
         self._end = last.deformer if is_whole else None
         for number in active:
-            skin_stage, frame = self.skin_stages[number], frames[number]
+            skin, frame = self.skins[number], frames[number]
             assert frame is not None
-            # The Multi Modifiers directly behind this skin stage have the same input.
-            for behind in range(number + 1, len(self.skin_stages)):
-                if not self.skin_stages[behind].multi or behind in starts:
+            # The Multi Modifiers directly behind this modifier have the same input.
+            for behind in range(number + 1, len(self.skins)):
+                if not self.skins[behind].multi or behind in starts:
                     break
                 starts[behind] = result
-            start, back, mask = starts.get(number, result), frame.model_from_bones, skin_stage.mask
+            start, back, mask = starts.get(number, result), frame.model_from_bones, skin.mask
             if back is not None:
                 start = np.zeros_like(result)
                 before = self._frames[number] if number < len(self._frames) else None
                 changed |= before is None or not are_equal(back, before.model_from_bones)
-            is_end = skin_stage.deformer is self._end
-            changed |= skin_stage.deformer.deform(start, frame, out if is_end else None)
-            moved = skin_stage.deformer.points
+            is_end = skin.deformer is self._end
+            changed |= skin.deformer.deform(start, frame, out if is_end else None)
+            moved = skin.deformer.points
             if back is not None:
                 if mask is not None and number not in starts:
                     # As in Blender, only a vertex without any share is not brought to the origin.
@@ -488,7 +488,7 @@ class SkinStack:
             if mask is not None:
                 result = result + mask[:, None] * (moved - result)
             elif not is_end:
-                # A copy, as the next skin stage compares its input with the last one: the array must not be
+                # A copy, as the next modifier compares its input with the last one: the array must not be
                 # overwritten.
                 result = moved.copy()
         self._points = result

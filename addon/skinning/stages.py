@@ -30,7 +30,7 @@ class Stage(Protocol):
 
         values       of its parameters in this frame
         rest_points  float32 [vertices, 3], the points that the bones deformed
-        frames       a SkinStageFrame for each Armature modifier, None for one that took no part
+        frames       a ModifierFrame for each Armature modifier, None for one that took no part
         """
 
 

@@ -38,7 +38,8 @@ class Twists:
 class TwistFinder:
     def __init__(self, bones: Bones) -> None:
         self._names, self._deform, self._parents = bones.names, bones.deform, bones.parents
-        self._segments, self._carriers, self._children = bones.segments, bones.carriers, bones.children
+        self._segments, self._children = bones.segments, bones.children
+        self._deforming_parents = bones.deforming_parents
         self._limbs, self._known = bones.limbs
         rest = bones.rest[: len(bones.names)].astype(np.float64)
         self._heads, self._own = rest[:, :3, 3], bones.lengths[:, None] * rest[:, :3, 1]
@@ -74,7 +75,7 @@ class TwistFinder:
         if role == NEITHER or not self._limbs[bone].any():
             return None
         if role == UPPER:
-            base = int(self._carriers[bone])
+            base = int(self._deforming_parents[bone])
             base = int(self._parents[bone]) if base < 0 else base
             if not self._known[bone]:
                 text = "{bone} carries no bone and moves no skin that its axis could be told from"

@@ -17,7 +17,7 @@ from ..skinning.engines import ENGINE_GROUP
 from . import character, operators
 from .stepped import OVER
 
-# One elbow under each method (docs/draw_sheets.py), and its height in lines of a menu.
+# One elbow under each method (tools/pictures/draw_sheets.py), and its height in lines of a menu.
 PICTURES, PICTURE_HEIGHT = Path(__file__).with_name("pictures"), 1.8
 # Holds what Blender loads of them; empty without a window.
 _pictures: list[bpy.utils.previews.ImagePreviewCollection] = []

@@ -552,9 +552,7 @@ def undecided(obj: bpy.types.Object) -> np.ndarray:
     """bool [vertices]: those at a discontinuity of a modifier, for an object that was just deformed."""
     skinned = session.state_of(obj)
     deformers = [
-        stage.deformer
-        for stage in skinned.bound.skin_stack.skin_stages
-        if stage.deformer.last_frame is not None
+        skin.deformer for skin in skinned.bound.skin_stack.skins if skin.deformer.last_frame is not None
     ]
     return np.logical_or.reduce([undecided_by(deformer) for deformer in deformers])
 
@@ -596,12 +594,12 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     moved = numbers(len(rest_points), "rounding").uniform(-1.0, 1.0, rest_points.shape) * ROUNDING * extent
     shapes = []
     for points in (rest_points, rest_points + moved):
-        stages = []
-        for known in skinned.bound.skin_stack.skin_stages:
+        skins = []
+        for known in skinned.bound.skin_stack.skins:
             own = known.deformer
             deformer = skin_stack.SkinDeformer(own.weighting, own.mix_weights, own.vertex_data)
-            stages.append(skin_stack.SkinStage(deformer, known.mask, known.multi))
-        chain = skin_stack.SkinStack(stages)
+            skins.append(skin_stack.ModifierSkin(deformer, known.mask, known.multi))
+        chain = skin_stack.SkinStack(skins)
         chain.deform(points.astype(np.float32), skinned.shown.frames)
         shapes.append(chain.points)
     moved = np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
@@ -847,7 +845,7 @@ def error_of(
     left_out = undecided(obj) | unstable(obj, extent)
     errors = np.abs(shown - expected).max(axis=1) / extent
     far = np.flatnonzero(~left_out & (errors > scenes.TOLERANCE) & (errors < ROUNDING_OF_BLENDER))
-    if len(far) > 0 and len(session.state_of(obj).bound.skin_stack.skin_stages) > 1:
+    if len(far) > 0 and len(session.state_of(obj).bound.skin_stack.skins) > 1:
         with without_modifiers_behind(obj):
             before = shape_of(obj, armature, method, outcome, route)
         left_out[far] = is_nearly_exact(obj, far, before[far], extent)

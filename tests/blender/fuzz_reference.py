@@ -37,7 +37,7 @@ MARGINS = {"log": 0.03}
 def deform(
     stack: skin_stack.SkinStack,
     rest_points: np.ndarray,
-    frames: list[skin_stack.SkinStageFrame | None],
+    frames: list[skin_stack.ModifierFrame | None],
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """float64 [of `vertices`, 3], object space, and bool [of them]: those where rounding does not decide.
@@ -49,13 +49,13 @@ def deform(
     decided = np.ones(len(vertices), dtype=bool)
     # The starting point of a Multi Modifier: the input of the modifier before it.
     start_before = points
-    for stage, frame in zip(stack.skin_stages, frames, strict=True):
-        start = start_before if stage.multi else points
+    for skin, frame in zip(stack.skins, frames, strict=True):
+        start = start_before if skin.multi else points
         start_before = start
         if frame is None:
             continue
-        deformed, is_decided = _by_one_modifier(stage.deformer, frame, start, vertices)
-        share = np.ones(len(vertices)) if stage.mask is None else stage.mask[vertices].astype(np.float64)
+        deformed, is_decided = _by_one_modifier(skin.deformer, frame, start, vertices)
+        share = np.ones(len(vertices)) if skin.mask is None else skin.mask[vertices].astype(np.float64)
         points = points.copy()
         points[vertices] += share[:, None] * (deformed - points[vertices])
         decided &= is_decided
@@ -66,7 +66,7 @@ def stages_after(
     stack: skin_stack.SkinStack,
     points: np.ndarray,
     rest_points: np.ndarray,
-    frames: list[skin_stack.SkinStageFrame | None],
+    frames: list[skin_stack.ModifierFrame | None],
     values: Mapping[str, Mapping[str, Any]],
     rounding: np.ndarray | float = 0.0,
 ) -> np.ndarray:
@@ -118,36 +118,36 @@ def _of_first_bones(
     stack: skin_stack.SkinStack,
     points: np.ndarray,
     rest_points: np.ndarray,
-    frames: list[skin_stack.SkinStageFrame | None],
+    frames: list[skin_stack.ModifierFrame | None],
     mask: np.ndarray | None,
     stage_of: Callable[..., np.ndarray],
 ) -> np.ndarray:
     """Uses the bones of the first participating modifier whose own mask contains all of a vertex.
 
     stage_of  takes the points, rest points and influences in armature space, the motions, the mask, the
-              modifier's stage and its frame
+              ModifierSkin and its frame
     """
     number = next((i for i, frame in enumerate(frames) if frame is not None), None)
     if number is None:
         return points
-    stage, frame = stack.skin_stages[number], frames[number]
+    skin, frame = stack.skins[number], frames[number]
     mask = np.ones(len(points)) if mask is None else mask
-    if stage.mask is not None:
-        mask = np.where(stage.mask >= 1.0, mask, 0.0)
-    space, weighting = frame.bones_from_model, stage.deformer.weighting
+    if skin.mask is not None:
+        mask = np.where(skin.mask >= 1.0, mask, 0.0)
+    space, weighting = frame.bones_from_model, skin.deformer.weighting
     rest = _moved(space, rest_points.astype(np.float64))
     influences = weighting.influences_over_joints(rest)
     mesh = rest, influences.offsets, influences.bones, influences.weights
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(weighting.bones.rest.astype(np.float64))
-    result = stage_of(_moved(space, points), mesh, motions, mask, stage, frame)
+    result = stage_of(_moved(space, points), mesh, motions, mask, skin, frame)
     return _moved(np.linalg.inv(space), result)
 
 
 def _limited(*given: Any) -> np.ndarray:
     *of_mesh, options = given
 
-    def limited(points, mesh, motions, mask, stage, _frame):
-        ends = segments(stage.deformer.bones)
+    def limited(points, mesh, motions, mask, skin, _frame):
+        ends = segments(skin.deformer.bones)
         return bulge_limit_reference.limit(points, *mesh, *ends, motions, mask=mask, **options)
 
     return _of_first_bones(*of_mesh, limited)
@@ -156,8 +156,8 @@ def _limited(*given: Any) -> np.ndarray:
 def _twisted(*given: Any) -> np.ndarray:
     *of_mesh, options = given
 
-    def twisted(points, mesh, motions, mask, stage, frame):
-        bones, inputs = stage.deformer.bones, np.array(frame.twists, np.float32).reshape(-1, 9)
+    def twisted(points, mesh, motions, mask, skin, frame):
+        bones, inputs = skin.deformer.bones, np.array(frame.twists, np.float32).reshape(-1, 9)
         twists = bones.twists
         return twist_spread_reference.spread(
             points,
@@ -171,7 +171,7 @@ def _twisted(*given: Any) -> np.ndarray:
             blend=blend_of(frame.method),
             mix_blend=blend_of(frame.mix or frame.method),
             mask=mask,
-            mix=stage.deformer.mix_weights if frame.mix else None,
+            mix=skin.deformer.mix_weights if frame.mix else None,
         )[0]
 
     return _of_first_bones(*of_mesh, twisted)
@@ -179,7 +179,7 @@ def _twisted(*given: Any) -> np.ndarray:
 
 def _by_one_modifier(
     deformer: skin_stack.SkinDeformer,
-    frame: skin_stack.SkinStageFrame,
+    frame: skin_stack.ModifierFrame,
     points: np.ndarray,
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -195,7 +195,7 @@ def _by_one_modifier(
 
 def _by_one_method(
     deformer: skin_stack.SkinDeformer,
-    frame: skin_stack.SkinStageFrame,
+    frame: skin_stack.ModifierFrame,
     method: str,
     points: np.ndarray,
     vertices: np.ndarray,

@@ -33,7 +33,7 @@ def facts_of(script: str, folder: Path, *others: str) -> dict:
     """
     program, package = program_and_package()
     shutil.copy(package, folder / "sinew.zip")
-    shutil.copy(REPOSITORY / "docs" / "window.py", folder)
+    shutil.copy(REPOSITORY / "tools" / "pictures" / "window.py", folder)
     for name in ("window_scene", *others, script):
         shutil.copy(HERE / f"{name}.py", folder)
     options = ("--factory-startup", "--enable-event-simulate", "--python-exit-code", "3", "--python")

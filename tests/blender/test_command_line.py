@@ -271,7 +271,7 @@ def keyed_file(tmp_path):
 def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path):
     path, expected = keyed_file
     before = path.read_bytes()
-    options = ["--method", "sclerp", "--spline", "--out", tmp_path / "out"]
+    options = ["--method", "sclerp", "--path", "spline", "--out", tmp_path / "out"]
     result = run_sinew("inbetween", path, *options)
     assert "1 of 1 files" in result.stdout
     assert path.read_bytes() == before

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""farm/flamenco: the job type compiled by node in a Manager of our own, its commands run on real files."""
+"""Flamenco: the job type compiled by node in a Manager of our own, its commands run on real files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 ROOT = Path(__file__).resolve().parents[2]
-SCRIPT = ROOT / "farm" / "flamenco" / "sinew_reskin.js"
+SCRIPT = ROOT / "addon" / "jobs" / "sinew_reskin.js"
 MANAGER = Path(__file__).with_name("flamenco_manager.js")
 
 

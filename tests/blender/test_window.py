@@ -20,7 +20,7 @@ from conftest import REPOSITORY
 
 pytestmark = pytest.mark.window
 
-SCRIPTS = (REPOSITORY / "docs" / "window.py", *Path(__file__).parent.glob("window_*.py"))
+SCRIPTS = (REPOSITORY / "tools/pictures/window.py", *Path(__file__).parent.glob("window_*.py"))
 OPTIONS = ("--enable-event-simulate", "--python-exit-code", "3", "--python")
 # Two Blenders at a time. The second one is restarted with what it saved last.
 FIRST = ("files", "undo", "windows", "modes")

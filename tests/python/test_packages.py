@@ -25,7 +25,7 @@ from platforms import PLATFORMS
 
 ROOT = Path(__file__).resolve().parents[2]
 HEADERS = Path(sysconfig.get_path("include"))
-PYCONFIG = (ROOT / "cmake/python/pyconfig.h").read_text(encoding="utf-8")
+PYCONFIG = (ROOT / "native/cmake/python/pyconfig.h").read_text(encoding="utf-8")
 
 
 def test_the_lists_of_platforms_agree():

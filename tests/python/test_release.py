@@ -76,7 +76,9 @@ def test_what_is_no_version_is_refused(wrong):
 
 
 def test_what_is_compiled_in_has_a_notice():
-    declared = re.findall(r"FetchContent_Declare\((\w+)", (ROOT / "cmake/dependencies.cmake").read_text())
+    declared = re.findall(
+        r"FetchContent_Declare\((\w+)", (ROOT / "native/cmake/dependencies.cmake").read_text()
+    )
     # Only for tests and benchmarks, which are not distributed.
     compiled_in = {*declared, "pybind11"} - {"googletest", "benchmark"}
     # From zig, whose C and C++ libraries tools/cross_build.py links.

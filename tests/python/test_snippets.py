@@ -51,7 +51,7 @@ def test_the_mesh_in_gltf():
 def test_the_variables_of_flamenco():
     (text,) = [text for language, text in blocks("docs/flamenco.md") if language == "yaml"]
     variables = yaml.safe_load(text)["variables"]
-    (script,) = (ROOT / "farm").rglob("*.js")
+    script = ROOT / "addon/jobs/sinew_reskin.js"
     for name, variable in variables.items():
         assert "{" + name + "}" in script.read_text(encoding="utf-8")
         assert {value["platform"] for value in variable["values"]} <= {"linux", "windows", "darwin"}

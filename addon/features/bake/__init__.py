@@ -8,7 +8,7 @@ PUBLIC = (
     "bake_apart",
     "bake_bones",
     "bake_export",
-    "feature",
+    "helper_bones",
     "helper_bones_io",
     "segment_bones",
 )

@@ -15,7 +15,7 @@ from ...io import files
 from ...io.actions import curves_of
 from . import bake_export, bake_state, baked_files, shape_animation
 from .bake_bones import BoneBake
-from .bake_state import Started, state_of, take_off
+from .bake_state import Started, skinned_now, take_off
 from .bake_vat import VatBake
 from .helper_bones import DEFAULT_HELPERS, HelperOptions
 from .vat import DEFAULT_VAT, VatOptions
@@ -64,7 +64,7 @@ class Cache:
     """A point cache, and a Mesh Cache modifier in place of Sinew's that plays it."""
 
     def __init__(self, obj: bpy.types.Object, frames: Sequence[float], path: Path, kind: str) -> None:
-        vertices = len(state_of(obj).points)
+        vertices = len(skinned_now(obj).points)
         baked_files.check_space(path.parent, 12 * vertices * len(frames))
         render = bpy.context.scene.render
         self.obj, self.frames, self.kind, self.vertices = obj, frames, kind, vertices
@@ -131,7 +131,7 @@ class Bake(Started):
         with self.whole_or_nothing(), characters.kept_frame(scene):
             characters.set_frame(scene, frames[0])
             for obj in meshes:
-                state_of(obj)
+                skinned_now(obj)
                 if kind == SHAPE_KEYS:
                     self.bakes.append(ShapeKeys(obj, frames))
                 else:
@@ -146,7 +146,7 @@ class Bake(Started):
             for number, frame in enumerate(self.frames):
                 characters.set_frame(scene, frame)
                 for one in self.bakes:
-                    one.take(state_of(one.obj).points)
+                    one.take(skinned_now(one.obj).points)
                 yield (number + 1) / len(self.frames)
             for one in self.bakes:
                 one.end()

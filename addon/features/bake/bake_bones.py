@@ -14,7 +14,7 @@ from ...base.errors import SinewError, about
 from ...deform import characters, session
 from ...io import mesh_io
 from ...skinning.influences import Influences, joined
-from ...skinning.skin_stack import SkinDeformer, SkinStack, SkinStageFrame
+from ...skinning.skin_stack import ModifierFrame, SkinDeformer, SkinStack
 from ...skinning.stages import StageValues
 from ...skinning.vectors import transformed
 from . import bake_state, helper_bones, helper_bones_io, pose_helpers, pose_samples, shape_animation
@@ -31,7 +31,7 @@ _SAME_SIZE = 1e-4
 _POSES, _UNSEEN_POSES = 64, 32
 
 # The inputs of a mesh's shape at a frame: its rest points, its pose, the values of its stages.
-Shape = tuple[np.ndarray, SkinStageFrame, StageValues]
+Shape = tuple[np.ndarray, ModifierFrame, StageValues]
 
 
 class BoneBake(Started):
@@ -47,7 +47,7 @@ class BoneBake(Started):
         with characters.kept_frame(bpy.context.scene):
             characters.set_frame(bpy.context.scene, frames[0])
             for obj in meshes:
-                bake_state.posed_state_of(obj)
+                bake_state.posed_now(obj)
                 rigs.setdefault(_rig_of(obj), []).append(obj)
         self.frames, self.options, self.what = frames, options, ", ".join(obj.name for obj in meshes)
         self._rigs = [_Rig(rig, own, options) for rig, own in rigs.items()]
@@ -93,7 +93,7 @@ class _Rig:
 
     def take(self) -> None:
         """Records the evaluated frame."""
-        states = [bake_state.posed_state_of(obj) for obj in self.meshes]
+        states = [bake_state.posed_now(obj) for obj in self.meshes]
         frames = [state.shown.frames[0] for state in states]
         deformers = [state.bound.first_deformer for state in states]
         targets, rest = [], []

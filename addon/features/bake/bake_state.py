@@ -86,7 +86,7 @@ def check_on(obj: bpy.types.Object) -> None:
         raise _off(obj)
 
 
-def state_of(obj: bpy.types.Object) -> SkinnedObject:
+def skinned_now(obj: bpy.types.Object) -> SkinnedObject:
     """Returns the object's state at the current frame. Raises SinewError where Sinew does not give its
     modifier a shape."""
     # The depsgraph as it was evaluated for the frame: evaluating what Sinew wrote since is not needed.
@@ -96,9 +96,9 @@ def state_of(obj: bpy.types.Object) -> SkinnedObject:
     return pairs[0][1]
 
 
-def posed_state_of(obj: bpy.types.Object) -> SkinnedObject:
+def posed_now(obj: bpy.types.Object) -> SkinnedObject:
     """Returns the same where its first Armature modifier takes part; otherwise raises SinewError."""
-    state = state_of(obj)
+    state = skinned_now(obj)
     if state.shown.frames[0] is None:
         raise _off(obj)
     return state

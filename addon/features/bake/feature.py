@@ -7,26 +7,22 @@ import bpy
 
 from ...attach.feature import Feature
 from ...base.frames import parse_frames
+from ...base.options import options_of, read_options
 from ...deform import characters
 from ...ui import stepped
 from ...ui.operators import OfSkinned, OnSinewObjects, sinew_targets
+from ...ui.options import with_options
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from . import bake, bake_apart, bake_bones, bake_state
 from .baked_files import BONES, EXPORTS, FILES, VAT
-from .helper_bones import KEYS, POSE, HelperOptions
-from .vat import EXR, EXR_HALF, PNG, VatOptions
+from .helper_bones import HelperOptions
+from .vat import VatOptions
 
-INFLUENCES = {
-    "name": "Influences",
-    "description": "How many bones move a vertex at most; most engines take four",
-    "default": 4,
-    "min": 1,
-    "soft_max": 8,
-}
 WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
 
 
+@with_options(HelperOptions, VatOptions)
 class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.types.Operator):
     bl_label = "Bake"
     bl_description = (
@@ -59,58 +55,13 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
     step: bpy.props.IntProperty(
         name="Step", description="Every so many of the frames", default=1, min=1, soft_max=12
     )
-    helpers: bpy.props.IntProperty(
-        name="Helper Bones",
-        description="How many each armature gets at most; 0: two a joint",
-        default=0,
-        min=0,
-        soft_max=200,
-    )
-    error: bpy.props.FloatProperty(
-        name="Error",
-        description="No more helper bones are added once the rms error is this much of the meshes' diagonal; "
-        "0: all of them",
-        default=0.0,
-        min=0.0,
-        max=100.0,
-        precision=3,
-        subtype="PERCENTAGE",
-    )
-    influences: bpy.props.IntProperty(**INFLUENCES)
-    motion: bpy.props.EnumProperty(
-        name="Motion",
-        description="What moves helper bones",
-        items=[
-            (KEYS, "Keys", "Plain keys over these frames, of bones that do not change size: for any engine"),
-            (POSE, "Pose", "Constraints by which they follow the pose: other animation has them, too"),
-        ],
-    )
-
-    axes: bpy.props.EnumProperty(
-        name="Engine",
-        description="Whose axes and units the textures have",
-        items=[
-            ("unreal", "Unreal", "Z up, Y to the other side, centimetres"),
-            ("unity", "Unity", "Y up, X to the other side, metres"),
-            ("gltf", "Godot, three.js", "Y up, metres, as glTF has them"),
-        ],
-    )
-    texels: bpy.props.EnumProperty(
-        name="Texels",
-        description="How exact they are",
-        items=[
-            (EXR, "EXR, Float", "32 bits: exact"),
-            (EXR_HALF, "EXR, Half", "16 bits of floating point: half the size, to a part in 2,000"),
-            (PNG, "PNG, 16 Bits", "Whole numbers between the bounds: to a part in 130,000 of these"),
-        ],
-    )
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        of_kind = ("motion", "helpers", "error", "influences") if self.kind == BONES else ()
+        of_kind = options_of(HelperOptions) if self.kind == BONES else ()
         if self.kind not in WITHOUT_FILES:
-            of_kind = ("folder", "overwrite", *(("axes", "texels") if self.kind == VAT else ()))
+            of_kind = ("folder", "overwrite", *(options_of(VatOptions) if self.kind == VAT else ()))
         for name in ("kind", "frames", "step", *of_kind):
             layout.prop(self, name)
         if self.kind not in FILES:
@@ -138,10 +89,9 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
         frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
         suffix = FILES.get(self.kind, ".blend")
         target = self.target(suffix, self.kind not in WITHOUT_FILES)
-        helpers = HelperOptions(self.helpers, self.error, self.influences, self.motion)
         meshes, frames = sinew_targets(context), frames[:: self.step]
-        vat = VatOptions(self.axes, self.texels)
-        return bake.start(meshes, self.kind, frames, target, self.overwrite, helpers, vat)
+        options = read_options(HelperOptions, self), read_options(VatOptions, self)
+        return bake.start(meshes, self.kind, frames, target, self.overwrite, *options)
 
 
 class SINEW_PT_bake(Sidebar, OfSkinned, bpy.types.Panel):

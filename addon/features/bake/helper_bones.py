@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...base.errors import SinewError
+from ...base.options import option
 from ...base.phrases import Phrase, phrase
 from ...skinning.influences import Influences
 from ...skinning.vectors import distances_from_axes
@@ -134,23 +135,42 @@ class Solution:
     blends: tuple[Blend, ...] = ()
 
 
-KEYS, POSE = MOTIONS = ("keys", "pose")
+KEYS, POSE = "keys", "pose"
 
 
 @dataclass(frozen=True)
 class HelperOptions:
     """What the user chooses.
 
-    helpers     the largest number for each armature; 0 for two per joint
-    error       rms error in percent of the diagonal, to be reached with as few as possible; 0 to use all
-    influences  the largest number per vertex
-    motion      what moves helper bones, of MOTIONS
+    error  in percent of the diagonal, to be reached with as few as possible
     """
 
-    helpers: int = 0
-    error: float = 0.0
-    influences: int = 4
-    motion: str = KEYS
+    motion: str = option(
+        KEYS,
+        "Motion",
+        "What moves helper bones",
+        choices=(
+            (KEYS, "Keys", "Plain keys over these frames, of bones that do not change size: for any engine"),
+            (POSE, "Pose", "Constraints by which they follow the pose: other animation has them, too"),
+        ),
+    )
+    helpers: int = option(
+        0, "Helper Bones", "How many each armature gets at most; 0: two a joint", soft_most=200
+    )
+    error: float = option(
+        0.0,
+        "Error",
+        "No more helper bones are added once the rms error is this much of the meshes' diagonal; 0: all of "
+        "them",
+        kind="percent",
+    )
+    influences: int = option(
+        4,
+        "Influences",
+        "How many bones move a vertex at most; most engines take four",
+        least=1,
+        soft_most=8,
+    )
 
     def of(self, motion: Motion) -> Wanted:
         # Each weighted bone except the first has a joint with another.

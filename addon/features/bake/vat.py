@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import SinewError
+from ...base.options import option
 from .baked_files import is_even
 
 # By engine: its axes in those of Blender, and its units in one of Blender's.
@@ -23,7 +24,6 @@ AXES: dict[str, tuple[np.ndarray, float]] = {
 }
 # What texels are.
 EXR, EXR_HALF, PNG = "exr", "exr-half", "png"
-TEXELS = (EXR, EXR_HALF, PNG)
 # What engines and graphics cards take.
 MOST_COLUMNS, MOST_ROWS = 4096, 16384
 _OF_16_BITS = 65535
@@ -31,10 +31,26 @@ _OF_16_BITS = 65535
 
 @dataclass(frozen=True)
 class VatOptions:
-    """axes: of AXES; texels: of TEXELS"""
-
-    axes: str = "unreal"
-    texels: str = EXR
+    axes: str = option(
+        "unreal",
+        "Engine",
+        "Whose axes and units the textures have",
+        choices=(
+            ("unreal", "Unreal", "Z up, Y to the other side, centimetres"),
+            ("unity", "Unity", "Y up, X to the other side, metres"),
+            ("gltf", "Godot, three.js", "Y up, metres, as glTF has them"),
+        ),
+    )
+    texels: str = option(
+        EXR,
+        "Texels",
+        "How exact they are",
+        choices=(
+            (EXR, "EXR, Float", "32 bits: exact"),
+            (EXR_HALF, "EXR, Half", "16 bits of floating point: half the size, to a part in 2,000"),
+            (PNG, "PNG, 16 Bits", "Whole numbers between the bounds: to a part in 130,000 of these"),
+        ),
+    )
 
 
 DEFAULT_VAT = VatOptions()

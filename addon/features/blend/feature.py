@@ -7,8 +7,10 @@ import bpy
 
 from ...attach.feature import Feature
 from ...base.errors import SinewError
+from ...base.options import read_options
 from ...io import actions
 from ...ui import operators, stepped
+from ...ui.options import with_options
 from ...ui.sidebar import draw_text
 from ...ui.translations import counted, tr
 from . import blend_actions, clips_io, motion
@@ -33,6 +35,7 @@ class SinewBlendAction(bpy.types.PropertyGroup):
     )
 
 
+@with_options(motion.Settings)
 class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
     bl_label = "Blend Actions"
     bl_description = (
@@ -44,48 +47,10 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
     actions: bpy.props.CollectionProperty(
         type=SinewBlendAction, description="The actions to blend", options={"SKIP_SAVE"}
     )
-    method: bpy.props.EnumProperty(
-        name="Method",
-        description="How poses of a bone are blended",
-        items=[(m.name, m.label, m.description, m.number) for m in motion.METHODS.values()],
-        default="dlb",
-    )
-    align: bpy.props.BoolProperty(
-        name="Align",
-        description="Bring the actions to the same moment of their motion, and cycles to a common length; "
-        "else each plays from its first frame",
-        default=True,
-    )
     changes: bpy.props.BoolProperty(
         name="Change Weights",
         description="Let the weights change evenly from the first frame to the last",
         default=False,
-    )
-    cycles: bpy.props.IntProperty(
-        name="Cycles",
-        description="How often actions that repeat go round in the blend",
-        default=1,
-        min=1,
-        soft_max=20,
-    )
-    root_motion: bpy.props.EnumProperty(
-        name="Root Motion",
-        description="What becomes of the way that the root goes over the ground",
-        items=[
-            (
-                motion.TRAVEL,
-                "Blended",
-                "Steps of the root are blended and added up: speeds and turns blend",
-                0,
-            ),
-            (motion.IN_PLACE, "In Place", "The way over the ground is taken out", 1),
-            (motion.KEYED, "As Keyed", "The root is blended as any other bone", 2),
-        ],
-        default=motion.TRAVEL,
-    )
-    root: bpy.props.StringProperty(
-        name="Root",
-        description="The bone that carries the others; empty: the uppermost that moves",
     )
 
     @classmethod
@@ -142,7 +107,7 @@ class SINEW_OT_blend_actions(stepped.WithDialog, bpy.types.Operator):
             armature,
             [bpy.data.actions[each.name] for each in chosen],
             weights,
-            motion.Settings(self.method, self.align, self.root or None, self.root_motion, self.cycles),
+            read_options(motion.Settings, self),
         )
 
     def run(self, context: bpy.types.Context) -> None:

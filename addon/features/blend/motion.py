@@ -12,6 +12,7 @@ import numpy as np
 from sinew import interpolate, quat_vec
 
 from ...base.errors import WrongUse
+from ...base.options import option
 from ...io.poses import Poses
 from ..inbetween.interpolation import Method, in_layout_of, inbetweens, rigid_of
 from . import timing
@@ -19,7 +20,7 @@ from .align import Warp, align, same_pace
 from .clip import Clip, Rig, common_rig
 from .root import Grounded, accumulated, as_keyed, carried, grounded, main_root
 
-TRAVEL, IN_PLACE, KEYED = "travel", "in_place", "keyed"
+TRAVEL, IN_PLACE, KEYED = "travel", "in-place", "keyed"
 
 
 # In the order of menus, the recommended method first; numbers are those of the in-betweens. "sclerp" and
@@ -41,20 +42,34 @@ METHODS = {
 
 @dataclass(frozen=True)
 class Settings:
-    """How clips are blended.
+    """How clips are blended."""
 
-    method       of METHODS
-    align        whether clips are brought to the same moment; otherwise each plays from its first frame
-    root         the bone that carries the others; None: found by main_root()
-    root_motion  TRAVEL: blended and accumulated; IN_PLACE: removed; KEYED: blended like any bone's pose
-    cycles       how often the blend repeats; clips that are no cycles repeat once
-    """
-
-    method: interpolate.Method = "dlb"
-    align: bool = True
-    root: str | None = None
-    root_motion: str = TRAVEL
-    cycles: int = 1
+    method: interpolate.Method = option(
+        "dlb",
+        "Method",
+        "How poses of a bone are blended",
+        choices=[(m.name, m.label, m.description, m.number) for m in METHODS.values()],
+    )
+    align: bool = option(
+        True,
+        "Align",
+        "Bring the actions to the same moment of their motion, and cycles to a common length; "
+        "else each plays from its first frame",
+    )
+    cycles: int = option(
+        1, "Cycles", "How often actions that repeat go round in the blend", least=1, soft_most=20
+    )
+    root_motion: str = option(
+        TRAVEL,
+        "Root Motion",
+        "What becomes of the way that the root goes over the ground",
+        choices=(
+            (TRAVEL, "Blended", "Steps of the root are blended and added up: speeds and turns blend", 0),
+            (IN_PLACE, "In Place", "The way over the ground is taken out", 1),
+            (KEYED, "As Keyed", "The root is blended as any other bone", 2),
+        ),
+    )
+    root: str = option("", "Root", "The bone that carries the others; empty: the uppermost that moves")
 
 
 @dataclass(frozen=True)
@@ -110,7 +125,7 @@ def blend(
     shares = timing.Weights.of(weights, len(clips))
     _check(settings)
     reference = int(np.argmax(shares.first))
-    root = rig.index(settings.root) if settings.root is not None else main_root(rig, list(clips))
+    root = rig.index(settings.root) if settings.root else main_root(rig, list(clips))
     travels = _in_place(clips, root, np.asarray(up), settings)
     placed = [travel.clip for travel in travels]
     warps = _warps(placed, reference, rig, root, settings)

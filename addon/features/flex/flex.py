@@ -163,7 +163,7 @@ def _skeleton(rigs: Sequence[_Rig]) -> Skeleton:
             (
                 rest,
                 bones.limb_ends(rest),
-                np.where(bones.carriers >= 0, bones.carriers + rig.first, -1),
+                np.where(bones.deforming_parents >= 0, bones.deforming_parents + rig.first, -1),
                 bones.deform,
                 side,
                 np.where(mirror >= 0, mirror + rig.first, -1),

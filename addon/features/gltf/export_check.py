@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ...base.options import option, same_option
 from ...base.phrases import Phrase, phrase
 from ...skinning.influences import Influences
 from ...skinning.vectors import unit
+from ..bake.helper_bones import HelperOptions
 from .played import Played, blended, padded
 
 # Of the diagonal: a smaller distance is rounding.
@@ -44,7 +46,21 @@ FRAMES = 25
 
 
 @dataclass(frozen=True)
-class Moment:
+class ExportOptions:
+    """frames: to verify; None for some of the scene's"""
+
+    influences: int = same_option(HelperOptions, "influences")
+    verify: bool = option(
+        False,
+        "Verify",
+        "Read the file again, play it as an engine does, and say how far that is from what is seen here, and "
+        "why",
+    )
+    frames: Sequence[float] | None = None
+
+
+@dataclass(frozen=True)
+class SeenFrame:
     """A mesh at one frame, in Blender. Bones are followed by joints of bendy bones and by one that moves
     vertices without influences.
 
@@ -90,8 +106,8 @@ class Seen:
     has_keys: bool
     corners: np.ndarray
     normals: np.ndarray
-    frames: list[Moment] = field(default_factory=list)
-    between: list[Moment] = field(default_factory=list)
+    frames: list[SeenFrame] = field(default_factory=list)
+    between: list[SeenFrame] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -200,29 +216,29 @@ class Comparison:
         slots, weights = padded(influences, self._none)
         return slots[self._vertices], weights[self._vertices]
 
-    def _motions(self, moment: Moment) -> np.ndarray:
+    def _motions(self, seen: SeenFrame) -> np.ndarray:
         """The file's, by the numbers of Blender's bones, from object space."""
-        motions = moment.bound.copy()
-        motions[self._bone_of] = self._played.motions(moment.frame) @ self._file_from_object
-        motions[self._none] = moment.bound[self._none]
+        motions = seen.bound.copy()
+        motions[self._bone_of] = self._played.motions(seen.frame) @ self._file_from_object
+        motions[self._none] = seen.bound[self._none]
         return motions
 
-    def _expected(self, moment: Moment) -> np.ndarray:
+    def _expected(self, seen: SeenFrame) -> np.ndarray:
         """What the file should have of them: without an animation the rest pose."""
-        bound = moment.bound
+        bound = seen.bound
         return bound if self._played.is_animated else np.broadcast_to(bound[-1], bound.shape)
 
-    def _damaged(self, moment: Moment, motions: np.ndarray) -> np.ndarray:
+    def _damaged(self, seen: SeenFrame, motions: np.ndarray) -> np.ndarray:
         """bool [bones, 1, 1]: those whose motions may be different in the file."""
         if not self._played.is_animated:
             return np.zeros((len(motions), 1, 1), dtype=bool)
-        axes = moment.bound[:, :3, :3]
+        axes = seen.bound[:, :3, :3]
         apart = np.abs(motions[:, :3, :3] - axes).max(axis=(1, 2))
-        return (apart <= moment.damaged * np.abs(axes).max())[:, None, None]
+        return (apart <= seen.damaged * np.abs(axes).max())[:, None, None]
 
-    def _rest(self, moment: Moment) -> np.ndarray:
+    def _rest(self, seen: SeenFrame) -> np.ndarray:
         """The file's rest points, in object space."""
-        points, matrix = self._played.rest_at(moment.frame), self._object_from_file
+        points, matrix = self._played.rest_at(seen.frame), self._object_from_file
         return points @ matrix[:3, :3].T + matrix[:3, 3]
 
     @property
@@ -244,42 +260,42 @@ class Comparison:
             chosen.append(np.where(is_cut[:, None], narrow, wide))
         return chosen[0], chosen[1]
 
-    def played(self, moment: Moment) -> np.ndarray:
+    def played(self, seen: SeenFrame) -> np.ndarray:
         """float64 [file's vertices, 3], world: what an engine plays."""
         return blended(
             self._played.slots,
             self._played.weights,
-            self._played.motions(moment.frame),
-            self._played.rest_at(moment.frame),
+            self._played.motions(seen.frame),
+            self._played.rest_at(seen.frame),
         )
 
     def check(self) -> Check:
         seen, at = self._seen, self._vertices
         pairs: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {name: [] for name in (*CAUSES, "total")}
         cut = self._cut
-        for moment in seen.frames:
-            own, rest = self._rows(moment.influences), moment.rest[at]
-            linear = blended(*own, moment.motions, rest)
-            motions = self._motions(moment)
-            points = self._rest(moment) if seen.has_keys else rest
-            damaged, expected = self._damaged(moment, motions), self._expected(moment)
-            constant = blended(*self._constant, moment.motions, rest)
-            played = self.played(moment)
-            pairs["total"].append((played, moment.seen[at]))
-            pairs["modifiers"].append((moment.seen[at], moment.shown[at]))
-            pairs["method"].append((moment.shown[at], linear))
-            pairs["pose"].append((blended(*own, expected, rest), blended(*own, moment.bound, rest)))
+        for each in seen.frames:
+            own, rest = self._rows(each.influences), each.rest[at]
+            linear = blended(*own, each.motions, rest)
+            motions = self._motions(each)
+            points = self._rest(each) if seen.has_keys else rest
+            damaged, expected = self._damaged(each, motions), self._expected(each)
+            constant = blended(*self._constant, each.motions, rest)
+            played = self.played(each)
+            pairs["total"].append((played, each.seen[at]))
+            pairs["modifiers"].append((each.seen[at], each.shown[at]))
+            pairs["method"].append((each.shown[at], linear))
+            pairs["pose"].append((blended(*own, expected, rest), blended(*own, each.bound, rest)))
             pairs["bendy"].append((constant, linear))
-            pairs["influences"].append((blended(*cut, moment.motions, rest), constant))
-            pairs["shape_keys"].append((blended(*own, moment.motions, points), linear))
-            of_damaged = np.where(damaged, motions, moment.motions)
+            pairs["influences"].append((blended(*cut, each.motions, rest), constant))
+            pairs["shape_keys"].append((blended(*own, each.motions, points), linear))
+            of_damaged = np.where(damaged, motions, each.motions)
             pairs["shear_scale"].append((blended(*own, of_damaged, rest), linear))
-            pairs["transforms"].append((blended(*own, moment.bound, rest), linear))
+            pairs["transforms"].append((blended(*own, each.bound, rest), linear))
             pairs["rest"].append((blended(*cut, np.where(damaged, motions, expected), points), played))
-        for moment in seen.between if self._played.is_animated else ():
-            own, rest = self._rows(moment.influences), moment.rest[at]
-            motions = np.where(moment.damaged[:, None, None] > 0.0, moment.bound, self._motions(moment))
-            pairs["sampling"].append((blended(*own, motions, rest), blended(*own, moment.bound, rest)))
+        for each in seen.between if self._played.is_animated else ():
+            own, rest = self._rows(each.influences), each.rest[at]
+            motions = np.where(each.damaged[:, None, None] > 0.0, each.bound, self._motions(each))
+            pairs["sampling"].append((blended(*own, motions, rest), blended(*own, each.bound, rest)))
         found = {
             name: Distance.of([np.linalg.norm(a - b, axis=1) for a, b in own]) for name, own in pairs.items()
         }
@@ -291,17 +307,17 @@ class Comparison:
     def _angles(self) -> Distance | None:
         """Between the normals that an engine skins, without the inverse of scale, and those seen."""
         seen, normals = self._seen, self._played.normals
-        moments = [moment for moment in seen.frames if moment.normals is not None]
-        if normals is None or not moments or not len(seen.corners):
+        seen_frames = [each for each in seen.frames if each.normals is not None]
+        if normals is None or not seen_frames or not len(seen.corners):
             return None
         corners = self._corners(normals)
         rows, found = corners >= 0, []
-        for moment in moments:
-            assert moment.normals is not None
-            motions = self._played.motions(moment.frame).copy()
+        for each in seen_frames:
+            assert each.normals is not None
+            motions = self._played.motions(each.frame).copy()
             motions[:, :3, 3] = 0.0
             skinned = unit(blended(self._played.slots, self._played.weights, motions, normals)[rows])
-            shown = unit(moment.normals[corners[rows]].astype(np.float64))
+            shown = unit(each.normals[corners[rows]].astype(np.float64))
             sines = np.linalg.norm(np.cross(skinned, shown), axis=1)
             found.append(np.degrees(np.arctan2(sines, (skinned * shown).sum(axis=1))))
         return Distance.of(found) if rows.any() else None

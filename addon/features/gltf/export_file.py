@@ -7,7 +7,7 @@ from __future__ import annotations
 import errno
 import io
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,23 +25,10 @@ from ..bake.bake_export import TEXTURES_STAY
 from ..bake.baked_files import is_whole
 from ..bake.segment_bones import SegmentReport
 from . import export, verify
-from .export_check import FRAMES, Check, spread_frames
+from .export_check import FRAMES, Check, ExportOptions, spread_frames
 
 # What the add-on for VRM writes of a vertex.
 _VRM_INFLUENCES = 4
-
-
-@dataclass(frozen=True)
-class ExportOptions:
-    """
-    influences  .glb: of a vertex, at most
-    verify      say how far the file plays from what is seen
-    frames      to verify; None for some of the scene's
-    """
-
-    influences: int = 4
-    verify: bool = False
-    frames: Sequence[float] | None = None
 
 
 @dataclass

@@ -10,18 +10,18 @@ import bpy
 from ...attach import attach, properties
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
+from ...base.options import read_options
 from ...base.output import remove, unfinished_path
 from ...deform import characters
 from ...io import files
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects
+from ...ui.options import with_options
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
 from ..bake import bake_apart
-from ..bake.feature import INFLUENCES
 from . import export
-from .export_check import Check
-from .export_file import ExportOptions
+from .export_check import Check, ExportOptions
 
 # What was verified last, the largest difference first, by the session_uid of the scene. Nothing is stored in
 # files.
@@ -43,6 +43,7 @@ class SinewGltf(bpy.types.PropertyGroup):
 _ADDON = __package__.rpartition(".features")[0]
 
 
+@with_options(ExportOptions)
 class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.types.Operator):
     bl_label = "Export"
     bl_description = "Write the scene for engines: bones, weights and animation. This file stays as it is"
@@ -63,13 +64,6 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
             (".vrm", "VRM", "One human character, by the add-on VRM Format where it is installed"),
         ],
     )
-    influences: bpy.props.IntProperty(**INFLUENCES)
-    verify: bpy.props.BoolProperty(
-        name="Verify",
-        description="Read the file again, play it as an engine does, and say how far that is from what is "
-        "seen here, and why",
-        default=False,
-    )
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
@@ -83,7 +77,7 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         files.check_free(self.path, self.overwrite)
         deformed = attach.deformed_meshes(list(context.scene.objects))
         skinned = [obj.name for obj in deformed if properties.has_sinew(obj) and properties.of(obj).enabled]
-        options = asdict(ExportOptions(self.influences, self.verify))
+        options = asdict(read_options(ExportOptions, self))
         task = {"command": "write", "objects": skinned, "options": options}
         try:
             self.outcome = yield from bake_apart.follow(task, self.path)

@@ -41,10 +41,10 @@ def read_fbx(
         raise SinewError("FBX files are verified by ufbx: install it for Blender's Python (pip install ufbx)")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "read.npz")
-        asked = json.dumps([str(path), str(out), played, rate, list(frames)])
+        request = json.dumps([str(path), str(out), played, rate, list(frames)])
         paths = os.pathsep.join(dict.fromkeys(_folder_of(name) for name in ("ufbx", "numpy")))
         done = subprocess.run(
-            [sys.executable, __file__, asked],
+            [sys.executable, __file__, request],
             env={**os.environ, "PYTHONPATH": paths},
             capture_output=True,
             text=True,

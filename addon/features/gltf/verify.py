@@ -20,7 +20,7 @@ from ...skinning.influences import Influences
 from ...skinning.vectors import transformed
 from . import played as readers
 from . import read_fbx, read_usd
-from .export_check import EXPLAINED, Check, Comparison, Moment, Seen, damaged_bones, plain
+from .export_check import EXPLAINED, Check, Comparison, Seen, SeenFrame, damaged_bones, plain
 from .played import Played
 
 # The files that are glTF.
@@ -67,11 +67,11 @@ class Recording:
                 depsgraph = bpy.context.evaluated_depsgraph_get()
                 for obj, state in session.states_of(meshes, depsgraph):
                     if obj.name in self._meshes:
-                        moment = self._meshes[obj.name].moment(obj, state, frame, kind)
-                        self._meshes[obj.name].moments.append(moment)
+                        each = self._meshes[obj.name].seen_at(obj, state, frame, kind)
+                        self._meshes[obj.name].seen_frames.append(each)
         for mesh in self._meshes.values():
-            mesh.between = mesh.moments[1 + len(frames) :]
-            mesh.frames = mesh.moments[1 : 1 + len(frames)]
+            mesh.between = mesh.seen_frames[1 + len(frames) :]
+            mesh.frames = mesh.seen_frames[1 : 1 + len(frames)]
 
     def verify(self, path: Path, segments: Mapping[str, Mapping[int, str]]) -> list[Check]:
         """Reads the file, and compares; adds to `left_out`.
@@ -107,7 +107,7 @@ class Recording:
 class _Mesh:
     """A mesh over frames. What is read of it once is at the current frame, which is the exporter's.
 
-    moments  the scene's first frame, where plain bones get their weights, and those to compare
+    seen_frames  the scene's first frame, where plain bones get their weights, and those to compare
     """
 
     def __init__(self, obj: bpy.types.Object, state: SkinnedObject) -> None:
@@ -123,11 +123,11 @@ class _Mesh:
         self._influences: Influences | None = None
         # At each frame, the values of shape keys.
         self._values: dict[float, dict[str, float]] = {}
-        self.moments: list[Moment] = []
-        self.frames: list[Moment] = []
-        self.between: list[Moment] = []
+        self.seen_frames: list[SeenFrame] = []
+        self.frames: list[SeenFrame] = []
+        self.between: list[SeenFrame] = []
 
-    def moment(self, obj: bpy.types.Object, state: SkinnedObject, frame: float, kind: str) -> Moment:
+    def seen_at(self, obj: bpy.types.Object, state: SkinnedObject, frame: float, kind: str) -> SeenFrame:
         bones, given = self.bones, state.shown.frames[0]
         evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
         rig = properties.of(obj).armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -143,7 +143,7 @@ class _Mesh:
         axes = bones.rest_axes.astype(np.float64)
         flat = np.full(len(bones.rest) - len(bones.names), -1)
         damaged = damaged_bones(motions @ axes, np.append(bones.parents, flat), kind)
-        return Moment(
+        return SeenFrame(
             frame,
             transformed(final, world) if len(final) == len(shown) else shown,
             shown,
@@ -162,9 +162,9 @@ class _Mesh:
 
     def seen(self, name: str, segments: Mapping[int, str], influences: int) -> Seen:
         """segments: names of the plain bones for joints, if there are some"""
-        constant = self.moments[0].influences
+        constant = self.seen_frames[0].influences
         if self.bones.bend and not segments:
-            in_armature = transformed(self.moments[0].rest, self._bones_from_model)
+            in_armature = transformed(self.seen_frames[0].rest, self._bones_from_model)
             constant = self._weighting.influences(in_armature)
         has_envelopes = not segments and (
             self._weighting.use_envelopes
@@ -205,10 +205,10 @@ class _Mesh:
         placed = found.binds.copy()
         placed[bones >= 0, :3, 3] = at_rest[bones[bones >= 0], :3, 3]
         from_file = np.linalg.inv(self._world) @ placed @ np.linalg.inv(found.binds) @ found.up
-        moments = {moment.frame: moment for moment in self.moments}
+        seen_frames = {each.frame: each for each in self.seen_frames}
         return replace(
             found,
-            motions=lambda frame: moments[frame].bound[bones] @ from_file,
+            motions=lambda frame: seen_frames[frame].bound[bones] @ from_file,
             shapes=lambda frame: np.array([self._values[frame].get(name, 0.0) for name in found.shape_names]),
             is_animated=True,
         )
@@ -233,11 +233,11 @@ class _Mesh:
         several = [row for row, own in enumerate(near) if len(own) > 1]
         if not several:
             return comparison
-        moments = [self.frames[0], self.frames[len(self.frames) // 2], self.frames[-1]]
-        shapes = [comparison.played(moment) for moment in moments]
+        seen_frames = [self.frames[0], self.frames[len(self.frames) // 2], self.frames[-1]]
+        shapes = [comparison.played(each) for each in seen_frames]
         for row in several:
             apart = [
-                max(np.linalg.norm(m.seen[v] - s[row]) for m, s in zip(moments, shapes, strict=True))
+                max(np.linalg.norm(m.seen[v] - s[row]) for m, s in zip(seen_frames, shapes, strict=True))
                 for v in near[row]
             ]
             vertices[row] = near[row][int(np.argmin(apart))]

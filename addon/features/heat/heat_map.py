@@ -17,7 +17,7 @@ from .measures import SinewMeasures
 _last: dict[int, tuple] = {}
 
 
-def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
+def update(heated: live.SkinnedObjects, depsgraph: bpy.types.Depsgraph) -> None:
     """Colours those objects with a heat map that are in the evaluated scene, if anything changed. An object
     that its Armature modifier deforms has no point buffer, and shows no colours."""
     if not heated:
@@ -79,7 +79,7 @@ def scale_of(settings: SinewMeasures, measured: Measured, values: np.ndarray) ->
     return HeatScale.fixed(metric, getattr(settings, settings.end), least, most)
 
 
-def _title(settings: SinewMeasures, shown: live.Pairs) -> str:
+def _title(settings: SinewMeasures, shown: live.SkinnedObjects) -> str:
     """Returns the measure, and the methods."""
     methods = list(dict.fromkeys(properties.method_label(properties.of(obj).method) for obj, _state in shown))
     text = f"{tr(settings.metric.label)}, {joined(methods)}"

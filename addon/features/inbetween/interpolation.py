@@ -6,12 +6,14 @@ their parents' tails (Smith 2013, figure 3.3). The method gives the rigid part; 
 keyed scales, with the same weights.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import sinew
 from sinew import affine, interpolate, quat_vec, spline
 
+from ...base.options import option
 from ...io.poses import Poses
 
 # Between two keys, or on a spline through four.
@@ -94,6 +96,28 @@ TOO_FAR = {
     SPLINE: "rotates too far for this spline, and may jump: key in between, or choose one that is smooth on "
     "splines",
 }
+
+
+@dataclass(frozen=True)
+class InbetweenOptions:
+    """step: from one baked key to the next"""
+
+    method: interpolate.Method = option(
+        "qv_slerp",
+        "Method",
+        "How the bones move between the keyed poses of the action",
+        choices=[(m.name, m.label, m.description, m.number) for m in METHODS.values()],
+    )
+    path: str = option(
+        STRAIGHT,
+        "Path",
+        "Which keyed poses shape the way from one to the next",
+        choices=(
+            (STRAIGHT, "Key to Key", "The two neighbours, at the pace of the keys' own interpolation"),
+            (SPLINE, "Spline", "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace"),
+        ),
+    )
+    step: int = option(1, "Step", "Frames from one baked key to the next", least=1, soft_most=12)
 
 
 class Inbetweens(NamedTuple):

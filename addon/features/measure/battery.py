@@ -166,7 +166,7 @@ def posed(bones: Bones, pose: Pose) -> np.ndarray:
     rest = bones.rest.astype(np.float64)
     motions = np.tile(np.identity(4), (len(rest), 1, 1))
     for bone in bones.from_the_root:
-        above = bones.carriers[bone]
+        above = bones.deforming_parents[bone]
         if above >= 0:
             motions[bone] = motions[above]
         rotation = pose.rotations.get(bone)
@@ -190,9 +190,9 @@ def bend_angles(bones: Bones, pose: np.ndarray) -> np.ndarray:
     motions = pose[:count, :3, :3].astype(np.float64) @ np.linalg.pinv(
         bones.rest[:count, :3, :3].astype(np.float64)
     )
-    relative = np.swapaxes(motions[bones.carriers], 1, 2) @ motions
+    relative = np.swapaxes(motions[bones.deforming_parents], 1, 2) @ motions
     cosines = (np.trace(relative, axis1=1, axis2=2) - 1.0) / 2.0
-    return np.where(bones.carriers >= 0, np.arccos(cosines.clip(-1.0, 1.0)), 0.0)
+    return np.where(bones.deforming_parents >= 0, np.arccos(cosines.clip(-1.0, 1.0)), 0.0)
 
 
 class Battery:
@@ -208,7 +208,7 @@ class Battery:
         self._own_axes = bones.rest[:count, :3, :3].astype(np.float64)
         self._axes = _along(self._own_axes, bones.limbs.vectors)
         self._along = self._axes[:, :, 1]
-        self._joints = [int(bone) for bone in np.flatnonzero(moving) if bones.carriers[bone] >= 0]
+        self._joints = [int(bone) for bone in np.flatnonzero(moving) if bones.deforming_parents[bone] >= 0]
         self._words = [words_of(name) for name in bones.names]
 
     def poses(self) -> list[Pose]:
@@ -301,7 +301,7 @@ class Battery:
     def _roles(self) -> list[str]:
         roles = [""] * len(self._words)
         for bone in self._bones.from_the_root:
-            above = int(self._bones.carriers[bone])
+            above = int(self._bones.deforming_parents[bone])
             roles[bone] = self._role(self._words[bone], roles[above] if above >= 0 else "")
         arms = [bone for bone, role in enumerate(roles) if role in ("shoulder", "upper_arm")]
         trunk = {above for arm in arms for above in self._above(arm)}
@@ -386,7 +386,7 @@ class Battery:
         found: list[int] = []
         while bone >= 0 and bone not in found:
             found.append(bone)
-            bone = int(self._bones.carriers[bone])
+            bone = int(self._bones.deforming_parents[bone])
         return found
 
     def _rotation(self, move: Move, bone: int, angle: float) -> np.ndarray | None:
@@ -413,7 +413,7 @@ class Battery:
     def _hinge(self, bone: int, toward: np.ndarray) -> tuple[np.ndarray | None, float]:
         """The axis that a limb bends about: as it is bent at rest, else toward a direction; and the angle by
         which it is bent at rest, in radians."""
-        along, above = self._along[bone], int(self._bones.carriers[bone])
+        along, above = self._along[bone], int(self._bones.deforming_parents[bone])
         bent = np.cross(self._along[above], along)
         is_limb = self._roles[bone] in ("forearm", "shin", "finger", "thumb")
         if is_limb and self._roles[above] != "hand" and np.linalg.norm(bent) > math.sin(math.radians(8.0)):

@@ -31,7 +31,7 @@ from .metrics import FrameOfRig, Gauge, Measured, Pose, Shape
 # Sets of objects that are kept prepared: those of the heat map and those of the panel.
 MOST_SUBJECTS = 2
 
-Pairs = Sequence[tuple[bpy.types.Object, SkinnedObject]]
+SkinnedObjects = Sequence[tuple[bpy.types.Object, SkinnedObject]]
 
 
 @dataclass
@@ -126,7 +126,7 @@ def forget() -> None:
     _subjects.clear()
 
 
-def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject | None:
+def measure(pairs: SkinnedObjects, other: str, depsgraph: bpy.types.Depsgraph) -> Subject | None:
     """Returns the objects with `measured` of the current frame; the same result object where nothing differs
     from the last call.
 
@@ -201,7 +201,7 @@ class Moment:
         return cls(subject, inputs, subject.worlds, subject.armatures)
 
     def posed(self, poses: Callable[[Bones], np.ndarray]) -> Self:
-        """Returns the same in other poses, which tell no turns.
+        """Returns the same in other poses. Rotations beyond half a turn are unknown there.
 
         poses  returns float32 [bones + joints, 4, 4], armature space
         """
@@ -211,11 +211,11 @@ class Moment:
                 frame
                 and replace(
                     frame,
-                    pose=poses(stage.deformer.bones),
+                    pose=poses(skin.deformer.bones),
                     twists=tuple((*of_bone[:2], *NOT_TOLD) for of_bone in frame.twists),
                     turns=None,
                 )
-                for stage, frame in zip(own.part.skin_stack.skin_stages, own.frames, strict=False)
+                for skin, frame in zip(own.part.skin_stack.skins, own.frames, strict=False)
             ]
             inputs.append(replace(own, frames=frames))
         return replace(self, inputs=inputs)
@@ -280,7 +280,7 @@ def _is_current(part: Part, pair: tuple[bpy.types.Object, SkinnedObject]) -> boo
     return part.skinned is pair[1] and part.bound is pair[1].bound
 
 
-def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> Subject | None:
+def _read(pairs: SkinnedObjects, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> Subject | None:
     """Reads topology and weights; keeps the old gauge where they are unchanged."""
     parts = []
     for obj, skinned in pairs:
@@ -294,10 +294,10 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
             return None
         skin_stack = skinned.bound.skin_stack
         surface = mesh_io.read_surface(mesh)
-        for stage in skin_stack.skin_stages:
-            if stage.deformer.vertex_data is not None:
+        for skin in skin_stack.skins:
+            if skin.deformer.vertex_data is not None:
                 # Distances may be measured to a method that needs them.
-                stage.deformer.vertex_data.add_triangles(surface.triangles)
+                skin.deformer.vertex_data.add_triangles(surface.triangles)
         parts.append(Part(obj, skinned, skinned.bound, surface, skin_stack.another()))
     if not parts:
         return None

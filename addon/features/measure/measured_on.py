@@ -124,7 +124,7 @@ def _differing(now: Bound, before: Bound) -> list[str]:
     keys = [each.shape_keys for each in (source, known)]
     has_same_keys = keys[0] is keys[1] or (None not in keys and keys[0].equals(keys[1]))
     is_same_mesh = source.topology.equals(known.topology) and has_same_keys
-    pairs = zip(now.skin_stack.skin_stages, before.skin_stack.skin_stages, strict=False)
+    pairs = zip(now.skin_stack.skins, before.skin_stack.skins, strict=False)
     return [
         *(["mesh"] if not (is_same_mesh and are_equal(source.surface_points, known.surface_points)) else []),
         *(["weights"] if not source.equals_but_for_points(known) or now.groups != before.groups else []),

@@ -119,13 +119,13 @@ class _Attached:
 
     def add_frame(self, depsgraph: bpy.types.Depsgraph, chosen: Pose | None) -> None:
         world = np.array(self.obj.evaluated_get(depsgraph).matrix_world)
-        carrier = self.obj
-        while carrier is not None and carrier.parent_type != "BONE":
-            carrier = carrier.parent
-        if chosen is not None and carrier is not None:
-            armature = carrier.parent.evaluated_get(depsgraph)
+        on_bone = self.obj
+        while on_bone is not None and on_bone.parent_type != "BONE":
+            on_bone = on_bone.parent
+        if chosen is not None and on_bone is not None:
+            armature = on_bone.parent.evaluated_get(depsgraph)
             bones, place = armature_io.read_bones(armature), np.array(armature.matrix_world)
-            bone = bones.names.index(carrier.parent_bone)
+            bone = bones.names.index(on_bone.parent_bone)
             posed, now = chosen.of(armature, bones)[bone], armature_io.read_pose(armature, bones)[bone]
             world = place @ posed @ np.linalg.pinv(place @ now) @ world
         self.part.add_frame(_STILL, world)
@@ -214,8 +214,8 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         raise SinewError("Sinew deforms neither it nor a copy of it")
     obj_of_state, state = found[0]
     settings, bound = properties.of(obj_of_state), state.bound
-    stages = bound.skin_stack.skin_stages
-    if len(stages) != 1 or stages[0].mask is not None:
+    skins = bound.skin_stack.skins
+    if len(skins) != 1 or skins[0].mask is not None:
         raise SinewError("several Armature modifiers deform it, or one with a vertex group")
     if settings.scale_rule != BLENDER_4.name:
         raise SinewError(f"its rule for scale is not {BLENDER_4.label}")

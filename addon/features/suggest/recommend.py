@@ -50,7 +50,7 @@ def forget() -> None:
     bases.clear()
 
 
-class Moment(NamedTuple):
+class Judged(NamedTuple):
     """A frame or a pose, with its crossings at rest; None where they are not counted."""
 
     name: str
@@ -99,10 +99,10 @@ def _new_crossings(moment: live.Moment, points: np.ndarray, at_rest: set[tuple[i
     return np.flatnonzero(moment.pose.bent_triangles)[pairs].ravel()
 
 
-def _with_crossings(name: str, moment: live.Moment, number: int, count: int) -> Moment:
+def _with_crossings(name: str, moment: live.Moment, number: int, count: int) -> Judged:
     step = max(1, -(-count // MOST_CROSSINGS))
     at_rest = _crossings(moment, moment.pose.rest.points.T) if number % step == 0 else None
-    return Moment(name, moment, at_rest)
+    return Judged(name, moment, at_rest)
 
 
 def _crossings(moment: live.Moment, points: np.ndarray) -> set[tuple[int, int]]:
@@ -115,13 +115,13 @@ def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
     rigs: dict[int, tuple[Bones, set[str], dict[str, np.ndarray]]] = {}
     for part in now.subject.parts:
         pairs = attach.replaced_modifiers(part.obj)
-        for stage, (_modifier, replaced) in zip(part.skin_stack.skin_stages, pairs, strict=False):
+        for skin, (_modifier, replaced) in zip(part.skin_stack.skins, pairs, strict=False):
             if replaced.armature is not None:
                 limits = armature_io.read_limits(replaced.armature)
-                uid, bones = replaced.armature.session_uid, stage.deformer.bones
+                uid, bones = replaced.armature.session_uid, skin.deformer.bones
                 known = rigs.get(uid, (bones, set(), limits))
                 rigs[uid] = (known[0].with_skin_of(bones) if uid in rigs else bones, *known[1:])
-                known[1].update(stage.deformer.moving_bones)
+                known[1].update(skin.deformer.moving_bones)
     found: dict[tuple[str, ...], list[battery.Pose]] = {}
     for bones, names, limits in rigs.values():
         moving = np.array([name in names for name in bones.names], bool)

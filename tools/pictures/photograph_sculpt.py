@@ -2,7 +2,7 @@
 """Photographs sculpt mode under dq in the window of a real Blender, on human.blend: the shape is the same as
 before, and the panel says why.
 
-    blender --factory-startup human.blend --python docs/photograph_sculpt.py -- sinew.zip sculpt.png
+    blender --factory-startup human.blend --python tools/pictures/photograph_sculpt.py -- sinew.zip sculpt.png
 """
 
 from __future__ import annotations

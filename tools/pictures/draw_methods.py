@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws every method and stage on bent and twisted limbs, and writes docs/pictures.md with their numbers.
 
-    python docs/draw_methods.py [--out docs] [--only wrist]
+    python tools/pictures/draw_methods.py [--out docs] [--only wrist]
 
 `./dev pictures` runs it. human.blend is found in the folder SINEW_RIGS; without it its pictures are left out.
 """
@@ -29,7 +29,7 @@ from sinew_addon.features.pages import render
 from sinew_addon.features.pages.views import View, close_view, seen_extent, whole_view
 from sinew_addon.io import files
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPOSITORY / "tests" / "python"))
 import tube as tubes  # noqa: E402 - it is found there
 

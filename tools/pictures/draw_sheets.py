@@ -2,7 +2,7 @@
 """Draws the sheets of methods beside each other, and photographs the pages of commands: what Sinew's command
 line makes, as the documents show it.
 
-    python docs/draw_sheets.py [--out docs] [--only page.png]
+    python tools/pictures/draw_sheets.py [--out docs] [--only page.png]
 
 human.blend is found in the folder SINEW_RIGS. Pages want Chromium, as `chromium` of Debian.
 """
@@ -22,7 +22,7 @@ from pathlib import Path
 import sinew as library
 from PIL import Image, ImageDraw, ImageFont
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+REPOSITORY = Path(__file__).resolve().parents[2]
 BLEND_FILES = REPOSITORY / "blend_files"
 SINEW = Path(sys.executable).with_name("sinew")
 # In the order of the documents.

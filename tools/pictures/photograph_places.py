@@ -2,7 +2,7 @@
 """Photographs where else than in the sidebar Sinew is found, in the window of a real Blender: the menu, the
 modifier's own panel, the dialog of Bake, a corrective key and the preferences.
 
-    blender --factory-startup --enable-event-simulate human.blend --python docs/photograph_places.py -- sinew.zip FOLDER
+    blender --factory-startup --enable-event-simulate human.blend --python tools/pictures/photograph_places.py -- sinew.zip FOLDER
 
 The window has 1280 x 800 pixels.
 """  # noqa: E501

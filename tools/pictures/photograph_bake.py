@@ -2,7 +2,7 @@
 """Photographs the heat map of the error of a bake in the window of a real Blender: human.blend baked to
 bones, with the errors before on the left and those after on the right.
 
-    blender --factory-startup human.blend --python docs/photograph_bake.py -- sinew.zip bake-error.webp
+    blender --factory-startup human.blend --python photograph_bake.py -- sinew.zip bake-error.webp
 """
 
 from __future__ import annotations

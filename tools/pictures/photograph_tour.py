@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The photographs of docs/tour.md: human.blend in clothes, from the first click to a rendered comparison.
 
-    blender --factory-startup --enable-event-simulate human.blend --python docs/photograph_tour.py -- sinew.zip FOLDER
+    blender --factory-startup --enable-event-simulate human.blend --python tools/pictures/photograph_tour.py -- sinew.zip FOLDER
 
 The window has 1280 x 800 pixels; places are those of its picture.
 """  # noqa: E501

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bends every joint of free rigs under all methods, and writes docs/benchmark.md with tables and pictures.
 
-    python docs/draw_benchmark.py [--out docs] [--only Fox]
+    python tools/pictures/draw_benchmark.py [--out docs] [--only Fox]
 
 `./dev benchmark` runs it. Rigs that are not of this repository are found in the folder SINEW_RIGS and in
 "corpus" beside it; without them they are left out.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws what blends of motions do, for docs/motion.md; prints the numbers that it quotes.
 
-    python docs/draw_motion.py [--out docs]
+    python tools/pictures/draw_motion.py [--out docs]
 
 An arm between two poses, skinned by the library, and the walks of tests/python/walks.py. Without Blender.
 """
@@ -26,7 +26,7 @@ from sinew_addon.io.poses import Poses
 matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPOSITORY / "tests" / "python"))
 import walks  # noqa: E402 - it is found there
 
@@ -194,12 +194,12 @@ def draw_sliding(path: Path) -> None:
 def draw_strips(path: Path) -> None:
     """Legs from the side: the clips, and their blend, aligned or not."""
     walk, run = pair()
-    still = Settings(root_motion="in_place")
+    still = Settings(root_motion="in-place")
     rows = {
         "walk": blend([walk, run], (1, 0), still),
         "run": blend([run, walk], (1, 0), still),
         "blend, aligned": blend([walk, run], (1, 1), still),
-        "blend, not aligned": blend([walk, run], (1, 1), Settings(root_motion="in_place", align=False)),
+        "blend, not aligned": blend([walk, run], (1, 1), Settings(root_motion="in-place", align=False)),
     }
     figure, grid = plt.subplots(len(rows), 1, figsize=(12.6, 7.2), layout="constrained")
     for axes, (title, made) in zip(grid, rows.items(), strict=True):
@@ -229,7 +229,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder for the pictures")
+    parser.add_argument("--out", type=Path, default=REPOSITORY / "docs", help="folder for the pictures")
     arguments = parser.parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
     draw_arms(arguments.out / "motion-arms.png")

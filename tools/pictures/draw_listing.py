@@ -2,7 +2,7 @@
 """Draws the pictures of the extension's page on a platform: the icon, the picture at the top, and photographs
 of Blender's window.
 
-    .venv/bin/python listing/draw.py dist/sinew-VERSION.zip [--only icon.png]
+    .venv/bin/python tools/pictures/draw_listing.py dist/sinew-VERSION.zip [--only icon.png]
 
 human.blend is found in the folder SINEW_RIGS, the Blender with a window by SINEW_FULL_BLENDER (docs/dev.md).
 """
@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from matplotlib.patches import FancyBboxPatch, Polygon
 from PIL import Image
 
 HERE = Path(__file__).resolve().parent
-DOCS = HERE.parent / "docs"
+LISTING = HERE.parents[1] / "docs" / "listing"
 # Pixels, as extensions.blender.org asks for them.
 ICON, PICTURE = (256, 256), (1920, 1080)
 BACKGROUND, BONE, FIBRES = "#262626", "#f2ead8", ("#8c2f24", "#b5402f", "#d9583d", "#ee7f55")
@@ -63,7 +62,6 @@ def draw_icon(path: Path) -> None:
 
 def draw_top(path: Path) -> None:
     """Three methods beside each other."""
-    sys.path.insert(0, str(DOCS))
     from draw_sheets import sheet
 
     fitted(sheet("wrist.blend", "lbs,dq,cor", 24, 620)).save(path, quality=90)
@@ -82,8 +80,8 @@ def fitted(drawn: Image.Image) -> Image.Image:
 
 def photograph(script: str, package: Path, names: tuple[str, ...]) -> None:
     human = Path(os.environ["SINEW_RIGS"], "human.blend")
-    pictures = [HERE / f"{name}.webp" for name in names]
-    words = ["run", "--factory-startup", human, "--python", DOCS / script, "--", package, *pictures]
+    pictures = [LISTING / f"{name}.webp" for name in names]
+    words = ["run", "--factory-startup", human, "--python", HERE / script, "--", package, *pictures]
     screen = os.environ | {"SCREEN": "x".join(map(str, PICTURE))}
     subprocess.run(
         [os.environ["SINEW_FULL_BLENDER"], *words], check=True, env=screen, stdout=subprocess.DEVNULL
@@ -98,7 +96,7 @@ def main() -> None:
     drawn = {"icon.png": draw_icon, "top.webp": draw_top}
     for name, draw in drawn.items():
         if options.only in (None, name):
-            draw(HERE / name)
+            draw(LISTING / name)
     for script, names in PHOTOGRAPHS.items():
         if options.only is None or options.only.removesuffix(".webp") in names:
             photograph(script, options.package.resolve(), names)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Photographs the heat map and the diagnostics in the window of a real Blender, on human.blend.
 
-blender --factory-startup human.blend --python docs/photograph_heat.py -- sinew-VERSION.zip heat-map.png diagnostics.png
+blender --factory-startup human.blend --python tools/pictures/photograph_heat.py -- sinew-VERSION.zip heat-map.png diagnostics.png
 """  # noqa: E501
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares the methods on human.blend in a Blender with a window, and photographs it.
 
-    blender --factory-startup human.blend --python docs/photograph_comparison.py -- sinew.zip comparison.png
+    blender --factory-startup human.blend --python photograph_comparison.py -- sinew.zip comparison.png
 
 Prints as facts what became of it on playback, posing, flipping, undo, saving, reopening and at its end.
 """

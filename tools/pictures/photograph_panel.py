@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Installs Sinew's zip in a Blender with a window, works its panel on human.blend and photographs it.
 
-blender --factory-startup human.blend --python docs/photograph_panel.py -- sinew-VERSION.zip panel.png [de_DE]
+blender --factory-startup human.blend --python photograph_panel.py -- sinew.zip panel.png [de_DE]
 
 The language of Blender's interface may be given; without it, it is English.
 """

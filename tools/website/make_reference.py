@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pages of the site that are made from code: the command line, the Python package, the C++ headers.
 
-    python docs/make_reference.py commands|python|cpp
+    python tools/website/make_reference.py commands|python|cpp
 
-docs/mkdocs_hook.py calls this when the site is built. The parsers are asked, so Sinew's library must be
-installed; Python and C++ are read, not run.
+mkdocs_hook.py calls this when the site is built. The parsers are asked, so Sinew's library must be installed;
+Python and C++ are read, not run.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "native" / "python" / "sinew"
 HEADERS = ROOT / "native" / "sinew"
 
