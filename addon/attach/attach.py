@@ -292,9 +292,12 @@ def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
     properties.clear(obj)
 
 
-def switch(obj: bpy.types.Object, on: bool) -> None:
+def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
     """On: Sinew's modifier has the icons that the artist gave it. Off: its icons are off, and the Armature
-    modifiers deform by themselves."""
+    modifiers deform by themselves.
+
+    in_depsgraph  Sinew deforms it within Blender's evaluation
+    """
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     was_on = settings.replaces_modifiers
     if on:
@@ -304,7 +307,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         restore_builtin(obj)
     smooths = {}
     for name in VIEWS:
-        _switch_own(obj, nodes, f"show_{name}", on, was_on)
+        _switch_own(obj, nodes, f"show_{name}", on, was_on, in_depsgraph)
         smooths[name] = not on or _icons(obj, nodes, on, name).deformer is Deformer.ARMATURE
     undeformed.mark(obj, on)
     corrective_smooth.switch(obj, **smooths)
@@ -312,7 +315,12 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
 
 
 def _switch_own(
-    obj: bpy.types.Object, nodes: bpy.types.NodesModifier | None, icon: str, on: bool, was_on: bool
+    obj: bpy.types.Object,
+    nodes: bpy.types.NodesModifier | None,
+    icon: str,
+    on: bool,
+    was_on: bool,
+    in_depsgraph: bool,
 ) -> None:
     """Switches an icon of Sinew's modifiers, unless an animation does."""
     known, is_shown, is_clicked = properties.of(obj).stack, on, on != was_on
@@ -322,7 +330,9 @@ def _switch_own(
             property_groups.store(known, icon, getattr(nodes, icon))
         is_shown = on and getattr(known, icon)
         _set_icon(nodes, icon, is_shown)
-    undeformed.switch(obj, icon, is_shown, is_clicked)
+    # Within the evaluation, in_depsgraph.py switches them: a click evaluates the object once.
+    is_clicked |= not is_shown
+    undeformed.switch(obj, icon, on if in_depsgraph else is_shown, is_clicked)
 
 
 def is_off(obj: bpy.types.Object) -> bool:

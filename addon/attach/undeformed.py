@@ -124,7 +124,7 @@ def switch(obj: bpy.types.Object, icon: str, is_on: bool, is_clicked: bool) -> N
     """Switches the helping modifiers on or off, and notes where somebody has switched one.
 
     icon        show_viewport or show_render
-    is_clicked  Sinew's own modifier was switched, which they follow
+    is_clicked  Sinew's own modifier was switched, which they may follow
     """
     for modifier in stack.helping_modifiers(obj):
         # Setting an unchanged value makes Blender evaluate the object, too.

@@ -120,7 +120,7 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         return
     given = wanted.normals
     point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
-    attach.switch(obj, on=True)
+    attach.switch(obj, on=True, in_depsgraph=wanted.is_in_depsgraph)
     attach.restore_pointers(obj)
 
 

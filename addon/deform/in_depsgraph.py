@@ -124,8 +124,8 @@ def _leave_out(
     evaluated: bpy.types.Object, modifiers: pose.Modifiers, skinned: SkinnedObject, icons: tuple[Icons, Icons]
 ) -> None:
     """Switches these Armature modifiers off in evaluated data, where Sinew's modifier comes after them and
-    sets each vertex: on a large mesh they take as long as Sinew. Sinew's own go off where all Armature
-    modifiers are off. foreach_set() tags nothing, which is not allowed here.
+    sets each vertex: on a large mesh they take as long as Sinew. Sinew's own are on where it deforms.
+    foreach_set() tags nothing, which is not allowed here.
 
     Exporters evaluate for themselves, and find them as they are: USD writes a skin where one is on.
     """
@@ -135,10 +135,14 @@ def _leave_out(
     stack_now, own = evaluated.modifiers, {skinned.noted.modifier, *skinned.noted.helping}
     left_out = {replaced.name for replaced, _armature in modifiers}
     for view, of_view in zip(VIEWS, icons, strict=True):
-        if of_view.sinew:
-            names = own if of_view.deformer is Deformer.NOTHING else left_out
-            shown = [getattr(m, f"show_{view}") and m.name not in names for m in stack_now]
-            stack_now.foreach_set(f"show_{view}", shown)
+        is_by_sinew = of_view.deformer is Deformer.SINEW
+        shown = [
+            is_by_sinew
+            if m.name in own
+            else getattr(m, f"show_{view}") and not (is_by_sinew and m.name in left_out)
+            for m in stack_now
+        ]
+        stack_now.foreach_set(f"show_{view}", shown)
     # A mark, which goes when Blender copies the icons from the original again (pose.icons_of).
     marked = [m.show_in_editmode or m.name == skinned.noted.modifier for m in stack_now]
     stack_now.foreach_set("show_in_editmode", marked)

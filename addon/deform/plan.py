@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Decides how an object is deformed: one pure function of plain facts, without Blender."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -81,6 +83,13 @@ class Plan:
     leaves_out: bool = True
     viewport: Deformer = Deformer.SINEW
     render: Deformer = Deformer.SINEW
+
+    def gives_as(self, other: Plan) -> bool:
+        """Whether Sinew gives the same points as by another plan, wherever they are shown: the icons decide
+        that within the evaluation."""
+        views = (self.viewport, self.render)
+        is_same = self == replace(other, viewport=self.viewport, render=self.render)
+        return is_same and (self.is_in_depsgraph or views == (other.viewport, other.render))
 
     @property
     def uses_builtin(self) -> bool:

@@ -269,7 +269,7 @@ class _Event:
         # it again, without what animation had set.
         is_same = not is_of_another_stack and skinned.bound.source.equals(self.bound_before.source)
         is_same &= not (skinned.has_new_data or self.is_rescaled)
-        is_new_plan = self.bound_before is None or new != self.old
+        is_new_plan = self.bound_before is None or not new.gives_as(self.old)
         if known.is_planned or is_of_another_stack:
             self._note(new)
         else:

@@ -109,6 +109,23 @@ def test_posing_evaluates_the_mesh_once(set_up):
     assert [evaluations_in(lambda: pose(armature), obj.name) for _ in range(3)] == [1, 1, 1]
 
 
+@pytest.mark.usefixtures("counting")
+@with_few
+@pytest.mark.parametrize("modifier", ["Sinew", "Armature"])
+def test_a_click_on_an_icon_evaluates_the_mesh_as_often_as_blender(set_up, modifier):
+    obj, armature = scenes.make_arm()
+    SETUPS[set_up](obj, armature)
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(2)
+
+    def click() -> None:
+        own = obj.modifiers[modifier]
+        own.show_viewport = not own.show_viewport
+        scenes.final_points(obj)
+
+    assert [evaluations_in(click, obj.name) for _ in range(4)] == [1, 1, 1, 1]
+
+
 def modules_passed(action: Callable[[], object]) -> dict[str, set[str]]:
     """The extension's modules whose functions run during the action on this thread, by the function that
     Blender called."""

@@ -248,12 +248,13 @@ def test_a_saved_file_is_as_without_sinew(rendered, tmp_path):
     _assert_same(rendered(bpy.data.objects["Arm"]), expected)
 
 
-def test_it_is_said_where_a_click_on_a_helping_modifier_is_taken_back():
+def test_it_is_said_where_a_click_on_a_helping_modifier_is_taken_back(tmp_path):
     obj, _armature = scenes.skinned_arm("dq")
     nodes = stack.sinew_modifier(obj)
     # Clicks on Sinew's own icon and on its switch are none on theirs.
     for act in (
         lambda: setattr(nodes, "show_viewport", False),
+        lambda: bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend")),
         lambda: setattr(nodes, "show_viewport", True),
         lambda: setattr(obj.sinew, "enabled", False),
         lambda: setattr(obj.sinew, "enabled", True),
