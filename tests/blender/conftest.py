@@ -26,29 +26,6 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 # The reader of glTF for engines, and what tests of Python have, too.
 sys.path += [str(REPOSITORY / "shaders"), str(REPOSITORY / "tests" / "python")]
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
-# Tests of what commands write: they only run in 4.2 and in the newest Blender. The versions in between run
-# all other tests: how Blender evaluates, stores and edits.
-OLDEST_AND_NEWEST = {
-    *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_blend", "test_check"),
-    "test_cluster",
-    *("test_command_line", "test_compare", "test_comparison", "test_export", "test_export_verify"),
-    *("test_flamenco", "test_hostile", "test_output", "test_read_only", "test_restore", "test_segment_bones"),
-    "test_stages_in_features",
-}
-# Tests of what Sinew computes from a character, and of its panels: they only run in long-term releases. The
-# others run how Blender evaluates, stores, edits and renders.
-LONG_TERM = {
-    "test_auto_mix",
-    *("test_bulge_limit", "test_character", "test_corrective_key", "test_ddm", "test_delta_mush"),
-    *("test_diagnostics_panel", "test_flex", "test_flex_panel", "test_found_where_looked_for"),
-    *("test_golden", "test_heat_map", "test_ik"),
-    *("test_inbetween", "test_lesson", "test_mask_groups", "test_mending", "test_method_parameters"),
-    *("test_mix", "test_precomputation"),
-    *("test_preferences", "test_recommended", "test_scale_rule", "test_sdef", "test_small_meshes"),
-    *("test_stopped", "test_suggest", "test_translations", "test_twist_spread", "test_worst_frames"),
-}
-# Run a second time with Sinew's default for small meshes, except for tests marked by_sinew.
-BOTH_WAYS = {"test_changes", "test_editing", "test_in_front", "test_several_views"}
 REAL_RIGS = ("human.blend", "CesiumMan.glb", "Fox.glb")
 
 
@@ -91,17 +68,15 @@ def pytest_unconfigure():
 
 
 def pytest_collection_modifyitems(items):
-    left = OLDEST_AND_NEWEST if os.environ.get("SINEW_BETWEEN") else set()
-    if os.environ.get("SINEW_SHORT_TERM"):
-        left = left | LONG_TERM
-    skip = pytest.mark.skip(reason="left to the versions before and after this one")
-    for item in items:
-        if item.path.stem in left:
-            item.add_marker(skip)
-    if os.environ.get("SINEW_NOT_NEWEST"):
-        skip = pytest.mark.skip(reason="tested once, in the newest Blender")
+    left = {
+        "outer_versions": "SINEW_BETWEEN",
+        "long_term": "SINEW_SHORT_TERM",
+        "once": "SINEW_NOT_NEWEST",
+    }
+    for mark in (mark for mark, variable in left.items() if os.environ.get(variable)):
+        skip = pytest.mark.skip(reason=f"left to other versions of Blender: {mark}")
         for item in items:
-            if item.get_closest_marker("once"):
+            if item.get_closest_marker(mark):
                 item.add_marker(skip)
 
 
@@ -153,7 +128,8 @@ def small_meshes_as_users_have_them(request, monkeypatch):
 
 def pytest_generate_tests(metafunc):
     is_marked = metafunc.definition.get_closest_marker("by_sinew") is not None
-    if metafunc.module.__name__ in BOTH_WAYS and not is_marked and "route" not in metafunc.fixturenames:
+    is_both = metafunc.definition.get_closest_marker("both_ways") is not None
+    if is_both and not is_marked and "route" not in metafunc.fixturenames:
         name = "small_meshes_as_users_have_them"
         metafunc.parametrize(name, [False, True], indirect=True, ids=["by Sinew", "as users have it"])
 

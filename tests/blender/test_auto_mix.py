@@ -16,6 +16,8 @@ from sinew_addon.deform import session
 from sinew_addon.features.auto_mix import auto_mix
 from sinew_addon.features.auto_mix.shares import VertexErrors
 
+pytestmark = pytest.mark.long_term
+
 FRAMES = range(1, 12)
 SMOOTHING = 0.3
 BEND, PULL, TWIST = 90.0, 0.4, 140.0

@@ -18,6 +18,8 @@ from sinew_addon.base.errors import SinewError
 from sinew_addon.features.bake import bake, baked_files
 from sinew_addon.io import actions
 
+pytestmark = pytest.mark.outer_versions
+
 FRAMES = list(range(1, 12))
 TOLERANCE = 1e-6
 METHOD = "dq"

@@ -17,6 +17,8 @@ from sinew_addon.features.bake import bake, bake_apart
 from sinew_addon.features.bake.baked_files import EXPORTS
 from test_bake import FRAMES, METHOD, read_elsewhere
 
+pytestmark = pytest.mark.outer_versions
+
 KINDS = list(EXPORTS)
 
 

@@ -20,6 +20,8 @@ from sinew_addon.features.heat import bake_error, measures
 from sinew_addon.io import actions
 from test_bake import FRAMES, read_elsewhere
 
+pytestmark = pytest.mark.outer_versions
+
 METHOD = "dq"
 # World points of float32 matrices.
 ROUNDING = 3e-6

@@ -33,6 +33,8 @@ from sinew_addon.blender_process import BlenderProcess, Limits, how_it_ended
 from sinew_addon.io import files
 from sinew_addon.jobs.job_file import Settings
 
+pytestmark = pytest.mark.outer_versions
+
 # On Windows tools/platform_tests.py provides another.
 newest_only = pytest.mark.skipif(
     bpy.app.version < (5, 2) and os.name != "nt", reason="long: runs with the newest Blender alone"

@@ -17,6 +17,8 @@ from sinew_addon.features.blend import blend_actions, clips_io, motion
 from sinew_addon.features.blend.motion import Settings
 from sinew_addon.io import actions, files
 
+pytestmark = pytest.mark.outer_versions
+
 CLOSE = 2e-5
 MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
 

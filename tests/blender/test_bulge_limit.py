@@ -14,6 +14,8 @@ from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.skinning.bulge_limit import segments
 
+pytestmark = pytest.mark.long_term
+
 
 def limit(obj: bpy.types.Object, **values: object) -> None:
     scenes.set_stage(obj, "bulge_limit", **values)

@@ -15,6 +15,8 @@ from sinew_addon.io import mesh_io
 from sinew_addon.ui import state_text
 from test_editing import assert_follows
 
+pytestmark = pytest.mark.both_ways
+
 
 def test_swapped_bone_names_swap_the_groups():
     obj, armature = scenes.skinned_arm()

@@ -13,6 +13,8 @@ from sinew_addon.attach.subscribers import subscribers
 from sinew_addon.deform import session, small_meshes
 from sinew_addon.ui import character, operators, state_text
 
+pytestmark = pytest.mark.long_term
+
 
 @pytest.fixture
 def armature():

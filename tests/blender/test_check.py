@@ -17,6 +17,8 @@ from program import run_sinew
 from sinew_addon.attach import attach, properties
 from sinew_addon.commands.check import line_of
 
+pytestmark = pytest.mark.outer_versions
+
 
 def check(*arguments: object, status: int = 0) -> dict[str, dict]:
     """The reports of `sinew check --json`, by the names of files; checks that its text says the same."""

@@ -23,9 +23,10 @@ from distributed.utils import get_ip
 from program import run_program
 from sinew_addon.attach import properties
 
-pytestmark = pytest.mark.skipif(
-    bpy.app.version < (5, 2), reason="not of Blender: runs with the newest one alone"
-)
+pytestmark = [
+    pytest.mark.skipif(bpy.app.version < (5, 2), reason="not of Blender: runs with the newest one alone"),
+    pytest.mark.outer_versions,
+]
 BATCH = (REPOSITORY / "docs" / "batch.md").read_text(encoding="utf-8")
 
 

@@ -21,6 +21,8 @@ from sinew_addon.features.inbetween import inbetween_bake
 from sinew_addon.io import files
 from sinew_addon.skinning.engines import METHODS
 
+pytestmark = pytest.mark.outer_versions
+
 
 @pytest.fixture
 def arm_file(tmp_path):

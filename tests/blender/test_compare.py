@@ -17,6 +17,8 @@ from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.attach import properties
 
+pytestmark = pytest.mark.outer_versions
+
 # Pictures take a third of a second each, and are almost the same in all versions.
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="drawn with the newest Blender only")
 

@@ -17,6 +17,8 @@ from sinew_addon.features.compare import comparison_labels, comparison_state
 from sinew_addon.io import files
 from sinew_addon.ui import operators
 
+pytestmark = pytest.mark.outer_versions
+
 METHODS = characters.method_names()
 # The copies' coordinates are larger than the original's by the offset.
 TOLERANCE = 1e-6

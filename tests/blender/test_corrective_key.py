@@ -13,6 +13,8 @@ from sinew_addon.attach import attach, properties
 from sinew_addon.base.errors import SinewError
 from sinew_addon.features.corrective import corrective_key
 
+pytestmark = pytest.mark.long_term
+
 
 @pytest.fixture
 def arm():

@@ -15,6 +15,8 @@ from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.deform.plan import State
 
+pytestmark = pytest.mark.long_term
+
 if "ddm" not in {method.name for method in sinew.methods()}:
     pytest.skip("built without ddm", allow_module_level=True)
 

@@ -13,6 +13,8 @@ from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.deform.plan import State
 
+pytestmark = pytest.mark.long_term
+
 FRAMES = [1, 6, 11]
 GROUP = "smooth here"
 

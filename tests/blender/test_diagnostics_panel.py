@@ -14,6 +14,8 @@ from sinew_addon.attach import attach
 from sinew_addon.attach.subscribers import notify, subscribers
 from sinew_addon.features.diagnose import diagnose
 
+pytestmark = pytest.mark.long_term
+
 # Vertices of the planted faults; the tube's rings have twelve.
 UNWEIGHTED = [3, 4, 5]
 SMALL = [20, 21]

@@ -17,6 +17,8 @@ from sinew_addon.deform.plan import State
 from sinew_addon.io import armature_io
 from sinew_addon.ui import state_text
 
+pytestmark = pytest.mark.both_ways
+
 
 def assert_follows(obj: bpy.types.Object) -> None:
     """Asserts that the object's shape by Sinew is the linear modifier's, which it has when Sinew is off."""

@@ -24,6 +24,8 @@ from sinew_addon import cli
 from sinew_addon.deform import characters
 from sinew_addon.features.gltf import export
 
+pytestmark = pytest.mark.outer_versions
+
 SCHEMA, SKIN_SCHEMA = (
     json.loads((REPOSITORY / "docs" / f"SINEW_skinning{of}schema.json").read_text(encoding="utf-8"))
     for of in (".", ".skin.")

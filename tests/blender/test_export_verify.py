@@ -24,6 +24,8 @@ from sinew_addon.features.gltf import feature, played, verify
 from sinew_addon.features.gltf.export_check import CAUSES, EXPLAINED
 from test_segment_bones import make_bendy, world_rest
 
+pytestmark = pytest.mark.outer_versions
+
 FRAMES = list(range(1, 12))
 
 

@@ -16,9 +16,12 @@ from sinew_addon.attach import properties
 from sinew_addon.io import files
 from test_batch import make_rig
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("node") is None, reason="node is not installed here, which compiles the job type"
-)
+pytestmark = [
+    pytest.mark.skipif(
+        shutil.which("node") is None, reason="node is not installed here, which compiles the job type"
+    ),
+    pytest.mark.outer_versions,
+]
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "addon" / "jobs" / "sinew_reskin.js"

@@ -23,6 +23,8 @@ from sinew_addon.features.flex import flex
 from sinew_addon.features.flex.limits import Table
 from whole_file import assert_same, content
 
+pytestmark = pytest.mark.long_term
+
 ROOT = Path(__file__).resolve().parents[2]
 OWN_RIGS = ("elbow", "shoulder", "wrist", "tentacle", "report_links", "report_mesh")
 # Faults of different kinds; the others are found in the same way.

@@ -13,6 +13,8 @@ from sinew_addon.features.flex.verdict import Finding
 from sinew_addon.io import armature_io
 from whole_file import assert_same, content
 
+pytestmark = pytest.mark.long_term
+
 
 @pytest.fixture
 def arm_with_a_bare_patch():

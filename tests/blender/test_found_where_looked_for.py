@@ -14,6 +14,8 @@ from bl_operators.wm import WM_OT_doc_view_manual
 from sinew_addon.attach import properties
 from sinew_addon.ui import character, manual, menus
 
+pytestmark = pytest.mark.long_term
+
 
 def operator_types() -> Iterator[tuple[type, bpy.types.Struct]]:
     for name in dir(bpy.ops.sinew):

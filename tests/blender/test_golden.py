@@ -9,6 +9,8 @@ import make_golden
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.long_term
+
 
 @pytest.mark.parametrize("set_up", make_golden.CASES, ids=lambda case: case.__name__)
 def test_current(set_up):

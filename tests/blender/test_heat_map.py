@@ -18,6 +18,8 @@ from sinew_addon.features.measure import live, subjects
 from sinew_addon.features.measure.heat_scale import HeatScale, linear
 from sinew_addon.features.measure.metrics import METRICS
 
+pytestmark = pytest.mark.long_term
+
 
 def shown_colours(obj: bpy.types.Object) -> np.ndarray:
     """float32 [vertices, 3], linear, of the final evaluated mesh."""

@@ -12,7 +12,7 @@ import scenes
 from program import run_sinew, start_sinew
 
 SCRIPT = "<script>alert(1)</script>"
-pytestmark = pytest.mark.once
+pytestmark = [pytest.mark.once, pytest.mark.outer_versions]
 
 
 @pytest.fixture

@@ -17,6 +17,8 @@ from sinew_addon.base.errors import SinewError
 from sinew_addon.features.action_copy import action_copy
 from sinew_addon.io import files, ik_io
 
+pytestmark = pytest.mark.long_term
+
 FRAMES = range(1, 25)
 
 

@@ -14,6 +14,8 @@ from sinew_addon.base.errors import SinewError
 from sinew_addon.io import mesh_compare, mesh_io
 from test_against_armature_modifier import assert_equal_to_modifier
 
+pytestmark = pytest.mark.both_ways
+
 FRAMES = [1, 4, 8, 11]
 
 

@@ -18,6 +18,8 @@ from sinew_addon.features.action_copy import action_copy
 from sinew_addon.features.inbetween import inbetween_bake, keyed_poses
 from sinew_addon.io import actions
 
+pytestmark = pytest.mark.long_term
+
 METHODS = sinew.interpolate.METHODS
 PATHS = ("straight", "spline")
 FRAMES = range(-3, 45)

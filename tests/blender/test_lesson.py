@@ -14,6 +14,8 @@ from sinew_addon.attach import properties
 from sinew_addon.features.compare import comparison_state
 from sinew_addon.ui import lesson
 
+pytestmark = pytest.mark.long_term
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = runpy.run_path(str(ROOT / "blend_files" / "make_lesson.py"))["LESSON"]
 

@@ -10,6 +10,8 @@ from sinew_addon.deform import session, survey
 from sinew_addon.features.diagnose import diagnose
 from sinew_addon.features.measure import subjects
 
+pytestmark = pytest.mark.long_term
+
 GROUP = "a mask"
 
 

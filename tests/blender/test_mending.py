@@ -12,6 +12,8 @@ from sinew_addon.features.diagnose import diagnose, mending
 from sinew_addon.io import mesh_io
 from test_diagnostics_panel import LEFTOVER, MANY, SMALL, UNWEIGHTED, faulty_arm, found, twisted_arm
 
+pytestmark = pytest.mark.long_term
+
 
 def dense(obj: bpy.types.Object) -> np.ndarray:
     """[vertices, groups]"""

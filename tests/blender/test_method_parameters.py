@@ -7,12 +7,15 @@ import json
 
 import bpy
 import numpy as np
+import pytest
 import scenes
 import sinew
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
 from sinew_addon.skinning.engines import METHODS
 from test_sdef import make_model
+
+pytestmark = pytest.mark.long_term
 
 FRAME = 9
 CHOICES = ("nlerp", "slerp")

@@ -12,6 +12,8 @@ from sinew_addon.attach import properties
 from sinew_addon.deform import safe_mode, session
 from sinew_addon.deform.plan import State
 
+pytestmark = pytest.mark.long_term
+
 FRAMES = [1, 4, 7, 11]
 GROUP = "dq here"
 

@@ -24,6 +24,8 @@ from sinew_addon.base import output
 from sinew_addon.base.errors import SinewError
 from sinew_addon.base.names import as_file_name
 
+pytestmark = pytest.mark.outer_versions
+
 oldest_and_newest = pytest.mark.skipif(
     bpy.app.version[:2] not in ((4, 2), (5, 2)), reason="long: runs with the oldest and the newest Blender"
 )

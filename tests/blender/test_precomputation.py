@@ -26,6 +26,8 @@ from sinew_addon.deform.plan import State
 from sinew_addon.skinning import vertex_data
 from sinew_addon.skinning.precompute import precomputations
 
+pytestmark = pytest.mark.long_term
+
 FRAME = 8
 
 

@@ -13,6 +13,8 @@ from sinew_addon.io import addon_preferences, units
 from sinew_addon.skinning import precompute
 from sinew_addon.skinning.precompute import precomputations
 
+pytestmark = pytest.mark.long_term
+
 
 @pytest.fixture
 def preferences():

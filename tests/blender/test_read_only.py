@@ -14,6 +14,8 @@ from sinew_addon.base.errors import SinewError
 from sinew_addon.deform import characters
 from sinew_addon.io import files
 
+pytestmark = pytest.mark.outer_versions
+
 SIMULATED = {"cloth": "CLOTH", "soft": "SOFT_BODY", "hair": "PARTICLE_SYSTEM", "paint": "DYNAMIC_PAINT"}
 EDITED = "Arm: saved in Edit Mode, and used as in Object Mode"
 

@@ -19,6 +19,8 @@ from sinew_addon.features.measure import battery
 from sinew_addon.features.suggest import recommend
 from whole_file import assert_same, content
 
+pytestmark = pytest.mark.long_term
+
 
 def arm(degrees: float, axis: int, **options: object) -> tuple[bpy.types.Object, bpy.types.Object]:
     """A tube whose second bone rotates about one of its axes, up to frame 11; deformed by linear blending."""

@@ -8,12 +8,15 @@ import shutil
 from pathlib import Path
 
 import bpy
+import pytest
 import scenes
 import whole_file
 from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.io import files
+
+pytestmark = pytest.mark.outer_versions
 
 FRAMES = [1, 6, 11]
 

@@ -16,6 +16,8 @@ import sinew
 from sinew_addon.attach import properties
 from sinew_addon.deform import session
 
+pytestmark = pytest.mark.long_term
+
 RIGID_METHODS = [method.name for method in sinew.methods() if method.name != "lbs"]
 
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import pytest
 import reference
 import routes
 import scenes
 from sinew_addon.attach import attach
 from sinew_addon.deform import session
 from sinew_addon.skinning import sdef
+
+pytestmark = pytest.mark.long_term
 
 
 def make_model() -> tuple[bpy.types.Object, bpy.types.Object]:

@@ -19,6 +19,8 @@ from sinew_addon.features.bake import bake, bake_bones
 from sinew_addon.features.bake.helper_bones import HelperOptions
 from sinew_addon.features.gltf import export
 
+pytestmark = pytest.mark.outer_versions
+
 FRAMES = list(range(1, 12))
 # Of the diagonal.
 EXACT = 1e-6

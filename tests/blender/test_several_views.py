@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import pytest
 import routes
 import scenes
 from sinew_addon.attach import attach
 from sinew_addon.deform import handlers, session
+
+pytestmark = pytest.mark.both_ways
 
 
 def points_in(obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:

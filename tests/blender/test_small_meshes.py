@@ -15,6 +15,8 @@ from sinew_addon.deform import session, small_meshes
 from sinew_addon.skinning.scale_rule import IGNORED
 from sinew_addon.ui import state_text
 
+pytestmark = pytest.mark.long_term
+
 FRAMES = [1, 6, 11]
 
 

@@ -24,6 +24,8 @@ from sinew_addon.features.measure import subjects, worst_frames
 from sinew_addon.features.measure.heat_scale import HeatScale, linear
 from sinew_addon.features.measure.metrics import METRICS, Measured
 
+pytestmark = pytest.mark.outer_versions
+
 FRAMES = [1, 6, 11]
 GROUP = "painted"
 AFTER = "after the blend"

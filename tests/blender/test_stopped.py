@@ -27,6 +27,8 @@ from sinew_addon.io import actions, ik_io
 from sinew_addon.ui import stepped
 from whole_file import assert_same, content
 
+pytestmark = pytest.mark.long_term
+
 Steps = Iterator[float]
 
 

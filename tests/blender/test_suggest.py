@@ -18,6 +18,8 @@ from sinew_addon.features.suggest import recommend, suggest, thumbnail, worst_pi
 from sinew_addon.io import actions
 from sinew_addon.ui import stepped
 
+pytestmark = pytest.mark.long_term
+
 
 @pytest.fixture(autouse=True)
 def nothing_known():

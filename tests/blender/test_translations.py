@@ -13,6 +13,8 @@ import sinew_addon
 from conftest import REPOSITORY
 from sinew_addon.ui import translations
 
+pytestmark = pytest.mark.long_term
+
 LANGUAGES = list(translations.LANGUAGES)
 
 

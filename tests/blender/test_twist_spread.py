@@ -15,6 +15,8 @@ from sinew_addon.attach import properties, stage_settings
 from sinew_addon.deform import session
 from sinew_addon.skinning.twists import Twists
 
+pytestmark = pytest.mark.long_term
+
 
 def spread(obj: bpy.types.Object, **values: object) -> None:
     scenes.set_stage(obj, "twist_spread", **values)

@@ -13,6 +13,8 @@ from sinew_addon.features.measure.comparison import peaks
 from sinew_addon.features.measure.metrics import METRICS
 from sinew_addon.ui import stepped
 
+pytestmark = pytest.mark.long_term
+
 
 def waving_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
     """Bent most at frames 5, 15 and 25, of these farthest at 15 and least at 5; at rest at 1, 10, 20 and
