@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +24,7 @@ from .arguments import (
     add_set,
     add_viewer,
     check_viewer,
-    count,
+    count_or_none,
     pixels,
 )
 from .console import Console
@@ -60,14 +59,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_object(parser)
     parser.add_argument(
         "--pictures",
-        type=partial(count, least=0),
+        type=count_or_none,
         default=4,
         metavar="N",
         help="most frames to draw, of those at which a measure is worst; 0: none (default: %(default)s)",
     )
     parser.add_argument(
         "--influences",
-        type=partial(count, least=0),
+        type=count_or_none,
         default=USUAL_INFLUENCES,
         metavar="N",
         help="how many bones a vertex may have before it is reported (default: %(default)s)",

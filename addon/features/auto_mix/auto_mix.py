@@ -18,7 +18,8 @@ from ...ui import stepped
 from ...ui.translations import tr
 from ..measure import live
 from ..measure.crossings import crossings, frames_to_count
-from ..measure.worst_frames import armatures_of, check_measurable, measure_at
+from ..measure.measured_on import armatures_of
+from ..measure.worst_frames import check_measurable, measure_at
 from .shares import VertexErrors, shares
 
 STAGE = stage_settings.STAGES["mix"]

@@ -147,19 +147,19 @@ def _armatures(obj: bpy.types.Object) -> tuple[int, ...]:
 
 def _frames(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str) -> list[int]:
     try:
-        return stepped.frames_over(scene, _rigs(objects), over) if over else []
+        return stepped.frames_over(scene, armatures_of(objects), over) if over else []
     except SinewError:
         return []
 
 
-def _rigs(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+def armatures_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
     return list(dict.fromkeys(armature for obj in objects for armature in properties.of(obj).armatures))
 
 
 def _played(objects: Sequence[bpy.types.Object]) -> list[tuple[tuple, list[bpy.types.FCurve]]]:
     """What plays the armatures, each with its curves."""
     found = []
-    for rig in _rigs(objects):
+    for rig in armatures_of(objects):
         for player in actions.players(rig.animation_data) if rig.animation_data is not None else ():
             action, slot = player.action, actions.slot_of(player)
             uid = action.session_uid if action is not None else 0

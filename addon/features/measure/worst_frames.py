@@ -13,7 +13,7 @@ from ...ui import stepped
 from . import live
 from .comparison import LENGTHS, ROUNDING, peaks
 from .heat_scale import HeatScale
-from .measured_on import OWN, MeasuredOn
+from .measured_on import OWN, MeasuredOn, armatures_of
 from .metrics import METRICS, Metric
 
 SHOWN = 5
@@ -45,10 +45,6 @@ class Scan:
 
 # By the session_uid of the scene. Quickly computed again, so not stored in the file.
 scans: dict[int, Scan] = {}
-
-
-def armatures_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
-    return list(dict.fromkeys(a for obj in objects for a in properties.of(obj).armatures))
 
 
 def check_measurable(objects: Sequence[bpy.types.Object]) -> None:

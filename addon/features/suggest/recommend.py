@@ -20,8 +20,8 @@ from ...skinning.rig import Bones
 from ...ui import stepped
 from ..measure import battery, live
 from ..measure.crossings import crossing_triangles
-from ..measure.measured_on import MeasuredOn
-from ..measure.worst_frames import armatures_of, check_measurable, measure_at
+from ..measure.measured_on import MeasuredOn, armatures_of
+from ..measure.worst_frames import check_measurable, measure_at
 from . import recommendation
 from .recommendation import Choice
 

@@ -13,10 +13,10 @@ from ...base.steps import as_part
 from ...ui import stepped
 from ..measure import live
 from ..measure.crossings import crossings, frames_to_count
-from ..measure.measured_on import CHOICE, STAGES, MeasuredOn
+from ..measure.measured_on import CHOICE, STAGES, MeasuredOn, armatures_of
 from ..measure.metrics import Measured
 from ..measure.suggestion import LONGEST, MEASURED, Suggestion
-from ..measure.worst_frames import armatures_of, check_measurable, measure_at
+from ..measure.worst_frames import check_measurable, measure_at
 from . import recommend, worst_pictures
 from .recommendation import Choice
 
