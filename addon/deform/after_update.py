@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..attach import point_store, properties
+from ..base.errors import SinewError
 from . import bound, pose, source
 from .changes import Changes
 from .skinned_object import SkinnedObject
@@ -81,10 +82,12 @@ def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: b
     """Updates what is known of a mesh that its Armature modifiers deform to this evaluation, for measuring or
     baking it; other meshes are up to date. Changes nothing in Blender.
 
-    Raises SinewError where the mesh has become one that cannot be deformed.
+    Raises SinewError where the mesh cannot be deformed, or not yet.
     """
     if not skinned.plan.uses_builtin:
         return
+    if not source.is_ready(obj, depsgraph):
+        raise SinewError(f"{obj.name}: Blender has not evaluated what is in front of Sinew yet")
     if skinned.noted.options_keyed and bound.is_of_other_modifiers(obj, skinned.bound, depsgraph):
         skinned.bind(bound.read(obj, depsgraph))
     if skinned.needs_recheck:

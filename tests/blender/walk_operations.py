@@ -1026,6 +1026,9 @@ def weights(w: Walker, r: random.Random) -> None:
 def paint_weights(w: Walker, r: random.Random) -> None:
     obj = w.editable(r)
     w.skip_if(not obj.vertex_groups or not w.select(obj))
+    # Under a parent of type Armature, Blender normalizes the groups of bones alone if the object has any
+    # modifier, such as Sinew's that are off, and all groups if it has none.
+    w.skip_if(obj.parent_type == "ARMATURE" and not w.modifiers(obj))
     w.push_undo()
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     # As in a window: tools need the armature of the modifiers, which Sinew restores meanwhile.
