@@ -34,7 +34,6 @@
 #include "sinew/transform/rigid_distance.h"
 #include "sinew/transform/screw.h"
 #include "sinew/twist_spread.h"
-#include "sinew/vertex_buffers.h"
 #if SINEW_WITH_DDM
 #include "sinew/methods/ddm/direct_delta_mush.h"
 #endif
